@@ -307,7 +307,7 @@ def breakdown(samples: int) -> None:
                     with ArchiveWriter(path, program, run, fields.sizes) as writer:
                         for block in blocks:
                             fields.merge(fields.sums(block.poses, block.start))
-                            writer.append(stored(block, [variable.name for variable in writer.kept]))
+                            writer.append(stored(block, [row.label for row in writer.kept], program.nominal))
             inside = {word: seconds for word, seconds in spent.items() if word not in ("fields", "archive")}
             turns.append([*spent.values(), whole - sum(inside.values())])
         cells = 1e6 * np.median(turns, axis=0) / (samples // 4)

@@ -1,4 +1,4 @@
-"""Kill a run before each of its writes, or each nth, and resume what it left: kill_at_each_write.py FOLDER [n].
+"""Kill a run before each of its writes, or each nth, and resume what it left: kill_at_each_write.py FOLDER [n [stations]].
 
 The writes counted are those of the interpreter to an open archive, whoever makes them: a profile function sees every call.
 """
@@ -11,13 +11,14 @@ from pathlib import Path
 
 import tolcontact as tc
 from tests import cases
+from tests.cases import stations
 from tests.helpers import contents
 from tolcontact.archive import Run
 from tolcontact.workflow.run import write_archive
 
 folder, step = Path(sys.argv[1]), int((*sys.argv, 1)[2])
 whole = folder / "whole.nc"
-program = tc.build(cases.stack(), solver="daqp")
+program = tc.build(stations.rail() if "stations" in sys.argv else cases.stack(), solver="daqp")
 
 
 settings = Run(seed=3, samples=9000, keep="measures", surfaces=4, fields="some", checkpoint_interval=0.0)
@@ -60,7 +61,7 @@ def check_resumed(path, write):
     write_archive(path, program, settings, progress=begun.append, is_resumed=True)
     assert begun[0] == min(summed + 4096, 9000), f"kill {write}: began at {begun[0]}"
     reached.append(summed)
-    for group in (None, "field/middle", "field/upper"):
+    for group in (None, *(f"field/{part.name}" for part in program.nominal.last_parts)):
         assert contents(path, group).identical(contents(whole, group)), f"{group} after kill {write}"
 
 

@@ -77,7 +77,7 @@ class Question:
             **terms.FIXED_LABELS,
             terms.MEASURE: list(units[terms.MEASURE]),
             terms.CONTRIBUTOR: list(nominal.contributors),
-            terms.PART: [part.name for part in nominal.parts],
+            terms.PART: [part.name for part in nominal.last_parts],
             terms.PAIR: [pair.name for pair in nominal.pairs],
             **labels,
         }

@@ -33,7 +33,9 @@ MAX_CONDITION = 1e8  # of the objective's quadratic term: contact points with a 
 def farthest_poses(program: Program, region: Region, model: LinearModel) -> np.ndarray:
     """Return bounds (measure, state, end); those of the raw state are without contact."""
     bounds = np.empty((len(model.measures), len(terms.STATES), len(terms.ENDS)))
-    reactions = _reactions(model, region) if program.method.objective == "all points" else None
+    # With stations, reactions of a later one do not act on the motions of an earlier one.
+    has_optimum = program.method.objective == "all points" and not program.stations
+    reactions = _reactions(model, region) if has_optimum else None
     for measure in range(len(model.measures)):
         for end, sense in enumerate(terms.SENSES):
             raw = _Problem(model, region, measure, sense, is_moved=False, reactions=None)

@@ -23,8 +23,8 @@ def owners(program: Program, by: str) -> list[str]:
     if by == "contributor":
         contributors = zip(labels, program.draws.contributors, strict=True)
         return [label.rpartition(" ")[0] if contributor.source == FORM else label for label, contributor in contributors]
-    # Locators belong to the part that they locate, even if `by` is "feature".
-    owner_of = {label: part.name for part in nominal.parts for label in part.locators.labels}
+    # Locators belong to the part that they locate, even if `by` is "feature"; in a station to the part or joint there.
+    owner_of = {label: part.located for part in nominal.parts for label in part.locators.labels}
     for pattern in nominal.patterns:
         part = pattern.declared.part.name
         owner_of |= {label: part if by == "part" else label.rpartition(".")[0] for label in pattern.labels}

@@ -85,22 +85,25 @@ def _kinks(ahead: np.ndarray, behind: np.ndarray) -> np.ndarray:
 def leverages(program: Program) -> np.ndarray:
     """Return the leverage (contributor,) of each locator; NaN for other contributors.
 
-    The leverage is the largest displacement of any vertex of the part for 1 mm, nominally. It is 1 for three locators on a
-    plane that span all of the part, and larger the closer together they stand.
+    The leverage is the largest displacement of any vertex of the part, or of its joint, for 1 mm, nominally. It is 1 for three
+    locators on a plane that span all of the part, and larger the closer together they stand.
     """
     nominal = program.nominal
     leverages = np.full(len(nominal.contributors), np.nan)
-    for number, part in enumerate(nominal.parts):
+    for number in range(len(nominal.parts)):
         columns = nominal.columns(number)
         if not len(columns):
             continue
         steps = np.zeros((len(columns), len(leverages)))
         steps[np.arange(len(columns)), columns] = STEP
         ends = [
-            program.place(deviations=sign * steps)["poses"].reshape(len(columns), len(nominal.parts), -1)[:, number]
-            for sign in (1, -1)
+            program.place(deviations=sign * steps)["poses"].reshape(len(columns), len(nominal.parts), -1) for sign in (1, -1)
         ]
-        displacements = pose.apply(ends[0], part.vertices) - pose.apply(ends[1], part.vertices)
+        carried = [k for k, other in enumerate(nominal.parts) if other.carried and other.parent == number]
+        displacements = np.concatenate(
+            [pose.apply(ends[0][:, k], nominal.parts[k].vertices) - pose.apply(ends[1][:, k], nominal.parts[k].vertices)
+             for k in (number, *carried)], axis=1
+        )  # fmt: skip
         leverages[columns] = np.linalg.norm(displacements, axis=-1).max(axis=-1, initial=0) / (2 * STEP)
     return leverages
 
@@ -145,6 +148,11 @@ def _motions(program: Program, sign: int) -> np.ndarray:
         for part, mobility in zip(group.parts, group.mobilities, strict=True):
             if mover in mobility.movers:
                 poses[row, part] += sign * STEP * np.concatenate([turn.ravel(), origin])
+    deviations = np.zeros((len(freedoms), len(program.nominal.contributors)))
+    for station in program.stations:
+        if station.place is not None:  # a motion in an earlier station moves what it hands on
+            placed = station.place(poses=poses[:, station.sources], deviations=deviations)["placed"]
+            poses[:, station.parts] += placed.reshape(len(freedoms), -1, pose.ENTRIES) - pose.AT_REST
     return poses.reshape(len(freedoms), pose.ENTRIES * len(program.nominal.parts))
 
 

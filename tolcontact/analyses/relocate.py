@@ -151,8 +151,10 @@ class RelocatedTrials:
     def _with_locators(self, scheme: tuple[Locator, ...]) -> Assembly:
         """Return the assembly with other locators of the part."""
         locations = self._assembly.locations
-        part = self._part.part
-        return self._assembly.replaced(locations=[replace(x, scheme=scheme) if x.part is part else x for x in locations])
+        part, station = self._part.part, self._part.station
+        return self._assembly.replaced(
+            locations=[replace(x, scheme=scheme) if x.part is part and x.station == station else x for x in locations]
+        )
 
 
 class Places:
@@ -212,7 +214,7 @@ def declared_locators(part: NominalPart) -> tuple[Locator, ...]:
     features = {f"{part.name}.{feature.name}": feature for feature in part.part.features}
     locators = part.locators
     return tuple(
-        Locator(label.removeprefix(f"{part.name}."), point, direction, on=features[face.name] if face else None)
+        Locator(label.removeprefix(f"{part.located}."), point, direction, on=features[face.name] if face else None)
         for label, point, direction, face in zip(
             locators.labels, (locators.points - t_WP) @ R_WP, locators.directions @ R_WP, locators.faces, strict=True
         )
@@ -223,7 +225,7 @@ def at_point(locator: Locator, point: np.ndarray) -> Locator:
     """Return the same locator at another point (3,) [mm]."""
     return Locator(
         locator.name, point, locator.direction, locator.tolerance, one_sided=locator.one_sided, stiffness=locator.stiffness,
-        on=locator.on,
+        on=locator.on, part=locator.part,
     )  # fmt: skip
 
 

@@ -187,9 +187,10 @@ def _far_ends(region: Region, slopes: np.ndarray) -> np.ndarray:
 def _as_realizations(program: Program, deviations: np.ndarray) -> dict[str, np.ndarray]:
     """Return the variables that archives have of realizations, for deviations (n, contributor)."""
     (block,) = simulate_blocks(program, samples=len(deviations), seed=0, draws=GivenDraws(deviations), block=len(deviations))
+    last_poses = block.poses[:, :, program.nominal.last_indices]
     return {
-        terms.MEASURED.name: block.measured, terms.ROTATION.name: poses.rotation(block.poses),
-        terms.TRANSLATION.name: poses.translation(block.poses),
+        terms.MEASURED.name: block.measured, terms.ROTATION.name: poses.rotation(last_poses),
+        terms.TRANSLATION.name: poses.translation(last_poses),
         terms.GAP_MIN.name: block.gap_min, terms.KKT_RESIDUAL.name: block.kkt_residual, terms.STATUS.name: block.status,
     }  # fmt: skip
 

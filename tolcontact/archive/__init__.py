@@ -35,6 +35,10 @@ Each realization is one row and carries its own certificate.
 | `second_answers` | realization | QPs that another solver had to answer |
 | `searched` | realization | 1 if contact points were projected again |
 
+With stations (format 6) `measure_station`, `pair_station` and `part_station` state what belongs to which; the pose of a part is
+that in the last station that holds it, and the status is that of the worst station. Groups `station/<name>` hold the poses of
+all its parts (`station_part`), `station_translation` and `station_rotation`, and `station_status`.
+
 `state` is raw or corrected. Groups hold the rest: `contact` the contact points, `sample` the contributors (locators, freedoms
 of features, variables), with source, units, tolerance, rule and mean shift, and their drawn `deviation` (realization,
 contributor), `field/<part>` the displacement fields, `surface` the check between contact points, `model` the declaration as
@@ -143,18 +147,21 @@ from tolcontact.archive.analyses import check_room_for, keep
 from tolcontact.archive.archive_lock import taken
 from tolcontact.archive.disk_space import bytes_of_rows, size_in_words
 from tolcontact.archive.reader import method_of_run, model_of, open_archive, opened
+from tolcontact.archive.rows import Row, kept_rows, row_values
 from tolcontact.archive.settings import Run, run_settings
-from tolcontact.archive.stored_rows import check_rows, row_values, stored
+from tolcontact.archive.stored_rows import check_rows, stored
 from tolcontact.archive.variables import labelled, sizes_of_rows
 from tolcontact.archive.writer import ArchiveWriter, replacing_archive
 
 __all__ = [
     "ArchiveWriter",
+    "Row",
     "Run",
     "bytes_of_rows",
     "check_room_for",
     "check_rows",
     "keep",
+    "kept_rows",
     "labelled",
     "method_of_run",
     "model_of",

@@ -9,20 +9,20 @@ import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.settings import kept_rows
+from tolcontact.archive.rows import Row, kept_rows, stored_variables
 from tolcontact.archive.variables import rows_together, sizes_of_rows
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
-from tolcontact.vocabulary import ArchiveVariable
 
 CHUNKS = 8  # laid out in one write
 
 
-def check_room(path: Path, nominal: Nominal, rows: Sequence[ArchiveVariable], samples: int) -> None:
+def check_room(path: Path, nominal: Nominal, rows: Sequence[Row], samples: int) -> None:
     """Raise ArchiveError if the disk has no room for `samples` more realizations of the variables `rows`."""
     needed, free = samples * bytes_of_row(nominal, rows), shutil.disk_usage(path.parent).free
     if needed > free:
-        advice = ", or keep less of each realization (measures)" if terms.ROTATION in rows else ""
+        keeps_poses = any(row.variable is terms.ROTATION for row in rows)
+        advice = ", or keep less of each realization (measures)" if keeps_poses else ""
         raise ArchiveError(
             f'archive "{path}" needs {size_in_words(needed)} for {samples} realizations, but its disk has '
             f"{size_in_words(free)} free; ask for fewer, write to another disk{advice}"
@@ -31,13 +31,17 @@ def check_room(path: Path, nominal: Nominal, rows: Sequence[ArchiveVariable], sa
 
 def bytes_of_rows(nominal: Nominal, keep: str, samples: int) -> int:
     """Return the size of `samples` realizations in an archive with the option `keep` [bytes]."""
-    return samples * bytes_of_row(nominal, kept_rows(keep))
+    return samples * bytes_of_row(nominal, kept_rows(nominal, keep))
 
 
-def bytes_of_row(nominal: Nominal, rows: Sequence[ArchiveVariable]) -> int:
+def bytes_of_row(nominal: Nominal, rows: Sequence[Row]) -> int:
     """Return the size of one realization [bytes]."""
     sizes = {terms.REALIZATION: 1, **sizes_of_rows(nominal)}
-    return sum(np.dtype(v.kind).itemsize * prod(sizes[d] for d in v.dims) for v in (terms.NUMBERS, *rows))
+    stations = {terms.station_group(scene.station): {terms.STATION_PART: len(scene.assembly.parts)} for scene in nominal.scenes}
+    return sum(
+        np.dtype(row.variable.kind).itemsize * prod((sizes | stations.get(row.group, {}))[dim] for dim in row.variable.dims)
+        for row in (Row("", terms.NUMBERS), *rows)
+    )
 
 
 def size_in_words(count: float) -> str:
@@ -51,9 +55,8 @@ def size_in_words(count: float) -> str:
 
 def lay_out_rows(file: netCDF4.Dataset, start: int, stop: int) -> None:
     """Lay out rows `start` to `stop`: numbered, unfinished, and with their place in the file."""
-    for variable in terms.BY_REALIZATION:
-        stored = (file["sample"] if variable is terms.DEVIATION else file).variables.get(variable.name)
-        if stored is not None and 0 not in stored.shape[1:]:
+    for stored, variable in stored_variables(file):
+        if 0 not in stored.shape[1:]:
             initial = np.nan if np.dtype(variable.kind).kind == "f" else terms.UNFINISHED
             stored.set_var_chunk_cache(0)  # whole chunks go straight to the file
             rows = CHUNKS * rows_together(np.dtype(variable.kind).itemsize * prod(stored.shape[1:]))

@@ -8,7 +8,9 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive.form_values import form_sizes, form_values
-from tolcontact.archive.settings import Run, declaration, kept_rows, now, run_settings, versions
+from tolcontact.archive.rows import Row, kept_rows
+from tolcontact.archive.settings import Run, declaration, format_of, now, run_settings, versions
+from tolcontact.archive.station_header import write_stations
 from tolcontact.archive.stored_rows import empty_checks
 from tolcontact.archive.variables import Contents, define, labels_of_rows, units_of_rows
 from tolcontact.compilation import Program
@@ -28,7 +30,7 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
     file.setncatts(
         {
             "Conventions": terms.CONVENTIONS,
-            "format": np.int64(terms.FORMAT),
+            "format": np.int64(format_of(program)),
             "title": f"variation simulation of {nominal.assembly.name}",
             "source": "Monte-Carlo variation simulation of a rigid-body assembly with contact",
             "references": "Sadeghi Tabar, Lindkvist, Wärmefjord, Söderberg: "
@@ -39,18 +41,20 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
             **(nominal.assembly.title_block.attributes if nominal.assembly.title_block else {}),
         }
     )
+    rows = kept_rows(nominal, run.keep)
     _write_labels(contents, file, nominal)
-    _write_rows(contents, file, program, kept_rows(run.keep))
+    write_stations(contents, file, nominal, rows)
+    _write_rows(contents, file, program, rows)
     _write_measures(contents, file, program)
     _write_model(contents, file.createGroup("model"), nominal, declaration(program))
     _write_contact(contents, file.createGroup("contact"), program)
-    _write_sample(contents, file.createGroup("sample"), program, deviations=terms.DEVIATION in kept_rows(run.keep))
+    _write_sample(contents, file.createGroup("sample"), program, deviations=Row("sample", terms.DEVIATION) in rows)
     file["contact"].createDimension(terms.BOUND, 2)
     _lay_out_group(contents, file["contact"], empty_touching(file["contact"].dimensions[terms.POINT].size))
     checked = file.createGroup("surface")
     checked.createDimension(terms.CHECKED, run.surfaces)
     _lay_out_group(contents, checked, empty_checks(run.surfaces, len(nominal.pairs)))
-    for part, numbers in zip(nominal.parts, sums, strict=True):
+    for part, numbers in zip(nominal.last_parts, sums, strict=True):
         _write_field(contents, file.createGroup(terms.field_of(part.name)), part, numbers)
     contents.write()
 
@@ -68,16 +72,16 @@ def _write_labels(contents: Contents, file: netCDF4.Dataset, nominal: Nominal) -
             define(file, coordinate)
 
 
-def _write_rows(contents: Contents, file: netCDF4.Dataset, program: Program, rows: Sequence[ArchiveVariable]) -> None:
+def _write_rows(contents: Contents, file: netCDF4.Dataset, program: Program, rows: Sequence[Row]) -> None:
     """Define the variables of realizations, their checksums and checkpoints, all without values."""
     for variable in terms.ROWS:
-        if variable in rows:
+        if Row("", variable) in rows:
             define(file, variable)
     for variable, units in units_of_rows(program).items():
         file[variable.name].units = units
     file.createDimension(terms.BLOCK, None)
     file.createDimension(terms.ROW_VARIABLE, len(rows))
-    contents.add(file, terms.ROW_VARIABLE_LABEL, [variable.name for variable in rows])
+    contents.add(file, terms.ROW_VARIABLE_LABEL, [row.label for row in rows])
     define(file, terms.ROW_CHECKSUM)
     file.createDimension(terms.CHECKPOINT, 2)
     contents.lay_out(file, terms.SUMMED_ROWS, [terms.UNFINISHED] * 2)
@@ -152,7 +156,7 @@ def _write_model(contents: Contents, group: netCDF4.Group, nominal: Nominal, doc
         group.createDimension(terms.LINE_END, 2)
         contents.add(group, terms.MEASURE_OF_LINE, [number for number, _ in lines])
         contents.add(group, terms.LINE_ENDS, np.array([line for _, line in lines]))
-    for part in nominal.parts:
+    for part in nominal.last_parts:
         if isinstance(part.part.geometry, Mesh):
             mesh = group.createGroup(f"mesh/{terms.group_of(part.name)}")
             mesh.setncattr("part", part.name)
@@ -199,8 +203,8 @@ def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
     """Return the values of the group `contact`: which parts touch, and where."""
     nominal, pairs = program.nominal, program.nominal.pairs
     parts = {
-        terms.MOVING_PART: [pair.moving for pair in pairs],
-        terms.REFERENCE_PART: [-1 if pair.reference is None else pair.reference for pair in pairs],
+        terms.MOVING_PART: [nominal.number(pair.moving) for pair in pairs],
+        terms.REFERENCE_PART: [-1 if pair.reference is None else nominal.number(pair.reference) for pair in pairs],
     }
     if not pairs:
         return parts | _face_values(nominal) | form_values(program)

@@ -20,7 +20,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
 from tolcontact.child import ChildDiedError, limit_resources, run_child
 from tolcontact.errors import ArchiveError, shown
-from tolcontact.vocabulary import ArchiveVariable, archive, form, variation
+from tolcontact.vocabulary import ArchiveVariable, archive, form, stations, variation
 
 MAX_SECONDS, SECONDS_PER_GB = 20.0, 20.0  # of processor time
 MEMORY = 1 << 30  # beside four times the file's own size
@@ -46,10 +46,10 @@ OF_CONTACT = (terms.MOVING_PART, terms.REFERENCE_PART)
 OF_SAMPLE = (terms.LOCATOR_LABEL, terms.TOLERANCE_RANGE)
 BEFORE_CONTRIBUTORS = 3  # format of archives in which locators alone varied
 OF_MESH = (terms.MESH_VERTICES, terms.MESH_FACES)
-CHECKED_GROUPS = ("", "model", "contact", "sample", "surface", "field")
+CHECKED_GROUPS = ("", "model", "contact", "sample", "surface", "field", terms.STATIONS_GROUP)
 VARIABLES = {  # by name; no two variables of an archive differ that have one name
     variable.name: variable
-    for module in (archive, variation, form)
+    for module in (archive, variation, form, stations)
     for item in vars(module).values()
     for variable in (item if isinstance(item, tuple) else (item,))
     if isinstance(variable, ArchiveVariable)
@@ -106,9 +106,9 @@ def _check_format(file: netCDF4.Dataset) -> None:
     number = file.getncattr("format") if "format" in file.ncattrs() else 1
     if not isinstance(number, int | np.integer) or number < 1:
         raise DamagedError(f"is damaged: its format is {number!r}")
-    if number > terms.FORMAT:
+    if number > terms.STATIONS_FORMAT:
         raise DamagedError(
-            f"has format {number}; this version of tolcontact reads formats up to {terms.FORMAT}; use a newer one"
+            f"has format {number}; this version of tolcontact reads formats up to {terms.STATIONS_FORMAT}; use a newer one"
         )
 
 
@@ -230,11 +230,27 @@ def _check_needed(file: netCDF4.Dataset) -> None:
             raise DamagedError("is damaged: its checkpoints cover more realizations than it has")
     if tuple(_texts(file[terms.STATE])) != terms.STATES:
         raise DamagedError("is damaged: its states are not raw and corrected")
+    _check_stations(file)
     for part in _texts(file[terms.PART]):
         name = terms.group_of(part)
         if name not in file["field"].groups:
             raise DamagedError(f'is damaged: it has no field for part "{part}"')
         _need(file["field"][name], OF_FIELD)
+
+
+def _check_stations(file: netCDF4.Dataset) -> None:
+    """Check that the groups of stations name their parts, and that measures, pairs and parts belong to them."""
+    if terms.STATIONS_GROUP not in file.groups:
+        return
+    _need(file, terms.OF_STATIONS)
+    parts, names = set(_texts(file[terms.PART])), set[str]()
+    for group in file[terms.STATIONS_GROUP].groups.values():
+        _need(group, (terms.STATION_PART_LABEL, terms.STATION_STATUS))
+        names.add(str(getattr(group, "station", "")))
+        if not set(_texts(group[terms.STATION_PART])) <= parts:
+            raise DamagedError(f"is damaged: group {group.path} has parts that the archive does not have")
+    if any(not set(_texts(file[variable.name])) <= names for variable in terms.OF_STATIONS):
+        raise DamagedError("is damaged: a measure, pair or part belongs to a station that the archive does not have")
 
 
 def _need(group: netCDF4.Dataset, needed: tuple[ArchiveVariable, ...]) -> None:

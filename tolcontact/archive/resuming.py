@@ -19,7 +19,7 @@ POINT_TOLERANCE = 1e-9  # mm: points may differ by rounding from one machine to 
 
 def check_same_run(file: netCDF4.Dataset, path: Path, program: Program, settings: Mapping[str, Any], surfaces: int) -> None:
     """Raise ArchiveError if the archive `file`, in the file `path`, is of another model or another run."""
-    if getattr(file, "format", 1) != terms.FORMAT:
+    if getattr(file, "format", 1) < terms.FORMAT:
         raise ArchiveError(f'"{path}" was begun by an earlier version of tolcontact: it can be read, not resumed')
     if not file.dimensions[terms.REALIZATION].isunlimited():
         raise ArchiveError(f'"{path}" is a copy that cannot grow; resume the archive that tolcontact wrote')
@@ -39,7 +39,7 @@ def check_same_model(file: netCDF4.Dataset, path: Path, program: Program) -> Non
     """Raise ArchiveError if the archive `file`, in the file `path`, is of another model."""
     if _comparable(str(file["model"][terms.DECLARATION.name][...])) != _comparable(declaration(program)):
         raise ArchiveError(f'"{path}" contains another model than this one; write to a new file')
-    for part in program.nominal.parts:
+    for part in program.nominal.last_parts:
         if not _is_equal(file[f"field/{terms.group_of(part.name)}"][terms.FIELD_VERTICES.name], part.vertices):
             raise ArchiveError(f'"{path}": part "{part.name}" had another shape (was its mesh replaced?); write to a new file')
     for variable, values in contact_values(program).items():

@@ -13,7 +13,6 @@ from tolcontact.compilation import ACCURACY, Program
 from tolcontact.declaration.document import to_document
 from tolcontact.method import Method
 from tolcontact.simulation import block_rows
-from tolcontact.vocabulary import ArchiveVariable
 
 _LIBRARIES = ("tolcontact", "casadi", "numpy", "scipy", "trimesh", "xarray", "netCDF4")
 
@@ -80,10 +79,9 @@ def _method_origin(program: Program) -> str:
     return "options"
 
 
-def kept_rows(kept: str) -> tuple[ArchiveVariable, ...]:
-    """Return the variables that are archived of each realization."""
-    omitted = {"measures": {*terms.POSES, terms.DEVIATION}, "poses": {terms.DEVIATION}, "all": set[ArchiveVariable]()}
-    return tuple(variable for variable in terms.BY_REALIZATION if variable not in omitted[kept])
+def format_of(program: Program) -> int:
+    """Return the format number of an archive of a program."""
+    return terms.STATIONS_FORMAT if program.stations else terms.FORMAT
 
 
 def declaration(program: Program) -> str:

@@ -8,7 +8,9 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import poses as pose, vocabulary as terms
+from tolcontact.archive.rows import Row, group_of_rows, kept_rows, row_values
 from tolcontact.checksums import crc32
+from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
 from tolcontact.realizations import finished
 from tolcontact.simulation import Block
@@ -18,7 +20,7 @@ PIECE_BYTES = 1 << 22  # of a variable that are read at once to compare them wit
 
 
 class StoredBlock(NamedTuple):
-    """Realizations `start` to `stop`: the values of each archived variable, by name, and their checksums."""
+    """Realizations `start` to `stop`: the values of each archived variable, by label, and their checksums."""
 
     start: int
     stop: int
@@ -26,21 +28,11 @@ class StoredBlock(NamedTuple):
     checksums: list[int]
 
 
-def stored(block: Block, names: Sequence[str]) -> StoredBlock:
-    """Return a block, converted once for the file and for its checksums; `names` are those of its variables."""
-    values = row_values(block, names)
-    checksums = [crc32(variable, values[variable.name]) for variable in terms.BY_REALIZATION if variable.name in values]
+def stored(block: Block, labels: Sequence[str], nominal: Nominal) -> StoredBlock:
+    """Return a block, converted once for the file and for its checksums; `labels` are those of its variables."""
+    values = row_values(block, labels, nominal)
+    checksums = [crc32(row.variable, values[row.label]) for row in kept_rows(nominal, "all") if row.label in values]
     return StoredBlock(block.start, block.start + len(block), values, checksums)
-
-
-def row_values(block: Block, names: Sequence[str]) -> dict[str, np.ndarray]:
-    """Return the values of the variables of these names as they are stored."""
-    values = block.values()
-    return {
-        variable.name: np.ascontiguousarray(values[variable], dtype=variable.kind)
-        for variable in terms.BY_REALIZATION
-        if variable.name in names
-    }
 
 
 def check_rows(results: xr.DataTree) -> None:
@@ -73,12 +65,15 @@ def _damaged(results: xr.DataTree, stored: xr.Dataset, rows: int) -> Iterator[tu
         yield terms.STATUS.name, done // rows
     sums = stored[terms.ROW_CHECKSUM.name].values
     names = stored[terms.ROW_VARIABLE].values.astype(str).tolist()
-    for variable in terms.BY_REALIZATION:
-        if variable.name in names:
-            values = (results["sample"].to_dataset() if variable is terms.DEVIATION else stored)[variable.name][:complete]
-            actual, expected = _checksums(variable, values, rows), sums[: -(-complete // rows), names.index(variable.name)]
+    groups = results[terms.STATIONS_GROUP].children.values() if terms.STATIONS_GROUP in results.children else ()
+    candidates = [Row(group_of_rows(variable), variable) for variable in terms.BY_REALIZATION]
+    candidates += [Row(group.path.lstrip("/"), variable) for group in groups for variable in terms.STATION_ROWS]
+    for row in candidates:
+        if row.label in names:
+            values = (results[row.group].to_dataset() if row.group else stored)[row.variable.name][:complete]
+            actual, expected = _checksums(row.variable, values, rows), sums[: -(-complete // rows), names.index(row.label)]
             wrong = np.flatnonzero(actual != expected)
-            yield from ((variable.name, int(block)) for block in wrong[:1])
+            yield from ((row.label, int(block)) for block in wrong[:1])
 
 
 def _checksums(variable: ArchiveVariable, values: xr.DataArray, rows: int) -> np.ndarray:
@@ -139,15 +134,19 @@ class _Largest:
         self.numbers, self._values = numbers[order], values[order]
 
 
-def archived_poses(file: netCDF4.Dataset, rows: np.ndarray) -> np.ndarray | None:
-    """Return corrected poses (row, part, 12) of some rows; None if the archive does not keep poses."""
+def archived_poses(file: netCDF4.Dataset, rows: np.ndarray, stations: Sequence[str]) -> np.ndarray | None:
+    """Return corrected poses (row, part, 12) of some rows; None if the archive does not keep poses.
+
+    With `stations` the parts are those of all stations, one after the other.
+    """
     if terms.ROTATION.name not in file.variables:
         return None
-    R, t = (
-        np.array([np.ma.getdata(file[variable.name][int(row), 1]) for row in rows])
-        for variable in (terms.ROTATION, terms.TRANSLATION)
-    )
-    return pose.pose(R, t)
+    groups = [(file[terms.station_group(station)], terms.STATION_POSES) for station in stations] or [(file, terms.POSES)]
+    poses = []
+    for group, variables in groups:
+        t, R = (np.array([np.ma.getdata(group[v.name][int(row), terms.CORRECTED]) for row in rows]) for v in variables)
+        poses.append(pose.pose(R, t))
+    return np.concatenate(poses, axis=1)
 
 
 def empty_checks(count: int, pairs: int) -> dict[ArchiveVariable, np.ndarray]:

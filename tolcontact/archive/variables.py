@@ -94,7 +94,7 @@ def labels_of_rows(nominal: Nominal) -> dict[str, Sequence[str]]:
     """Return the labels along the dimensions of rows."""
     return {
         terms.STATE: terms.STATES,
-        terms.PART: [part.name for part in nominal.parts],
+        terms.PART: [part.name for part in nominal.last_parts],
         terms.PAIR: [pair.name for pair in nominal.pairs],
         terms.MEASURE: [measure.name for measure in nominal.measures],
         terms.AXIS: terms.AXES,

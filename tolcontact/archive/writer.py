@@ -18,14 +18,15 @@ import netCDF4
 import numpy as np
 from xarray.backends.locks import HDF5_LOCK, NETCDFC_LOCK, combine_locks
 
-from tolcontact import poses, vocabulary as terms
+from tolcontact import vocabulary as terms
 from tolcontact.archive.disk_space import check_room, lay_out_rows
 from tolcontact.archive.header import empty_field, empty_touching, write_header
 from tolcontact.archive.inspection import inspect
 from tolcontact.archive.raw_file import LaidOut
 from tolcontact.archive.reader import opened
 from tolcontact.archive.resuming import check_same_run
-from tolcontact.archive.settings import Run, kept_rows, now, run_settings, versions
+from tolcontact.archive.rows import kept_rows
+from tolcontact.archive.settings import Run, now, run_settings, versions
 from tolcontact.archive.stored_rows import StoredBlock, archived_poses, check_rows, choose, empty_checks
 from tolcontact.checksums import crc32
 from tolcontact.compilation import Program
@@ -41,7 +42,7 @@ class ArchiveWriter:
 
     rows      realizations that are in it; the next block starts there
     samples   realizations that it was begun for
-    kept      variables of each realization that it keeps
+    kept      what it keeps of each realization
     """
 
     def __init__(self, path: Path, program: Program, run: Run, sums: Sequence[int]) -> None:
@@ -49,7 +50,7 @@ class ArchiveWriter:
 
         Raises ArchiveError if it cannot be written, or if there is no room for it.
         """
-        check_room(path, program.nominal, kept_rows(run.keep), run.samples)
+        check_room(path, program.nominal, kept_rows(program.nominal, run.keep), run.samples)
         with replacing_archive(path) as part, opened_locked(part, "w") as file:
             write_header(file, program, run, sums)
             lay_out_rows(file, 0, min(run.samples, terms.FIRST_ROWS))
@@ -70,15 +71,15 @@ class ArchiveWriter:
                 check_rows(results)
             with opened_locked(copy, "r+") as file:
                 check_same_run(file, path, program, run_settings(program, run), run.surfaces)
-                rows = last_checkpoint(file, path, [part.name for part in program.nominal.parts]).rows
+                rows = last_checkpoint(file, path, [part.name for part in program.nominal.last_parts]).rows
                 samples, length = max(run.samples, int(file.samples)), len(file.dimensions[terms.REALIZATION])
-                check_room(path, program.nominal, kept_rows(run.keep), samples - length)
+                check_room(path, program.nominal, kept_rows(program.nominal, run.keep), samples - length)
                 lay_out_rows(file, length, samples)
                 file.setncattr("samples", np.int64(samples))
                 software = "" if file.versions == versions() else f" with {versions()}"
                 file.setncattr("history", f"{file.history}\n{now()} resumed after {rows} realizations{software}")
             # Fields and checks were of the earlier rows.
-            initial = {terms.field_of(part.name): empty_field(len(part.vertices)) for part in program.nominal.parts}
+            initial = {terms.field_of(part.name): empty_field(len(part.vertices)) for part in program.nominal.last_parts}
             initial["surface"] = empty_checks(run.surfaces, len(program.nominal.pairs))
             with contextlib.closing(LaidOut(copy)) as values:
                 if values.has("contact", terms.TOUCHING_SHARE):  # not in archives that were begun before
@@ -88,14 +89,15 @@ class ArchiveWriter:
         return writer
 
     def _go_on(self, path: Path, nominal: Nominal, checkpoint_interval: float) -> None:
-        self._path, self._parts, self._pairs = path, [part.name for part in nominal.parts], len(nominal.pairs)
+        self._path, self._parts, self._pairs = path, [part.name for part in nominal.last_parts], len(nominal.pairs)
+        self._stations = [scene.station for scene in nominal.scenes]
         self._checkpoint_interval = checkpoint_interval
         with _as_archive_error(path):
             self._values = LaidOut(path)
             with opened_locked(path, "r") as file:
                 self._length, self._block_rows = len(file.dimensions[terms.REALIZATION]), int(file.block_rows)
                 self.samples, self._checked = int(file.samples), len(file["surface"].dimensions[terms.CHECKED])
-        self.kept = [variable for variable in terms.BY_REALIZATION if self._values.has(_group_of(variable), variable)]
+        self.kept = tuple(row for row in kept_rows(nominal, "all") if self._values.has(row.group, row.variable))
         self.rows = self._place = 0
         self.take_up()
 
@@ -118,9 +120,9 @@ class ArchiveWriter:
         with _as_archive_error(self._path):
             if block.stop > self._length:
                 self._make_room_for_all()
-            for variable in self.kept:
-                if variable is not terms.STATUS:
-                    self._values.overwrite(_group_of(variable), variable, block.values[variable.name], block.start)
+            for row in self.kept:
+                if row.variable is not terms.STATUS:
+                    self._values.overwrite(row.group, row.variable, block.values[row.label], block.start)
             self._values.overwrite("", terms.ROW_CHECKSUM, [block.checksums], block.start // self._block_rows)
             self._values.overwrite("", terms.STATUS, block.values[terms.STATUS.name], block.start)
         self.rows = block.stop
@@ -171,7 +173,7 @@ class ArchiveWriter:
     def poses(self, rows: np.ndarray) -> np.ndarray | None:
         """Return corrected poses (row, part, 12) of some rows; None if they are not kept."""
         with opened_locked(self._path, "r") as file:
-            return archived_poses(file, rows)
+            return archived_poses(file, rows, self._stations)
 
     def first_poses(self, end: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the numbers (row,) of the first rows, before `end`, that are not `searched`, and their corrected poses.
@@ -180,8 +182,9 @@ class ArchiveWriter:
         """
         with opened_locked(self._path, "r") as file:
             rows = np.flatnonzero(file[terms.SEARCHED.name][:end] == 0)
-            R, t = (file[variable.name][:end, terms.CORRECTED][rows] for variable in (terms.ROTATION, terms.TRANSLATION))
-        return rows, poses.pose(R, t)
+            poses = archived_poses(file, rows, self._stations)
+        assert poses is not None
+        return rows, poses
 
     def write_checked(self, rows: np.ndarray, at_random: np.ndarray, findings: Iterable[np.ndarray]) -> None:
         """Write the findings (row, pair) of the check of some rows, in the order of SURFACE in the vocabulary."""
@@ -214,11 +217,6 @@ def _as_archive_error(path: Path) -> Iterator[None]:
     except (OSError, RuntimeError) as error:
         reason = getattr(error, "strerror", None) or f"{error} (is the disk full?)"
         raise ArchiveError(f'archive "{path}" cannot be written: {reason}') from error
-
-
-def _group_of(variable: terms.ArchiveVariable) -> str:
-    """Return the path of the group that holds a variable of realizations."""
-    return "sample" if variable is terms.DEVIATION else ""
 
 
 @contextlib.contextmanager

@@ -77,7 +77,7 @@ def check(
     if view:
         _open_view(assembly, program.nominal, (), temporary_page(model))
     typer.echo(program.nominal.assembly)
-    for part in program.nominal.parts:
+    for part in program.nominal.last_parts:
         size = " x ".join(f"{length:.4g}" for length in part.body.extents.round(9))
         typer.echo(f"  part {part.name}: {size} mm along x, y, z of the assembly, {len(part.mesh.faces)} triangles")
     for k, pair in enumerate(program.nominal.pairs):

@@ -16,6 +16,8 @@ from tolcontact.compilation.elements import ElementQP, has_elements
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.measure_accuracy import measure_accuracies
 from tolcontact.compilation.plugins import Plugin, plugin
+from tolcontact.compilation.station_program import StationProgram, station_programs
+from tolcontact.declaration.locator import FIRST_ORDER
 from tolcontact.declaration.measure import Tape
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
 from tolcontact.errors import ModelError
@@ -60,6 +62,7 @@ class Program(Pictured):
     groups       the contact QPs
     nominal_measures  values of the measures in the nominal assembly
     accuracies   of the measures, in their units (see measure_accuracies)
+    stations     of an assembly that is built in steps, in their order; `place` then places the parts of all of them
     tapes        the users' own expressions by measure name
     """
 
@@ -77,11 +80,16 @@ class Program(Pictured):
     nominal_measures: np.ndarray
     accuracies: np.ndarray
     tapes: dict[str, Tape]
+    stations: tuple[StationProgram, ...] = ()
 
     def __str__(self) -> str:
         nominal, method = self.nominal, self.method
         rows = [f"program of {nominal.assembly.name}: {self.plugin.name}, {method.resolution}, {method.objective}"]
-        rows += [f"  part {part.name}: {len(part.locators)} locators{', free' * part.free}" for part in nominal.parts]
+        rows += [
+            f"  part {part.name}{f' in station {part.station}' * bool(part.station)}: "
+            f"{'joined' if part.carried else f'{len(part.locators)} locators'}{', free' * part.free}"
+            for part in nominal.parts
+        ]
         rows += [f"  contact {pair.name}: {self.contact_in_words(k)}" for k, pair in enumerate(nominal.pairs)]
         rows += [
             f"  measure {measure.name}: nominally {value:.6g} {measure.units}"
@@ -111,6 +119,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     is seating, for forces that are missing or move nothing.
     """
     _check_forms(nominal, method)
+    _check_placing(nominal, method)
     draws = Draws(nominal)
     with CONSTRUCTION_LOCK:  # users' functions run here, too, and may print
         with quiet():
@@ -161,6 +170,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
                 for measure, value in zip(nominal.measures, values, strict=True)
                 if measure.is_expression
             },
+            stations=tuple(station_programs(nominal, groups, method)),
         )
 
 
@@ -223,13 +233,27 @@ def _check_forms(nominal: Nominal, method: Method) -> None:
         raise ModelError(nominal.assembly.name, faults)
 
 
+def _check_placing(nominal: Nominal, method: Method) -> None:
+    """Raise ModelError for an objective that holds locators to first order, where contact moves a part placed otherwise."""
+    if method.minimizes.counts_points:
+        return
+    faults = [
+        f'part "{part.name}": its locators are placed by "{part.locators.placing}", and the objective "{method.objective}" '
+        'holds them to first order; leave placing out, or choose the objective "all points"'
+        for index, part in enumerate(nominal.parts)
+        if index in part.movers and part.locators.placing != FIRST_ORDER
+    ]
+    if faults:
+        raise ModelError(nominal.assembly.name, faults)
+
+
 def _check_forces(nominal: Nominal, groups: list[Group]) -> None:
     moved = {part for group in groups for part, mobility in zip(group.parts, group.mobilities, strict=True) if mobility.movers}
     faults = [
         f'force "{force.name}" acts on part "{force.at.part.name}", which contact cannot move, but the objective is "seating"; '
         "leave the force out, or declare the part free, with its contacts"
         for force in nominal.assembly.forces
-        if nominal.part_index(force.at.part) not in moved
+        if nominal.part_index(force.at.part, force.station) not in moved
     ]
     if not nominal.assembly.forces:
         faults = ['objective "seating" needs a force, and none is declared; declare one with assembly.force(...)']

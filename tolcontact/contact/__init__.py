@@ -135,8 +135,11 @@ True
 - A ball or shaft keeps its nominal wall: the ends of a hole or a groove are not searched for again as it moves along. A hole
   whose rim is not square to its axis, a shaft across another one, and two shafts side by side have sampled points. The
   contacts of balls and shafts are always constrained, also with `active_set="initial"`.
-- "linearized" neglects second-order rotation. Rows that contradict each other (a tab wider than its slot) end as
-  `not_converged`, as does a step that fails; only "exact" tells the two apart.
+- With stations contact is resolved station by station, and never again: a joint is rigid from then on, and penetration that a
+  station left is handed on. The accuracy of a measure counts contact of its own station alone.
+- "linearized" neglects second-order rotation, and stretches parts by that; a joint keeps the nearest rigid poses. Rows that
+  contradict each other (a tab wider than its slot) end as `not_converged`, as does a step that fails; only "exact" tells the
+  two apart.
 - `not_assemblable` means that no pose without penetration was found near the raw one, not that none exists.
 - A degree of freedom that no active point holds is determined by the regularization alone, and its motion may be large: with
   "active points", a part in a chain that barely penetrates can tilt or slide freely, and is then often `doubtful`. The other

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact import poses as pose
-from tolcontact.arrays import Array, Bool, Float
+from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ACCURACY, ContactGroup, Program
 from tolcontact.contact.acceptance import Limits
 from tolcontact.contact.candidates import Candidates
@@ -72,6 +72,13 @@ class ContactResolver:
     def spans(self) -> list[slice]:
         """The rows of each pair in the QP."""
         return self._step.spans
+
+    def raw_contact(
+        self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
+    ) -> tuple[Float[Array, "realization pair_of_group"], Int[Array, "realization pair_of_group"]]:
+        """Return the least gap [mm] and the number of active points of each pair of the group at raw X_RM."""
+        survey = self._candidates.survey(relative[:, self.pairs], deviations)
+        return survey.min_gap, survey.active
 
     def resolve(
         self,

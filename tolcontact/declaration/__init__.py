@@ -199,6 +199,35 @@ A measurement may lie within one part if it has features with tolerances there: 
 sides. Minima, clearances, and angles and distances that are nominally 0 have a kink in the nominal assembly. There they have no
 derivatives, so `sensitivities` and `contributions` state none for them by a linear model, and `worst` states no bound.
 
+## Stations and joints
+
+Products are located, joined, and located again before anybody measures them. `station(name)` declares the next step of such a
+sequence, and has the methods `locate`, `contact`, `force` and `measure` of an assembly, and `join`. Locators belong to a
+station and vary there ("weld.left.A1"); features belong to parts, and deviate alike in all stations. A joint keeps the poses
+of its parts relative to each other that they had in the station that joined them: raw states follow from raw states, and
+corrected states from corrected states. Later stations locate the joint by points of any of its parts.
+
+>>> line = tc.Assembly("line")
+>>> left, right = line.part("left", tc.Box(100, 50, 10)), line.part("right", tc.Box(100, 50, 10), at=(80, 0, 10))
+>>> weld, check = line.station("weld"), line.station("check")
+>>> for part in (left, right):
+...     location = weld.locate(part, tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x")), tolerance=0.2)
+>>> lap = weld.contact("lap", moving=right.face("-z"), reference=left.face("+z"))
+>>> rail = weld.join("rail", left, right)
+>>> points = [left.point(5, 5, 0), left.point(5, 45, 0), right.point(95, 25, 0)]
+>>> pins = [tc.Locator(f"P{k}", point, "z") for k, point in enumerate(points)]
+>>> stops = [tc.Locator("H1", left.point(5, 0, 5), "y"), tc.Locator("H2", right.point(95, 0, 5), "y")]
+>>> check.locate(rail, [*pins, *stops, tc.Locator("S", left.point(0, 25, 5), "x")], tolerance=0.1, placing="exact")
+location of rail on the ground: 6 locators, exact; normal, full width 0.1 mm
+>>> end = check.measure("end", right.point(100, 25, 10), along="z", tolerance=0.5)
+>>> tc.build(line).nominal.contributors[-6:]
+('check.rail.P0', 'check.rail.P1', 'check.rail.P2', 'check.rail.H1', 'check.rail.H2', 'check.rail.S')
+
+A fixture or a measuring table is a part, with locators and features of its own. `placing` states how a pose follows from
+locators: to "first order" (default, as in the paper); "exact", with faces that slide over them; or as the "best fit" of any
+number of locators, as a measuring machine aligns a part by its datum points, with `tolerance=0`. A station is a set of
+declarations, not a process: it has no springback, clamping order or weld distortion.
+
 ## The model's method, and faults
 
 A model can state the method that it needs (see `tolcontact.contact`): `tc.Assembly("cells",
@@ -268,6 +297,7 @@ from tolcontact.declaration.feature_tolerance import (
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.form import Form
 from tolcontact.declaration.geometry import Box, Geometry, Mesh, Pin
+from tolcontact.declaration.joint import Joint
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import (
@@ -291,6 +321,7 @@ from tolcontact.declaration.mobility import has_supports, is_free, movers
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.size import Size
+from tolcontact.declaration.station import Station
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import degrees
@@ -299,9 +330,9 @@ __all__ = [
     "OUTSIDE", "Angle", "Angularity", "Assembly", "AxisDistance", "Box", "Brep", "CircularRunout", "Clearance",
     "Coaxiality", "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets", "Difference",
     "Face", "Facing", "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance", "Geometry", "Inside",
-    "Largest", "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean", "MeanGap", "Measure", "Measurement",
-    "Mesh", "Minimum", "Near",
-    "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin", "Point", "Population", "Position", "Profile",
-    "Roundness", "Size", "Straightness", "Sum", "Symmetry", "ThreeTwoOne", "TitleBlock", "Tolerance", "TotalRunout",
+    "Joint", "Largest", "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean", "MeanGap", "Measure",
+    "Measurement", "Mesh", "Minimum", "Near", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin", "Point",
+    "Population", "Position", "Profile", "Roundness", "Size", "Station", "Straightness", "Sum", "Symmetry", "ThreeTwoOne",
+    "TitleBlock", "Tolerance", "TotalRunout",
     "Triangles", "Variable", "degrees", "has_supports", "is_free", "movers", "stations", "three_two_one",
 ]  # fmt: skip

@@ -1,7 +1,7 @@
 """The assembly: it collects declarations in the order of a script."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
 from tolcontact.declaration.contact_pair import ContactPair
@@ -12,24 +12,20 @@ from tolcontact.declaration.contributor import (
     correlation as _correlation,
     population as _population,
 )
+from tolcontact.declaration.declarations import Declarations, expect
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Geometry
-from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
+from tolcontact.declaration.joint import Joint
+from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.measurement import Measurement
-from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
+from tolcontact.declaration.part import Face, Feature, Part
+from tolcontact.declaration.sequence import in_order, joined_before, present_parts, sequence_faults, settings_of
 from tolcontact.declaration.size import Size
+from tolcontact.declaration.station import Station
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import tolerance as _tolerance
-from tolcontact.declaration.values import (
-    direction,
-    friction_faults,
-    key_faults,
-    repetitions,
-    script_line,
-    text_faults,
-    vector as _vector,
-)
+from tolcontact.declaration.values import friction_faults, key_faults, repetitions, script_line, text_faults, vector as _vector
+from tolcontact.errors import ModelError
 from tolcontact.later import FASTENER, LATER
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
@@ -39,7 +35,7 @@ T = TypeVar("T")
 CONSTANT_SHARE = 1e-3  # of the widest zone: a narrower one counts as a constant
 MAX_COUNTS = {  # of what an assembly declares
     "parts": 1000, "locations": 1000, "pairs": 5000, "measures": 2000, "forces": 5000, "variables": 5000, "correlations": 5000,
-    "populations": 1000,
+    "populations": 1000, "stations": 60, "joints": 1000,
 }  # fmt: skip
 
 
@@ -53,7 +49,7 @@ class Declared(Generic[T]):
         return self if assembly is None else tuple(assembly._declared[self._name])  # type: ignore[return-value]
 
 
-class Assembly(Pictured):
+class Assembly(Declarations, Pictured):
     """Parts, how they are located, which faces may touch, and what is measured. Lengths in mm, angles in rad.
 
     The methods only record declarations; `faults()` lists everything that is wrong with them. `method` states how contact in
@@ -69,12 +65,14 @@ class Assembly(Pictured):
     variables = Declared[Variable]()
     correlations = Declared[Correlation]()
     populations = Declared[Population]()
+    stations = Declared[Station]()
+    joints = Declared[Joint]()
 
     def __init__(
         self, name: str, *, method: Method | None = None, title_block: TitleBlock | None = None, mu: float | None = None
     ) -> None:  # fmt: skip
-        _expect(f'assembly "{name}": method', method, Method | None, "tc.Method(...)")
-        _expect(f'assembly "{name}": title_block', title_block, TitleBlock | None, "tc.TitleBlock(...)")
+        expect(f'assembly "{name}": method', method, Method | None, "tc.Method(...)")
+        expect(f'assembly "{name}": title_block', title_block, TitleBlock | None, "tc.TitleBlock(...)")
         self.name = name
         self.method = method
         self.title_block = title_block
@@ -85,6 +83,10 @@ class Assembly(Pictured):
         """Append a declaration to a list and return it."""
         self._declared[name].append(thing)
         return thing
+
+    @property
+    def _units(self) -> dict[str, str]:
+        return {measure.name: measure.units for measure in self.measures}
 
     def replaced(self, **lists: Iterable[Any]) -> "Assembly":
         """Return a copy in which `lists` (parts=..., pairs=...) replace its lists. Raises TypeError for other names."""
@@ -103,43 +105,13 @@ class Assembly(Pictured):
         self, name: str, geometry: Geometry, *, at: Any = (0, 0, 0), rotation: Any = (0, 0, 0), fixed: bool | None = None
     ) -> Part:  # fmt: skip
         """Declare a part: its shape, its position `at` [mm] and rotation vector [rad] in the nominal assembly (see Part)."""
-        _expect(f'part "{name}": geometry', geometry, Geometry, "tc.Box(x, y, z) or tc.Mesh(file)")
-        _expect(f'part "{name}": fixed', fixed, bool | None, "True, False or None")
+        expect(f'part "{name}": geometry', geometry, Geometry, "tc.Box(x, y, z) or tc.Mesh(file)")
+        expect(f'part "{name}": fixed', fixed, bool | None, "True, False or None")
         return self._add("parts", Part(name, geometry, _vector(at), _vector(rotation), fixed, script_line()))
 
-    def locate(
-        self,
-        part: Part,
-        scheme: ThreeTwoOne | Sequence[Locator],
-        *,
-        tolerance: Any = None,
-        on: Part | Feature | None = None,
-        floating: bool = False,
-    ) -> Location:
-        """Locate a part by six locators, or by fewer if it is `floating`, on the ground or `on` another part (see Location).
-
-        On a feature of another part, it also follows the deviations of that feature.
-        `tolerance` applies to each locator without a tolerance: the full width of its zone [mm], limit deviations ("±0.1",
-        "+0.1/-0.05"), a Tolerance, or a frozen scipy.stats distribution.
-        """
-        _expect("locate: the first argument", part, Part, "a part")
-        _expect(f'locate "{part.name}": on', on, Part | Feature | None, "a part, a feature of it, or None for the ground")
-        scheme = scheme if isinstance(scheme, ThreeTwoOne) else tuple(scheme)
-        for locator in scheme if isinstance(scheme, tuple) else ():
-            _expect(f'locate "{part.name}": a locator', locator, Locator, "tc.Locator(name, point, direction)")
-        zone = None if tolerance is None else _tolerance(tolerance)
-        _expect(f'locate "{part.name}": floating', floating, bool, "True or False")
-        return self._add("locations", Location(part, scheme, zone, on, script_line(), floating))
-
-    def contact(
-        self, name: str, *, moving: Face | Feature, reference: Face | Feature, points: int | str | None = None,
-        spacing: float | None = None, within: float | None = None, mu: float | None = None,
-    ) -> ContactPair:  # fmt: skip
-        """Declare that points of the `moving` face stay outside the `reference` face (see ContactPair)."""
-        for side, face in (("moving", moving), ("reference", reference)):
-            _expect(f'contact "{name}": {side}', face, Face | Feature, 'part.face("+z"), or a feature')
-        sides = face_of(moving), face_of(reference)
-        return self._add("pairs", ContactPair(name, *sides, points, spacing, within, script_line(), mu))
+    def station(self, name: str) -> Station:
+        """Declare the next station of an assembly that is built in steps, and return it (see Station)."""
+        return self._add("stations", Station(name, script_line()).belonging_to(self))
 
     def fasten(
         self,
@@ -163,35 +135,11 @@ class Assembly(Pictured):
 
         Raises ModelError if the fastener does not fit into the nominal assembly.
         """
+        if self.stations:
+            advice = "declare its part, its location and its contacts in a station"
+            raise ModelError(self.name, [f'fastener "{name}" ({script_line()}): stations take no fasteners yet; {advice}'])
         part: Part = LATER[FASTENER](self, name, fastener, through=through, into=into, seat=seat, pushed=pushed, drift=drift)
         return part
-
-    def force(self, name: str, *, at: Point, vector: Any) -> Force:
-        """Declare a force `vector` [N], in the assembly frame, at a point of a part (see Force)."""
-        _expect(f'force "{name}": at', at, Point, "part.point(x, y, z)")
-        return self._add("forces", Force(name, at, _vector(vector), script_line()))
-
-    def measure(
-        self,
-        name: str,
-        of: Point | Measurement | Callable[[Any], Any],
-        *,
-        to: Point | None = None,
-        along: Any = None,
-        tolerance: Any = None,
-        limits: Sequence[float | None] | None = None,
-        absolute: bool | None = None,
-        units: str | None = None,
-    ) -> Measure:
-        """Declare a measure of a point, of two points, of a measurement, or of a CasADi expression of the poses (see Measure).
-
-        `units` are those of an expression, by default mm. A measurement has its own.
-        """
-        axis = None if along is None else direction(along)
-        if units is None:
-            units = min(of.units_among(self._units), default="mm") if isinstance(of, Measurement) else "mm"
-        bounds: Any = tuple(limits) if isinstance(limits, list | tuple) else limits
-        return self._add("measures", Measure(name, of, to, axis, tolerance, units, script_line(), bounds, absolute))
 
     def variable(self, name: str, tolerance: Any, *, drives: Mapping[str, float], units: str = "mm") -> Variable:
         """Declare a cause that drives several contributors, each by a factor (see Variable)."""
@@ -205,13 +153,30 @@ class Assembly(Pictured):
         """Declare that contributors are drawn from measured rows: a CSV file, a DataFrame, a Dataset (see Population)."""
         return self._add("populations", _population(source, columns, script_line()))
 
-    @property
-    def _units(self) -> dict[str, str]:
-        return {measure.name: measure.units for measure in self.measures}
-
     def location_of(self, part: Part) -> Location | None:
         """Return the location of `part`; None for a part that is not located."""
         return next((location for location in self.locations if location.part is part), None)
+
+    @property
+    def scenes(self) -> "tuple[Assembly, ...]":
+        """The models of the stations, in their order; an assembly without stations is its only scene."""
+        return tuple(map(self._scene, self.stations)) or (self,)
+
+    @property
+    def in_station_order(self) -> "Assembly":
+        """The same assembly with its declarations station by station; an assembly without stations itself."""
+        return self.replaced(**in_order(self)) if self.stations else self
+
+    def _scene(self, station: Station) -> "Assembly":
+        """Return the model of a station: the parts that it holds, what it declares, and the joints that it locates."""
+        parts, joined = present_parts(self, station), joined_before(self, station)
+        joints = dict.fromkeys(joined[part] for part in parts if part in joined)
+        none = dict.fromkeys(("stations", "variables", "correlations", "populations"), ())
+        return self.replaced(parts=parts, joints=joints, **settings_of(self, station), **none)
+
+    def body_of(self, part: Part) -> tuple[Part, ...]:
+        """Return the parts of the rigid body to which a part of a scene belongs; the first one carries the others."""
+        return next((joint.members for joint in self.joints if part in joint.members), (part,))
 
     def smallest_zone(self) -> float:
         """Return the smallest width of a tolerance zone [mm] of any locator, feature or measure; infinite without a zone.
@@ -254,15 +219,16 @@ class Assembly(Pictured):
             yield from key_faults(kind, [thing.name for thing in self._declared[name]])
         for part in self.parts:
             yield from _located("part", part, part.faults())
-            yield from _located("part", part, self._location_faults(part))
+            if not self.stations:
+                yield from _located("part", part, self._repetition_faults(part))
+                yield from _located("part", part, self._location_faults(part))
             yield from self._feature_faults(part)
         for location in self.locations:
-            yield from _located("part", location.part, location.faults(), location.declared_at)
-            mentioned = location.part, location.parent, *location.mentioned
-            yield from self._unknown_parts(f'locators of "{location.part.name}"', location.declared_at, *mentioned)
+            yield from _located(location.noun, location, location.faults())
+            yield from self._unknown_parts(f'locators of "{location.name}"', location.declared_at, *location.parts)
         references: list[tuple[str, Any, Iterable[Part]]] = [
-            *(("contact pair", pair, (*pair.moving.parts, *pair.reference.parts)) for pair in self.pairs),
-            *(("force", force, (force.at.part,)) for force in self.forces),
+            *(("contact pair", pair, pair.parts) for pair in self.pairs),
+            *(("force", force, force.parts) for force in self.forces),
             *(("measure", measure, measure.parts) for measure in self.measures),
             *(("variable", variable, ()) for variable in self.variables),
             *(("correlation", correlation, ()) for correlation in self.correlations),
@@ -273,7 +239,12 @@ class Assembly(Pictured):
             yield from self._unknown_parts(f'{kind} "{thing.name}"', thing.declared_at, *parts)
         yield from key_faults("variable", [variable.name for variable in self.variables])
         for number, measure in enumerate(self.measures):
-            yield from _located("measure", measure, measure.reference_faults(self.measures[:number]))
+            earlier = [other for other in self.measures[:number] if other.station == measure.station]
+            yield from _located("measure", measure, measure.reference_faults(earlier))
+        if self.stations:
+            yield from sequence_faults(self)
+            for scene in self.scenes:
+                yield from (fault for part in scene.parts for fault in _located("part", part, scene._location_faults(part)))
 
     def _feature_faults(self, part: Part) -> Iterator[str]:
         letters = [declared.datum for declared in part.toleranced if declared.datum] + [datum.letter for datum in part.targets]
@@ -301,6 +272,11 @@ class Assembly(Pictured):
                             f'declare it with part.feature(..., datum="{letter}")'
                         )
 
+    def _repetition_faults(self, part: Part) -> Iterator[str]:
+        count = sum(location.part is part for location in self.locations)
+        if count > 1:
+            yield f"it is located {count} times; locate it once"
+
     def _location_faults(self, part: Part) -> Iterator[str]:
         location = self.location_of(part)
         if location is not None and location.floating:
@@ -308,9 +284,6 @@ class Assembly(Pictured):
                 yield "it is floating, and in no contact pair, so nothing decides its place; declare its contacts"
             if part.fixed is True:
                 yield "it is floating, so contact has to move it; leave fixed out"
-        count = sum(location.part is part for location in self.locations)
-        if count > 1:
-            yield f"it is located {count} times; locate it once"
         chain: list[Part] = []
         support: Part | None = part
         while support is not None:
@@ -331,16 +304,14 @@ class Assembly(Pictured):
         causes = *self.variables, *self.correlations, *self.populations
         declared = (row for part in self.parts for row in (*part.toleranced, *part.targets))
         rows = *self.parts, *declared, *causes, *self.locations, *self.pairs, *self.forces, *self.measures
+        for scene, station in zip(self.scenes, self.stations, strict=False):
+            settings = *scene.locations, *scene.pairs, *scene.forces, *scene.measures
+            joined = [joint for joint in self.joints if joint.station == station.name]
+            rows = *(row for row in rows if row not in settings), station, *settings, *joined
         return "\n".join([f"assembly {self.name}", *(f"  {row}" for row in rows)])
 
 
-def _expect(label: str, value: Any, kind: Any, expected: str) -> None:
-    """Raise TypeError at the script's own line if an argument has a type that no other check could handle."""
-    if not isinstance(value, kind):
-        raise TypeError(f"{label} is a {type(value).__name__}; expected {expected}")
-
-
-def _located(kind: str, thing: Any, faults: Iterator[str], line: str = "") -> Iterator[str]:
+def _located(kind: str, thing: Any, faults: Iterator[str]) -> Iterator[str]:
     """Return faults that begin with the name and the script line of a declaration."""
-    line = line or thing.declared_at
+    line = thing.declared_at
     return (f'{kind} "{thing.name}"{f" ({line})" if line else ""}: {fault}' for fault in faults)

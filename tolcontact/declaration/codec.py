@@ -246,7 +246,7 @@ class Record(Named):
                 value = UNSET if item is UNSET else member.codec.decode(item, place[member.key])
             if value is not UNSET:
                 arguments |= zip(member.names, [value] if len(member.names) == 1 else value, strict=True)
-            if member.names[0] == "part":
+            if member.names[0] == "part" and "part" in arguments:
                 place = replace(place, part=arguments["part"])
             if member.key == "declared_at":
                 arguments.setdefault("declared_at", place.line)

@@ -3,8 +3,9 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
-from tolcontact.declaration.part import Face
+from tolcontact.declaration.part import Face, Part
 from tolcontact.declaration.values import friction_faults
 from tolcontact.readable import Readable
 
@@ -34,6 +35,13 @@ class ContactPair(Readable):
     within: float | None = None
     declared_at: str = ""
     mu: float | None = None
+    station: str = ""
+    noun: ClassVar[str] = "contact pair"
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The parts to which its faces refer."""
+        return (*self.moving.parts, *self.reference.parts)
 
     def faults(self) -> Iterator[str]:
         yield from self.moving.faults()

@@ -34,13 +34,15 @@ from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, 
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.form import COVARIANCES, Form
 from tolcontact.declaration.geometry import UNITS, Box, Mesh, Pin
-from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
+from tolcontact.declaration.joint import Joint
+from tolcontact.declaration.locator import PLACINGS, Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, Tape, tape_of
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.measurement_entry import MEASURED
 from tolcontact.declaration.part import ASSOCIATIONS, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.place import EntryError, Place, Sources
 from tolcontact.declaration.size import MOVES, Size
+from tolcontact.declaration.station import Station
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
 from tolcontact.errors import ArchiveError
@@ -48,6 +50,7 @@ from tolcontact.method import ACTIVE_SETS, OBJECTIVES, REGULARIZATIONS, RESOLUTI
 from tolcontact.poses import ENTRIES
 
 MAX_FREEDOMS = 7  # of a feature, with its size
+OF_STATIONS = ("stations", "joints")  # lists that a document without stations leaves out
 
 
 class Shape(Choice):
@@ -184,7 +187,7 @@ SHAPE = Shape(
     Wrapped("mesh", Plain(str, read=lambda text, place: _mesh(place))),
 )  # fmt: skip
 LOCATOR = Record(
-    Locator, "name point direction one_sided stiffness tolerance on?",
+    Locator, "name point direction one_sided stiffness tolerance part? on?",
     direction=UNIT_VECTOR, stiffness=Plain(POSITIVE, write=floats),
 )  # fmt: skip
 SCHEME = Choice(
@@ -213,23 +216,28 @@ FEATURES = Inline(
 )
 RECORDS = {
     "parts": Record(Part, "geometry name at rotation fixed declared_at features", geometry=SHAPE, features=FEATURES),
-    "locations": Record(Location, "part on tolerance scheme declared_at floating?", scheme=SCHEME, on=GROUND),
+    "locations": Record(
+        Location, "part on tolerance scheme declared_at floating? station? joint? placing?",
+        scheme=SCHEME, on=GROUND, placing=Plain(text_type(PLACINGS)),
+    ),
     "pairs": Record(
-        ContactPair, "moving reference name points spacing within declared_at mu?",
+        ContactPair, "moving reference name points spacing within declared_at mu? station?",
         points=Plain(INDEX | text_type([VERTICES]) | None, read=indices_of),
         spacing=Plain(POSITIVE | None), within=Plain(POSITIVE | None), mu=Plain(NOT_NEGATIVE | None, write=floats),
     ),
     "measures": Record(
-        Measure, "name of to? along tolerance units declared_at absolute? limits?", of=Inline(
+        Measure, "name of to? along tolerance units declared_at absolute? limits? station?", of=Inline(
             {"of": MEASURED.wire, "tape": Annotated[list[list[str | int | float]], Meta(description="steps of an expression")]},
             _measured_entries, _measured,
         ), along=Optional(UNIT_VECTOR), tolerance=Plain(POSITIVE | tuple[float, float] | str | None),
         limits=Plain(tuple[float | None, float | None] | None, write=floats),
     ),
-    "forces": Record(Force, "at name vector declared_at"),
+    "forces": Record(Force, "at name vector declared_at station?"),
     "variables": Record(Variable, "tolerance drives name units declared_at", drives=Plain(Mapping[str, float], write=floats)),
     "correlations": Record(Correlation, "labels matrix declared_at"),
     "populations": Record(Population, "values columns source declared_at"),
+    "stations": Record(Station, "name declared_at"),
+    "joints": Record(Joint, "name members station declared_at"),
 }  # fmt: skip
 DOCUMENT = msgspec.defstruct("Document", [
     ("name", str), ("parts", Items(RECORDS["parts"]).wire), ("measures", Items(RECORDS["measures"]).wire),
@@ -244,7 +252,11 @@ def to_document(
 ) -> Document:
     """Return the document of an assembly, for an archive, or for a JSON model in a folder (see Writing)."""
     writing = Writing(triangles, tapes, folder)
-    lists = {name: [record.encode(thing, writing) for thing in getattr(assembly, name)] for name, record in RECORDS.items()}
+    lists = {
+        name: [record.encode(thing, writing) for thing in getattr(assembly, name)]
+        for name, record in RECORDS.items()
+        if name not in OF_STATIONS or assembly.stations
+    }
     titles = {} if assembly.title_block is None else {"title_block": TITLE_BLOCK.encode(assembly.title_block, writing)}
     friction = {} if assembly.mu is None else {"mu": float(assembly.mu)}
     return {"name": assembly.name, "method": Optional(METHOD).encode(assembly.method, writing), **titles, **friction, **lists}
@@ -294,11 +306,14 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
         things[name] = Items(RECORDS[name]).decode(getattr(struct, name), place[name])
     locators = sum(len(location.scheme) if isinstance(location.scheme, tuple) else 6 for location in things["locations"])
     deviations = locators + MAX_FREEDOMS * sum(len(part.features) for part in parts) + len(things["variables"])
-    sources = replace(sources, inputs=ENTRIES * len(parts) + deviations)
+    entries = ENTRIES * len(parts) * max(1, len(things["stations"]))
+    sources = replace(sources, inputs=entries + deviations)
     things["measures"] = Items(RECORDS["measures"]).decode(struct.measures, Place(sources)["measures"])
     method = Optional(METHOD).decode(struct.method, place["method"])
     title_block = Optional(TITLE_BLOCK).decode(struct.title_block, place["title_block"])
     assembly = Assembly(struct.name, method=method, title_block=title_block, mu=struct.mu).replaced(**things)
+    for station in assembly.stations:
+        station.belonging_to(assembly)
     for fault in assembly.faults():  # a model with faults is never archived
         raise place.error(fault)
     return assembly

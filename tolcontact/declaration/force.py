@@ -2,8 +2,9 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
-from tolcontact.declaration.part import Point
+from tolcontact.declaration.part import Part, Point
 from tolcontact.declaration.values import Vector, is_finite
 from tolcontact.readable import Readable
 
@@ -16,6 +17,13 @@ class Force(Readable):
     at: Point
     vector: Vector
     declared_at: str = ""
+    station: str = ""
+    noun: ClassVar[str] = "force"
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The part that it acts on."""
+        return (self.at.part,)
 
     def faults(self) -> Iterator[str]:
         yield from self.at.faults()

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tolcontact.declaration.part import Face, Feature, Part, face_of
+from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
 from tolcontact.declaration.tolerance import Tolerance, tolerance as _tolerance
 from tolcontact.declaration.values import (
     Vector,
@@ -19,6 +19,8 @@ from tolcontact.declaration.values import (
 )
 from tolcontact.readable import Readable
 
+FIRST_ORDER, EXACT, BEST_FIT = PLACINGS = ("first order", "exact", "best fit")
+
 
 @dataclass(frozen=True, repr=False)
 class Locator(Readable):
@@ -27,7 +29,8 @@ class Locator(Readable):
     A positive deviation moves the part along `direction`. `tolerance=None` takes the tolerance of the `locate` call. A
     `one_sided` locator is a support: the part may lift off it along `direction`, but not pass through it. The objective
     "locator stiffness" uses `stiffness` [N/mm]. A locator `on` a feature of its part touches this feature, and also moves the
-    part by the deviation of the feature at the point.
+    part by the deviation of the feature at the point. A locator of a joint is at a point of any of its parts, which the point
+    itself states: part.point(x, y, z).
     """
 
     name: str
@@ -37,6 +40,7 @@ class Locator(Readable):
     one_sided: bool
     stiffness: float
     on: Feature | None
+    part: Part | None
 
     def __init__(
         self,
@@ -48,7 +52,10 @@ class Locator(Readable):
         one_sided: bool = False,
         stiffness: float = 1.0,
         on: Feature | None = None,
+        part: Part | None = None,
     ) -> None:
+        if isinstance(point, Point):
+            part, on, point = point.part, on or point.on, point.position
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "point", _vector(point))
         object.__setattr__(self, "direction", _direction(direction))
@@ -56,6 +63,7 @@ class Locator(Readable):
         object.__setattr__(self, "one_sided", one_sided)
         object.__setattr__(self, "stiffness", stiffness)
         object.__setattr__(self, "on", on)
+        object.__setattr__(self, "part", part)
 
     def faults(self) -> Iterator[str]:
         if not is_finite(self.point):
@@ -70,6 +78,8 @@ class Locator(Readable):
             yield f"stiffness is {self.stiffness!r}; expected a number in N/mm above 0"
         if not isinstance(self.on, Feature | None):
             yield f"on is a {type(self.on).__name__}; expected a feature of the part, or None"
+        if not isinstance(self.part, Part | None):
+            yield f"part is a {type(self.part).__name__}; expected the part of the point, or None"
 
     def __str__(self) -> str:
         point, along = (", ".join(f"{c:g}" for c in v) for v in (self.point, self.direction))
@@ -119,6 +129,11 @@ class Location(Readable):
 
     A `floating` part has fewer than six locators. The directions that they leave open are nominal in the raw state, and contact
     determines them.
+
+    `placing` states how the pose follows from the locators: to "first order" in the deviations, as in the paper; "exact", with
+    faces that slide over the locators; or as the "best fit" of any number of locators, as a measuring machine aligns a part.
+
+    In a `station` the located body may be a `joint`, by its name; `part` is then its first part.
     """
 
     part: Part
@@ -127,11 +142,29 @@ class Location(Readable):
     on: Part | Feature | None = None
     declared_at: str = ""
     floating: bool = False
+    station: str = ""
+    joint: str = ""
+    placing: str = FIRST_ORDER
+
+    @property
+    def noun(self) -> str:
+        """The kind of the located body: a part, or a joint."""
+        return "joint" if self.joint else "part"
+
+    @property
+    def name(self) -> str:
+        """The name of the located body."""
+        return self.joint or self.part.name
 
     @property
     def parent(self) -> Part | None:
         """The part that the locators are on; None for the ground."""
         return self.on.part if isinstance(self.on, Feature) else self.on
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The located part, the part that it is on, and those to which the faces of the scheme refer."""
+        return (self.part, *([] if self.parent is None else [self.parent]), *self.mentioned)
 
     @property
     def mentioned(self) -> tuple[Part, ...]:
@@ -141,6 +174,10 @@ class Location(Readable):
 
     def faults(self) -> Iterator[str]:
         yield from self._faces_faults() if isinstance(self.scheme, ThreeTwoOne) else self._locator_faults(self.scheme)
+        if self.placing not in PLACINGS:
+            yield f"placing is {self.placing!r}; expected one of: {', '.join(PLACINGS)}"
+        elif self.placing != FIRST_ORDER and (self.floating or self._has_supports):
+            yield f'placing="{self.placing}" needs locators that hold both ways; leave floating and one_sided out'
         if self.tolerance is not None:
             yield from (f"locators: {fault}" for fault in self.tolerance.faults())
         if isinstance(self.on, Feature) and self.on not in self.on.part.features:
@@ -151,6 +188,8 @@ class Location(Readable):
         for face in self.scheme.faces if isinstance(self.scheme, ThreeTwoOne) else ():
             if face.part is not self.part:
                 yield f'face {face} belongs to part "{face.part.name}", not to part "{self.part.name}"'
+        if self.joint:
+            yield f'joint "{self.joint}" needs locators at points of its parts: tc.Locator(name, part.point(...), ...)'
         if self.floating:
             yield "a 3-2-1 scheme leaves nothing open; leave floating out, or give it fewer locators"
         if self.tolerance is None:
@@ -159,7 +198,12 @@ class Location(Readable):
     def _locator_faults(self, scheme: tuple[Locator, ...]) -> Iterator[str]:
         names = [locator.name for locator in scheme]
         for locator in scheme:
-            if isinstance(locator.on, Feature) and locator.on.part is not self.part:
+            part = locator.part or self.part
+            if self.joint and locator.part is None:
+                yield f'locator "{locator.name}": it is at no part of joint "{self.joint}"; give part.point(x, y, z)'
+            elif not self.joint and part is not self.part:
+                yield f'locator "{locator.name}" is at a point of part "{part.name}"'
+            if isinstance(locator.on, Feature) and locator.on.part is not part:
                 yield f'locator "{locator.name}" is on feature "{locator.on.name}" of part "{locator.on.part.name}"'
             yield from (f'locator "{locator.name}": {fault}' for fault in locator.faults())
             if locator.tolerance is None and self.tolerance is None:
@@ -173,7 +217,7 @@ class Location(Readable):
                 f"it has {count}; a rigid part needs six independent ones (3-2-1, for example), or locate(..., floating=True) "
                 "if contact holds it in the other directions"
             )
-        elif len(two_sided) > 6:
+        elif len(two_sided) > 6 and self.placing != BEST_FIT:
             idle = [locator.name for locator in _repeating(two_sided)]
             sufficient = ", ".join(locator.name for locator in two_sided if locator.name not in idle)
             verb = "is" if len(idle) == 1 else "are"
@@ -181,17 +225,22 @@ class Location(Readable):
                 f"it is over-constrained: {len(two_sided)} of its {count} hold it both ways, and {', '.join(idle)} {verb} "
                 f"redundant with {sufficient}; make the redundant ones one_sided=True, or leave them out"
             )
+        elif self.floating and self.joint:
+            yield f'joint "{self.joint}" cannot be floating; give it six locators'
         elif self.floating and len(two_sided) == 6:
             yield "it is floating, but six locators hold it both ways; leave floating out, or some of them"
+
+    @property
+    def _has_supports(self) -> bool:
+        return isinstance(self.scheme, tuple) and any(locator.one_sided for locator in self.scheme)
 
     def __str__(self) -> str:
         scheme = self.scheme if isinstance(self.scheme, ThreeTwoOne) else f"{len(self.scheme)} locators"
         feature = f"{self.on.name} of " if isinstance(self.on, Feature) else ""
         ground = f"{feature}{self.parent.name}" if self.parent else "the ground"
         floating = ", floating" if self.floating else ""
-        return f"location of {self.part.name} on {ground}: {scheme}{floating}" + (
-            f"; {self.tolerance}" if self.tolerance else ""
-        )
+        floating += f", {self.placing}" if self.placing != FIRST_ORDER else ""
+        return f"location of {self.name} on {ground}: {scheme}{floating}" + (f"; {self.tolerance}" if self.tolerance else "")
 
 
 def _repeating(locators: list[Locator]) -> list[Locator]:

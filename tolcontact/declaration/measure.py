@@ -9,7 +9,7 @@ import contextlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Part, Point
@@ -42,6 +42,8 @@ class Measure(Readable):
     declared_at: str = ""
     limits: tuple[float | None, float | None] | None = None
     absolute: bool | None = None
+    station: str = ""
+    noun: ClassVar[str] = "measure"
 
     def __post_init__(self) -> None:
         with contextlib.suppress(TextFault):  # faults() reports it

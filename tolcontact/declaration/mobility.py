@@ -9,11 +9,12 @@ def is_free(assembly: Assembly, part: Part) -> bool:
 
     Without a declared choice a part is free if it is a moving side, floats, or has one-sided locators.
     """
-    if part.fixed is not None:
-        return not part.fixed
+    body = assembly.body_of(part)
+    if any(member.fixed is not None for member in body):
+        return any(member.fixed is False for member in body)
     location = assembly.location_of(part)
     floats = location is not None and location.floating
-    return floats or any(pair.moving.part is part for pair in assembly.pairs) or has_supports(assembly, part)
+    return floats or any(pair.moving.part in body for pair in assembly.pairs) or has_supports(assembly, part)
 
 
 def has_supports(assembly: Assembly, part: Part) -> bool:
@@ -23,8 +24,15 @@ def has_supports(assembly: Assembly, part: Part) -> bool:
 
 
 def movers(assembly: Assembly, part: Part) -> tuple[Part, ...]:
-    """Return the free parts whose corrections move `part`: the parts that it is located on, then the part itself."""
+    """Return the free parts whose corrections move `part`: the parts that it is located on, then the part itself.
+
+    A part of a joint is moved by the first part of the joint.
+    """
+    body = assembly.body_of(part)
+    part = body[0]
     location = assembly.location_of(part)
     supports = movers(assembly, location.parent) if location and location.parent else ()
-    touches = any(part in (pair.moving.part, pair.reference.part) for pair in assembly.pairs) or has_supports(assembly, part)
+    touches = has_supports(assembly, part) or any(
+        side.part in body for pair in assembly.pairs for side in (pair.moving, pair.reference)
+    )
     return (*supports, part) if touches and is_free(assembly, part) else supports

@@ -91,7 +91,8 @@ its wall, is detected only afterwards (see the checks of surfaces in `tolcontact
 from tolcontact.discretization.discretizing import discretize
 from tolcontact.discretization.form_places import FIRST_POINT, are_over, face_points, raised_places
 from tolcontact.discretization.locators import Locators
-from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart, Offsets
+from tolcontact.discretization.nominal import ContactPoints, Nominal, Offsets
+from tolcontact.discretization.nominal_part import NominalPart
 from tolcontact.discretization.round_points import RoundPoint, RoundPoints
 
 __all__ = [

@@ -11,9 +11,11 @@ import trimesh
 from tolcontact.declaration import Assembly, ContactPair, Face, Part
 from tolcontact.declaration.contact_pair import MAX_POINTS
 from tolcontact.discretization.form_points import check_flat, check_resolved, form_lengths, form_spacing, with_rims
-from tolcontact.discretization.nominal import ContactPoints, NominalPart, Offsets
+from tolcontact.discretization.nominal import ContactPoints, Offsets
+from tolcontact.discretization.nominal_part import NominalPart
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
+from tolcontact.discretization.scenes import Scene
 from tolcontact.errors import ContactWarning, GeometryFault, designation
 from tolcontact.features import FaceDeviation, Features
 from tolcontact.geometry.curvature import CHORD_SHARE, curvature_points, distinct, facet_error, is_flat, sampling_error
@@ -28,9 +30,9 @@ POINT_TOLERANCE = 1e-9  # of the part's size: points that are no farther apart a
 
 
 def contact_points(
-    assembly: Assembly, pair: ContactPair, placed: Mapping[Part, NominalPart], meshes: Meshes, features: Features
+    scene: Scene, pair: ContactPair, placed: Mapping[Part, NominalPart], meshes: Meshes, features: Features
 ) -> ContactPoints:
-    """Return the contact points of a declared pair, between the parts as `placed`.
+    """Return the contact points of a declared pair of a scene, between the parts as `placed`.
 
     Raises GeometryFault if its faces are nowhere within reach, or point the same way.
     """
@@ -47,12 +49,12 @@ def contact_points(
     if balls_and_shafts:
         P_m, P_r, n_r = (np.array(rows) for rows in zip(*(point.nominal() for point in balls_and_shafts), strict=True))
     else:
-        P_m = _candidates(assembly, pair, moving, unplaced.mesh, (moving_face, reference_face), reach, lengths)
+        P_m = _candidates(scene.assembly, pair, moving, unplaced.mesh, (moving_face, reference_face), reach, lengths)
         P_m, P_r, n_r = _touching(pair, P_m, moving_face, reference_face, reach)
     points = ContactPoints(
         name=pair.name,
-        moving=assembly.parts.index(moving.part),
-        reference=assembly.parts.index(reference.part),
+        moving=scene.index(moving.part),
+        reference=scene.index(reference.part),
         P_m=P_m,
         P_r=P_r,
         n_r=n_r,

@@ -22,11 +22,14 @@ from tolcontact.declaration import (
     is_free,
     movers,
 )
+from tolcontact.declaration.locator import FIRST_ORDER
 from tolcontact.discretization.contact_points import contact_points
 from tolcontact.discretization.locators import Locators, scheme_locators
 from tolcontact.discretization.measurements import nominal_measurements
-from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart, Offsets
+from tolcontact.discretization.nominal import ContactPoints, Nominal, Offsets
+from tolcontact.discretization.nominal_part import NominalPart
 from tolcontact.discretization.partial_surfaces import warn_of_partial_surfaces
+from tolcontact.discretization.scenes import Scene, carried, scenes_of
 from tolcontact.discretization.unit_check import warn_of_units
 from tolcontact.errors import GeometryFault, ModelError, designation
 from tolcontact.features import Features, Placement, datum_order
@@ -60,42 +63,73 @@ def discretize(assembly: Assembly, *, incomplete: bool = False) -> Nominal:
     omissions = tuple(assembly.omissions()) if incomplete else ()
     faults = _Faults(fault for fault in assembly.faults() if fault not in omissions)
     is_sound = not faults
+    assembly = assembly.in_station_order if is_sound else assembly
     shapes = _shapes(assembly, faults)
     meshes = {part: read.mesh for part, read in shapes.items()}
-    parts = [_nominal_part(assembly, part, meshes, faults) for part in assembly.parts]
+    scenes = scenes_of(assembly) if is_sound or not assembly.stations else ()
+    entries = [(scene, part) for scene in scenes for part in scene.assembly.parts]
+    parts = [_nominal_part(scene, part, meshes, faults) for scene, part in entries]
     features = Features(sum(len(part.locators) for part in parts if part is not None))
     if is_sound and None not in parts:
-        _add_features(assembly, meshes, features, faults)
+        _add_features(assembly, {part: number for number, (_, part) in enumerate(entries)}, meshes, features, faults)
         placements = {part.part: part.placement for part in parts if part is not None}
         parts = [
-            _on_ground(_on_features(part, features, meshes, faults), assembly.location_of(part.part), features, placements)
-            for part in parts
+            replace(
+                _on_ground(
+                    _on_features(part, features, meshes, faults), scene.assembly.location_of(part.part), features, placements
+                ),
+                carried=carried(scenes, scene, part.part),
+            )
+            for (scene, _), part in zip(entries, parts, strict=True)
             if part is not None
         ]
     nominal_parts = tuple(part for part in parts if part is not None)
-    placed = {nominal.part: nominal for nominal in nominal_parts}
     if len(assembly.pairs) > MANY_PAIRS:
         log.warning("%d contact pairs: to prepare them takes about a tenth of a second each", len(assembly.pairs))
     pairs = [
-        faults.attempt(designation("contact pair", pair), contact_points, assembly, pair, placed, meshes, features)
-        for pair in assembly.pairs
+        faults.attempt(designation("contact pair", pair), contact_points, scene, pair, placed, meshes, features)
+        for scene, placed in [(scene, _placed(nominal_parts, scene)) for scene in scenes]
+        for pair in scene.assembly.pairs
         if not any(pair.faults()) and all(part in placed for part in (*pair.moving.parts, *pair.reference.parts))
     ]
     if is_sound:
-        faults.extend(_immovable_pairs(assembly))
+        faults.extend(fault for scene in scenes for fault in _immovable_pairs(scene.assembly))
         labels = [label for nominal in nominal_parts for label in nominal.locators.labels]
         labels += [*features.labels, *(variable.name for variable in assembly.variables)]
         faults.extend(_repeated_labels(labels))
         if not faults:
             shifts = {labels[column] for pattern in features.patterns for column in pattern.leans}
             faults.extend(_contributor_faults(assembly, labels, shifts))
-    faults.extend(_reserved_names(assembly))
+    faults.extend(fault for scene in scenes for fault in _reserved_names(scene))
     if faults:
         raise ModelError(assembly.name, list(dict.fromkeys(faults)))
     warn_of_units(assembly, shapes)
     warn_of_partial_surfaces(assembly, meshes)
-    nominal = Nominal(assembly, nominal_parts, (*pairs, *_support_pairs(nominal_parts)), assembly.measures, features)
-    return replace(nominal, measurements=nominal_measurements(nominal))
+    return _nominal(assembly, scenes, nominal_parts, (*pairs, *_support_pairs(nominal_parts, scenes)), features)
+
+
+def _nominal(
+    assembly: Assembly,
+    scenes: Sequence[Scene],
+    parts: tuple[NominalPart, ...],
+    pairs: tuple[ContactPoints, ...],
+    features: Features,
+) -> Nominal:
+    """Return the nominal model with its measurements; with stations those of all of them, station by station."""
+    models = [
+        Nominal(scene.assembly, parts, pairs, scene.assembly.measures, features, station=scene.station) for scene in scenes
+    ]
+    models = [replace(model, measurements=nominal_measurements(model)) for model in models]
+    if not assembly.stations:
+        return models[0]
+    measures = tuple(measure for model in models for measure in model.measures)
+    measurements = tuple(measurement for model in models for measurement in model.measurements)
+    return Nominal(assembly, parts, pairs, measures, features, measurements, tuple(models))
+
+
+def _placed(parts: Sequence[NominalPart], scene: Scene) -> dict[Part, NominalPart]:
+    """Return the parts of a scene by their declarations."""
+    return {nominal.part: nominal for nominal in parts if nominal.station == scene.station}
 
 
 def _shapes(assembly: Assembly, faults: _Faults) -> dict[Part, Shape]:
@@ -107,8 +141,9 @@ def _shapes(assembly: Assembly, faults: _Faults) -> dict[Part, Shape]:
     return {part: read for part, read in attempts.items() if read is not None}
 
 
-def _add_features(assembly: Assembly, meshes: Meshes, features: Features, faults: _Faults) -> None:
-    for index, part in enumerate(assembly.parts):
+def _add_features(assembly: Assembly, indices: Mapping[Part, int], meshes: Meshes, features: Features, faults: _Faults) -> None:
+    for part in assembly.parts:
+        index = indices[part]
         ordered, circular = datum_order(part)
         for declared in ordered:
             place = f'part "{part.name}": {designation(declared.noun, declared)}'
@@ -135,7 +170,8 @@ def _on_features(part: NominalPart, features: Features, meshes: Meshes, faults: 
         faces = tuple(deviations[k] for k in (0, 0, 0, 1, 1, 2))
     else:
         faces = tuple(
-            locator.on and features.face_of(locator.on, np.array(locator.point), part.placement) for locator in scheme
+            locator.on and features.face_of(locator.on, np.array(locator.point), placement_of(locator.part or part.part))
+            for locator in scheme
         )
     return replace(part, locators=replace(part.locators, faces=faces))
 
@@ -182,28 +218,31 @@ def _contributor_faults(assembly: Assembly, labels: Sequence[str], shifts: Set[s
                 sources[label] = place
 
 
-def _reserved_names(assembly: Assembly) -> Iterator[str]:
-    reserved = {_supports_name(part) for part in assembly.parts if has_supports(assembly, part)}
+def _reserved_names(scene: Scene) -> Iterator[str]:
+    assembly = scene.assembly
+    reserved = {_supports_name(scene, part) for part in assembly.parts if has_supports(assembly, part)}
     for pair in assembly.pairs:
         if pair.name in reserved:
             place = designation("contact pair", pair)
             yield f"{place}: its name is reserved for the one-sided locators of a part; rename it"
 
 
-def _supports_name(part: Part) -> str:
-    return f"supports of {part.name}"
+def _supports_name(scene: Scene, part: Part) -> str:
+    return f"supports of {part.name}" + (f" in {scene.station}" if scene.station else "")
 
 
-def _support_pairs(parts: tuple[NominalPart, ...]) -> Iterator[ContactPoints]:
-    """Yield the one-sided locators of each free part as a contact pair."""
+def _support_pairs(parts: tuple[NominalPart, ...], scenes: Sequence[Scene]) -> Iterator[ContactPoints]:
+    """Yield the one-sided locators of each free part, or of each part of a free joint, as a contact pair."""
     start = 0
     for index, part in enumerate(parts):
-        supports = np.flatnonzero(part.locators.one_sided)
-        if part.free and supports.size:
+        owners = np.array(part.owners or (index,) * len(part.locators), dtype=int)
+        for owner in np.unique(owners[part.locators.one_sided]) if part.free else ():
+            supports = np.flatnonzero(part.locators.one_sided & (owners == owner))
             P, n = part.locators.points[supports], part.locators.directions[supports]
             offsets = _support_offsets(part.locators, start, supports)
-            name = _supports_name(part.part)
-            yield ContactPoints(name, index, part.parent, P, P, n, offsets, locators=start + supports)
+            scene = next(scene for scene in scenes if scene.station == part.station)
+            name = _supports_name(scene, parts[owner].part)
+            yield ContactPoints(name, int(owner), part.parent, P, P, n, offsets, locators=start + supports)
         start += len(part.locators)
 
 
@@ -219,15 +258,14 @@ def _support_offsets(locators: Locators, start: int, supports: np.ndarray) -> Of
     return Offsets.joined(offsets, len(supports)) if len(offsets) > 1 else offsets[0]
 
 
-def _nominal_part(assembly: Assembly, part: Part, meshes: Meshes, faults: _Faults) -> NominalPart | None:
+def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> NominalPart | None:
     """Return a part in its nominal place with its locators; None if it has no shape or is badly declared."""
     if part not in meshes or any(part.faults()):
         return None
     mesh = meshes[part]
-    R_WP = Rotation.from_rotvec(part.rotation).as_matrix()
-    t_WP = np.array(part.at)
+    R_WP, t_WP = placement_of(part)
     vertices, faces = field_surface(mesh)
-    location = assembly.location_of(part)
+    location = scene.assembly.location_of(part)
     locators: tuple[Locator, ...] = ()
     if location is not None and not any(location.faults()):
         if isinstance(location.scheme, ThreeTwoOne):
@@ -236,12 +274,12 @@ def _nominal_part(assembly: Assembly, part: Part, meshes: Meshes, faults: _Fault
         else:
             locators = location.scheme
     common = location.tolerance if location else None
-    nominal = _locators(part, locators, common, R_WP, t_WP)
+    nominal = _locators(scene, location, locators, common, part)
     if location is not None and location.floating:
         nominal = replace(nominal, floating=(_middle(mesh) @ R_WP.T + t_WP, float(mesh.scale)))
     if len(nominal):
-        faults.attempt(designation("part", part), nominal.check_independent)
-    parent = location.parent if location else None
+        place = designation("joint", location) if location and location.joint else designation("part", part)
+        faults.attempt(place, nominal.check_independent)
     return NominalPart(
         name=part.name,
         part=part,
@@ -251,8 +289,12 @@ def _nominal_part(assembly: Assembly, part: Part, meshes: Meshes, faults: _Fault
         faces=faces,
         locators=nominal,
         scheme=location.scheme if len(nominal) and location is not None else None,
-        parent=assembly.parts.index(parent) if parent in assembly.parts else None,
-        free=is_free(assembly, part),
+        parent=scene.parent(part),
+        free=is_free(scene.assembly, part),
+        located=scene.label(location.name if location else part.name),
+        movers=scene.movers(part),
+        station=scene.station,
+        owners=tuple(scene.index(locator.part or part) for locator in locators) if location and location.joint else (),
     )
 
 
@@ -261,18 +303,31 @@ def _middle(mesh: Any) -> np.ndarray:
     return mesh.area_faces @ mesh.triangles_center / mesh.area
 
 
+def placement_of(part: Part) -> Placement:
+    """Return R (3, 3) and t (3,) [mm] of a part in the nominal assembly."""
+    return Rotation.from_rotvec(part.rotation).as_matrix(), np.array(part.at)
+
+
 def _locators(
-    part: Part, declared: Sequence[Locator], common: Tolerance | None, R_WP: np.ndarray, t_WP: np.ndarray
+    scene: Scene, location: Location | None, declared: Sequence[Locator], common: Tolerance | None, part: Part
 ) -> Locators:
+    points = np.array([locator.point for locator in declared]).reshape(-1, 3)
+    directions = np.array([locator.direction for locator in declared]).reshape(-1, 3)
+    owners = [locator.part or part for locator in declared]
+    for owner in dict.fromkeys(owners):
+        rows = [other is owner for other in owners]
+        R_WP, t_WP = placement_of(owner)
+        points[rows], directions[rows] = points[rows] @ R_WP.T + t_WP, directions[rows] @ R_WP.T
     return Locators(
-        labels=tuple(f"{part.name}.{locator.name}" for locator in declared),
-        points=np.array([locator.point for locator in declared]).reshape(-1, 3) @ R_WP.T + t_WP,
-        directions=np.array([locator.direction for locator in declared]).reshape(-1, 3) @ R_WP.T,
+        labels=tuple(scene.label(f"{location.name if location else part.name}.{locator.name}") for locator in declared),
+        points=points,
+        directions=directions,
         tolerances=tuple(locator.tolerance or common or Tolerance(0.0) for locator in declared),
         stiffness=np.array([float(locator.stiffness) for locator in declared]),
         one_sided=np.array([locator.one_sided for locator in declared], dtype=bool),
         faces=(None,) * len(declared),
         grounds=(None,) * len(declared),
+        placing=location.placing if location else FIRST_ORDER,
     )
 
 

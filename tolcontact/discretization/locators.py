@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.declaration import Face, Locator, ThreeTwoOne, Tolerance
+from tolcontact.declaration.locator import BEST_FIT, FIRST_ORDER
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation
 from tolcontact.geometry.faces import Meshes, patch
@@ -28,6 +29,7 @@ class Locators:
     faces        for each locator the face of a feature that it stands against; None for a nominal face
     grounds      for each locator the feature of another part that it is on; None if it is on no feature
     floating     middle (3,) and size [mm] of a floating part; None for a part that its locators fix
+    placing      how the pose follows from them: one of PLACINGS
     """
 
     labels: tuple[str, ...]
@@ -39,6 +41,7 @@ class Locators:
     faces: tuple[FaceDeviation | None, ...]
     grounds: tuple[FaceDeviation | None, ...]
     floating: tuple[np.ndarray, float] | None = None
+    placing: str = FIRST_ORDER
 
     def __len__(self) -> int:
         return len(self.labels)
@@ -87,6 +90,8 @@ class Locators:
             return self._least_motion(J, self.floating[1]), centre
         if len(J) == 6:
             return np.linalg.inv(J), centre
+        if self.placing == BEST_FIT:
+            return np.linalg.pinv(J), centre
         exact, supports = J[~self.one_sided], J[self.one_sided]
         kkt = np.block([[supports.T @ supports, exact.T], [exact, np.zeros((len(exact), len(exact)))]])
         M = np.zeros((6, len(J)))

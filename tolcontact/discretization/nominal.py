@@ -5,14 +5,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-import trimesh
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
-from tolcontact.declaration import Assembly, Face, Locator, Measure, Part, Point, ThreeTwoOne
+from tolcontact.declaration import Assembly, Face, Measure, Part, Point
 from tolcontact.discretization.form_points import form_lengths, form_spacing
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.measured_geometry import NominalMeasurement
+from tolcontact.discretization.nominal_part import NominalPart
 from tolcontact.discretization.pair_form import PairForm
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
@@ -26,37 +26,6 @@ from tolcontact.geometry.surface import Surface
 EVERY_POINT = slice(None)
 RIM_REACH = 0.1  # of the size of the moving face: how far from it, nominally, rim points of the other face count
 GAPS_TOGETHER = 1 << 20  # that are computed at once
-
-
-@dataclass(frozen=True, eq=False)
-class NominalPart:
-    """A part in its nominal place.
-
-    vertices, faces      its surface (vertex, 3) [mm], (face, 3), fine enough to show displacement fields
-    locators             as `scheme` declares them; none if the part is fixed
-    parent               index of the part that it is located on; None for the ground
-    """
-
-    name: str
-    part: Part
-    placement: tuple[np.ndarray, np.ndarray]
-    mesh: trimesh.Trimesh
-    vertices: np.ndarray
-    faces: np.ndarray
-    locators: Locators
-    scheme: ThreeTwoOne | tuple[Locator, ...] | None
-    parent: int | None
-    free: bool
-
-    @cached_property
-    def body(self) -> trimesh.Trimesh:
-        """The mesh in its nominal place."""
-        return trimesh.Trimesh(self.placed(np.asarray(self.mesh.vertices)), self.mesh.faces, process=False)
-
-    def placed(self, p: np.ndarray) -> np.ndarray:
-        """Return nominal assembly coordinates (..., 3) [mm] of points (..., 3) in the part's own frame."""
-        R_WP, t_WP = self.placement
-        return p @ R_WP.T + t_WP
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,6 +195,10 @@ class Nominal:
     """An assembly with numbers.
 
     measurements   of each measure; None for those of points and expressions
+    scenes         the models of the stations, which share the parts: each has its own measures; none without stations
+    station        the name of the station, in the model of one
+
+    With stations a part has an entry among the `parts` in each station that holds it, station by station.
     """
 
     assembly: Assembly
@@ -234,6 +207,8 @@ class Nominal:
     measures: tuple[Measure, ...]
     _features: Features
     measurements: tuple[NominalMeasurement | None, ...] = ()
+    scenes: "tuple[Nominal, ...]" = ()
+    station: str = ""
     _face_pairs: dict[int, FacePair] = field(default_factory=dict, init=False)
 
     def face_pair(self, index: int) -> FacePair | None:
@@ -282,8 +257,33 @@ class Nominal:
         start = sum(len(earlier.locators) for earlier in self.parts[:part])
         return np.arange(start, start + len(self.parts[part].locators))
 
-    def part_index(self, part: Part) -> int:
-        return self.assembly.parts.index(part)
+    def part_index(self, part: Part, station: str = "") -> int:
+        """Return the index of a part: in a station, or in the last one that holds it."""
+        return self._indices[part, station or self.station]
+
+    @cached_property
+    def _indices(self) -> dict[tuple[Part, str], int]:
+        last = {(entry.part, ""): index for index, entry in enumerate(self.parts)}
+        return last | {(entry.part, entry.station): index for index, entry in enumerate(self.parts)}
+
+    @cached_property
+    def last_indices(self) -> np.ndarray:
+        """The index (part,) of each part of the assembly in the last station that holds it."""
+        return np.array([self._indices[part, ""] for part in self.assembly.parts], dtype=int)
+
+    def number(self, index: int) -> int:
+        """Return the number of a part of a station among the parts of the assembly."""
+        return self.assembly.parts.index(self.parts[index].part)
+
+    def may_differ(self, index: int) -> bool:
+        """Return whether contact may move a part: in its own station, or in an earlier one, which a joint hands on."""
+        part = self.parts[index]
+        return bool(part.movers) or (bool(self.scenes) and part.station != self.scenes[0].station)
+
+    @property
+    def last_parts(self) -> tuple[NominalPart, ...]:
+        """The parts of the assembly, each in the last station that holds it."""
+        return tuple(self.parts[index] for index in self.last_indices)
 
     @property
     def lines(self) -> list[np.ndarray]:

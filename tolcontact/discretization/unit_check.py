@@ -35,7 +35,7 @@ def warn_of_units(assembly: Assembly, shapes: Mapping[Part, Shape]) -> None:
 def _far_point(assembly: Assembly, part: Part, geometry: Mesh, shape: Shape) -> Iterator[str]:
     """Yield the point that lies farthest off the mesh, if all points would lie on it in another unit."""
     location = assembly.location_of(part)
-    scheme = location.scheme if location and isinstance(location.scheme, tuple) else ()
+    scheme = location.scheme if location and not location.joint and isinstance(location.scheme, tuple) else ()
     declared = [
         *((f'its locator "{locator.name}"', locator.point) for locator in scheme),
         *(

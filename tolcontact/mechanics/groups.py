@@ -1,11 +1,10 @@
 """Contact groups: parts that contact couples to each other. Each group has a QP of its own."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tolcontact.declaration import movers
 from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import Mobility
 from tolcontact.mechanics.displacement import moment_table
@@ -75,7 +74,7 @@ def contact_groups(nominal: Nominal, *, weighs_areas: bool) -> list[Group]:
 
     Contact points count by the areas that they stand for if `weighs_areas`; in the paper each counts once.
     """
-    chains = [tuple(nominal.part_index(mover) for mover in movers(nominal.assembly, part.part)) for part in nominal.parts]
+    chains = [part.movers for part in nominal.parts]
     clusters: list[set[int]] = []
     for pair in nominal.pairs:
         joined = set(chains[pair.moving]) | _movers_of(pair.reference, chains)
@@ -106,9 +105,8 @@ def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int,
         points[pair.moving].append(pair.P_m)
         if pair.reference is not None:
             points[pair.reference].append(pair.P_r)
-    # A part without contact points of its own turns about those of the last part that moves it.
     moving_points = np.vstack([pair.P_m for _, pair in members])
-    centre = {part: np.vstack(points[part] or points[(chains[part] or free)[-1]]).mean(axis=0) for part in parts}
+    centre = {part: np.vstack(_points_near(part, points, chains, free)).mean(axis=0) for part in parts}
     references = {pair.reference for _, pair in members}
     spread = float(np.sqrt(((moving_points - moving_points.mean(axis=0)) ** 2).sum(axis=1).mean()))
     length = spread or float(nominal.parts[members[0][1].moving].mesh.scale)
@@ -130,6 +128,14 @@ def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int,
         length=length,
         count=sum(len(side.points) for side in sides),
     )
+
+
+def _points_near(
+    part: int, points: Mapping[int, list[np.ndarray]], chains: Sequence[tuple[int, ...]], free: tuple[int, ...]
+) -> list[np.ndarray]:
+    """Return contact points of a part; without any, those of the last part that moves it, or of its joint."""
+    mover = (chains[part] or free)[-1]
+    return points[part] or points[mover] or [P for other in points if chains[other] == chains[mover] for P in points[other]]
 
 
 def _side(pair: int, part: int, points: np.ndarray, weights: np.ndarray, centre: np.ndarray, radius: float) -> Side:

@@ -117,6 +117,8 @@ def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list
 
     Raises ModelError if a user's function fails or does not return a scalar.
     """
+    if nominal.scenes:
+        return [expression for scene in nominal.scenes for expression in measured(scene, poses, deviations)]
     faults: list[str] = []
     expressions: list[ca.SX] = []
     for measure, measurement in zip(nominal.measures, nominal.measurements, strict=True):

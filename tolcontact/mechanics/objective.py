@@ -76,7 +76,7 @@ def _forces(setting: Setting, poses: Sequence[Pose]) -> Energy:
     nominal, group = setting.nominal, setting.group
     work, total = ca.SX(0), 0.0
     for force in nominal.assembly.forces:
-        part = nominal.part_index(force.at.part)
+        part = nominal.part_index(force.at.part, force.station)
         if part in group.parts and group.mobilities[group.position(part)].movers:
             p, k = ca.DM(nominal.position(force.at)), group.position(part)
             work += ca.dot(ca.DM(np.array(force.vector)), poses[k].apply(p) - setting.raw[k].apply(p))

@@ -61,6 +61,13 @@ def rotation(theta: ca.SX) -> ca.SX:
     return ca.SX.eye(3) + (ca.sin(angle) / angle) * K + (half**2 / 2) * (K @ K)
 
 
+def nearest_rotation(R: ca.SX, steps: int = 4) -> ca.SX:
+    """Return the rotation nearest to a matrix R (3, 3) that is nearly one, by Newton's iteration for its polar factor."""
+    for _ in range(steps):
+        R = R @ (3 * ca.SX.eye(3) - R.T @ R) / 2
+    return R
+
+
 def relative(X_WM: Pose, X_WR: Pose) -> Pose:
     """Return X_RM, the pose of the moving part in the frame of the reference part."""
     return Pose(X_WR.R.T @ X_WM.R, X_WR.R.T @ (X_WM.t - X_WR.t))

@@ -17,7 +17,8 @@ MAX_COMPARED = 1000  # pairs of bodies whose boxes overlap
 def body_overlaps(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence for each two bodies without a contact pair that overlap in the nominal assembly."""
     nominal = draws.program.nominal
-    in_contact = {frozenset((pair.moving, pair.reference)) for pair in nominal.pairs}
+    parts = [part.part for part in nominal.parts]
+    known = {frozenset((parts[pair.moving], parts[pair.reference])) for pair in nominal.pairs if pair.reference is not None}
     bodies = [SolidBody(part.body) for part in nominal.parts]
     bounds = np.array([body.bounds for body in bodies])
     thickness = (bounds[:, 1] - bounds[:, 0]).min(axis=1)
@@ -25,8 +26,10 @@ def body_overlaps(draws: TrialDraws) -> Iterator[str]:
     min_overlap = MIN_SHARE * np.minimum(thickness[:, None], thickness[None])
     candidates = np.argwhere(np.triu((common > min_overlap[..., None]).all(axis=2), 1))
     for i, j in itertools.islice(candidates, MAX_COMPARED):
-        if {i, j} in in_contact or not (bodies[i].is_closed and bodies[j].is_closed):
+        is_known = nominal.parts[i].station != nominal.parts[j].station or {parts[i], parts[j]} in known
+        if is_known or not (bodies[i].is_closed and bodies[j].is_closed):
             continue
+        known.add(frozenset((parts[i], parts[j])))
         facets = FACET_FACTOR * (bodies[i].facet_height + bodies[j].facet_height)
         ball = common_ball(bodies[i], bodies[j], max(float(min_overlap[i, j]), facets))
         if ball is not None:

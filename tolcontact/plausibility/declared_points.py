@@ -28,7 +28,7 @@ class DeclaredPoint(NamedTuple):
 def far_points(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence for each part with declared points far off its body, about the farthest one."""
     points = _declared_points(draws)
-    for nominal in draws.program.nominal.parts:
+    for nominal in draws.program.nominal.last_parts:
         declared = points[nominal.part]
         if not declared or _is_in_other_units(nominal, declared):
             continue
@@ -55,9 +55,10 @@ def unfit_directions(draws: TrialDraws) -> Iterator[str]:
     """
     for nominal in draws.program.nominal.parts:
         scheme = nominal.scheme
-        if not isinstance(scheme, tuple):
+        if not isinstance(scheme, tuple) or nominal.owners:
             continue
-        R_WP, place = nominal.placement[0], location_designation(draws.program.nominal.assembly, nominal.part)
+        R_WP = nominal.placement[0]
+        place = location_designation(draws.program.nominal.assembly, nominal.part, nominal.station)
         normals = [-_normals_at(nominal, np.array(locator.point)) for locator in scheme]
         on_surface = [(locator, inward) for locator, inward in zip(scheme, normals, strict=True) if len(inward)]
         fits = [bool((inward @ (R_WP.T @ np.array(locator.direction))).max() > 1 - ALONG) for locator, inward in on_surface]
@@ -79,7 +80,7 @@ def unfit_directions(draws: TrialDraws) -> Iterator[str]:
 
 def parts_in_other_units(draws: TrialDraws) -> list[Part]:
     """Return the parts of which a UnitsWarning says that their file is probably in other units."""
-    points, parts = _declared_points(draws), draws.program.nominal.parts
+    points, parts = _declared_points(draws), draws.program.nominal.last_parts
     return [nominal.part for nominal in parts if _is_in_other_units(nominal, points[nominal.part])]
 
 
@@ -94,8 +95,10 @@ def _declared_points(draws: TrialDraws) -> "defaultdict[Part, list[DeclaredPoint
     points: defaultdict[Part, list[DeclaredPoint]] = defaultdict(list)
     for nominal in draws.program.nominal.parts:
         for locator in nominal.scheme if isinstance(nominal.scheme, tuple) else ():
-            owner = f'{location_designation(draws.program.nominal.assembly, nominal.part)}: locator "{locator.name}"'
-            points[nominal.part].append(DeclaredPoint(owner, np.array(locator.point)))
+            place = location_designation(assembly, nominal.part, nominal.station)
+            points[locator.part or nominal.part].append(
+                DeclaredPoint(f'{place}: locator "{locator.name}"', np.array(locator.point))
+            )
     for measure in assembly.measures:
         for point in measure.points:
             if point.position is not None:

@@ -19,7 +19,7 @@ MAX_TILT = math.radians(45)  # by the locators, at three sigma
 
 def rotations(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence for each part whose rotation is more than a turn, or more than half a turn in whole numbers."""
-    for nominal in draws.program.nominal.parts:
+    for nominal in draws.program.nominal.last_parts:
         rotation = np.array(nominal.part.rotation)
         angle = float(np.linalg.norm(rotation))
         if angle > 2 * math.pi * (1 + 1e-6) or (angle > math.pi * (1 + 1e-6) and (rotation == np.round(rotation)).all()):
@@ -36,7 +36,7 @@ def wide_tolerances(draws: TrialDraws) -> Iterator[str]:
     for nominal in draws.program.nominal.parts:
         if nominal.part in in_other_units:
             continue
-        place = location_designation(draws.program.nominal.assembly, nominal.part)
+        place = location_designation(draws.program.nominal.assembly, nominal.part, nominal.station)
         size = float(np.ptp(nominal.mesh.bounds, axis=0).max())
         widths = _widths(nominal, place)
         owner, width = max(widths, key=lambda entry: entry[1], default=("", 0.0))

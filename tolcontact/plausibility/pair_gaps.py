@@ -58,7 +58,8 @@ def _face_pairs(draws: TrialDraws) -> Iterator[tuple[int, ContactPoints, float]]
 
 
 def _place(draws: TrialDraws, k: int) -> str:
-    return designation("contact pair", draws.program.nominal.assembly.pairs[k])
+    name = draws.program.nominal.pairs[k].name
+    return designation("contact pair", next(pair for pair in draws.program.nominal.assembly.pairs if pair.name == name))
 
 
 def _name(draws: TrialDraws, part: int | None) -> str:

@@ -133,7 +133,7 @@ def _bodies(results: xr.DataTree) -> Iterator[_Body]:
 
 def _declared(model: Assembly) -> tuple[list[_Body], Marks]:
     nominal = discretize(model)
-    return [_Body(part.name, part.vertices, part.faces) for part in nominal.parts], marks_of_nominal(nominal)
+    return [_Body(part.name, part.vertices, part.faces) for part in nominal.last_parts], marks_of_nominal(nominal)
 
 
 def _mesh(body: _Body) -> Any:

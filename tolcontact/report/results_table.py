@@ -85,7 +85,7 @@ def _row(measure: xr.Dataset, summary: xr.Dataset) -> ResultRow:
     nominal, lower, upper = (float(measure[name].values) for name in (terms.MEASURE_NOMINAL.name, *terms.MEASURE_LIMITS[:2]))
     scale = upper - lower if math.isfinite(upper - lower) else None
     return ResultRow(
-        str(measure["measure"].values),
+        full_name(measure),
         str(measure["measure_units"].values),
         str(measure["measure_quantity"].values),
         verdict_text(opinion),
@@ -121,11 +121,18 @@ def verdict_text(opinion: Verdict | None) -> str:
     return f"{UNDECIDED}: about {grouped(int(round(opinion.more, min(digits, 0))))} more realizations"
 
 
+def full_name(measure: xr.Dataset) -> str:
+    """Return the name of one measure of a summary, with its station if the assembly has stations."""
+    name, station = str(measure[terms.MEASURE].values), terms.MEASURE_STATION.name
+    return f"{name}, station {measure[station].values}" if station in measure.coords else name
+
+
 def verdict_lines(summary: xr.Dataset) -> Iterator[str]:
     """Yield the verdict on each measurement that has limits."""
     for name in summary["measure"].values:
-        if text := verdict_text(verdict_of(summary.sel(measure=name), summary.attrs["realizations"])):
-            yield f"{name}: {text} its limits" if not text.startswith(UNDECIDED) else f"{name}: {text}"
+        measure = summary.sel(measure=name)
+        if text := verdict_text(verdict_of(measure, summary.attrs["realizations"])):
+            yield f"{full_name(measure)}: {text}" + ("" if text.startswith(UNDECIDED) else " its limits")
 
 
 def overview_columns() -> list[str]:
@@ -137,7 +144,7 @@ def overview_rows(summary: xr.Dataset) -> list[list[str]]:
     """Return rows of each measurement and state: mean, 6 sigma, Ppk and share out of specification."""
     rows, units = [], share_units(summary)
     for measure, states in zip(summary["measure"].values, summary["statistic_value"], strict=True):
-        rows.append([str(measure), "", "", "", ""])
+        rows.append([full_name(summary.sel(measure=measure)), "", "", "", ""])
         for word, of_state in zip(terms.STATE_WORDS, states, strict=True):
             mean, spread, ppk, outside = of_state.sel(statistic=[terms.MEAN, terms.SIX_SIGMA, terms.PPK, terms.OUTSIDE]).values
             rows.append([f"  {word}", number(mean), number(spread), number(ppk), with_units(outside, units)])

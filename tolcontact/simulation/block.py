@@ -13,7 +13,8 @@ from tolcontact.contact import ContactResolver, Resolved
 from tolcontact.contact.record import Record, join_groups, untouched_numbers
 from tolcontact.mechanics import ENTRIES
 from tolcontact.readable import Readable
-from tolcontact.vocabulary import CORRECTED, Status
+from tolcontact.simulation.sequence import Beginning, hand_over, stages
+from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -27,8 +28,10 @@ class Block(Record, Readable):
     active        (n, pair): number of active contact points in the raw state
     carrying      (n, pair): number of contact points under load: with more than 1e-4 of the largest reaction
     reaction      (n, pair): sum of their reactions, in the units of the objective
-    status        (n,), Status
+    status        (n,), Status: with stations, that of the worst station
+    station_status  (n, station), Status
 
+    With stations, parts and pairs are those of all stations, one after the other, and measures as well.
     The numbers of the record (kkt_residual, iterations, starts, second_answers, searched) are 0 if contact touches nothing.
     """
 
@@ -41,6 +44,7 @@ class Block(Record, Readable):
     carrying: Int[Array, "n pair"] = field(metadata={"variable": terms.CARRYING})
     reaction: Float[Array, "n pair"] = field(metadata={"variable": terms.REACTION})
     status: Int[Array, " n"] = field(metadata={"variable": terms.STATUS})
+    station_status: Int[Array, "n station"]
 
     def __len__(self) -> int:
         return len(self.status)
@@ -63,6 +67,7 @@ class Block(Record, Readable):
         raw: Float[Array, "n part 12"],
         measured: Float[Array, "n measure"],
         pairs: int,
+        stations: int,
     ) -> "Block":
         """Return realizations at their raw poses (n, part, 12), with measures (n, measure), that contact does not change."""
         count, states = len(raw), len(terms.STATES)
@@ -77,6 +82,7 @@ class Block(Record, Readable):
             carrying=np.zeros((count, pairs), dtype=int),
             reaction=np.zeros((count, pairs)),
             status=np.full(count, terms.Status.UNTOUCHED, dtype=np.int8),
+            station_status=np.full((count, stations), terms.Status.UNTOUCHED, dtype=np.int8),
         )
 
     @classmethod
@@ -115,17 +121,28 @@ def simulate_block(
     placed = program.place(deviations=deviations)["poses"]
     raw = placed.reshape(len(deviations), len(program.nominal.parts), ENTRIES)
     measured, relative = _observe(program, raw, deviations)
-    block = Block.untouched(start, deviations, raw, measured, len(program.nominal.pairs))
-    worst = np.zeros(len(block), dtype=np.int8)
-    for resolver in resolvers:
-        resolved = resolver.resolve(raw, relative, deviations)
-        _put(block, resolver, resolved)
-        worst[resolved.touched] = np.maximum(worst[resolved.touched], _outcome(resolved))
-    unknown = ~np.isfinite(raw).all(axis=(1, 2))  # gaps that are not numbers touch nothing
-    worst[unknown], block.kkt_residual[unknown] = Outcome.UNSOLVED, np.inf
+    block = Block.untouched(start, deviations, raw, measured, len(program.nominal.pairs), len(program.stations))
+    sequence = stages(program)
+    outcomes_by_stage = np.zeros((len(block), len(sequence)), dtype=np.int8)
+    begin, is_unknown = Beginning(raw, relative), ~np.isfinite(raw).all(axis=(1, 2))  # gaps that are not numbers touch nothing
+    raw_relative = relative.copy() if program.stations else relative
+    for stage in sequence:
+        worst = outcomes_by_stage[:, stage.number]
+        changed = np.flatnonzero(outcomes_by_stage.any(axis=1))
+        is_placed_again = hand_over(program, stage, changed, begin, block.poses[:, CORRECTED], deviations)
+        for resolver in (resolvers[number] for number in stage.groups):
+            resolved = resolver.resolve(begin.poses, begin.relative, deviations)
+            _put(block, resolver, resolved)
+            if is_placed_again:
+                _put_raw(block, resolver, changed, raw_relative)
+            worst[resolved.touched] = np.maximum(worst[resolved.touched], _outcome(resolved))
+    is_unknown |= ~np.isfinite(begin.poses).all(axis=(1, 2))
+    outcomes_by_stage[is_unknown], block.kkt_residual[is_unknown] = Outcome.UNSOLVED, np.inf
+    worst = outcomes_by_stage.max(axis=1)
     touched = worst > Outcome.UNTOUCHED
     block.measured[touched, CORRECTED], _ = _observe(program, block.poses[touched, CORRECTED], deviations[touched])
-    block.status[:] = _statuses(program.method.is_exact)[worst]
+    statuses = _statuses(program.method.is_exact)
+    block.status[:], block.station_status[:] = statuses[worst], statuses[outcomes_by_stage[:, : len(program.stations)]]
     return block
 
 
@@ -137,6 +154,13 @@ def _put(block: Block, resolver: ContactResolver, resolved: Resolved) -> None:
     block.carrying[np.ix_(touched, pairs)] = resolved.carrying(resolver.spans)
     block.reaction[np.ix_(touched, pairs)] = resolved.reactions(resolver.spans)
     join_groups(block, touched, state)
+
+
+def _put_raw(block: Block, resolver: ContactResolver, rows: np.ndarray, relative: Float[Array, "n pair 12"]) -> None:
+    """Write gaps and active points of the raw state of some rows, whose contact began at handed-over poses."""
+    gaps, active = resolver.raw_contact(relative[rows], block.deviations[rows])
+    block.gap_min[rows[:, None], RAW, resolver.pairs] = gaps
+    block.active[rows[:, None], resolver.pairs] = active
 
 
 def _outcome(resolved: Resolved) -> Int[Array, " n"]:

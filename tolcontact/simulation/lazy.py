@@ -8,7 +8,6 @@ import lazy_loader
 import numpy as np
 
 from tolcontact.compilation import Program
-from tolcontact.simulation.block import Block
 from tolcontact.simulation.cluster import needs_dask
 from tolcontact.simulation.packing import Packed, pack_model, packed_program
 from tolcontact.simulation.threads import block_rows, map_blocks
@@ -38,7 +37,7 @@ def lazy_draws(program: Program, samples: int, seed: int) -> Any:
     return array.map_blocks(_drawn, dtype=float, chunks=chunks, model=_sent(program), seed=seed)
 
 
-def lazy_realizations(program: Program, deviations: Any, function: Callable[[Block], np.ndarray], kind: np.dtype) -> Any:
+def lazy_realizations(program: Program, deviations: Any, function: Callable[..., np.ndarray], kind: np.dtype) -> Any:
     """Return, as a lazy array, what `function` makes of blocks at deviations (realization, contributor): records of a kind."""
     return dask_arrays().map_blocks(
         _simulated, deviations, dtype=kind, drop_axis=1, meta=np.empty(0, kind), model=_sent(program), function=function
@@ -57,6 +56,6 @@ def _drawn(*, model: Packed, seed: int, block_info: dict) -> np.ndarray:
     return packed_program(model).draws(seed=seed, start=start, stop=stop)
 
 
-def _simulated(deviations: np.ndarray, *, model: Packed, function: Callable[[Block], np.ndarray]) -> np.ndarray:
+def _simulated(deviations: np.ndarray, *, model: Packed, function: Callable[..., np.ndarray]) -> np.ndarray:
     draws, program = GivenDraws(deviations), packed_program(model)
     return np.concatenate(list(map_blocks(function, program, samples=len(deviations), seed=0, threads=1, draws=draws)))

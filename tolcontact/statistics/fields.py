@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.declaration import movers
 from tolcontact.discretization import Nominal
 from tolcontact.statistics import intervals, kernel
 from tolcontact.vocabulary import CORRECTED, RAW, ArchiveVariable
@@ -75,10 +74,11 @@ class DisplacementFields:
 
     def __init__(self, nominal: Nominal, fields: str) -> None:
         """Start with no realizations; `fields` limits the magnitudes to a number of realizations, "some", "all" or "none"."""
-        self._parts = [_Surface(part.vertices) for part in nominal.parts]
+        self._indices = nominal.last_indices
+        self._parts = [_Surface(part.vertices) for part in nominal.last_parts]
         self._magnitudes = [_magnitudes(fields, len(part)) for part in self._parts]
         # A part that contact cannot move has one field.
-        self._states = [[RAW, CORRECTED] if movers(nominal.assembly, part.part) else [RAW] for part in nominal.parts]
+        self._states = [[RAW, CORRECTED] if nominal.may_differ(index) else [RAW] for index in nominal.last_indices]
         self.start_over()
 
     def start_over(self) -> None:
@@ -109,7 +109,7 @@ class DisplacementFields:
         """Return the sums of one block, from realization `start` on, at poses (n, state, part, 12). Threads may share it."""
         return [
             [part.sums(poses[:, state, index], max(0, count - start)) for state in states]
-            for index, (part, states, count) in enumerate(zip(self._parts, self._states, self._magnitudes, strict=True))
+            for index, part, states, count in zip(self._indices, self._parts, self._states, self._magnitudes, strict=True)
         ]
 
     def merge(self, sums: BlockSums) -> None:

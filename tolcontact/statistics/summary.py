@@ -129,6 +129,7 @@ def _coordinates(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int
             for name, values in zip(terms.MEASURE_LIMITS, zip(*limits(rows), strict=True), strict=True)
         },
         terms.QUANTITY.name: (terms.MEASURE, _quantities(rows)),
+        **{label.name: (label.dims, rows[label.name].values) for label in terms.OF_STATIONS if label.name in rows},
     }
 
 

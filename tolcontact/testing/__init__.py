@@ -72,10 +72,11 @@ def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) ->
         largest, place, meetings = 0.0, "", _meetings(tree)
         for number, name in enumerate(archived[terms.PAIR].values):
             pair = ArchivedPair(tree, number, *meetings.get(number, (None, None)))
+            rows_of_pair = _rows_in_station(tree, rows, number)
             count = max(1, MAX_GAPS // len(pair.normal))
             for start in range(0, len(comparable), count):
                 piece = slice(start, start + count)
-                errors = np.abs(_least_gaps(pair, rows, piece) - archived[piece, :, number].values)[comparable[piece]]
+                errors = np.abs(_least_gaps(pair, rows_of_pair, piece) - archived[piece, :, number].values)[comparable[piece]]
                 errors[np.isnan(errors)] = np.inf
                 if errors.max(initial=0.0) > largest:
                     largest = float(errors.max())
@@ -110,6 +111,7 @@ def assert_same_run(a: Results, b: Results, *, variables: Sequence[str] | None =
         if sizes[0] != sizes[1]:
             raise AssertionError(f"the runs have {sizes[0]} and {sizes[1]} realizations")
         rows = _rows(expected), _rows(actual)
+        names += [name for name in {**rows[0], **rows[1]} if name.startswith(f"{terms.STATIONS_GROUP}/")]
         texts = [_difference(name, *rows, _numbers(expected)) for name in names if variables is None or name in variables]
     differences = [text for text in texts if text]
     if differences:
@@ -132,9 +134,29 @@ def _opened(results: Results) -> Iterator[xr.DataTree]:
 
 
 def _rows(tree: xr.DataTree) -> Rows:
-    """Return the variables of realizations that are kept."""
+    """Return the variables of realizations that are kept; those of stations with the paths of their groups."""
     groups = [tree.to_dataset(), *(tree.children[name].to_dataset() for name in ("sample",) if name in tree.children)]
-    return {str(name): values for group in groups for name, values in group.data_vars.items()}
+    stations = tree.children[terms.STATIONS_GROUP].children.values() if terms.STATIONS_GROUP in tree.children else ()
+    rows = {str(name): values for group in groups for name, values in group.data_vars.items()}
+    return rows | {
+        f"{group.path.lstrip('/')}/{name}": values
+        for group in stations
+        for name, values in group.to_dataset().data_vars.items()
+    }
+
+
+def _rows_in_station(tree: xr.DataTree, rows: Rows, pair: int) -> Rows:
+    """Return the variables of realizations with the poses of the station in which a pair may touch."""
+    if terms.PAIR_STATION.name not in rows:
+        return rows
+    group = terms.station_group(str(rows[terms.PAIR_STATION.name].values[pair]))
+    parts = tree.to_dataset()[terms.PART].values
+    poses = {
+        variable.name: rows[f"{group}/{stored.name}"].rename({terms.STATION_PART: terms.PART}).reindex({terms.PART: parts})
+        for variable, stored in zip(terms.POSES, terms.STATION_POSES, strict=True)
+        if f"{group}/{stored.name}" in rows
+    }
+    return {**rows, **poses}
 
 
 def _numbers(tree: xr.DataTree) -> np.ndarray:

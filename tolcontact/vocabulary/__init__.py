@@ -5,6 +5,7 @@ from tolcontact.vocabulary.archive import *  # noqa: F403 (one namespace, of whi
 from tolcontact.vocabulary.form import *  # noqa: F403
 from tolcontact.vocabulary.labels import *  # noqa: F403
 from tolcontact.vocabulary.labels import ArchiveVariable as ArchiveVariable
+from tolcontact.vocabulary.stations import *  # noqa: F403
 from tolcontact.vocabulary.summary import *  # noqa: F403
 from tolcontact.vocabulary.surface import *  # noqa: F403
 from tolcontact.vocabulary.variation import *  # noqa: F403

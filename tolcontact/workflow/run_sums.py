@@ -89,7 +89,7 @@ ReducedBlock = tuple[StoredBlock, tuple[BlockSums, TouchingCounts]]
 class _BlockReduction:
     """Reduction of a block, where it is simulated, to the rows that are stored and to sums.
 
-    kept      names of the stored variables
+    kept      labels of the stored variables
     counted   number of realizations, from the first of the run, in which touching points are counted
     """
 
@@ -103,7 +103,7 @@ class _BlockReduction:
 
     def __call__(self, program: Program, block: Block) -> ReducedBlock:
         counts = count_in_block(program, block, self.counted)
-        return stored(block, self.kept), (self.fields.sums(block.poses, block.start), counts)
+        return stored(block, self.kept, program.nominal), (self.fields.sums(block.poses, block.start), counts)
 
 
 class RunSums:
@@ -126,13 +126,11 @@ class RunSums:
 
     def start_from(self, writer: ArchiveWriter) -> bool:
         """Start from the last checkpoint of an archive, and return whether it has one."""
-        kept = tuple(variable.name for variable in writer.kept)
+        kept = {row.variable for row in writer.kept}
         # Touching points are known only where a reader of the archive could compute gaps again.
-        is_known = terms.ROTATION.name in kept and (
-            terms.DEVIATION.name in kept or not gaps_need_deviations(self._program.nominal)
-        )
+        is_known = terms.ROTATION in kept and (terms.DEVIATION in kept or not gaps_need_deviations(self._program.nominal))
         counted = counted_realizations(self._program.nominal) if is_known else 0
-        self.of_blocks = _BlockReduction(kept, self._fields, counted)
+        self.of_blocks = _BlockReduction(tuple(row.label for row in writer.kept), self._fields, counted)
         checkpoint = writer.take_up()
         self._fields.go_on_from(checkpoint)
         self._touching = TouchingShares(self._points)

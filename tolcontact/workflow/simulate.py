@@ -1,6 +1,8 @@
 """Lazy realizations: a dataset whose chunks dask simulates when they are needed."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -82,9 +84,13 @@ class _Records:
     def kind(self) -> np.dtype:
         return np.dtype(list(self.fields))
 
-    def __call__(self, block: Block) -> np.ndarray:
+    def bound_to(self, program: Program) -> Callable[[Block], np.ndarray]:
+        """Return the function of a block of that program."""
+        return partial(self, program)
+
+    def __call__(self, program: Program, block: Block) -> np.ndarray:
         records = np.empty(len(block), self.kind)
-        for name, values in row_values(block, [name for name, *_ in self.fields]).items():
+        for name, values in row_values(block, [name for name, *_ in self.fields], program.nominal).items():
             records[name] = values
         return records
 

@@ -44,10 +44,11 @@ SCRIPTS = {
         "data.js",
         "labels.js",
         "viewer.js",
+        "stations.js",
         "charts.js",
         "report.js",
     ),
-    "view": ("vendor/three.min.js", "data.js", "labels.js", "viewer.js", "features.js", "view.js"),
+    "view": ("vendor/three.min.js", "data.js", "labels.js", "viewer.js", "stations.js", "features.js", "view.js"),
     "compare": ("vendor/plotly-basic.min.js", "data.js", "charts.js", "compare.js"),
 }
 RUN = ("solver", "resolution", "objective", "regularization", "eta", "active_set", "search", "method_from", "sampler", "seed",
@@ -103,6 +104,7 @@ def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock |
         "max_rows": MAX_ROWS,
         "run": {name: str(results.attrs[name]) for name in RUN if name in results.attrs},
         "missing": _missing(scene),
+        "stations": scene["stations"],
     }
     data = {
         "scene": scene,
@@ -127,8 +129,9 @@ def view_page(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]
         "has_features": any(part.toleranced for part in assembly.parts),
         "pairs": gap_rows(nominal),
         "file": _file(assembly, nominal, faults),
+        "stations": (scene := view_of(assembly, nominal, others))["stations"],
     }
-    return _page("view", values, {"scene": view_of(assembly, nominal, others), "charts": []})
+    return _page("view", values, {"scene": scene, "charts": []})
 
 
 def nominal_and_faults(assembly: Assembly) -> tuple[Nominal | None, tuple[str, ...]]:

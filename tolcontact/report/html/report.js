@@ -6,6 +6,8 @@ const MOST_PORTRAITS = 40;
 
 function drive(viewer) {
   const one = data.scene.realizations, motions = one.motions && unpacked(one.motions);
+  const ofStations = data.scene.stations.map((station) => station.motions && unpacked(station.motions));
+  const stations = new Stations(viewer, () => moved());
   const gaps = unpacked(one.gaps), measured = unpacked(one.measured), residual = unpacked(one.residual).values;
   const state = () => Number(document.querySelector("input[name=state]:checked").value);
   byId("which").max = Math.max(one.names.length - 1, 0);
@@ -41,7 +43,7 @@ function drive(viewer) {
       one.names[k], `status: ${one.status[k]}, residual ${figure(residual[k])} mm`, deepest, ...values,
     ].join("\n");
     viewer.bend(k - one.worstCases, Number(byId("factor").value));
-    return viewer.move(motions, k, seen, Number(byId("factor").value), own.map((gap) => gap < -1e-6));
+    return viewer.move(ofStations[stations.chosen] ?? motions, k, seen, Number(byId("factor").value), own.map((gap) => gap < -1e-6));
   }
 
   const both = () => { painted(); moved(); };
@@ -59,7 +61,10 @@ function drive(viewer) {
     if (stop) playing = clearInterval(playing) ?? null;
     else {
       byId("single").checked = true;
-      playing = setInterval(() => { byId("which").value = (Number(byId("which").value) + 1) % one.names.length; both(); }, 300);
+      playing = setInterval(() => {
+        if (stations.next()) byId("which").value = (Number(byId("which").value) + 1) % one.names.length;
+        both();
+      }, 300);
     }
     byId("play").textContent = stop ? "play" : "stop";
     byId("play").setAttribute("aria-pressed", String(!stop));

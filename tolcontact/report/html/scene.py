@@ -17,6 +17,7 @@ from tolcontact.report.html.decimation import coarser, triangle_budgets
 from tolcontact.report.html.feature_list import feature_lists
 from tolcontact.report.html.form_scene import MAX_GAPS, SingleStates
 from tolcontact.report.html.single_realizations import SingleRealization, single_realizations
+from tolcontact.report.html.station_scenes import station_poses, stations_of, stations_of_nominal
 from tolcontact.statistics import touching
 
 Packed = dict[str, Any]
@@ -36,8 +37,11 @@ def scene_of(results: xr.DataTree, summary: xr.Dataset) -> Scene:
     singles = single_realizations(results)
     states = SingleStates(results, np.array([single.row for single in singles], dtype=int))
     scene = {
-        "parts": _parts(results, states), **packed_marks(marks_of(results)), "realizations": _realizations(results, singles),
-    }  # fmt: skip
+        "parts": _parts(results, states),
+        **packed_marks(marks_of(results)),
+        "realizations": _realizations(results, singles),
+        "stations": _stations(results, singles),
+    }
     _add_contact(scene["contacts"], results, summary)
     _add_gaps(scene["contacts"], states, len(singles))
     return {**scene, "reactionUnits": summary["reaction"].attrs["units"]}
@@ -127,6 +131,22 @@ def _realizations(results: xr.DataTree, singles: list[SingleRealization]) -> Sce
     return entries
 
 
+def _stations(results: xr.DataTree, singles: list[SingleRealization]) -> list[Scene]:
+    """Return the scenes of stations; archived worst cases, which have no poses there, are not drawn."""
+    worst = archived_analysis(results, terms.WORST_CASE)
+    cases, order = (
+        0 if worst is None else worst.sizes[terms.CASE],
+        np.argsort([single.row for single in singles], kind="stable"),
+    )
+    rows, rank = np.array([single.row for single in singles], dtype=int)[order], np.argsort(order, kind="stable")
+    stations = stations_of(results)
+    for station in stations:
+        if (poses := station_poses(results, station["name"], rows)) is not None:
+            R, t = (np.pad(a[rank], [(cases, 0), *[(0, 0)] * (a.ndim - 1)], constant_values=np.nan) for a in poses)
+            station["motions"] = _motions(R - np.eye(3), t)
+    return stations
+
+
 def _motions(R: np.ndarray, t: np.ndarray) -> Packed:
     return packed(np.concatenate([R.reshape(*R.shape[:-2], 9), t], axis=-1))
 
@@ -139,6 +159,7 @@ def view_of(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) 
     return {
         "parts": [_drawn_part(part, image, faulty) for part, image in previews.items()],
         "toleranced": feature_lists(assembly, {part: image.mesh for part, image in previews.items()}),
+        "stations": stations_of_nominal(nominal),
         **packed_marks(marks),
     }
 

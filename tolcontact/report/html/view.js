@@ -61,6 +61,7 @@ function gaps(viewer) {
 
 const viewer = new Viewer(data.scene);
 control(viewer);
+window.stations = new Stations(viewer, () => {});
 gaps(viewer);
 viewer.paint("", 3, CORRECTED);
 pick(viewer, new FeatureList(viewer));

@@ -148,11 +148,14 @@ class Viewer {
       for (const at of measure.points) {
         const ball = new THREE.Mesh(shape, material);
         ball.position.set(...at);
+        ball.name = measure.name;
         group.add(ball);
       }
       const ends = measure.lines.flat().map((at) => new THREE.Vector3(...at));
-      group.add(new THREE.LineSegments(new THREE.BufferGeometry().setFromPoints(ends), stroke));
-      group.add(labelOf(measure.name, measure.at));
+      const lines = new THREE.LineSegments(new THREE.BufferGeometry().setFromPoints(ends), stroke);
+      const label = labelOf(measure.name, measure.at);
+      lines.name = label.name = measure.name;
+      group.add(lines, label);
     }
     this.scene.add(group);
     return group;

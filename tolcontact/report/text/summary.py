@@ -10,7 +10,7 @@ from rich.padding import Padding
 from rich.text import Text
 
 from tolcontact.report.figures import NO_INTERVAL, grouped, limits_text, number, percent, settled, share
-from tolcontact.report.results_table import overview_columns, overview_rows, verdict_lines
+from tolcontact.report.results_table import full_name, overview_columns, overview_rows, verdict_lines
 from tolcontact.report.text.table import FigureTable
 from tolcontact.vocabulary import (
     ABOVE,
@@ -58,7 +58,7 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | FigureTable | Padding]:
     yield FigureTable(overview_columns(), overview_rows(summary))
     yield from map(Text, verdict_lines(summary))
     for measure in summary["measure"].values:
-        yield from _measure_section(summary.sel(measure=measure), str(measure))
+        yield from _measure_section(summary.sel(measure=measure))
     magnitudes = int(summary["magnitude_realizations"])
     yield Text("\n6 sigma of the displacement magnitude over the surface of each part (mm)", style="bold")
     if magnitudes < count:
@@ -90,10 +90,10 @@ def _limits(summary: xr.Dataset) -> Iterator[Text | FigureTable]:
             yield from map(Text, notes(rows))
 
 
-def _measure_section(measure: xr.Dataset, name: str) -> Iterator[Text | FigureTable]:
+def _measure_section(measure: xr.Dataset) -> Iterator[Text | FigureTable]:
     units, quantity = str(measure["measure_units"].values), str(measure["measure_quantity"].values)
     subtitle = ", ".join(text for text in (quantity, limits_text(measure)) if text)
-    yield Text(f"\n{name} ({units}){': ' if subtitle else ''}{subtitle}", style="bold")
+    yield Text(f"\n{full_name(measure)} ({units}){': ' if subtitle else ''}{subtitle}", style="bold")
     rows = measure_rows(measure)
     yield FigureTable(["", *STATE_WORDS, "change"], rows)
     yield from map(Text, notes(rows))

@@ -1,0 +1,50 @@
+"""Pages of assemblies with stations: one scene for each, and a play that goes through them."""
+
+import pytest
+
+import tolcontact as tc
+from tests.cases import stations as cases
+from tests.test_report import browser, data_of, needs_browser, open_page  # noqa: F401 (fixtures)
+from tolcontact.discretization import discretize
+from tolcontact.report import write_page, write_view
+
+SCENES = {"weld": ([0, 1], ["lap"], ["step"]), "check": ([0, 1, 2], [], ["flush"])}
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pages")
+    model = cases.rail()
+    results = tc.run(model, samples=60, seed=1, solver="daqp", surfaces=0)
+    write_page(results, tc.summarize(results), folder / "report.html")
+    write_view(model, discretize(model), [], folder / "view.html")
+    return folder
+
+
+@pytest.mark.parametrize("kind", ["report", "view"])
+def test_a_page_has_one_scene_for_each_station(kind, pages):
+    scenes = data_of((pages / f"{kind}.html").read_text(encoding="utf-8"))["scene"]["stations"]
+    assert {s["name"]: (s["parts"], s["contacts"], s["measures"]) for s in scenes} == SCENES
+    assert [len(scene["locators"]) for scene in scenes] == [12, 12]
+    assert all(label.startswith(f"{scene['name']}.") for scene in scenes for label in scene["locators"])
+    assert kind == "view" or all(scene["motions"]["shape"][1:] == [2, 3, 12] for scene in scenes)
+
+
+@pytest.mark.slow
+@needs_browser
+def test_the_station_is_chosen_and_a_play_goes_through_all(pages, open_page):  # noqa: F811
+    opened = open_page(pages / "report.html", 1280)
+    visible = "window.viewer.parts.map((part) => part.group.visible)"
+    assert opened.evaluate(visible) == [True, True, True]
+    opened.select_option("#station", "0")
+    assert opened.evaluate(visible) == [True, True, False]
+    assert opened.evaluate("window.viewer.pairs[0].points.visible")
+    opened.locator("#play").click()
+    shown = set()
+    for _ in range(100):
+        shown.add((opened.locator("#station").input_value(), opened.locator("#which").input_value()))
+        if {("0", "1"), ("1", "1")} <= shown:
+            break
+        opened.wait_for_timeout(50)
+    assert {("0", "1"), ("1", "1")} <= shown
+    opened.locator("#play").click()

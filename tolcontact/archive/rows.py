@@ -1,0 +1,70 @@
+"""Which variables of each realization an archive holds, in which groups, and their values."""
+
+from collections.abc import Collection, Iterable
+from typing import NamedTuple
+
+import netCDF4
+import numpy as np
+
+from tolcontact import poses as pose, vocabulary as terms
+from tolcontact.discretization import Nominal
+from tolcontact.simulation import Block
+from tolcontact.vocabulary import ArchiveVariable
+
+OMITTED = {"measures": {*terms.POSES, *terms.STATION_POSES, terms.DEVIATION}, "poses": {terms.DEVIATION}, "all": set()}
+
+
+class Row(NamedTuple):
+    """A variable of realizations in the group of that path; empty for the root."""
+
+    group: str
+    variable: ArchiveVariable
+
+    @property
+    def label(self) -> str:
+        """The name of the variable, with the group if several groups have it."""
+        return f"{self.group}/{self.variable.name}" if self.variable in terms.STATION_ROWS else self.variable.name
+
+
+def kept_rows(nominal: Nominal, keep: str) -> tuple[Row, ...]:
+    """Return what an archive holds of each realization with the option `keep`."""
+    stations = [terms.station_group(scene.station) for scene in nominal.scenes]
+    rows = [Row(group_of_rows(variable), variable) for variable in terms.BY_REALIZATION]
+    rows += [Row(group, variable) for group in stations for variable in terms.STATION_ROWS]
+    return tuple(row for row in rows if row.variable not in OMITTED[keep])
+
+
+def group_of_rows(variable: ArchiveVariable) -> str:
+    """Return the path of the group that holds a variable of realizations, if it belongs to no station."""
+    return "sample" if variable is terms.DEVIATION else ""
+
+
+def stored_variables(file: netCDF4.Dataset) -> Iterable[tuple[netCDF4.Variable, ArchiveVariable]]:
+    """Yield the variables of realizations in a file, as they are stored and as they are defined."""
+    stations = file[terms.STATIONS_GROUP].groups.values() if terms.STATIONS_GROUP in file.groups else ()
+    groups = [(file, terms.ROWS), (file["sample"], (terms.DEVIATION,)), *((group, terms.STATION_ROWS) for group in stations)]
+    for group, variables in groups:
+        for variable in variables:
+            if variable.name in group.variables:
+                yield group[variable.name], variable
+
+
+def row_values(block: Block, labels: Collection[str], nominal: Nominal) -> dict[str, np.ndarray]:
+    """Return the values of variables of a block as they are stored, by their labels, in the order of an archive."""
+    values = {Row(group_of_rows(variable), variable): array for variable, array in block.values().items()}
+    if nominal.scenes:
+        values |= _station_values(block, nominal)
+        poses = block.poses[:, :, nominal.last_indices]
+        values |= {Row("", terms.ROTATION): pose.rotation(poses), Row("", terms.TRANSLATION): pose.translation(poses)}
+    rows = [row for row in kept_rows(nominal, "all") if row.label in labels]
+    return {row.label: np.ascontiguousarray(values[row], dtype=row.variable.kind) for row in rows}
+
+
+def _station_values(block: Block, nominal: Nominal) -> dict[Row, np.ndarray]:
+    values: dict[Row, np.ndarray] = {}
+    for number, scene in enumerate(nominal.scenes):
+        group = terms.station_group(scene.station)
+        poses = block.poses[:, :, [k for k, part in enumerate(nominal.parts) if part.station == scene.station]]
+        arrays = pose.translation(poses), pose.rotation(poses), block.station_status[:, number]
+        values |= {Row(group, variable): array for variable, array in zip(terms.STATION_ROWS, arrays, strict=True)}
+    return values

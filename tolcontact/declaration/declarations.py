@@ -1,0 +1,113 @@
+"""The declarations that an assembly and each of its stations take: locations, contact pairs, forces and measures."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+from tolcontact.declaration.contact_pair import ContactPair
+from tolcontact.declaration.force import Force
+from tolcontact.declaration.joint import Joint
+from tolcontact.declaration.locator import FIRST_ORDER, Location, Locator, ThreeTwoOne
+from tolcontact.declaration.measure import Measure
+from tolcontact.declaration.measurement import Measurement
+from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
+from tolcontact.declaration.tolerance import tolerance as _tolerance
+from tolcontact.declaration.values import direction, script_line, vector as _vector
+
+T = TypeVar("T")
+
+
+class Declarations:
+    """The methods that declare how parts are located, where they touch, what presses them, and what is measured."""
+
+    _station = ""  # the name of the station; empty for an assembly by itself
+
+    def _add(self, name: str, thing: T) -> T:
+        """Append a declaration to a list of the assembly and return it."""
+        raise NotImplementedError
+
+    @property
+    def _units(self) -> dict[str, str]:
+        """The units of the measures declared so far, by name."""
+        raise NotImplementedError
+
+    def locate(
+        self,
+        part: Part | Joint,
+        scheme: ThreeTwoOne | Sequence[Locator],
+        *,
+        tolerance: Any = None,
+        on: Part | Feature | Joint | None = None,
+        floating: bool = False,
+        placing: str = FIRST_ORDER,
+    ) -> Location:
+        """Locate a part by six locators, or by fewer if it is `floating`, on the ground or `on` another part (see Location).
+
+        On a feature of another part, it also follows the deviations of that feature. A joint is located by points of its parts.
+        `tolerance` applies to each locator without a tolerance: the full width of its zone [mm], limit deviations ("±0.1",
+        "+0.1/-0.05"), a Tolerance, or a frozen scipy.stats distribution.
+        `placing` is "first order", "exact" or "best fit".
+        """
+        expect("locate: the first argument", part, Part | Joint, "a part")
+        expect(
+            f'locate "{part.name}": on', on, Part | Feature | Joint | None, "a part, a feature of it, or None for the ground"
+        )
+        scheme = scheme if isinstance(scheme, ThreeTwoOne) else tuple(scheme)
+        for locator in scheme if isinstance(scheme, tuple) else ():
+            expect(f'locate "{part.name}": a locator', locator, Locator, "tc.Locator(name, point, direction)")
+        zone = None if tolerance is None else _tolerance(tolerance)
+        expect(f'locate "{part.name}": floating', floating, bool, "True or False")
+        joint, part = (part.name, part.first) if isinstance(part, Joint) else ("", part)
+        ground = on.first if isinstance(on, Joint) else on
+        location = Location(part, scheme, zone, ground, script_line(), floating, self._station, joint, placing)
+        return self._add("locations", location)
+
+    def contact(
+        self,
+        name: str,
+        *,
+        moving: Face | Feature,
+        reference: Face | Feature,
+        points: int | str | None = None,
+        spacing: float | None = None,
+        within: float | None = None,
+        mu: float | None = None,
+    ) -> ContactPair:
+        """Declare that points of the `moving` face stay outside the `reference` face (see ContactPair)."""
+        for side, face in (("moving", moving), ("reference", reference)):
+            expect(f'contact "{name}": {side}', face, Face | Feature, 'part.face("+z"), or a feature')
+        sides = face_of(moving), face_of(reference)
+        return self._add("pairs", ContactPair(name, *sides, points, spacing, within, script_line(), mu, self._station))
+
+    def force(self, name: str, *, at: Point, vector: Any) -> Force:
+        """Declare a force `vector` [N], in the assembly frame, at a point of a part (see Force)."""
+        expect(f'force "{name}": at', at, Point, "part.point(x, y, z)")
+        return self._add("forces", Force(name, at, _vector(vector), script_line(), self._station))
+
+    def measure(
+        self,
+        name: str,
+        of: Point | Measurement | Callable[[Any], Any],
+        *,
+        to: Point | None = None,
+        along: Any = None,
+        tolerance: Any = None,
+        limits: Sequence[float | None] | None = None,
+        absolute: bool | None = None,
+        units: str | None = None,
+    ) -> Measure:
+        """Declare a measure of a point, of two points, of a measurement, or of a CasADi expression of the poses (see Measure).
+
+        `units` are those of an expression, by default mm. A measurement has its own.
+        """
+        axis = None if along is None else direction(along)
+        if units is None:
+            units = min(of.units_among(self._units), default="mm") if isinstance(of, Measurement) else "mm"
+        bounds: Any = tuple(limits) if isinstance(limits, list | tuple) else limits
+        measure = Measure(name, of, to, axis, tolerance, units, script_line(), bounds, absolute, self._station)
+        return self._add("measures", measure)
+
+
+def expect(label: str, value: Any, kind: Any, expected: str) -> None:
+    """Raise TypeError at the script's own line if an argument has a type that no other check could handle."""
+    if not isinstance(value, kind):
+        raise TypeError(f"{label} is a {type(value).__name__}; expected {expected}")

@@ -1,0 +1,47 @@
+"""Joints: parts that a station joined to one rigid body."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from tolcontact.declaration.part import Part
+from tolcontact.readable import Readable
+
+MIN_MEMBERS = 2
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Joint(Readable):
+    """Parts that keep, after the station that joins them, the poses relative to each other that they had there.
+
+    `members` are the joined parts. The first one carries the others: poses of the joint are its poses. A joint that is joined
+    again is stated by its parts.
+    """
+
+    name: str
+    members: tuple[Part, ...]
+    station: str
+    declared_at: str = ""
+    noun: ClassVar[str] = "joint"
+
+    @property
+    def first(self) -> Part:
+        """The part that carries the others."""
+        return self.members[0]
+
+    def faults(self) -> Iterator[str]:
+        if len(self.members) < MIN_MEMBERS:
+            yield f"it has {len(self.members)} part; join at least {MIN_MEMBERS}"
+        for part in dict.fromkeys(self.members):
+            if self.members.count(part) > 1:
+                yield f'station "{self.station}" joins part "{part.name}" {self.members.count(part)} times in it; name it once'
+            if part.fixed:
+                yield f'part "{part.name}" is fixed, so no later station can move it; locate it in station "{self.station}"'
+
+    def __str__(self) -> str:
+        return f"joint {self.name}: {', '.join(part.name for part in self.members)}, joined in station {self.station}"
+
+
+def parts_of(bodies: Sequence[Part | Joint]) -> tuple[Part, ...]:
+    """Return the parts of which bodies consist, in their order."""
+    return tuple(part for body in bodies for part in (body.members if isinstance(body, Joint) else (body,)))

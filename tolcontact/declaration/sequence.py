@@ -1,0 +1,161 @@
+"""The sequence of stations: which parts are present in each, as which bodies, and what is wrong with that.
+
+A station is a model by itself: its parts, with the locations, contact pairs, forces and measures that it declares, and the
+joints that it locates.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Protocol
+
+from tolcontact.declaration.joint import Joint
+from tolcontact.declaration.locator import Location
+from tolcontact.declaration.part import Part
+from tolcontact.declaration.station import Station
+from tolcontact.declaration.values import key_faults, repetitions
+from tolcontact.errors import designation
+
+SETTINGS = {"locations": "locate", "pairs": "contact", "measures": "measure", "forces": "force"}  # lists, and their methods
+
+
+class Line(Protocol):
+    """The assembly that the stations build."""
+
+    parts: Any
+    locations: Any
+    pairs: Any
+    measures: Any
+    forces: Any
+    stations: Any
+    joints: Any
+
+
+def joined_before(line: Line, station: Station) -> dict[Part, Joint]:
+    """Return the joint of each part that is joined when a station begins: the latest one."""
+    names = [earlier.name for earlier in line.stations[: line.stations.index(station)]]
+    # Of two joints of one station, which is a fault, the first one counts.
+    joints = [joint for name in names for joint in reversed(line.joints) if joint.station == name]
+    return {part: joint for joint in joints for part in joint.members}
+
+
+def settings_of(line: Line, station: Station) -> dict[str, list[Any]]:
+    """Return the declarations of a station by the name of their list."""
+    return {name: [thing for thing in getattr(line, name) if thing.station == station.name] for name in SETTINGS}
+
+
+def in_order(line: Line) -> dict[str, list[Any]]:
+    """Return the declarations of all stations by the name of their list, station by station."""
+    of_stations = [settings_of(line, station) for station in line.stations]
+    return {name: [thing for settings in of_stations for thing in settings[name]] for name in SETTINGS}
+
+
+def present_parts(line: Line, station: Station) -> tuple[Part, ...]:
+    """Return the parts in a station: those that it locates, with all parts of their joints, and fixed ones that it mentions.
+
+    Parts that no station holds are in the first one.
+    """
+    present = _held_parts(line, station)
+    if station is line.stations[0]:
+        held = {part for other in line.stations for part in _held_parts(line, other)}
+        present |= {part for part in line.parts if part not in held}
+    return tuple(part for part in line.parts if part in present)
+
+
+def _held_parts(line: Line, station: Station) -> set[Part]:
+    joined, settings = joined_before(line, station), settings_of(line, station)
+    located = {
+        part
+        for location in settings["locations"]
+        for part in (joined[location.part].members if location.part in joined else (location.part,))
+    }
+    mentioned = {part for things in settings.values() for thing in things for part in thing.parts}
+    return {part for part in line.parts if part in located or (part.fixed is True and part in mentioned)}
+
+
+def sequence_faults(line: Line) -> Iterator[str]:
+    """Yield the faults of the sequence: each names the station, the part and the script line."""
+    names = [station.name for station in line.stations]
+    yield from key_faults("station", names)
+    yield from key_faults("joint", [joint.name for joint in line.joints])
+    yield from repetitions("part or joint", [part.name for part in line.parts] + [joint.name for joint in line.joints])
+    for list_name, method in SETTINGS.items():
+        for thing in getattr(line, list_name):
+            if thing.station not in names:
+                yield f"{designation(thing.noun, thing)} belongs to no station; declare it in one: station.{method}(...)"
+    for joint in line.joints:
+        yield from (f"{designation(joint.noun, joint)}: {fault}" for fault in joint.faults())
+        if joint.station not in names:
+            yield f'{designation(joint.noun, joint)} refers to station "{joint.station}"; the stations are: {", ".join(names)}'
+    for station in line.stations:
+        yield from _station_faults(line, station)
+
+
+def _station_faults(line: Line, station: Station) -> Iterator[str]:
+    joined, settings = joined_before(line, station), settings_of(line, station)
+    if not settings["locations"]:
+        yield f"{designation(station.noun, station)}: it locates nothing; call {station.name}.locate(...)"
+    bodies: dict[Joint | Part, Location] = {}
+    for location in settings["locations"]:
+        yield from (f"{designation(location.noun, location)}: {fault}" for fault in _location_faults(location, joined, station))
+        body = joined.get(location.part, location.part)
+        if body in bodies:
+            earlier = bodies[body].declared_at or "an earlier location"
+            place = designation(location.noun, location)
+            yield f'{place}: station "{station.name}" locates it twice, first in {earlier}; locate it once'
+        bodies.setdefault(body, location)
+    present = present_parts(line, station)
+    for things in settings.values():
+        for thing in things:
+            for part in dict.fromkeys(thing.parts):
+                if part in line.parts and part not in present and not (isinstance(thing, Location) and part is thing.part):
+                    yield f"{designation(thing.noun, thing)}: {_absence(part, joined, station)}"
+    yield from _join_faults(line, station, present)
+
+
+def _location_faults(location: Location, joined: dict[Part, Joint], station: Station) -> Iterator[str]:
+    joint = joined.get(location.part)
+    if joint is not None and location.joint != joint.name:
+        body = f'joint "{location.joint}"' if location.joint else f'part "{location.part.name}"'
+        yield (
+            f'station "{station.name}" locates {body}, which is in joint "{joint.name}" since station "{joint.station}"; '
+            "locate that joint"
+        )
+    elif joint is None and location.joint:
+        yield f'station "{station.name}" locates joint "{location.joint}", which no earlier station joins'
+    elif joint is not None:
+        for locator in location.scheme if isinstance(location.scheme, tuple) else ():
+            if locator.part is not None and locator.part not in joint.members:
+                names = ", ".join(part.name for part in joint.members)
+                place = f'locator "{locator.name}" is at a point of part "{locator.part.name}"'
+                yield f"{place}; the parts of the joint are: {names}"
+    if joint is not None and location.parent in joint.members:
+        yield f'joint "{joint.name}" is located on its own part "{location.parent.name if location.parent else ""}"'
+
+
+def _join_faults(line: Line, station: Station, present: Sequence[Part]) -> Iterator[str]:
+    before = joined_before(line, station)
+    joints: dict[Part, Joint] = {}
+    for joint in line.joints:
+        if joint.station != station.name:
+            continue
+        place = designation(joint.noun, joint)
+        for part in dict.fromkeys(joint.members):
+            if part in joints:
+                yield (
+                    f'{place}: station "{station.name}" joins part "{part.name}" twice, first in joint "{joints[part].name}" '
+                    f"({joints[part].declared_at}); join all in one joint"
+                )
+                break
+            elif part not in present:
+                yield f"{place}: {_absence(part, before, station)}"
+            elif part in before and not set(before[part].members) <= set(joint.members):
+                yield (
+                    f'{place}: station "{station.name}" joins part "{part.name}", which is in joint "{before[part].name}" '
+                    f'since station "{before[part].station}"; join that joint'
+                )
+            joints.setdefault(part, joint)
+
+
+def _absence(part: Part, joined: dict[Part, Joint], station: Station) -> str:
+    """Return the fault of a part that a station needs and does not hold."""
+    body = f'joint "{joined[part].name}" with part "{part.name}"' if part in joined else f'part "{part.name}"'
+    return f'station "{station.name}" does not hold {body}; locate it there: {station.name}.locate(...)'

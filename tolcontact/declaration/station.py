@@ -1,0 +1,63 @@
+"""Stations: an assembly that is built in steps has one set of locations, contact pairs, measures and joints for each."""
+
+from collections.abc import Iterator
+from typing import Any, ClassVar, TypeVar
+
+from tolcontact.declaration.declarations import Declarations, expect
+from tolcontact.declaration.joint import Joint, parts_of
+from tolcontact.declaration.part import Part
+from tolcontact.declaration.values import script_line
+from tolcontact.readable import Readable
+
+T = TypeVar("T")
+
+
+class Station(Declarations, Readable):
+    """A step in which an assembly is built or measured: `assembly.station(name)` declares it, in the order of the steps.
+
+    Parts and joints are located anew in each station; a station that only measures is an inspection. Features belong to parts:
+    they deviate alike in all stations. A locator is a contributor of its own in each station, "weld.panel.A1".
+    """
+
+    name: str
+    declared_at: str
+    noun: ClassVar[str] = "station"
+
+    def __init__(self, name: str, declared_at: str = "") -> None:
+        self.name, self._station, self.declared_at = name, name, declared_at
+        self._assembly: Declarations | None = None
+
+    def belonging_to(self, assembly: Declarations) -> "Station":
+        """Let the station declare into the lists of an assembly, and return it."""
+        self._assembly = assembly
+        return self
+
+    def join(self, name: str, *bodies: Part | Joint) -> Joint:
+        """Declare that parts, or joints of earlier stations, are joined at the end of this station, and return the joint.
+
+        Later stations locate the joint by points of any of its parts.
+        """
+        for body in bodies:
+            expect(f'join "{name}": a body', body, Part | Joint, "parts and joints, as in weld.join(name, left, right)")
+        return self._add("joints", Joint(name, parts_of(bodies), self.name, script_line()))
+
+    def _add(self, name: str, thing: T) -> T:
+        if self._assembly is None:
+            raise TypeError(f'station "{self.name}" belongs to no assembly; declare it with assembly.station(name)')
+        return self._assembly._add(name, thing)
+
+    @property
+    def _units(self) -> dict[str, str]:
+        return {} if self._assembly is None else self._assembly._units
+
+    def faults(self) -> Iterator[str]:
+        if not isinstance(self.name, str):
+            yield f"name is {self.name!r}; expected a text"
+
+    def __eq__(self, other: Any) -> bool:
+        return self is other
+
+    __hash__ = object.__hash__
+
+    def __str__(self) -> str:
+        return f"station {self.name}"

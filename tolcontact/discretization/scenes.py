@@ -1,0 +1,56 @@
+"""Scenes: the models of stations, which share one list of parts. An assembly without stations is its only scene."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tolcontact.declaration import Assembly, Part, movers
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """The model of one station.
+
+    assembly   what it declares
+    station    its name; empty for an assembly without stations
+    first      index of its first part among the parts of all scenes
+    """
+
+    assembly: Assembly
+    station: str
+    first: int
+
+    def index(self, part: Part) -> int:
+        """Return the index of a part of the scene among the parts of all scenes."""
+        return self.first + self.assembly.parts.index(part)
+
+    def parent(self, part: Part) -> int | None:
+        """Return the index of the part that carries a part, or that it is located on; None on the ground."""
+        carrier = self.assembly.body_of(part)[0]
+        location = self.assembly.location_of(part)
+        parent = carrier if carrier is not part else location.parent if location else None
+        return self.index(parent) if parent in self.assembly.parts else None
+
+    def movers(self, part: Part) -> tuple[int, ...]:
+        """Return the indices of the free parts whose corrections move a part."""
+        return tuple(map(self.index, movers(self.assembly, part)))
+
+    def label(self, name: str) -> str:
+        """Return the name of something in this scene that is declared anew in each station."""
+        return f"{self.station}.{name}" if self.station else name
+
+
+def scenes_of(assembly: Assembly) -> tuple[Scene, ...]:
+    """Return the scenes of an assembly, in the order of its stations."""
+    models = assembly.scenes
+    names = [station.name for station in assembly.stations] or [""]
+    starts = [sum(len(earlier.parts) for earlier in models[:k]) for k in range(len(models))]
+    return tuple(map(Scene, models, names, starts))
+
+
+def carried(scenes: Sequence[Scene], scene: Scene, part: Part) -> tuple[int, int] | None:
+    """Return the indices of the part that carries a part, and of itself, in the station that joined them; None by itself."""
+    joint = next((joint for joint in scene.assembly.joints if part in joint.members[1:]), None)
+    if joint is None:
+        return None
+    source = next(other for other in scenes if other.station == joint.station)
+    return source.index(joint.first), source.index(part)

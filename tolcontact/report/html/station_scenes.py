@@ -1,0 +1,75 @@
+"""The scenes of stations: which parts and marks a station has, and where its parts stand in single realizations."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as terms
+from tolcontact.discretization import Nominal
+
+Scene = dict[str, Any]
+
+
+def stations_of(results: xr.DataTree) -> list[Scene]:
+    """Return the scene of each station of an archive; none without stations."""
+    if terms.STATIONS_GROUP not in results.children:
+        return []
+    rows, groups = results.to_dataset(), results[terms.STATIONS_GROUP].children.values()
+    names = [str(group.attrs["station"]) for group in groups]
+    order = {str(part): number for number, part in enumerate(rows[terms.PART].values)}
+    locators = [str(name) for name in results["sample"].to_dataset()[terms.LOCATOR].values]
+    return [
+        {
+            "name": name,
+            "parts": [order[str(part)] for part in group.to_dataset()[terms.STATION_PART].values],
+            "locators": [locator for locator in locators if _station_of(locator, names) == name],
+            "contacts": _labels(rows, terms.PAIR, terms.PAIR_STATION, name),
+            "measures": _labels(rows, terms.MEASURE, terms.MEASURE_STATION, name),
+        }
+        for name, group in zip(names, groups, strict=True)
+    ]
+
+
+def stations_of_nominal(nominal: Nominal | None) -> list[Scene]:
+    """Return the scene of each station of a model before a run; none for a model with faults, or without stations."""
+    if nominal is None:
+        return []
+    station_of_pair = [nominal.parts[pair.moving].station for pair in nominal.pairs]
+    return [
+        {
+            "name": scene.station,
+            "parts": [nominal.assembly.parts.index(part) for part in scene.assembly.parts],
+            "locators": [label for part in nominal.parts if part.station == scene.station for label in part.locators.labels],
+            "contacts": [pair.name for pair, name in zip(nominal.pairs, station_of_pair, strict=True) if name == scene.station],
+            "measures": [measure.name for measure in scene.measures],
+        }
+        for scene in nominal.scenes
+    ]
+
+
+def station_poses(results: xr.DataTree, station: str, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return R (row, state, part, 3, 3) and t (row, state, part, 3) [mm] of all parts in a station; None if not archived.
+
+    Parts that the station does not hold stand in their nominal place.
+    """
+    group = results[terms.station_group(station)].to_dataset()
+    if terms.STATION_ROTATION.name not in group:
+        return None
+    parts = results.to_dataset()[terms.PART].values
+    positions = [parts.tolist().index(part) for part in group[terms.STATION_PART].values]
+    R = np.tile(np.eye(3), (len(rows), len(terms.STATES), len(parts), 1, 1))
+    t = np.zeros((len(rows), len(terms.STATES), len(parts), 3))
+    t_held, R_held = (group[variable.name].isel({terms.REALIZATION: rows}).values for variable in terms.STATION_POSES)
+    R[:, :, positions], t[:, :, positions] = R_held, t_held
+    return R, t
+
+
+def _station_of(locator: str, stations: Sequence[str]) -> str:
+    """Return the station of a locator from its label "station.body.locator"."""
+    return max((name for name in stations if locator.startswith(f"{name}.")), key=len, default="")
+
+
+def _labels(rows: xr.Dataset, dim: str, of_station: terms.ArchiveVariable, station: str) -> list[str]:
+    return [str(name) for name in rows[dim].values[rows[of_station.name].values == station]]
