@@ -208,7 +208,9 @@ def _agreed(answers: Sequence[Estimate]) -> Tail:
     if len(answers) == 1:
         return Tail(best, 1.0)
     answer, alternative = answers
-    if min(answer.value, alternative.value) == 0.0 and best.value <= min(answer.upper, alternative.upper):
+    if best.value == 0.0:
+        return Tail(min(answers, key=lambda estimate: estimate.upper), 1.0)
+    if min(answer.value, alternative.value) == 0.0 and best.value <= min(answer.upper, alternative.upper) < 1.0:
         return Tail(best, 1.0)  # the other search ended where the event was negligible
     if not (answer.value > 0 and alternative.value > 0):
         return Tail(best._replace(lower=0.0), math.inf)

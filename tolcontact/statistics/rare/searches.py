@@ -31,7 +31,7 @@ NESTED_SEEDS = 1 / 3  # of all realizations: fewer and larger questions to the s
 FIRST_PACE, MAX_CHANGE, TRIES = 0.05, 3.0, 6  # by which 1 / s^2 grows from one inflated event to the next, and how it adapts
 LOOKS_BACK = 0.25  # share of realizations that are looked at in the event before
 BISECTIONS = 30
-NEGLIGIBLE = 1e-9  # probability below which a search with nested inflations ends
+NEGLIGIBLE = 1e-9  # probability below which a search ends
 BEFORE_NESTED = 3.0  # realizations for each place at a level, before the first nested event
 MAX_REACH = 700.0  # of a logarithm
 
@@ -45,9 +45,9 @@ class Found(NamedTuple):
     points: list[np.ndarray]
 
     @classmethod
-    def nothing(cls) -> "Found":
-        """Return what a search says that did not find the event."""
-        return cls(Estimate(0.0, 0.0, 1.0), [])
+    def nothing(cls, product: "Product") -> "Found":
+        """Return what a search says that did not find the event, or that ended where it was negligible."""
+        return cls(Estimate(0.0, 0.0, product.estimate.upper if product.is_negligible else 1.0), [])
 
 
 class Product:
@@ -73,6 +73,11 @@ class Product:
             mean = max(float(hits.mean()), 1 / hits.size)
             self.log -= math.log(mean)
             self._influence -= hits.mean(axis=1) / mean - 1
+
+    @property
+    def is_negligible(self) -> bool:
+        """Whether the probability that is searched for is negligible; it is at most the product so far."""
+        return self.log < math.log(NEGLIGIBLE)
 
     @property
     def estimate(self) -> Estimate:
@@ -145,7 +150,7 @@ def by_levels(walk: Walk) -> Found:
     """Search by levels of the score."""
     product = Product()
     u = _levels(walk, 1.0, product)
-    return Found.nothing() if u is None else Found(product.estimate, u)
+    return Found.nothing(product) if u is None else Found(product.estimate, u)
 
 
 def by_inflation(walk: Walk, inflation: float, budget: int) -> Found:
@@ -179,7 +184,7 @@ def first_inflation(score: Score, dimensions: int, count: int, rng: np.random.Ge
 
 
 def _levels(walk: Walk, inflation: float, product: Product) -> list[np.ndarray] | None:
-    """Return realizations of N(0, inflation^2) of each strand in the event; none if it is not found."""
+    """Return realizations of N(0, inflation^2) of each strand in the event; none if it is not found, or negligible."""
     u, g = walk.begun(inflation)
     for _ in range(MAX_LEVELS):
         threshold = _threshold(g)
@@ -187,6 +192,8 @@ def _levels(walk: Walk, inflation: float, product: Product) -> list[np.ndarray] 
         if not inside.any():
             return None
         product.times(inside.mean(axis=1))
+        if product.is_negligible:
+            return None
         if threshold == 0.0:
             return [points[hits] for points, hits in zip(u, inside, strict=True)]
         seeds = walk.chosen(inside)
@@ -195,7 +202,7 @@ def _levels(walk: Walk, inflation: float, product: Product) -> list[np.ndarray] 
 
 
 def _inflated(walk: Walk, inflation: float, product: Product) -> np.ndarray | None:
-    """Return realizations of N(0, inflation^2) in the event (strand, n, d); none if it is not found."""
+    """Return realizations of N(0, inflation^2) in the event (strand, n, d); none if it is not found, or negligible."""
     found = _levels(walk, inflation, product)
     if found is None:
         return None
@@ -210,7 +217,7 @@ def _weighted(walk: Walk, inflation: float) -> Found:
     product, s = Product(), inflation
     u = _inflated(walk, inflation, product)
     if u is None:
-        return Found.nothing()
+        return Found.nothing(product)
     while s > 1.0:
         squares = 0.5 * (u**2).sum(axis=-1)
 
@@ -222,6 +229,8 @@ def _weighted(walk: Walk, inflation: float) -> Found:
         largest = float(weights.max())
         weights = np.exp(weights - largest)
         product.times(weights.mean(axis=1), log_scale=largest)
+        if product.is_negligible:
+            return Found.nothing(product)
         seeds = u[walk.chosen(weights)]
         u, _ = walk.on(seeds, np.ones(seeds.shape[:2]), 0.0, t)
         s = t
@@ -236,7 +245,7 @@ def _nested(walk: Walk, inflation: float, budget: int) -> Found:
     product, s, pace = Product(), inflation, FIRST_PACE
     u = _inflated(walk, inflation, product)
     if u is None:
-        return Found.nothing()
+        return Found.nothing(product)
     z, looks = u / inflation, u[:, :0]  # u (strand, n, d) to be looked at, whether it is in the event before
     while s > 1.0:
         for _ in range(TRIES):
@@ -251,10 +260,10 @@ def _nested(walk: Walk, inflation: float, budget: int) -> Found:
             if share >= MIN_GOAL:
                 break
         if not share:
-            return Found.nothing()
+            return Found.nothing(product)
         product.times(hits.mean(axis=1))
-        if product.log < math.log(NEGLIGIBLE):
-            return Found(Estimate(0.0, 0.0, product.estimate.upper), [])
+        if product.is_negligible:
+            return Found.nothing(product)
         walk.spread(budget, nested_levels(t, math.exp(product.log)))
         seeds = z[walk.chosen(hits)]
         z, _ = walk.on(seeds, np.ones(seeds.shape[:2]), 0.0, stretch=t)
