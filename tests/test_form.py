@@ -24,8 +24,10 @@ from tolcontact.vocabulary import CORRECTED, Status
 def modes_at(program, feature, places):
     """Heights (place, mode) of the form of a feature, from the formulae of the archive's documentation."""
     form = next(nominal.form for nominal in program.nominal.features if nominal.feature.name == feature)
-    r = np.linalg.norm(places[:, None] - form.stations, axis=2) / form.length
-    return np.exp(-(r**2) / 2) @ form.weights - form.removed[0] - places @ form.removed[1:]
+    r = np.linalg.norm(places[:, None] - form.stations, axis=2) / form.lengths.across
+    n = np.broadcast_to(form.associated.surface.axis, places.shape)
+    displaced = np.column_stack([np.ones(len(places)), n, np.cross(places, n)])
+    return np.exp(-(r**2) / 2) @ form.weights - displaced @ form.removed
 
 
 def coefficients(program, run, feature):

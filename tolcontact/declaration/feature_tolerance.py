@@ -17,7 +17,8 @@ BONUSES = ("fills", "accepts", "none")
 MATERIALS = ("", "M", "L")
 SYMBOLS = {"M": "Ⓜ", "L": "Ⓛ"}
 ZONES = ("round", "flat")
-AROUND_ROUND = ("profile", "line profile", "circular run-out", "total run-out")  # kinds with zones for walls, not for axes
+RUNOUTS = ("circular run-out", "total run-out")
+AROUND_ROUND = ("profile", "line profile", *RUNOUTS)  # kinds with zones for walls, not for axes
 USUAL_FORM = Form()
 COMPARTMENT = re.compile(r"([A-Z]{1,2}(?:-[A-Z]{1,2})*)(?:\(([ML])\))?(><)?")
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.declaration import GeometricTolerance
-from tolcontact.features import FeatureOfSize, Layer, NominalFeature, NominalPattern, PlaneFeature
+from tolcontact.declaration.feature_tolerance import AROUND_ROUND, RUNOUTS
+from tolcontact.features import FeatureGeometry, FeatureOfSize, Layer, NominalFeature, NominalPattern, PlaneFeature
 from tolcontact.variation.form_spreads import FormedZone
 from tolcontact.variation.zones import MemberZone
 
@@ -63,22 +64,35 @@ def member_zones(pattern: NominalPattern, layer: Layer, basis: np.ndarray, form_
     if len(pattern.members) > 1:
         coordinates = np.where(np.abs(coordinates) < MIN_PART, 0.0, coordinates)
     places = pattern.geometry.slices
-    if not len(form_spreads) or layer.tolerance.tangent:
+    if not len(form_spreads) or not includes_form(layer.tolerance, pattern.geometry.members[0]):
         return [MemberZone(rows, coordinates[place]) for rows, place in zip(layer.rows, places, strict=True)]
     return [
-        _formed_zone(member, rows, coordinates[place], spread)
+        _formed_zone(member, layer.tolerance, rows, coordinates[place], spread)
         for member, rows, place, spread in zip(pattern.members, layer.rows, places, form_spreads, strict=True)
     ]
 
 
-def _formed_zone(member: NominalFeature, rows: np.ndarray, coordinates: np.ndarray, spread: float) -> FormedZone:
-    """Return the zone of a plane with form."""
-    field, plane = member.form, member.geometry
-    assert field is not None and isinstance(plane, PlaneFeature)
-    along = np.broadcast_to(plane.normal, (len(field.places), 1, 3))
-    offsets = plane.rows((field.places, along))[:, 0]
-    # A zone that limits tilts alone does not measure the offset, the first coordinate of a plane.
-    return FormedZone(rows, coordinates, spread * field.heights(field.places), offsets, not rows[..., 0].any())
+def includes_form(tolerance: GeometricTolerance, geometry: FeatureGeometry) -> bool:
+    """Return whether the zone of a tolerance is one for the surface with its form: not for an axis, or a tangent plane."""
+    return not tolerance.tangent and (isinstance(geometry, PlaneFeature) or tolerance.kind in AROUND_ROUND)
+
+
+def floats(tolerance: GeometricTolerance, geometry: FeatureGeometry, rows: np.ndarray) -> bool:
+    """Return whether a zone with these rows may lie anywhere along the normals of the surface, a round one of any size."""
+    if isinstance(geometry, PlaneFeature):
+        return not rows[..., 0].any()  # it limits tilts alone, and not the offset, the first coordinate of a plane
+    return tolerance.kind in RUNOUTS
+
+
+def _formed_zone(
+    member: NominalFeature, tolerance: GeometricTolerance, rows: np.ndarray, coordinates: np.ndarray, spread: float
+) -> FormedZone:
+    """Return the zone of a surface with form."""
+    field, geometry = member.form, member.geometry
+    assert field is not None
+    offsets = geometry.rows((field.places, field.normals[:, None]))[:, 0]
+    heights = spread * field.heights(field.places)
+    return FormedZone(rows, coordinates, heights, offsets, floats(tolerance, geometry, rows))
 
 
 def member_groups(pattern: NominalPattern, layer: Layer, zones: Sequence[MemberZone]) -> Iterator[MemberGroup]:

@@ -18,6 +18,7 @@ from tolcontact.variation.component_zones import (
     MemberGroup,
     bonus,
     component_zone,
+    includes_form,
     member_groups,
     member_zones,
     uneven_shifts,
@@ -239,7 +240,7 @@ class Contributors:
                 f'{layer.tolerance.kind}: the rule "{rule}" is for members that deviate by themselves, and the datums leave '
                 f'members to deviate together; choose "{INSIDE}" or "{EXTREMES}", or add the datum that locks them',
             )
-        if pattern.form is not None and rule != INSIDE and not layer.tolerance.tangent:
+        if pattern.form is not None and rule != INSIDE and includes_form(layer.tolerance, group.members[0].geometry):
             raise self._error(
                 pattern,
                 f'{layer.tolerance.kind}: the rule "{rule}" is for features that keep their shape, and the form of this one is '
