@@ -1,34 +1,34 @@
 """Round faces with form that fit into each other."""
 
+from typing import Any
+
 import trimesh
 
 import tolcontact as tc
 from tests.cases.locators import parked
 from tests.cases.round_contact import BARREL
 
-RADIUS, LENGTH = 10.0, 40.0
+RADIUS, LENGTH, CLEARANCE = 10.0, 40.0, 0.03
+PULL = (6.0, -2.0)
 
 
 def shaft_in_a_bore(
-    shaft: tc.Cylindricity | None = None,
-    bore: tc.Cylindricity | None = None,
-    clearance: float = 0.03,
-    pull: tuple[float, float] = (6.0, -2.0),
-    sections: int = 96,
-    **points,
+    shaft: Any = None,
+    bore: Any = None,
+    clearance: float = CLEARANCE,
 ) -> tc.Assembly:
     """A shaft of radius 10 that a force pulls aside in a bore, both 40 long; it does not turn about its axis."""
     a = tc.Assembly("fit")
     inner = RADIUS + clearance
-    ring = a.part("ring", tc.Mesh(trimesh.creation.annulus(inner, 20, LENGTH, sections=sections)), fixed=True)
-    pin = a.part("pin", tc.Mesh(trimesh.creation.cylinder(RADIUS, LENGTH, sections=sections)), fixed=False)
+    ring = a.part("ring", tc.Mesh(trimesh.creation.annulus(inner, 20, LENGTH, sections=96)), fixed=True)
+    pin = a.part("pin", tc.Mesh(trimesh.creation.cylinder(RADIUS, LENGTH, sections=96)), fixed=False)
     hole = ring.feature("bore", ring.face(tc.Cylinder(radius=inner)), *([bore] if bore else []))
     barrel = pin.feature("shaft", pin.face(BARREL), *([shaft] if shaft else []))
-    a.contact("fit", moving=barrel, reference=hole, **points)
+    a.contact("fit", moving=barrel, reference=hole)
     stops = parked("X1:-10,0,18:x", "X2:-10,0,-18:x", "Y1:0,-10,18:y", "Y2:0,-10,-18:y")
     a.locate(pin, [tc.Locator("Z", (0, 0, -20), "z", 0), tc.Locator("T", (10, 0, 0), "y", 0), *stops])
-    a.force("pull", at=pin.point(0, 0, 3), vector=(*pull, 0))
-    for name, z in (("top", 20), ("foot", -20)):
+    a.force("pull", at=pin.point(0, 0, 3), vector=(*PULL, 0))
+    for name, z in (("top", 20), ("foot", -20), ("pulled", 3)):
         for axis in "xy":
             a.measure(f"{name} {axis}", pin.point(0, 0, z), along=axis)
     return a

@@ -16,6 +16,7 @@ from tolcontact.geometry.surface import RIM_TOLERANCE, Surface
 FACING = -0.99999  # cosine of the angle between the normals of planes that face each other
 SPACING_SHARE = 1 / 5  # of the correlation length: the usual spacing
 ALONG_SHARE = 1 / 3  # of the correlation length: the same along the axis of cylinders, whose lines are straight
+MIN_AZIMUTHS = 48  # of a cylinder
 END_SHARE = 1e-6  # of the length: how far inside their ends the outermost points of cylinders are
 PARALLEL_TOLERANCE = 1e-3  # rad between the axes of cylinders
 MAX_SPACING_SHARE = 1 / 2
@@ -63,7 +64,7 @@ def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[Face
     across, along = (min(values) for values in zip(*lengths, strict=True))
     inset = END_SHARE * (end - start)
     heights = np.linspace(start + inset, end - inset, int(np.ceil((end - start) / (ALONG_SHARE * along))) + 1)
-    count = int(np.ceil(2 * np.pi * shaft.radius / (SPACING_SHARE * across)))
+    count = max(int(np.ceil(2 * np.pi * shaft.radius / (SPACING_SHARE * across))), MIN_AZIMUTHS)
     u = np.linalg.svd(shaft.axis[None])[2][1]
     outward = [np.cos(turn) * u + np.sin(turn) * np.cross(shaft.axis, u) for turn in np.arange(count) * 2 * np.pi / count]
     points = shaft.origin + heights[:, None, None] * shaft.axis + shaft.radius * np.array(outward)

@@ -40,10 +40,12 @@ def displacement_terms(normals: np.ndarray, arms: np.ndarray) -> np.ndarray:
 class AssociatedFeature(ABC):
     """What the form of a face on an analytic surface is measured from.
 
-    ends   places [mm] of the ends of the face along the axis of the surface
+    ends       places [mm] of the ends of the face along the axis of the surface
+    is_whole   whether it is the whole surface, and not several members of it
     """
 
     name: ClassVar[str]
+    is_whole: ClassVar[bool] = False
 
     surface: AnalyticSurface
     ends: tuple[float, float]
@@ -81,9 +83,9 @@ class AssociatedFeature(ABC):
     def rows(self, places: np.ndarray) -> np.ndarray:
         """Return heights (place, freedom) at the places of a member of displacements and growths, each at most 1."""
         _, normals = self.surface.distance(places)
-        terms = displacement_terms(normals, places - places.mean(axis=0))
-        varying = terms[:, 1:] - terms[:, 1:].mean(axis=0)
-        varying /= np.maximum(np.abs(terms[:, 1:]).max(axis=0), 1e-300)
+        arms = places - places.mean(axis=0)
+        terms = displacement_terms(normals, arms / np.linalg.norm(arms, axis=1).max())[:, 1:]
+        varying = terms - terms.mean(axis=0)
         directions, lengths, _ = np.linalg.svd(varying, full_matrices=False)
         directions = directions[:, lengths > MIN_LENGTH * max(lengths.max(initial=0.0), 1.0)]
         return np.column_stack([np.ones(len(places)), directions / np.abs(directions).max(axis=0)])
@@ -92,7 +94,7 @@ class AssociatedFeature(ABC):
 class AssociatedSurface(AssociatedFeature):
     """The surface as a whole."""
 
-    name = "surface"
+    name, is_whole = "surface", True
 
 
 class AxialFeature(AssociatedFeature):

@@ -19,7 +19,8 @@ from tolcontact.geometry.surface import Surface
 
 LENGTH_SHARE = 1 / 3  # of the longest extent of a face: the usual correlation length
 MAX_STATIONS = 200
-REST = 1e-8  # of the variance: what the stations leave out at no place
+POINTS_AT_ONCE = 1 << 14
+REST = 1e-5  # of the variance: what the stations leave out at no place
 MIN_VARIANCE = 1e-10  # of the largest: a mode with less is rounding
 
 
@@ -66,14 +67,28 @@ class FormField:
     def heights(self, points: np.ndarray) -> np.ndarray:
         """Return the heights (..., mode) of each mode at points (..., 3) [mm] of the face."""
         flat = points.reshape(-1, 3)
-        _, normals = self.associated.surface.distance(flat)
-        terms = displacement_terms(normals, flat)
-        values = _associated_covariance(self.form, self.lengths, self.associated, flat, self.stations)
         heights = np.zeros((len(flat), self.modes))
         # A product of matrices would depend, in its last bits, on the number of points.
-        for factor, row in zip((*-terms.T, *values.T), (*self.removed, *self.weights), strict=True):
+        for factor, row in zip(self._functions(flat).T, (*self.weights, *-self.removed), strict=True):
             heights += factor[:, None] * row
         return heights.reshape(*points.shape[:-1], self.modes)
+
+    def sums(self, points: np.ndarray, row: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+        """Return the heights (point,) [mm] at points (point, 3) of faces, each of its own row (point,) of coefficients."""
+        factors = np.zeros((len(coefficients), len(self.stations) + TERMS))
+        for k, mode in enumerate(np.vstack([self.weights, -self.removed]).T):
+            factors += coefficients[:, k, None] * mode
+        heights = np.zeros(len(points))
+        for start in range(0, len(points), POINTS_AT_ONCE):
+            piece = slice(start, start + POINTS_AT_ONCE)
+            heights[piece] = (self._functions(points[piece]) * factors[row[piece]]).sum(axis=1)
+        return heights
+
+    def _functions(self, points: np.ndarray) -> np.ndarray:
+        """Return covariances with the stations, and displacements of the face (point, station + 7) at points (point, 3)."""
+        _, normals = self.associated.surface.distance(points)
+        values = _associated_covariance(self.form, self.lengths, self.associated, points, self.stations)
+        return np.hstack([values, displacement_terms(normals, points)])
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "FormField":
         """Return the field of a face that stands at R (3, 3), t (3,) [mm]."""
@@ -84,14 +99,15 @@ class FormField:
 
 def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> FormField:
     """Return the form field of a face on an analytic surface, in its part's own frame."""
-    lengths = Lengths(form.length, form.length) if form.length else _usual_lengths(face, associated)
+    lengths = _lengths(form, face, associated)
     places, areas = associated.places(face, lengths)
     factor, pivots, rest = _cholesky(places, form, lengths, associated)
     stations, shares = places[pivots], areas / areas.sum()
     root, centre = np.sqrt(shares), places.mean(axis=0)
     inverse = np.linalg.inv(factor[:, pivots])
     functions = inverse.T @ _associated_covariance(form, lengths, associated, places, stations).T
-    terms = displacement_terms(associated.surface.distance(places)[1], places - centre)
+    # Sections and lines without what displaces them are not displaced as a whole either.
+    terms = associated.is_whole * displacement_terms(associated.surface.distance(places)[1], places - centre)
     removed, *_ = np.linalg.lstsq(terms * root[:, None], (functions * root).T, rcond=1e-10)
     remainder = (functions.T - terms @ removed) * root[:, None]
     variances, directions = np.linalg.eigh(remainder.T @ remainder)
@@ -110,16 +126,17 @@ def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> Form
     )
 
 
-def _usual_lengths(face: Surface, associated: AssociatedFeature) -> Lengths:
-    """Return a third of the extent of a face, of one with an axis across and along it."""
+def _lengths(form: Form, face: Surface, associated: AssociatedFeature) -> Lengths:
+    """Return the correlation lengths of a form: usually a third of the extent of a face, with an axis across and along it."""
     vertices, surface = np.asarray(face.mesh.vertices), associated.surface
     if not isinstance(surface, Cylinder | Cone):
-        length = LENGTH_SHARE * longest_extent(vertices)
+        length = form.length or LENGTH_SHARE * longest_extent(vertices)
         return Lengths(length, length)
     arms = vertices - surface.origin
     along = arms @ surface.axis
-    diameter = 2 * float(np.linalg.norm(arms - along[:, None] * surface.axis, axis=1).max())
-    return Lengths(LENGTH_SHARE * diameter, LENGTH_SHARE * float(np.ptp(along)))
+    radius = float(np.linalg.norm(arms - along[:, None] * surface.axis, axis=1).max())
+    across = radius / form.lobes if form.lobes else form.length or LENGTH_SHARE * 2 * radius
+    return Lengths(across, form.length or LENGTH_SHARE * float(np.ptp(along)))
 
 
 def longest_extent(points: np.ndarray) -> float:

@@ -9,8 +9,8 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 
-TURNS = 40  # places around the axis
-STEPS = 24  # places along a line, at the roots of a polynomial
+TURNS = 32  # places around the axis
+STEPS = 16  # places along a line, at the roots of a Legendre polynomial
 
 
 class ArchivedForm:
