@@ -22,12 +22,15 @@ class Form(Readable):
     modes        number of Karhunen-Loeve modes, those with the largest variances; each is a contributor
     lobes        of a cylinder or cone: all sections have this number of lobes, as waviness has; covariances then count the
                  distance along the axis alone
+    measured     path of the points of measured faces, one CSV or PLY file for each part, as in "scans/*.csv": lines x, y, z
+                 [mm] in the frame of the part. Faces then vary as these do, whatever the width of the tolerance
     """
 
     covariance: str = "squared exponential"
     length: float | None = None
     modes: int = 20
     lobes: int | None = None
+    measured: str | None = None
 
     def faults(self) -> Iterator[str]:
         if self.covariance not in COVARIANCES:
@@ -39,7 +42,14 @@ class Form(Readable):
         if self.lobes is not None and not _is_number(self.lobes, MIN_LOBES, MAX_LOBES):
             yield f"lobes is {self.lobes!r}; expected a whole number from {MIN_LOBES} to {MAX_LOBES}, or none"
 
+        if self.measured is not None and not (isinstance(self.measured, str) and self.measured):
+            yield f'measured is {self.measured!r}; expected the path of CSV or PLY files, as in "scans/*.csv"'
+        elif self.measured is not None and (self.covariance, self.length, self.lobes) != (COVARIANCES[0], None, None):
+            yield "it is measured, and has a covariance, a length or lobes beside that; leave these out"
+
     def __str__(self) -> str:
+        if self.measured is not None:
+            return f"form of up to {self.modes} components, measured in {self.measured}"
         length = "a third of the face" if self.length is None else f"{self.length:g} mm"
         lobes = "" if self.lobes is None else f", {self.lobes} lobes"
         return f"form of {self.modes} modes, {self.covariance}, length {length}{lobes}"

@@ -37,6 +37,8 @@ class FormField:
     removed     (7, mode): growth, translation and rotation [1/mm] about the origin of the face as a whole, which a mode leaves
                 out
     left_out    share of the variance of the field that the modes leave out
+    spreads     (mode,) [mm] standard deviations of the coefficients, as measured; None if these follow from a tolerance
+    means       (mode,) [mm] of the coefficients; None: 0
     """
 
     form: Form
@@ -47,6 +49,8 @@ class FormField:
     weights: np.ndarray
     removed: np.ndarray
     left_out: float
+    spreads: np.ndarray | None
+    means: np.ndarray | None
 
     @property
     def modes(self) -> int:
@@ -87,12 +91,12 @@ class FormField:
     def _functions(self, points: np.ndarray) -> np.ndarray:
         """Return covariances with the stations, and displacements of the face (point, station + 7) at points (point, 3)."""
         _, normals = self.associated.surface.distance(points)
-        values = _associated_covariance(self.form, self.lengths, self.associated, points, self.stations)
+        values = associated_covariance(self.form, self.lengths, self.associated, points, self.stations)
         return np.hstack([values, displacement_terms(normals, points)])
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "FormField":
         """Return the field of a face that stands at R (3, 3), t (3,) [mm]."""
-        removed = _about_origin(np.vstack([self.removed[:1], R @ self.removed[1:4], R @ self.removed[4:]]), t)
+        removed = displaced_about_origin(np.vstack([self.removed[:1], R @ self.removed[1:4], R @ self.removed[4:]]), t)
         places, stations = self.places @ R.T + t, self.stations @ R.T + t
         return replace(self, associated=self.associated.placed(R, t), places=places, stations=stations, removed=removed)
 
@@ -105,7 +109,7 @@ def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> Form
     stations, shares = places[pivots], areas / areas.sum()
     root, centre = np.sqrt(shares), places.mean(axis=0)
     inverse = np.linalg.inv(factor[:, pivots])
-    functions = inverse.T @ _associated_covariance(form, lengths, associated, places, stations).T
+    functions = inverse.T @ associated_covariance(form, lengths, associated, places, stations).T
     # Sections and lines without what displaces them are not displaced as a whole either.
     terms = associated.is_whole * displacement_terms(associated.surface.distance(places)[1], places - centre)
     removed, *_ = np.linalg.lstsq(terms * root[:, None], (functions * root).T, rcond=1e-10)
@@ -121,8 +125,10 @@ def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> Form
         places=places,
         stations=stations,
         weights=inverse @ modes,
-        removed=_about_origin(removed @ modes, centre),
+        removed=displaced_about_origin(removed @ modes, centre),
         left_out=float(1 - variances[-count:].sum() / (variances.sum() + rest @ shares)),
+        spreads=None,
+        means=None,
     )
 
 
@@ -145,13 +151,13 @@ def longest_extent(points: np.ndarray) -> float:
     return float(np.ptp(points @ directions.T, axis=0).max())
 
 
-def _about_origin(displacements: np.ndarray, centre: np.ndarray) -> np.ndarray:
+def displaced_about_origin(displacements: np.ndarray, centre: np.ndarray) -> np.ndarray:
     """Return displacements (7, n) that turn about the origin, of those that turn about a centre (3,) [mm]."""
     growth, translation, rotation = np.split(displacements, [1, TERMS - 3])
     return np.vstack([growth, translation + np.cross(centre, rotation, axisb=0).T, rotation])
 
 
-def _associated_covariance(
+def associated_covariance(
     form: Form, lengths: Lengths, associated: AssociatedFeature, points: np.ndarray, stations: np.ndarray
 ) -> np.ndarray:
     """Return the covariance (point, station), as functions of the points without what displaces sections or lines."""

@@ -32,6 +32,7 @@ from tolcontact.features.feature_geometry import (
 )
 from tolcontact.features.feature_recognition import analytic_surface
 from tolcontact.features.form_field import FormField, form_field
+from tolcontact.features.measured_field import measured_field
 from tolcontact.geometry.surface import Surface
 
 Associated = Mapping[type[FeatureGeometry], type[AssociatedFeature]]
@@ -83,4 +84,7 @@ def drawn_field(tolerance: GeometricTolerance, geometry: FeatureGeometry, face: 
     surface = analytic_surface(face)
     if tolerance.form is None or surface is None:
         return None
-    return form_field(tolerance.form, face, DRAWN[type(tolerance)][type(geometry)].of(surface, face))
+    associated = DRAWN[type(tolerance)][type(geometry)].of(surface, face)
+    if tolerance.form.measured is not None:
+        return measured_field(tolerance.form, tolerance.form.measured, face, associated)
+    return form_field(tolerance.form, face, associated)

@@ -55,10 +55,12 @@ class MemberGroup:
         return np.array([member.size_column for member in self.members if member.size_column is not None], dtype=int)
 
 
-def member_zones(pattern: NominalPattern, layer: Layer, basis: np.ndarray, form_spreads: Sequence[float]) -> list[MemberZone]:
+def member_zones(
+    pattern: NominalPattern, layer: Layer, basis: np.ndarray, form_spreads: Sequence[np.ndarray]
+) -> list[MemberZone]:
     """Return the zones of a layer for the members, as their components (coordinate, component) move what it controls.
 
-    `form_spreads` (member,) [mm] are standard deviations of the coefficients of their forms; empty without form.
+    `form_spreads` are the standard deviations (mode,) [mm] of the coefficients of the form of each; empty without form.
     """
     coordinates = layer.controlled @ layer.controlled.T @ basis
     if len(pattern.members) > 1:
@@ -85,13 +87,13 @@ def floats(tolerance: GeometricTolerance, geometry: FeatureGeometry, rows: np.nd
 
 
 def _formed_zone(
-    member: NominalFeature, tolerance: GeometricTolerance, rows: np.ndarray, coordinates: np.ndarray, spread: float
+    member: NominalFeature, tolerance: GeometricTolerance, rows: np.ndarray, coordinates: np.ndarray, spreads: np.ndarray
 ) -> FormedZone:
     """Return the zone of a surface with form."""
     field, geometry = member.form, member.geometry
     assert field is not None
     offsets = geometry.rows((field.places, field.normals[:, None]))[:, 0]
-    heights = spread * field.heights(field.places)
+    heights = spreads * field.heights(field.places)
     return FormedZone(rows, coordinates, heights, offsets, floats(tolerance, geometry, rows))
 
 

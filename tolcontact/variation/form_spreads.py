@@ -18,6 +18,7 @@ from tolcontact.variation.zones import SHARE, MemberZone, directions
 
 DIRECTIONS = 1 << 12
 NESTED_DIRECTIONS = 1 << 13  # displacements have larger spreads than modes, so that fewer directions tell more
+FACES = 500  # that are drawn for the mean width of measured ones
 MIN_SPREAD, MAX_SPREAD = 1e-6, 1e3  # of the width
 
 
@@ -58,9 +59,18 @@ class FormSpread:
 
         return float(scipy.optimize.brentq(excess, MIN_SPREAD * width, MAX_SPREAD * width, xtol=1e-12 * width))
 
-    def mean_width(self, spread: float) -> float:
-        """Return the mean width [mm] of the least zones of faces, with coefficients of a standard deviation [mm]."""
-        return float(spread * scipy.stats.chi.mean(self.field.modes) * self.widths.mean())
+    def spreads(self, width: float, cp: float) -> np.ndarray:
+        """Return the standard deviations (mode,) [mm] of the coefficients, for a process capability: equal, or as measured."""
+        if self.field.spreads is not None:
+            return self.field.spreads
+        return np.full(self.field.modes, self.spread(width) / cp)
+
+    def mean_width(self, spreads: np.ndarray) -> float:
+        """Return the mean width [mm] of the least zones of faces, with coefficients of standard deviations (mode,) [mm]."""
+        if self.field.means is None:
+            return float(spreads[0] * scipy.stats.chi.mean(self.field.modes) * self.widths.mean())
+        faces = self.field.means + spreads * np.random.default_rng(0).normal(size=(FACES, len(spreads)))
+        return float(least_widths(self.field.zone, faces @ self.field.heights(self.field.places).T).mean())
 
 
 @dataclass(frozen=True, eq=False)

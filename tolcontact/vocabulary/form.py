@@ -36,7 +36,11 @@ FORM_START, FORM_END = (
 )
 FORM_SURFACE = surface_variables("form_surface", FEATURE_FACE, "the surface of a face with form, nominal")
 FORM_SPREAD = ArchiveVariable(
-    "form_spread", (FEATURE_FACE,), "f8", "standard deviation of the coefficients of the form's modes; NaN: none", "mm"
+    "form_spread",
+    (FEATURE_FACE,),
+    "f8",
+    "standard deviation of the coefficients of the form's modes; NaN: none, or one for each, as measured",
+    "mm",
 )
 FORM_LEFT_OUT = ArchiveVariable(
     "form_left_out", (FEATURE_FACE,), "f8", "share of the variance of the field that the modes leave out; NaN: none", "1"
