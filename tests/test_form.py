@@ -68,6 +68,9 @@ class OneMode(FormField):
     def heights(self, points):
         return self.shape((points[..., 0] - 50) / 50, (points[..., 1] - 25) / 25)[..., None]
 
+    def sums(self, points, row, coefficients):
+        return (self.heights(points) * coefficients[row]).sum(axis=1)
+
 
 def seat_of_one_mode(shape):
     """Measures (realization, measure) of a seat whose form is one mode, and its coefficients (realization,)."""
