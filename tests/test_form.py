@@ -8,10 +8,13 @@ import pytest
 from scipy.optimize import linprog
 
 import tolcontact as tc
+from tests import cases
 from tests.cases.seats import PRESS, seat, sliding
 from tests.helpers import SEATED, joined, simulate
 from tolcontact.analyses.grouping import owners
 from tolcontact.compilation import compile_program
+from tolcontact.contact.raised_scan import raised_scan
+from tolcontact.contact.scan import PairScan, pair_scan
 from tolcontact.discretization import Offsets, discretize
 from tolcontact.errors import ModelError
 from tolcontact.features import FormField
@@ -252,3 +255,39 @@ def test_the_gap_of_a_station_over_a_face_with_form_counts_its_height_there():
     a.measure("clearance", tc.Clearance(block.face("-z"), base.face("+z")))
     with pytest.raises(ModelError, match="which has form, cannot be measured"):
         tc.build(a)
+
+
+def test_heights_that_are_summed_up_once_give_the_same_deepest_points():
+    program = tc.build(seat())
+    pair, gaps = program.nominal.pairs[0], program.gaps[0]
+    deviations = program.draws(seed=3, start=0, stop=50)
+    poses = program.place(deviations=deviations)["poses"]
+    relative = program.observe(poses=poses, deviations=deviations)["relative"].reshape(50, -1, 12)[:, 0]
+    scan = pair_scan(pair, gaps, (), 8)
+    raised = raised_scan(scan, deviations).take(np.arange(49, -1, -1))
+    actual, expected = (
+        raised.deepest(relative[::-1], deviations[::-1]),
+        PairScan.deepest(scan, relative[::-1], deviations[::-1]),
+    )
+    assert (actual.points == expected.points).all() and expected.depth.max() > 0
+    np.testing.assert_allclose(actual.depth, expected.depth, atol=1e-14)
+    for one, other in zip(
+        raised.rows(actual.points, deviations[::-1]), scan.rows(actual.points, deviations[::-1]), strict=True
+    ):
+        np.testing.assert_allclose(one, other, atol=1e-15)
+
+
+def test_four_times_as_many_points_tell_the_same():
+    """Points count by the areas that they stand for, so that 6 sigma stays within its interval."""
+    results = []
+    for points in ((400, 200, 200), (1600, 800, 800)):
+        ra2 = cases.model("ra2")
+        for pair, count in zip(ra2.pairs, points, strict=True):
+            face = pair.moving
+            face.part.feature(f"under {pair.name}", face, tc.Flatness(0.05))
+            object.__setattr__(pair, "points", count)
+        run = tc.run(ra2, samples=1000, solver="daqp")
+        results.append(tc.summarize(run)["statistic_value"].sel(statistic="6 sigma", state="corrected").isel(measure=0))
+    few, many = (result.sel(interval="estimate").item() for result in results)
+    lower, upper = (results[0].sel(interval=bound).item() for bound in ("lower", "upper"))
+    assert lower < many < upper and abs(many - few) < (upper - lower) / 4
