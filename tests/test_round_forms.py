@@ -10,6 +10,7 @@ from tests.cases.fits import CLEARANCE, LENGTH, PULL, RADIUS, shaft_in_a_bore
 from tests.helpers import SEATED, simulate
 from tests.test_form import coefficients
 from tolcontact.features.least_zone import least_widths
+from tolcontact.simulation.surfaces import check_surfaces
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
 from tolcontact.vocabulary import CORRECTED, Status
 
@@ -61,14 +62,9 @@ def farthest(heights, along, azimuths):
     ]
 
 
-def test_a_fit_is_the_one_of_a_linear_programme_and_needs_no_more_points(tmp_path):
-    """The grid of the pair tells within 0.5 um what 25 x 144 places tell; the archive alone gives its gaps."""
-    path = tmp_path / "fit.nc"
-    run = tc.run(
-        shaft_in_a_bore(tc.Cylindricity(0.02), tc.Cylindricity(0.02)), samples=40, solver="daqp", method=SEATED, out=path
-    )
-    run.close()
-    program, run = simulate(shaft_in_a_bore(tc.Cylindricity(0.02), tc.Cylindricity(0.02)), 40, solver="daqp", method=SEATED)
+def test_a_fit_is_the_one_of_a_linear_programme_and_needs_no_more_points():
+    """The grid of the pair tells within 0.5 um what 25 x 144 places tell."""
+    program, run = simulate(shaft_in_a_bore(tc.Cylindricity(0.02), tc.Cylindricity(0.02)), 20, solver="daqp", method=SEATED)
     assert (run["status"] == Status.RESOLVED).all() and run["gap_min"][:, CORRECTED].min() > -1e-9
     P = program.nominal.pairs[0].P_m
     along, azimuths = np.unique(P[:, 2].round(9)), np.unique(np.arctan2(P[:, 1], P[:, 0]).round(9))
@@ -77,18 +73,29 @@ def test_a_fit_is_the_one_of_a_linear_programme_and_needs_no_more_points(tmp_pat
     np.testing.assert_allclose(far, farthest(sums_of_heights(program, run, along, azimuths), along, azimuths), atol=1e-4)
     fine = np.linspace(-20, 20, 25), np.arange(144) * 2 * np.pi / 144
     np.testing.assert_allclose(far, farthest(sums_of_heights(program, run, *fine), *fine), atol=5e-4)
+    surfaces = check_surfaces(program, run["poses"][:5, CORRECTED], run["deviations"][:5])
+    assert 0 < surfaces.penetration[:, 0].max() < 1e-3
+
+
+def test_gaps_of_sections_and_lines_with_form_follow_from_the_archive_alone(tmp_path):
+    path = tmp_path / "fit.nc"
+    rough, lobed = tc.Form("matern 5/2", length=12, modes=6), tc.Form(lobes=3, modes=4)
+    model = shaft_in_a_bore(tc.Roundness(0.02, form=rough), tc.Straightness(0.02, form=rough))
+    pin = model.parts[1]
+    other = pin.feature("end", pin.face("+z"), tc.Flatness(0.01, form=tc.Form(modes=3)))
+    model.measure("end", other.point(0, 0, 20), along="z")
+    tc.run(model, samples=5, solver="daqp", method=SEATED, surfaces=1, out=path).close()
     assert_resolved(path)
     assert_gaps_recompute(path)
-    with tc.open_archive(path) as archive:
-        assert archive["surface"]["surface_penetration"].max() < 1e-3
-
-
-@pytest.mark.parametrize("tolerance", [tc.Roundness, tc.Straightness])
-def test_gaps_of_sections_and_lines_with_form_follow_from_the_archive_alone(tmp_path, tolerance):
-    path = tmp_path / "fit.nc"
-    form = tc.Form("matern 5/2", length=12, modes=6)
-    tc.run(shaft_in_a_bore(tolerance(0.02, form=form)), samples=10, solver="daqp", method=SEATED, out=path).close()
-    assert_resolved(path)
+    tc.run(
+        shaft_in_a_bore(tc.Cylindricity(0.02, form=lobed)),
+        samples=5,
+        solver="daqp",
+        method=SEATED,
+        surfaces=1,
+        out=path,
+        overwrite=True,
+    ).close()
     assert_gaps_recompute(path)
 
 
@@ -111,7 +118,7 @@ def test_zones_of_cylinders_are_those_of_a_linear_programme(tolerance):
     program = tc.build(shaft_in_a_bore(tolerance))
     field = form_of(program, "shaft")
     spread = program.draws.contributors[len(program.nominal.contributors) - 1].spread
-    heights = np.random.default_rng(1).normal(0, spread, (30, field.modes)) @ field.heights(field.places).T
+    heights = np.random.default_rng(1).normal(0, spread, (8, field.modes)) @ field.heights(field.places).T
     x, y, z = field.places.T
     terms = radial_terms(np.arctan2(y, x), z)
     keys = {"cylindricity": 0 * z, "roundness": z.round(6), "straightness": np.arctan2(y, x).round(6) % (2 * np.pi - 1e-5)}
@@ -124,7 +131,7 @@ def test_zones_of_cylinders_are_those_of_a_linear_programme(tolerance):
         widths = [width_by_programme(terms[own][:, columns], of_one[own]) for of_one in heights]
         expected = np.maximum(expected, widths)
     np.testing.assert_allclose(least_widths(field.zone, heights), expected, rtol=1e-6)
-    assert (expected <= 0.05).mean() > 0.9
+    assert 0.01 < expected.mean() < 0.05
 
 
 def test_a_roundness_displaces_no_section_and_a_straightness_no_line():
@@ -147,8 +154,8 @@ def test_form_and_place_of_a_bore_share_the_zone_around_them():
     spreads = []
     for inner in ((), (tc.Cylindricity(0.05),)):
         model = toleranced.ring_with("bore", tc.TotalRunout(0.1, "B"), *inner)
-        shares = tc.check_population(model, samples=3000).share_inside.sel(interval="estimate").values
-        assert (np.abs(shares - 0.9973) < 0.004).all()
+        shares = tc.check_population(model, samples=1500).share_inside.sel(interval="estimate").values
+        assert (np.abs(shares - 0.9973) < 0.005).all()
         spreads.append({c.label: c.spread for c in tc.build(model).draws.contributors}["ring.bore.tilt x"])
     assert 0.7 < spreads[1] / spreads[0] < 0.95
     with pytest.raises(tc.ModelError, match=r"cylindricity 0\.2 is wider than total run-out 0\.1, which contains it"):
