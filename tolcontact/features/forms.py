@@ -49,9 +49,13 @@ DRAWN: dict[type[GeometricTolerance], Associated] = {
 }
 
 
+# Of every feature that may have it. A roundness may be of part of a circle, a straightness of an axis.
+DRAWN_ALWAYS = (Flatness, Cylindricity)
+
+
 def is_drawn(kind: type[GeometricTolerance], per: object) -> bool:
-    """Return whether the form that a kind of tolerance limits, of whole surfaces or `per` a length, can be drawn."""
-    return kind in DRAWN and per is None
+    """Return whether the form that a kind of tolerance limits, of any surface or `per` a length, can surely be drawn."""
+    return kind in DRAWN_ALWAYS and per is None
 
 
 def drawn_form(declared: Toleranced, geometry: FeatureGeometry) -> GeometricTolerance | None:
@@ -66,7 +70,7 @@ def drawn_form(declared: Toleranced, geometry: FeatureGeometry) -> GeometricTole
         and (tolerance.is_form or (tolerance.limits_form_alone and isinstance(declared, Feature)))
     ]  # fmt: skip
     for tolerance in tolerances:
-        if not is_drawn(type(tolerance), tolerance.per) or type(geometry) not in DRAWN[type(tolerance)]:
+        if tolerance.per is not None or type(geometry) not in DRAWN.get(type(tolerance), {}):
             unit = " per unit" if tolerance.per is not None else ""
             raise GeometryFault(
                 f"the form of {tolerance.kind}{unit} of {geometry.in_words} cannot be drawn; give the {tolerance.kind} "

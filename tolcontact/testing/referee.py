@@ -244,7 +244,8 @@ class ArchivedPair:
         gaps = (from_moving - from_reference) / np.sqrt(length)
         if self.facing is not None:
             gaps -= of_moving[:, None, None] * self.facing + of_reference[:, None, None]
-            gaps -= self._form(deviations, self.moving_point, self.reference_point)[:, None]
+            gaps -= (self.faces.form(self.moving_face, deviations, self.moving_point) * self.facing)[:, None]
+            gaps -= self.faces.form(self.reference_face, deviations, self.reference_point)[:, None]
         supports = self.locators >= 0
         if supports.any():
             gaps[..., supports] -= self.faces.pushes(self.locators[supports], deviations)[:, None]
