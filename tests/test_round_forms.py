@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 
 import tolcontact as tc
 from tests.cases import toleranced
-from tests.cases.fits import CLEARANCE, LENGTH, PULL, RADIUS, shaft_in_a_bore
+from tests.cases.fits import CLEARANCE, LENGTH, PULL, RADIUS, shaft_in_a_bore, shaft_on_a_table
 from tests.helpers import SEATED, simulate
 from tests.test_form import coefficients
 from tolcontact.features.least_zone import least_widths
@@ -49,6 +49,23 @@ def test_a_two_lobed_shaft_in_a_two_lobed_bore_by_closed_form():
     far = run["measured"][:, CORRECTED, :2] @ PULL / np.linalg.norm(PULL)
     np.testing.assert_allclose(far, 0.1 - (own + other)[:, 0], atol=2e-4)
     assert np.ptp(far) > 0.01
+
+
+@pytest.mark.nightly
+def test_a_lobed_shaft_lies_on_its_highest_line(tmp_path):
+    """Beside its lowest line the shaft rises as its radius does, and with the cosine of the angle from there."""
+    model = shaft_on_a_table(tc.Form(lobes=3, length=1e5))
+    program, run = simulate(model, samples=20, solver="daqp", method=SEATED)
+    assert (run["status"] == Status.RESOLVED).all()
+    angles = np.linspace(-0.1, 0.1, 401)
+    places = np.column_stack([RADIUS * np.sin(angles), 0 * angles, -RADIUS * np.cos(angles)])
+    radii = RADIUS + coefficients(program, run, "barrel") @ form_of(program, "barrel").heights(places).T
+    expected = (radii * np.cos(angles)).max(axis=1) - RADIUS
+    np.testing.assert_allclose(run["measured"][:, CORRECTED], expected[:, None] * [1, 1], atol=3e-4)
+    assert np.ptp(expected) > 0.01
+    path = tmp_path / "roller.nc"
+    tc.run(model, samples=5, solver="daqp", method=SEATED, surfaces=1, out=path).close()
+    assert_gaps_recompute(path)
 
 
 def farthest(heights, along, azimuths):

@@ -152,19 +152,19 @@ class Candidates:
         projected: bool = False,
         slots: Sequence[Slots] = (),
         width: float = 1.0,
-        known: Sequence[Scan] = (),
+        earlier: Sequence[Scan] = (),
     ) -> list[Scan]:
         """Return scans of the points that may carry, projected again if the method requires it.
 
         Places of bounded pairs are found anew; in steps, with the `slots` of the pairs with changing points, places that carry
         remain a little beyond their edges, `width` times as far as they may in an answer. With `projected`, points against
-        curved faces are projected again in any case. `known` are scans of the same realizations, whose heights are summed up.
+        curved faces are projected again in any case. `earlier` are scans of the same realizations, whose heights are summed up.
         """
         scans = list(self._carrying_scans)
         for k in self._with_form:
             if k not in self.bounded and not self._method.is_iterated:
-                is_raised = len(known) > 0 and isinstance(known[k], RaisedScan)
-                scans[k] = known[k] if is_raised else raised_scan(fixed(scans[k]), deviations)
+                is_raised = len(earlier) > 0 and isinstance(earlier[k], RaisedScan)
+                scans[k] = earlier[k] if is_raised else raised_scan(fixed(scans[k]), deviations)
         if projected or self._method.is_iterated:
             for k in self._margins:
                 scans[k] = self.projected(k, relative[:, k])

@@ -16,10 +16,10 @@ def sum_heights(columns, slopes, leaves, deviations, raised, lowest):  # type: i
             for j in range(row.size):
                 raised[k, j] += factor * row[j]
         for leaf in range(leaves.size - 1):
-            least = raised[k, leaves[leaf]]
+            low = raised[k, leaves[leaf]]
             for j in range(leaves[leaf] + 1, leaves[leaf + 1]):
-                least = min(least, raised[k, j])
-            lowest[k, leaf] = least
+                low = min(low, raised[k, j])
+            lowest[k, leaf] = low
 
 
 @compiled
@@ -57,14 +57,14 @@ def deepest(points, clusters, relative, raised, lowest, numbers, may_carry, limi
             middle[leaf] += lowest[row, leaf] - spread[leaf]
         for cluster in range(clusters.size - 1):
             begin, end = clusters[cluster], clusters[cluster + 1]
-            least, where = limit, leaves[begin]
+            deepest_gap, where = limit, leaves[begin]
             promising = begin
             for leaf in range(begin + 1, end):
                 if middle[leaf] < middle[promising]:
                     promising = leaf
             for turn in range(begin - 1, end):
                 leaf = promising if turn < begin else turn
-                if turn == promising or middle[leaf] > least:
+                if turn == promising or middle[leaf] > deepest_gap:
                     continue
                 start, count = leaves[leaf], leaves[leaf + 1] - leaves[leaf]
                 gaps_of(points.coordinates, start, count, factors, gaps)
@@ -72,6 +72,6 @@ def deepest(points, clusters, relative, raised, lowest, numbers, may_carry, limi
                     if may_carry.size and not may_carry[k, start + j]:
                         continue
                     gap = gaps[j] + raised[row, start + j]
-                    if gap < least or (gap == least and start + j < where):
-                        least, where = gap, start + j
-            points_there[k, cluster], gaps_there[k, cluster] = where, least
+                    if gap < deepest_gap or (gap == deepest_gap and start + j < where):
+                        deepest_gap, where = gap, start + j
+            points_there[k, cluster], gaps_there[k, cluster] = where, deepest_gap

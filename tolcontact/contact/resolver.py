@@ -120,7 +120,7 @@ class ContactResolver:
             self._step.take(task, state, stride=start.stride)
         state.searched[:] = projected
         self._leave_adrift(task, state)
-        scans = self._candidates.scans(state.relative, task.deviations, projected=projected, known=task.scans)
+        scans = self._candidates.scans(state.relative, task.deviations, projected=projected, earlier=task.scans)
         task = replace(task, scans=scans)
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
         if self._method.is_exact:

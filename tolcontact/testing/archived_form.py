@@ -37,8 +37,8 @@ class ArchivedForm:
             points
         )
         n = self._normals(points)
-        whole = self._removed[:, 0] + n @ self._removed[:, 1:4].T + np.cross(points, n) @ self._removed[:, 4:].T
-        return (heights - whole).reshape(*places.shape[:-1], -1)
+        displacement = self._removed[:, 0] + n @ self._removed[:, 1:4].T + np.cross(points, n) @ self._removed[:, 4:].T
+        return (heights - displacement).reshape(*places.shape[:-1], -1)
 
     def _functions(self, points: np.ndarray) -> np.ndarray:
         """Return the sums (point, mode) of covariances with the stations."""
