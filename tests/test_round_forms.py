@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 import tolcontact as tc
 from tests.cases import toleranced
 from tests.cases.fits import CLEARANCE, LENGTH, PULL, RADIUS, shaft_in_a_bore, shaft_on_a_table
-from tests.helpers import SEATED, simulate
+from tests.helpers import SEATED, nightly, simulate
 from tests.test_form import coefficients
 from tolcontact.features.least_zone import least_widths
 from tolcontact.simulation.surfaces import check_surfaces
@@ -122,7 +122,7 @@ def width_by_programme(terms, heights):
     return linprog(np.eye(size + 1)[-1], A_ub=rows, b_ub=limits, bounds=[(None, None)] * (size + 1), method="highs").fun
 
 
-@pytest.mark.parametrize("tolerance", [tc.Cylindricity(0.05), tc.Roundness(0.05), tc.Straightness(0.05)], ids=str)
+@pytest.mark.parametrize("tolerance", [tc.Cylindricity(0.05), *nightly(tc.Roundness(0.05), tc.Straightness(0.05))], ids=str)
 def test_zones_of_cylinders_are_those_of_a_linear_programme(tolerance):
     program = tc.build(shaft_in_a_bore(tolerance))
     field = form_of(program, "shaft")
