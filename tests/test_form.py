@@ -6,12 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from scipy.optimize import linprog
+from scipy.stats import chi2
 
 import tolcontact as tc
+from tests import cases
 from tests.cases.seats import PRESS, seat, sliding
 from tests.helpers import SEATED, joined, simulate
 from tolcontact.analyses.grouping import owners
 from tolcontact.compilation import compile_program
+from tolcontact.contact.raised_scan import raised_scan
+from tolcontact.contact.scan import PairScan, pair_scan
 from tolcontact.discretization import Offsets, discretize
 from tolcontact.errors import ModelError
 from tolcontact.features import FormField
@@ -24,8 +28,10 @@ from tolcontact.vocabulary import CORRECTED, Status
 def modes_at(program, feature, places):
     """Heights (place, mode) of the form of a feature, from the formulae of the archive's documentation."""
     form = next(nominal.form for nominal in program.nominal.features if nominal.feature.name == feature)
-    r = np.linalg.norm(places[:, None] - form.stations, axis=2) / form.length
-    return np.exp(-(r**2) / 2) @ form.weights - form.removed[0] - places @ form.removed[1:]
+    r = np.linalg.norm(places[:, None] - form.stations, axis=2) / form.lengths.across
+    n = np.broadcast_to(form.associated.surface.axis, places.shape)
+    displaced = np.column_stack([np.ones(len(places)), n, np.cross(places, n)])
+    return np.exp(-(r**2) / 2) @ form.weights - displaced @ form.removed
 
 
 def coefficients(program, run, feature):
@@ -65,6 +71,9 @@ class OneMode(FormField):
 
     def heights(self, points):
         return self.shape((points[..., 0] - 50) / 50, (points[..., 1] - 25) / 25)[..., None]
+
+    def sums(self, points, row, coefficients):
+        return (self.heights(points) * coefficients[row]).sum(axis=1)
 
 
 def seat_of_one_mode(shape):
@@ -247,3 +256,39 @@ def test_the_gap_of_a_station_over_a_face_with_form_counts_its_height_there():
     a.measure("clearance", tc.Clearance(block.face("-z"), base.face("+z")))
     with pytest.raises(ModelError, match="which has form, cannot be measured"):
         tc.build(a)
+
+
+def test_heights_that_are_summed_up_once_give_the_same_deepest_points():
+    program = tc.build(seat())
+    pair, gaps = program.nominal.pairs[0], program.gaps[0]
+    deviations = program.draws(seed=3, start=0, stop=50)
+    poses = program.place(deviations=deviations)["poses"]
+    relative = program.observe(poses=poses, deviations=deviations)["relative"].reshape(50, -1, 12)[:, 0]
+    scan = pair_scan(pair, gaps, (), 8)
+    raised = raised_scan(scan, deviations).take(np.arange(49, -1, -1))
+    actual, expected = (
+        raised.deepest(relative[::-1], deviations[::-1]),
+        PairScan.deepest(scan, relative[::-1], deviations[::-1]),
+    )
+    assert (actual.points == expected.points).all() and expected.depth.max() > 0
+    np.testing.assert_allclose(actual.depth, expected.depth, atol=1e-14)
+    for one, other in zip(
+        raised.rows(actual.points, deviations[::-1]), scan.rows(actual.points, deviations[::-1]), strict=True
+    ):
+        np.testing.assert_allclose(one, other, atol=1e-15)
+
+
+@pytest.mark.nightly
+def test_four_times_as_many_points_tell_the_same():
+    """Points count by the areas that they stand for, so that 6 sigma stays within its interval of 95 %."""
+    spreads, count = [], 2000
+    for points in ((400, 200, 200), (1600, 800, 800)):
+        ra2 = cases.model("ra2")
+        for pair, of_pair in zip(ra2.pairs, points, strict=True):
+            face = pair.moving
+            face.part.feature(f"under {pair.name}", face, tc.Flatness(0.05))
+            object.__setattr__(pair, "points", of_pair)
+        _, run = simulate(ra2, samples=count, solver="daqp")
+        spreads.append(6 * run["measured"][:, CORRECTED, 0].std())
+    lower, upper = spreads[0] * np.sqrt(count / chi2.ppf([0.975, 0.025], count - 1))
+    assert lower < spreads[1] < upper and abs(spreads[1] - spreads[0]) < (upper - lower) / 4

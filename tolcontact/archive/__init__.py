@@ -84,10 +84,15 @@ direction times the displacement; for one on a feature of another part (`ground_
 displacement there.
 
 A face with form (`form_covariance` not empty) stands higher at a point p by the sum over modes of the `deviation` with number
-`form_contributor` times (covariance(|p - `station`| / `form_length`) @ `station_weight` - `form_removed` @ [1, p]), with the
-stations of that face (`face_of_station`). The covariances of a distance r are exp(-r^2 / 2); with s = sqrt(5) r, (1 + s + s^2 /
-3) exp(-s); and with s = sqrt(3) r, (1 + s) exp(-s). Subtract the heights of both sides from gaps, at their nominal points; add
-that of the face of a locator to its deviation. `tolcontact.testing.assert_gaps_recompute` does all of this from the file alone.
+`form_contributor` times (f(p) - `form_removed` @ [1, n, p x n]), where n is the unit normal of the surface `form_surface_...`
+at p, away from its axis or centre, and f(p) = covariance(p, `station`) @ `station_weight` with the stations of that face
+(`face_of_station`). The covariances of a distance r are exp(-r^2 / 2); with s = sqrt(5) r, (1 + s + s^2 / 3) exp(-s); and with
+s = sqrt(3) r, (1 + s) exp(-s). The distance counts in `form_length` across the axis of the surface, in `form_length_along`
+along it; with a number of `form_lobes` it is the one along the axis alone, and a cosine of that multiple of the angle around
+the axis is a factor. If a form is measured from the "circles" of sections (`form_associated`), f is without its first harmonic
+and its mean around the axis; from "lines", without its line of least squares between `form_start` and `form_end`. Subtract the
+heights of both sides from gaps, at their nominal points, that of the moving side times `facing`; add that of the face of a
+locator to its deviation. `tolcontact.testing.assert_gaps_recompute` does all of this from the file alone.
 
 `tc.open_archive(path)` checks everything but the rows and opens the file; `tc.model_of` rebuilds its model.
 

@@ -6,6 +6,8 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.compilation import Program
+from tolcontact.features.associated_features import TERMS
+from tolcontact.geometry.analytic_surfaces import surface_arrays
 from tolcontact.vocabulary import ArchiveVariable
 
 
@@ -17,7 +19,7 @@ def form_sizes(program: Program) -> dict[str, int]:
     return {
         terms.FORM_STATION: sum(len(form.stations) for form in forms),
         terms.FORM_MODE: max(form.modes for form in forms),
-        terms.FORM_TERM: 4,
+        terms.FORM_TERM: TERMS,
     }
 
 
@@ -28,17 +30,23 @@ def form_values(program: Program) -> dict[ArchiveVariable, Any]:
         return {}
     modes, contributors = sizes[terms.FORM_MODE], program.draws.contributors
     numbers = {variable: np.full(len(faces), np.nan) for variable in NUMBERS}
-    columns, removed = np.full((len(faces), modes), -1), np.zeros((len(faces), modes, 4))
+    columns, removed = np.full((len(faces), modes), -1), np.zeros((len(faces), modes, TERMS))
+    surfaces = [None if face.form is None else face.form.associated.surface for face in faces]
     weights = []
     with_form = [(number, face, face.form) for number, face in enumerate(faces) if face.form is not None]
     for number, face, form in with_form:
-        spread, width = contributors[face.form_columns[0]].spread, program.draws.contributors.mean_zones[face.name]
-        for variable, value in zip(NUMBERS, (form.length, spread, form.left_out, width), strict=True):
+        spread = np.nan if form.spreads is not None else contributors[face.form_columns[0]].spread
+        width = program.draws.contributors.mean_zones[face.name]
+        values = (*form.lengths, *form.associated.ends, spread, form.left_out, width)
+        for variable, value in zip(NUMBERS, values, strict=True):
             numbers[variable][number] = value
         columns[number, : form.modes], removed[number, : form.modes] = face.form_columns, form.removed.T
         weights.append(np.pad(form.weights, ((0, 0), (0, modes - form.modes))))
     return {
         terms.FORM_COVARIANCE: ["" if face.form is None else face.form.form.covariance for face in faces],
+        terms.FORM_LOBES: [0 if face.form is None else face.form.form.lobes or 0 for face in faces],
+        terms.FORM_ASSOCIATED: ["" if face.form is None else face.form.associated.name for face in faces],
+        **{terms.FORM_SURFACE[name]: values for name, values in surface_arrays(surfaces).items()},
         **numbers,
         terms.FORM_CONTRIBUTOR: columns,
         terms.FACE_OF_STATION: np.concatenate([np.full(len(form.stations), number) for number, _, form in with_form]),
@@ -48,4 +56,7 @@ def form_values(program: Program) -> dict[ArchiveVariable, Any]:
     }
 
 
-NUMBERS = (terms.FORM_LENGTH, terms.FORM_SPREAD, terms.FORM_LEFT_OUT, terms.FORM_MEAN_ZONE)
+NUMBERS = (
+    terms.FORM_LENGTH, terms.FORM_LENGTH_ALONG, terms.FORM_START, terms.FORM_END, terms.FORM_SPREAD, terms.FORM_LEFT_OUT,
+    terms.FORM_MEAN_ZONE,
+)  # fmt: skip

@@ -9,6 +9,7 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.discretization import ContactPoints, Nominal, raised_places
 from tolcontact.errors import ContactWarning, shown
+from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.meeting import Meeting, Reach, meeting
 
 TRIALS = 1024  # raw poses
@@ -63,7 +64,7 @@ def bounded_pair(
     nothing = None, Trial(np.nan, np.nan)
     if pair.moving_face is None or pair.reference_face is None or pair.reference is None or pair.round is not None:
         return nothing
-    if not np.isfinite(smallest):
+    if not np.isfinite(smallest) or (pair.has_form and not (is_flat(pair.moving_face) and is_flat(pair.reference_face))):
         return nothing
     highest = float(np.abs(pair.heights(deviations)).max())
     if pair.has_form:

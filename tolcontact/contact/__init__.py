@@ -121,9 +121,8 @@ True
 
 ## Limits
 
-- There is no friction (see `tc.seating`).
-- Planes may have form; other features shift, tilt and grow. With fixed points, gaps are correct only to
-  first order between faces that tilt and touch outside their nominal overlap; so are those of round faces with sampled points
+- There is no friction (see `tc.seating`). General surfaces have no form; they shift and tilt. With fixed points, gaps are
+  correct only to first order between faces that tilt and touch outside their nominal overlap; so are those of round faces with sampled points
   that change in size. The pose is a local optimum, found step by step from the raw pose. On 1000 realizations of five models
   ipopt, also started from the raw pose, found no lower one. In a chain of bodies with degrees of freedom that barely anything
   holds, another optimum may lie a few mm away with an objective that differs in the fifth digit; a round part of flat

@@ -11,6 +11,7 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
 from tolcontact.contact.bounded_scan import bounded_scan
+from tolcontact.contact.raised_scan import RaisedScan, raised_scan
 from tolcontact.contact.scan import PairScan, RoundScan, Scan, changing, fixed, min_gaps, pair_scan
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.state import State, Task
@@ -75,6 +76,7 @@ def project(scan: PairScan, surface: Surface | None, relative: Float[Array, "rea
 
 
 MAX_CLUSTERS = 6
+FORM_CLUSTERS = 8  # of faces with form, which touch at more places
 EDGE_SHARE = 1 / 4000  # of the smallest tolerance range: error of planes beyond their edges, in steps
 OVERHANG_SHARE = 0.01  # of their radius, by which balls and shafts that travelled far may carry beside a wall
 
@@ -127,12 +129,12 @@ class Candidates:
                 self._all_scans.append(round_scan)
                 self._carrying_scans.append(round_scan)
                 continue
-            self._all_scans.append(pair_scan(pair, gaps, tables, MAX_CLUSTERS))
+            clusters = FORM_CLUSTERS if pair.has_form else MAX_CLUSTERS
+            self._all_scans.append(pair_scan(pair, gaps, tables, clusters))
             # If the paper's set of points may carry, those between the corners count, too.
             corners = self._method.corners_suffice and index not in program.meetings
-            self._carrying_scans.append(
-                pair_scan(pair, gaps, (), MAX_CLUSTERS, gaps.corners) if corners else self._all_scans[-1]
-            )
+            self._carrying_scans.append(pair_scan(pair, gaps, (), clusters, gaps.corners) if corners else self._all_scans[-1])
+        self._with_form = [k for k, pair in enumerate(self._pairs) if pair.has_form]
         self._edge_error = EDGE_SHARE * program.nominal.assembly.smallest_zone()
         self.bounded = {k: program.meetings[index] for k, index in enumerate(group.group.pairs) if index in program.meetings}
         is_iterated = self._method.is_iterated
@@ -150,14 +152,19 @@ class Candidates:
         projected: bool = False,
         slots: Sequence[Slots] = (),
         width: float = 1.0,
+        earlier: Sequence[Scan] = (),
     ) -> list[Scan]:
         """Return scans of the points that may carry, projected again if the method requires it.
 
         Places of bounded pairs are found anew; in steps, with the `slots` of the pairs with changing points, places that carry
         remain a little beyond their edges, `width` times as far as they may in an answer. With `projected`, points against
-        curved faces are projected again in any case.
+        curved faces are projected again in any case. `earlier` are scans of the same realizations, whose heights are summed up.
         """
         scans = list(self._carrying_scans)
+        for k in self._with_form:
+            if k not in self.bounded and not self._method.is_iterated:
+                is_raised = len(earlier) > 0 and isinstance(earlier[k], RaisedScan)
+                scans[k] = earlier[k] if is_raised else raised_scan(fixed(scans[k]), deviations)
         if projected or self._method.is_iterated:
             for k in self._margins:
                 scans[k] = self.projected(k, relative[:, k])

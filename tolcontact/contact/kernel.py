@@ -34,7 +34,7 @@ class Points(NamedTuple):
 
 
 @inlined
-def _write_factors(basis, columns, X, deviations, factors):  # type: ignore[no-untyped-def]
+def write_factors(basis, columns, X, deviations, factors):  # type: ignore[no-untyped-def]
     """Write the factors (r + k,) of the coordinates in the gaps: [[X_RM, 1] @ basis, deviations[columns]]."""
     entries, size = basis.shape[0] - 1, basis.shape[1]
     for c in range(size):
@@ -62,7 +62,7 @@ def bounds(boxes, start, count, factors, middle, spread):  # type: ignore[no-unt
 
 
 @inlined
-def _gaps(coordinates, start, count, factors, gaps):  # type: ignore[no-untyped-def]
+def gaps_of(coordinates, start, count, factors, gaps):  # type: ignore[no-untyped-def]
     """Write the gaps (LEAF,) [mm] of the points `start` to `start + count`."""
     for j in range(count):
         gaps[j] = factors[0]
@@ -109,7 +109,7 @@ def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activit
     middle, spread = np.empty(branches.size - 1), np.empty(branches.size - 1)
     leaf_middle, leaf_spread = np.empty(BRANCH), np.empty(BRANCH)
     for k in range(relative.shape[0]):
-        _write_factors(points.basis, points.columns, relative[k], deviations[k], factors)
+        write_factors(points.basis, points.columns, relative[k], deviations[k], factors)
         bounds(points.branch_boxes, 0, middle.size, factors, middle, spread)
         number = 0
         for branch in range(middle.size):
@@ -132,7 +132,7 @@ def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activit
                     for moment in range(moments.shape[1]):
                         moments[k, moment] += leaf_sums[leaf, moment]
                     continue
-                _gaps(points.coordinates, start, count, factors, gaps)
+                gaps_of(points.coordinates, start, count, factors, gaps)
                 active_here = 0
                 for j in range(count):
                     is_active = gaps[j] < activity
@@ -159,7 +159,7 @@ def _deepest_of_leaves(points, first_leaf, end_leaf, factors, may_carry, lowest,
         if turn == promising or middle[place] - spread[place] > lowest:
             continue
         start, count = leaves[first_leaf + place], leaves[first_leaf + place + 1] - leaves[first_leaf + place]
-        _gaps(points.coordinates, start, count, factors, gaps)
+        gaps_of(points.coordinates, start, count, factors, gaps)
         for j in range(count):
             if may_carry.size and not may_carry[start + j]:
                 continue
@@ -183,7 +183,7 @@ def deepest(points, clusters, relative, deviations, may_carry, limit, numbers, g
     middle, spread = np.empty(branches.size - 1), np.empty(branches.size - 1)
     scratch = np.empty(LEAF), np.empty(BRANCH), np.empty(BRANCH)
     for k in range(relative.shape[0]):
-        _write_factors(points.basis, points.columns, relative[k], deviations[k], factors)
+        write_factors(points.basis, points.columns, relative[k], deviations[k], factors)
         bounds(points.branch_boxes, 0, middle.size, factors, middle, spread)
         for cluster in range(clusters.size - 1):
             begin, end = clusters[cluster], clusters[cluster + 1]
@@ -207,9 +207,9 @@ def count_below(basis, columns, coordinates, relative, deviations, limit, counts
     """Add to counts (point,) the number of realizations in which the gap of a point is below `limit`; see GapMap."""
     factors, gaps = np.empty(coordinates.shape[0]), np.empty(LEAF)
     for k in range(relative.shape[0]):
-        _write_factors(basis, columns, relative[k], deviations[k], factors)
+        write_factors(basis, columns, relative[k], deviations[k], factors)
         for start in range(0, coordinates.shape[1], LEAF):
             count = min(LEAF, coordinates.shape[1] - start)
-            _gaps(coordinates, start, count, factors, gaps)
+            gaps_of(coordinates, start, count, factors, gaps)
             for j in range(count):
                 counts[start + j] += gaps[j] < limit

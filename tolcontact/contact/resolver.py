@@ -127,7 +127,8 @@ class ContactResolver:
             self._step.take(task, state, stride=start.stride)
         state.searched[:] = projected
         self._leave_adrift(task, state)
-        task = replace(task, scans=self._candidates.scans(state.relative, task.deviations, projected=projected))
+        scans = self._candidates.scans(state.relative, task.deviations, projected=projected, earlier=task.scans)
+        task = replace(task, scans=scans)
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
         if self._method.is_exact:
             depth = undone(task.scans, state.gap_min, state.relative, task.deviations, task.may_carry, state.slack)

@@ -190,7 +190,7 @@ class CompiledScan(PairScan):
         active, moments = np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS))
         poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
         flat = moments.reshape(count, len(self._tables))
-        kernel.survey(self._points, self._tables, *self._sums, poses, heights, activity, active, flat)
+        kernel.survey(self.compiled, self._tables, *self._sums, poses, heights, activity, active, flat)
         return Survey(active, moments)
 
     def min_gap(
@@ -209,11 +209,18 @@ class CompiledScan(PairScan):
         gaps = np.empty(points.shape)
         poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
         mask = np.empty((len(relative), 0), dtype=bool) if may_carry is None else np.ascontiguousarray(may_carry)
-        kernel.deepest(self._points, clusters, poses, heights, mask, limit, points, gaps)
+        kernel.deepest(self.compiled, clusters, poses, heights, mask, limit, points, gaps)
         return points, gaps
 
     @cached_property
-    def _points(self) -> kernel.Points:
+    def contiguous(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """P_m, P_r and n_r (point, 3), in rows."""
+        P_m, P_r, n_r = (np.ascontiguousarray(values) for values in (self.P_m, self.P_r, self.n_r))
+        return P_m, P_r, n_r
+
+    @cached_property
+    def compiled(self) -> kernel.Points:
+        """The points as compiled passes take them."""
         rounding = BOUND_TOLERANCE * np.abs(self.coordinates[1:]).max(initial=0)
         boxes = []
         for starts in (self.leaves[:-1], self.leaves[self.branches[:-1]]):

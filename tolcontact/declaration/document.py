@@ -159,7 +159,7 @@ SIZE = Record(
     Size, "nominal upper lower cp cpk moves distribution tolerance_class?", kind="size", nominal=Plain(POSITIVE),
     upper=Plain(float | str), lower=Plain(float | None), moves=Plain(text_type(MOVES)), distribution=DISTRIBUTION,
 )  # fmt: skip
-CODECS[Form] = Record(Form, "covariance? length? modes?", covariance=Plain(text_type(COVARIANCES)))
+CODECS[Form] = Record(Form, "covariance? length? modes? lobes? measured?", covariance=Plain(text_type(COVARIANCES)))
 CONTROL = Choice(
     "FeatureTolerance", f"kind: one of {', '.join(['size', *KINDS])}", SIZE, *map(_tolerance_record, KINDS.values())
 )

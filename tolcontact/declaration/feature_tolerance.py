@@ -17,7 +17,8 @@ BONUSES = ("fills", "accepts", "none")
 MATERIALS = ("", "M", "L")
 SYMBOLS = {"M": "Ⓜ", "L": "Ⓛ"}
 ZONES = ("round", "flat")
-AROUND_ROUND = ("profile", "line profile", "circular run-out", "total run-out")  # kinds with zones for walls, not for axes
+RUNOUTS = ("circular run-out", "total run-out")
+AROUND_ROUND = ("profile", "line profile", *RUNOUTS)  # kinds with zones for walls, not for axes
 USUAL_FORM = Form()
 COMPARTMENT = re.compile(r"([A-Z]{1,2}(?:-[A-Z]{1,2})*)(?:\(([ML])\))?(><)?")
 
@@ -257,7 +258,10 @@ class TotalRunout(GeometricTolerance):
 
 
 class Straightness(GeometricTolerance):
-    """Straightness of an axis, or of any line of a plane (ISO 1101, 17.3). It limits form, and does not move the feature."""
+    """Straightness of lines of a surface, or of an axis (ISO 1101, 17.3). It limits form, and does not move the feature.
+
+    The lines of a cylinder or cone are drawn; for the straightness of its axis, or of lines of a plane, give form=None.
+    """
 
     kind, options, needs_datums, is_form = "straightness", ("per",), False, True
 

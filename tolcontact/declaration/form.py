@@ -8,6 +8,7 @@ from tolcontact.readable import Readable
 
 COVARIANCES = ("squared exponential", "matern 5/2", "matern 3/2")
 MAX_MODES = 200
+MIN_LOBES, MAX_LOBES = 2, 12  # one lobe displaces a section
 
 
 @dataclass(frozen=True, repr=False)
@@ -16,22 +17,44 @@ class Form(Readable):
 
     covariance   of the heights of two points, by their distance: "squared exponential", "matern 5/2" or "matern 3/2", from
                  smooth to rough
-    length       [mm] correlation length; by default a third of the longest extent of the face
+    length       [mm] correlation length; by default a third of the longest extent of the face, of a cylinder or cone a
+                 third of its length along the axis, and of its diameter across it
     modes        number of Karhunen-Loeve modes, those with the largest variances; each is a contributor
+    lobes        of a cylinder or cone: all sections have this number of lobes, as waviness has; covariances then count the
+                 distance along the axis alone
+    measured     path of the points of measured faces, one CSV or PLY file for each part, as in "scans/*.csv": lines x, y, z
+                 [mm] in the frame of the part. Faces then vary as these do, whatever the width of the tolerance
     """
 
     covariance: str = "squared exponential"
     length: float | None = None
     modes: int = 20
+    lobes: int | None = None
+    measured: str | None = None
 
     def faults(self) -> Iterator[str]:
         if self.covariance not in COVARIANCES:
             yield f"covariance is {self.covariance!r}; expected one of: {', '.join(map(repr, COVARIANCES))}"
         if self.length is not None and not (is_length(self.length) and self.length > 0):
             yield f"length is {self.length!r}; expected a correlation length in mm above 0"
-        if not (isinstance(self.modes, int) and not isinstance(self.modes, bool) and 1 <= self.modes <= MAX_MODES):
+        if not _is_number(self.modes, 1, MAX_MODES):
             yield f"modes is {self.modes!r}; expected a whole number from 1 to {MAX_MODES}"
+        if self.lobes is not None and not _is_number(self.lobes, MIN_LOBES, MAX_LOBES):
+            yield f"lobes is {self.lobes!r}; expected a whole number from {MIN_LOBES} to {MAX_LOBES}, or none"
+
+        if self.measured is not None and not (isinstance(self.measured, str) and self.measured):
+            yield f'measured is {self.measured!r}; expected the path of CSV or PLY files, as in "scans/*.csv"'
+        elif self.measured is not None and (self.covariance, self.length, self.lobes) != (COVARIANCES[0], None, None):
+            yield "it is measured, and has a covariance, a length or lobes beside that; leave these out"
 
     def __str__(self) -> str:
+        if self.measured is not None:
+            return f"form of up to {self.modes} components, measured in {self.measured}"
         length = "a third of the face" if self.length is None else f"{self.length:g} mm"
-        return f"form of {self.modes} modes, {self.covariance}, length {length}"
+        lobes = "" if self.lobes is None else f", {self.lobes} lobes"
+        return f"form of {self.modes} modes, {self.covariance}, length {length}{lobes}"
+
+
+def _is_number(value: object, least: int, most: int) -> bool:
+    """Return whether a value is a whole number in a range."""
+    return isinstance(value, int) and not isinstance(value, bool) and least <= value <= most

@@ -29,8 +29,10 @@ more than a two-thousandth of the smallest tolerance range. This is the smallest
 narrower than a thousandth of the widest one is treated as a constant and ignored.
 
 If a face has form, its points are a fifth of the correlation length apart, unless you choose otherwise; more than half is
-refused. Such a face can touch planes alone. Heights are those at the nominal points; where faces end, those at the places
-found at each pose, and contact points between these count as long as they stand over the reference face.
+refused. Planes with form touch planes that face them. A cylinder in a parallel one has a grid of points: at least 48 azimuths,
+and heights a third of the correlation length apart. Other round faces have the points of curved faces. Heights are those at the
+nominal points; where planes end, those at the places found at each pose, and contact points between these count as long as they
+stand over the reference face. Round faces with form are not followed beyond their ends.
 
 ## Warnings
 

@@ -10,7 +10,14 @@ import trimesh
 
 from tolcontact.declaration import Assembly, ContactPair, Face, Part
 from tolcontact.declaration.contact_pair import MAX_POINTS
-from tolcontact.discretization.form_points import check_flat, check_resolved, form_lengths, form_spacing, with_rims
+from tolcontact.discretization.form_points import (
+    check_facing,
+    check_resolved,
+    coaxial_points,
+    form_lengths,
+    form_spacing,
+    with_rims,
+)
 from tolcontact.discretization.nominal import ContactPoints, Offsets
 from tolcontact.discretization.nominal_part import NominalPart
 from tolcontact.discretization.round_contact import round_points
@@ -44,13 +51,15 @@ def contact_points(
     deviating = _deviation(pair.moving, moving, meshes, features), _deviation(pair.reference, reference, meshes, features)
     lengths = form_lengths(deviating)
     if lengths:
-        check_flat(moving_face, reference_face, deviating)
+        check_facing(moving_face, reference_face, deviating)
     balls_and_shafts = round_points(moving_face, reference_face, reach) if _is_open(pair) and not lengths else []
     if balls_and_shafts:
         P_m, P_r, n_r = (np.array(rows) for rows in zip(*(point.nominal() for point in balls_and_shafts), strict=True))
     else:
-        P_m = _candidates(scene.assembly, pair, moving, unplaced.mesh, (moving_face, reference_face), reach, lengths)
-        P_m, P_r, n_r = _touching(pair, P_m, moving_face, reference_face, reach)
+        candidates = coaxial_points(moving_face, reference_face, deviating) if _is_open(pair) and lengths else None
+        if candidates is None:
+            candidates = _candidates(scene.assembly, pair, moving, unplaced.mesh, (moving_face, reference_face), reach, lengths)
+        P_m, P_r, n_r = _touching(pair, candidates, moving_face, reference_face, reach)
     points = ContactPoints(
         name=pair.name,
         moving=scene.index(moving.part),
@@ -150,7 +159,7 @@ def _height_offsets(points: ContactPoints) -> Offsets:
         if face is not None and face.grows:
             offsets.append(Offsets(face.columns[face.height != 0], np.outer(face.height[face.height != 0], share)))
         if face is not None and face.form is not None:
-            offsets.append(Offsets(face.form_columns, face.form.heights(P).T))
+            offsets.append(Offsets(face.form_columns, face.form.heights(P).T * share))
     return Offsets.joined(offsets, len(facing)) if offsets else Offsets.none(len(facing))
 
 

@@ -8,12 +8,17 @@ from scipy.spatial import KDTree
 
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation
+from tolcontact.geometry.analytic_surfaces import Cylinder
 from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.overlap import rim_points
-from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.surface import RIM_TOLERANCE, Surface
 
 FACING = -0.99999  # cosine of the angle between the normals of planes that face each other
 SPACING_SHARE = 1 / 5  # of the correlation length: the usual spacing
+ALONG_SHARE = 1 / 3  # of the correlation length: the same along the axis of cylinders, whose lines are straight
+MIN_AZIMUTHS = 48  # of a cylinder
+END_SHARE = 1e-6  # of the length: how far inside their ends the outermost points of cylinders are
+PARALLEL_TOLERANCE = 1e-3  # rad between the axes of cylinders
 MAX_SPACING_SHARE = 1 / 2
 COVER_SHARE = 0.71  # of the spacing of a square grid: the distance of the middle of a square from the nearest point
 MIN_DISTANCE_SHARE = 1 / 4  # of the spacing: points of a rim that are nearer to others are left out
@@ -22,7 +27,7 @@ EDGES = 8  # of the triangles whose corners are compared with contact points, in
 
 def form_lengths(deviating: Sequence[FaceDeviation | None]) -> list[float]:
     """Return the correlation lengths [mm] of the faces that have form."""
-    return [face.form.length for face in deviating if face is not None and face.form is not None]
+    return [min(face.form.lengths) for face in deviating if face is not None and face.form is not None]
 
 
 def form_spacing(lengths: Sequence[float]) -> float:
@@ -30,15 +35,41 @@ def form_spacing(lengths: Sequence[float]) -> float:
     return COVER_SHARE * SPACING_SHARE * min(lengths)
 
 
-def check_flat(moving: Surface, reference: Surface, deviating: Sequence[FaceDeviation | None]) -> None:
-    """Raise GeometryFault for a face with form that does not touch a plane which faces it."""
+def check_facing(moving: Surface, reference: Surface, deviating: Sequence[FaceDeviation | None]) -> None:
+    """Raise GeometryFault for a plane with form and another plane that does not face it."""
     normals = [face.corner_normals[0, 0] for face in (moving, reference)]
-    if not (is_flat(moving) and is_flat(reference) and normals[0] @ normals[1] < FACING):
+    if is_flat(moving) and is_flat(reference) and normals[0] @ normals[1] > FACING:
         name = next(face.name for face in deviating if face is not None and face.form is not None)
         raise GeometryFault(
-            f"the face of feature {name} has form, and can touch parallel planes alone; give its tolerance form=None, "
+            f"the face of feature {name} has form, and its planes are not parallel; give its tolerance form=None, "
             "so that it keeps its shape"
         )
+
+
+def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[FaceDeviation | None]) -> np.ndarray | None:
+    """Return points (point, 3) [mm] of a cylinder inside or around a parallel one, with form; None of other faces.
+
+    They are a grid, of azimuths and of heights from the first end of either face to the last.
+    """
+    shaft, bore = (face.surfaces[0] if len(face.surfaces) == 1 else None for face in (moving, reference))
+    if not (isinstance(shaft, Cylinder) and isinstance(bore, Cylinder)):
+        return None
+    if np.linalg.norm(np.cross(shaft.axis, bore.axis)) > PARALLEL_TOLERANCE:
+        return None
+    extents = [(np.asarray(face.mesh.vertices) - shaft.origin) @ shaft.axis for face in (moving, reference)]
+    start, end = max(extent.min() for extent in extents), min(extent.max() for extent in extents)
+    if end <= start:
+        return None
+    lengths = [face.form.lengths for face in deviating if face is not None and face.form is not None]
+    across, along = (min(values) for values in zip(*lengths, strict=True))
+    inset = END_SHARE * (end - start)
+    heights = np.linspace(start + inset, end - inset, int(np.ceil((end - start) / (ALONG_SHARE * along))) + 1)
+    count = max(int(np.ceil(2 * np.pi * shaft.radius / (SPACING_SHARE * across))), MIN_AZIMUTHS)
+    u = np.linalg.svd(shaft.axis[None])[2][1]
+    outward = [np.cos(turn) * u + np.sin(turn) * np.cross(shaft.axis, u) for turn in np.arange(count) * 2 * np.pi / count]
+    points = shaft.origin + heights[:, None, None] * shaft.axis + shaft.radius * np.array(outward)
+    points = points.reshape(-1, 3)
+    return points[moving.overhang(points) <= RIM_TOLERANCE * moving.mesh.scale]
 
 
 def check_resolved(points: np.ndarray, face: trimesh.Trimesh, lengths: Sequence[float]) -> None:

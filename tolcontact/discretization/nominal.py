@@ -149,8 +149,12 @@ class ContactPoints:
     @cached_property
     def _modes(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """The columns (mode,) of the forms of both faces, and their heights (point, mode) at the points for deviations of 1."""
-        sides = zip(self.deviating, (self.P_m, self.P_r), strict=True)
-        return [(face.form_columns, face.form.heights(P)) for face, P in sides if face is not None and face.form is not None]
+        sides = zip(self.deviating, (self.P_m, self.P_r), (self.facing, np.ones(len(self.P_m))), strict=True)
+        return [
+            (face.form_columns, face.form.heights(P) * share[:, None])
+            for face, P, share in sides
+            if face is not None and face.form is not None
+        ]
 
     def least_gap(self, X_RM: np.ndarray, deviations: np.ndarray | None = None) -> np.ndarray:
         """Return the least gap (row,) [mm] of the points at X_RM (row, 12) for deviations (row, contributor) of the faces."""

@@ -27,8 +27,7 @@ class PairForm:
         heights = np.zeros(len(row))
         for face, places in zip(self.deviating, (P_m, P_r), strict=True):
             if face is not None and face.form is not None:
-                for column, modes in zip(face.form_columns, face.form.heights(places).T, strict=True):
-                    heights += self.deviations[row, column] * modes
+                heights += face.form.sums(places, row, self.deviations[:, face.form_columns])
         return heights
 
     def highest(self) -> Float[Array, " row"]:

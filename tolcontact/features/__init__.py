@@ -31,7 +31,7 @@ It deviates as a whole by small displacements in mm, each of them a contributor:
 | `tc.Profile(0.2, "A", outside=0.15)`, `tc.LineProfile` | any surface | place and tilt; without datums form alone |
 | `tc.Parallelism`, `tc.Perpendicularity`, `tc.Angularity` | plane, axis | tilt |
 | `tc.CircularRunout`, `tc.TotalRunout` | cylinder, plane | radial: place and tilt; axial: tilt |
-| `tc.Straightness` | plane, axis | form, which does not displace a feature |
+| `tc.Straightness` | plane, axis, cylinder, cone | form, which does not displace a feature |
 | `tc.Flatness` | plane | form |
 | `tc.Roundness` | cylinder, cone, sphere | form |
 | `tc.Cylindricity` | cylinder | form |
@@ -45,10 +45,10 @@ the zone as the size departs from its maximum (least) material limit: `bonus="fi
 
 ## Form
 
-A plane with a flatness, or with a profile without datums, is not flat: each drawn face has bumps and hollows of its own, and
-contact, locators, measured points and datum targets all see the same ones. Heights are a random field, the sum of modes with
-normal coefficients. Each coefficient is a contributor, "part.feature.form 01". Their common spread is such that 99.73 % of the
-faces need no wider zone than the flatness:
+A plane with a flatness is not flat, and a cylinder with a cylindricity is not round: each drawn face has bumps and hollows of
+its own, and contact, locators, measured points and datum targets all see the same ones. Heights are a random field, the sum of
+modes with normal coefficients. Each coefficient is a contributor, "part.feature.form 01". Their common spread is such that
+99.73 % of the faces need no wider zone than the tolerance:
 
 >>> rough = tc.Assembly("rough")
 >>> part = rough.part("part", tc.Box(100, 50, 10), fixed=True)
@@ -58,15 +58,27 @@ faces need no wider zone than the flatness:
 >>> len(program.nominal.contributors), program.nominal.contributors[-1]
 (20, 'part.seat.form 20')
 
+| tolerance | of | what is drawn |
+|---|---|---|
+| `tc.Flatness`; a profile without datums | plane | heights beside offset and tilts |
+| `tc.Cylindricity` | cylinder | heights beside size, shifts and tilts: lobes, and also bent, conical or barrel-shaped |
+| profile without datums | cylinder, cone, sphere | the same of any of these |
+| `tc.Roundness` | cylinder, cone | heights beside place and size of each section; sections are in line |
+| `tc.Straightness` | cylinder, cone | heights beside place and slope of each line, not of the axis |
+
 `tc.Flatness(0.05, form=tc.Form("matern 5/2", length=20, modes=40))` names the covariance of two heights by their distance
 ("squared exponential", "matern 5/2" or "matern 3/2", from smooth to rough), its correlation length, by default a third of the
-longest extent of the face, and the number of modes. Archives state which share of the variance the modes leave out, and the
+longest extent of the face, and the number of modes. For cylinders and cones it is a third of the length along the axis, and of
+the diameter across it. `tc.Form(lobes=3)` has this number of lobes in all sections. `tc.Form(measured="scans/*.csv")` varies as
+measured faces do, whose points are in files, one for each part: about their mean by their principal components. It is not
+scaled to the tolerance, and of its mean the zones around it count nothing. Of several tolerances of form the narrowest is
+drawn. Archives state which share of the variance the modes leave out, and the
 mean width of the zones. The field is orthogonal to displacements of the face as a whole: it moves no datum that is fitted by
 least squares, and datums do not touch high spots. The tolerances around a form limit form and displacement together, so that
 displacements have what the form leaves of their zones; a form that leaves nothing is refused.
 
-The form of other kinds, of part of a surface and of pairs of planes cannot be drawn yet. Such a tolerance needs `form=None`:
-it is stated, and the feature keeps its shape.
+The form of general surfaces, of lines of a plane, of sections of a sphere or of part of a circle, of part of a surface, and of
+pairs of planes cannot be drawn. Such a tolerance needs `form=None`: it is stated, and the feature keeps its shape.
 
 ## Datums
 

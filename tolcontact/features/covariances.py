@@ -1,8 +1,16 @@
-"""Covariances of the heights of two points of a face, by their distance in correlation lengths. The variance is 1."""
+"""Covariances of the heights of two points of a face, by their distance in correlation lengths. The variance is 1.
+
+With a number of lobes, heights vary around the axis of the face as a cosine, and by the distance along the axis.
+"""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
+import scipy
+
+from tolcontact.declaration.form import Form
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 
 
 def squared_exponential(distance: np.ndarray) -> np.ndarray:
@@ -27,3 +35,31 @@ COVARIANCES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "matern 5/2": matern_5_2,
     "matern 3/2": matern_3_2,
 }
+
+
+class Lengths(NamedTuple):
+    """The correlation lengths [mm] of a form: across the axis of its surface, and along it."""
+
+    across: float
+    along: float
+
+
+def covariance(form: Form, lengths: Lengths, surface: AnalyticSurface, points: np.ndarray, stations: np.ndarray) -> np.ndarray:
+    """Return the covariance (point, station) of points (point, 3) and stations (station, 3) [mm] of a surface."""
+    decay = COVARIANCES[form.covariance]
+    if form.lobes is None:
+        stretch = (1 / lengths.along - 1 / lengths.across) * np.outer(surface.axis, surface.axis)
+        scaled = [places / lengths.across + places @ stretch for places in (points, stations)]
+        return decay(scipy.spatial.distance.cdist(*scaled))
+    (arms, along), (station_arms, station_along) = (_about_axis(surface, places) for places in (points, stations))
+    cosines = np.einsum("pk,sk->ps", arms, station_arms)
+    lobes = np.cos(form.lobes * np.arccos(cosines.clip(-1.0, 1.0)))
+    return np.asarray(lobes * decay(np.abs(along[:, None] - station_along) / lengths.along))
+
+
+def _about_axis(surface: AnalyticSurface, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return unit vectors (point, 3) from the axis of a surface to points (point, 3), and places (point,) [mm] along it."""
+    arms = points - surface.origin
+    along = arms @ surface.axis
+    arms = arms - along[:, None] * surface.axis
+    return arms / np.linalg.norm(arms, axis=1, keepdims=True), along

@@ -36,7 +36,7 @@ def feature_geometry(faces: Sequence[Surface]) -> FeatureGeometry:
 
     Raises GeometryFault if a face spans several surfaces, or if two faces are not opposed planes.
     """
-    surfaces = [_analytic_surface(face) for face in faces]
+    surfaces = [analytic_surface(face) for face in faces]
     if len(faces) == 2:
         return _slab(faces, surfaces)
     face, surface = faces[0], surfaces[0]
@@ -53,7 +53,7 @@ def feature_geometry(faces: Sequence[Surface]) -> FeatureGeometry:
             return _general(face)
 
 
-def _analytic_surface(face: Surface) -> AnalyticSurface | None:
+def analytic_surface(face: Surface) -> AnalyticSurface | None:
     """Return the one analytic surface of a face; None for a general one."""
     if is_flat(face):
         normal_sum = face.corner_normals.reshape(-1, 3).mean(axis=0)

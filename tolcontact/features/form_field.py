@@ -1,94 +1,148 @@
 """Form fields: heights of a face as few functions of place, without what displaces the face as a whole.
 
-The functions are Karhunen-Loeve modes of a covariance, orthogonal to rigid displacements by area. They follow from a pivoted
-Cholesky factor of the covariance, so that they are known at any place: height(p) = covariance(p, stations) @ weights - removed.
-All that uses a face thus shares one field.
+The functions are Karhunen-Loeve modes of a covariance, orthogonal to rigid displacements and growths by area. They follow from
+a pivoted Cholesky factor of the covariance, so that they are known at any place: height(p) = covariance(p, stations) @ weights
+- removed. All that uses a face thus shares one field.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-import scipy
 
 from tolcontact.declaration.form import Form
-from tolcontact.features.covariances import COVARIANCES
-from tolcontact.geometry.quadrature import quadrature
+from tolcontact.features.associated_features import TERMS, AssociatedFeature, displacement_terms
+from tolcontact.features.covariances import Lengths, covariance
+from tolcontact.features.least_zone import ZoneMember
+from tolcontact.geometry.analytic_surfaces import Cone, Cylinder
 from tolcontact.geometry.surface import Surface
 
 LENGTH_SHARE = 1 / 3  # of the longest extent of a face: the usual correlation length
-MIN_QUADRATURE = 600  # places of a face over which areas are summed, at least
-MAX_QUADRATURE = 20_000
-QUADRATURE_SPACING = 1 / 4  # of the correlation length
 MAX_STATIONS = 200
-REST = 1e-8  # of the variance: what the stations leave out at no place
+POINTS_AT_ONCE = 1 << 14
+REST = 1e-5  # of the variance: what the stations leave out at no place
+MIN_VARIANCE = 1e-10  # of the largest: a mode with less is rounding
 
 
 @dataclass(frozen=True, eq=False)
 class FormField:
-    """Modes of a plane face, as functions of place; each has the standard deviation that it has in a field of variance 1.
+    """Modes of a face, as functions of place; each has the standard deviation that it has in a field of variance 1.
 
     form        as declared
-    length      [mm] correlation length
+    associated  what the form is measured from
+    lengths     correlation lengths
     places      (place, 3) [mm] all over the face, at which zones are evaluated
     stations    (station, 3) [mm]
     weights     (station, mode)
-    removed     (4, mode): constant and gradient [1/mm] of the displacement of the face as a whole, which a mode leaves out
+    removed     (7, mode): growth, translation and rotation [1/mm] about the origin of the face as a whole, which a mode leaves
+                out
     left_out    share of the variance of the field that the modes leave out
+    spreads     (mode,) [mm] standard deviations of the coefficients, as measured; None if these follow from a tolerance
+    means       (mode,) [mm] of the coefficients; None: 0
     """
 
     form: Form
-    length: float
+    associated: AssociatedFeature
+    lengths: Lengths
     places: np.ndarray
     stations: np.ndarray
     weights: np.ndarray
     removed: np.ndarray
     left_out: float
+    spreads: np.ndarray | None
+    means: np.ndarray | None
 
     @property
     def modes(self) -> int:
         """The number of modes."""
         return self.weights.shape[1]
 
+    @property
+    def normals(self) -> np.ndarray:
+        """Unit normals (place, 3) of the surface at the places, away from its axis or centre."""
+        return self.associated.surface.distance(self.places)[1]
+
+    @cached_property
+    def zone(self) -> tuple[ZoneMember, ...]:
+        """The members of the zone of the form, at the places."""
+        members = self.associated.members(self.places)
+        return tuple(ZoneMember(numbers, self.associated.rows(self.places[numbers])) for numbers in members)
+
     def heights(self, points: np.ndarray) -> np.ndarray:
         """Return the heights (..., mode) of each mode at points (..., 3) [mm] of the face."""
         flat = points.reshape(-1, 3)
-        covariance = COVARIANCES[self.form.covariance](scipy.spatial.distance.cdist(flat, self.stations) / self.length)
-        heights = np.tile(-self.removed[0], (len(flat), 1))
+        heights = np.zeros((len(flat), self.modes))
         # A product of matrices would depend, in its last bits, on the number of points.
-        for factor, row in zip((*-flat.T, *covariance.T), (*self.removed[1:], *self.weights), strict=True):
+        for factor, row in zip(self._functions(flat).T, (*self.weights, *-self.removed), strict=True):
             heights += factor[:, None] * row
         return heights.reshape(*points.shape[:-1], self.modes)
 
+    def sums(self, points: np.ndarray, row: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+        """Return the heights (point,) [mm] at points (point, 3) of faces, each of its own row (point,) of coefficients."""
+        factors = np.zeros((len(coefficients), len(self.stations) + TERMS))
+        for k, mode in enumerate(np.vstack([self.weights, -self.removed]).T):
+            factors += coefficients[:, k, None] * mode
+        heights = np.zeros(len(points))
+        for start in range(0, len(points), POINTS_AT_ONCE):
+            piece = slice(start, start + POINTS_AT_ONCE)
+            heights[piece] = (self._functions(points[piece]) * factors[row[piece]]).sum(axis=1)
+        return heights
+
+    def _functions(self, points: np.ndarray) -> np.ndarray:
+        """Return covariances with the stations, and displacements of the face (point, station + 7) at points (point, 3)."""
+        _, normals = self.associated.surface.distance(points)
+        values = associated_covariance(self.form, self.lengths, self.associated, points, self.stations)
+        return np.hstack([values, displacement_terms(normals, points)])
+
     def placed(self, R: np.ndarray, t: np.ndarray) -> "FormField":
         """Return the field of a face that stands at R (3, 3), t (3,) [mm]."""
-        gradient = R @ self.removed[1:]
-        removed = np.vstack([self.removed[0] - t @ gradient, gradient])
-        return replace(self, places=self.places @ R.T + t, stations=self.stations @ R.T + t, removed=removed)
+        removed = displaced_about_origin(np.vstack([self.removed[:1], R @ self.removed[1:4], R @ self.removed[4:]]), t)
+        places, stations = self.places @ R.T + t, self.stations @ R.T + t
+        return replace(self, associated=self.associated.placed(R, t), places=places, stations=stations, removed=removed)
 
 
-def form_field(form: Form, surface: Surface) -> FormField:
-    """Return the form field of a plane face, in its part's own frame."""
-    vertices = np.asarray(surface.mesh.vertices)
-    length = form.length or LENGTH_SHARE * longest_extent(vertices)
-    count = min(max(MIN_QUADRATURE, surface.mesh.area / (QUADRATURE_SPACING * length) ** 2), MAX_QUADRATURE)
-    places, areas = quadrature(surface.mesh, float(np.sqrt(surface.mesh.area / count)))
-    factor, pivots, rest = _cholesky(places, form, length)
-    root = np.sqrt(areas / areas.sum())
-    affine = np.column_stack([np.ones(len(places)), places])
-    removed, *_ = np.linalg.lstsq(affine * root[:, None], (factor * root).T, rcond=1e-10)
-    remainder = (factor.T - affine @ removed) * root[:, None]
+def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> FormField:
+    """Return the form field of a face on an analytic surface, in its part's own frame."""
+    lengths = _lengths(form, face, associated)
+    places, areas = associated.places(face, lengths)
+    factor, pivots, rest = _cholesky(places, form, lengths, associated)
+    stations, shares = places[pivots], areas / areas.sum()
+    root, centre = np.sqrt(shares), places.mean(axis=0)
+    inverse = np.linalg.inv(factor[:, pivots])
+    functions = inverse.T @ associated_covariance(form, lengths, associated, places, stations).T
+    # Sections and lines without what displaces them are not displaced as a whole either.
+    terms = associated.is_whole * displacement_terms(associated.surface.distance(places)[1], places - centre)
+    removed, *_ = np.linalg.lstsq(terms * root[:, None], (functions * root).T, rcond=1e-10)
+    remainder = (functions.T - terms @ removed) * root[:, None]
     variances, directions = np.linalg.eigh(remainder.T @ remainder)
-    modes = directions[:, : -form.modes - 1 : -1]  # of the rows of the factor
+    count = min(form.modes, int((variances > MIN_VARIANCE * variances[-1]).sum()))
+    modes = directions[:, : -count - 1 : -1]  # of the functions
     modes = modes * np.sign(np.diagonal(modes[np.abs(modes).argmax(axis=0)]))
     return FormField(
         form=form,
-        length=length,
+        associated=associated,
+        lengths=lengths,
         places=places,
-        stations=places[pivots],
-        weights=np.linalg.solve(factor[:, pivots], modes),
-        removed=removed @ modes,
-        left_out=float(1 - variances[-form.modes :].sum() / (variances.sum() + rest @ areas / areas.sum())),
+        stations=stations,
+        weights=inverse @ modes,
+        removed=displaced_about_origin(removed @ modes, centre),
+        left_out=float(1 - variances[-count:].sum() / (variances.sum() + rest @ shares)),
+        spreads=None,
+        means=None,
     )
+
+
+def _lengths(form: Form, face: Surface, associated: AssociatedFeature) -> Lengths:
+    """Return the correlation lengths of a form: usually a third of the extent of a face, with an axis across and along it."""
+    vertices, surface = np.asarray(face.mesh.vertices), associated.surface
+    if not isinstance(surface, Cylinder | Cone):
+        length = form.length or LENGTH_SHARE * longest_extent(vertices)
+        return Lengths(length, length)
+    arms = vertices - surface.origin
+    along = arms @ surface.axis
+    radius = float(np.linalg.norm(arms - along[:, None] * surface.axis, axis=1).max())
+    across = radius / form.lobes if form.lobes else form.length or LENGTH_SHARE * 2 * radius
+    return Lengths(across, form.length or LENGTH_SHARE * float(np.ptp(along)))
 
 
 def longest_extent(points: np.ndarray) -> float:
@@ -97,7 +151,25 @@ def longest_extent(points: np.ndarray) -> float:
     return float(np.ptp(points @ directions.T, axis=0).max())
 
 
-def _cholesky(places: np.ndarray, form: Form, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def displaced_about_origin(displacements: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Return displacements (7, n) that turn about the origin, of those that turn about a centre (3,) [mm]."""
+    growth, translation, rotation = np.split(displacements, [1, TERMS - 3])
+    return np.vstack([growth, translation + np.cross(centre, rotation, axisb=0).T, rotation])
+
+
+def associated_covariance(
+    form: Form, lengths: Lengths, associated: AssociatedFeature, points: np.ndarray, stations: np.ndarray
+) -> np.ndarray:
+    """Return the covariance (point, station), as functions of the points without what displaces sections or lines."""
+    values = np.zeros((len(points), len(stations)))
+    for factors, copies in associated.copies(points):
+        values += factors[:, None] * covariance(form, lengths, associated.surface, copies, stations)
+    return values
+
+
+def _cholesky(
+    places: np.ndarray, form: Form, lengths: Lengths, associated: AssociatedFeature
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the pivoted Cholesky factor (station, place) of the covariance, the pivots (station,), and what it leaves out.
 
     This is a variance (place,).
@@ -105,8 +177,8 @@ def _cholesky(places: np.ndarray, form: Form, length: float) -> tuple[np.ndarray
     variance, rows, pivots = np.ones(len(places)), np.zeros((0, len(places))), list[int]()
     while len(rows) < min(MAX_STATIONS, len(places)) and variance.max() > REST:
         pivot = int(variance.argmax())
-        distance = np.linalg.norm(places - places[pivot], axis=1) / length
-        row = (COVARIANCES[form.covariance](distance) - rows[:, pivot] @ rows) / np.sqrt(variance[pivot])
+        column = covariance(form, lengths, associated.surface, places, places[pivot][None])[:, 0]
+        row = (column - rows[:, pivot] @ rows) / np.sqrt(variance[pivot])
         rows, variance = np.vstack([rows, row]), np.maximum(variance - row**2, 0.0)
         pivots.append(pivot)
     return rows, np.array(pivots), variance

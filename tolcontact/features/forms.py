@@ -1,21 +1,61 @@
-"""Forms that are drawn: tolerances of form alone, and the kinds of features that have a form field for them.
+"""Forms that are drawn: tolerances of form alone, the features that have a form field for them, and what it is measured from.
 
-A new form is a row of DRAWN, and its field.
+A new form is a row of DRAWN, and its associated feature.
 """
 
-from tolcontact.declaration import Feature, Flatness, GeometricTolerance, LineProfile, Profile
+from collections.abc import Mapping
+
+from tolcontact.declaration import (
+    Cylindricity,
+    Feature,
+    Flatness,
+    GeometricTolerance,
+    LineProfile,
+    Profile,
+    Roundness,
+    Straightness,
+)
 from tolcontact.declaration.toleranced import Toleranced
 from tolcontact.errors import GeometryFault
-from tolcontact.features.feature_geometry import FeatureGeometry, PlaneFeature
+from tolcontact.features.associated_features import (
+    AssociatedCircles,
+    AssociatedFeature,
+    AssociatedLines,
+    AssociatedSurface,
+)
+from tolcontact.features.feature_geometry import (
+    ConeFeature,
+    CylinderFeature,
+    FeatureGeometry,
+    PlaneFeature,
+    SphereFeature,
+)
+from tolcontact.features.feature_recognition import analytic_surface
+from tolcontact.features.form_field import FormField, form_field
+from tolcontact.features.measured_field import measured_field
+from tolcontact.geometry.surface import Surface
 
-DRAWN: dict[type[GeometricTolerance], type[FeatureGeometry]] = {
-    Flatness: PlaneFeature, Profile: PlaneFeature, LineProfile: PlaneFeature,
-}  # fmt: skip
+Associated = Mapping[type[FeatureGeometry], type[AssociatedFeature]]
+WITH_AXIS = (CylinderFeature, ConeFeature)
+WHOLE: Associated = dict.fromkeys((PlaneFeature, *WITH_AXIS, SphereFeature), AssociatedSurface)
+
+DRAWN: dict[type[GeometricTolerance], Associated] = {
+    Flatness: {PlaneFeature: AssociatedSurface},
+    Cylindricity: {CylinderFeature: AssociatedSurface},
+    Roundness: dict.fromkeys(WITH_AXIS, AssociatedCircles),
+    Straightness: dict.fromkeys(WITH_AXIS, AssociatedLines),
+    Profile: WHOLE,
+    LineProfile: WHOLE,
+}
+
+
+# Of every feature that may have it. A roundness may be of part of a circle, a straightness of an axis.
+DRAWN_ALWAYS = (Flatness, Cylindricity)
 
 
 def is_drawn(kind: type[GeometricTolerance], per: object) -> bool:
-    """Return whether the form that a kind of tolerance limits, of whole surfaces or `per` a length, can be drawn."""
-    return kind in DRAWN and per is None
+    """Return whether the form that a kind of tolerance limits, of any surface or `per` a length, can surely be drawn."""
+    return kind in DRAWN_ALWAYS and per is None
 
 
 def drawn_form(declared: Toleranced, geometry: FeatureGeometry) -> GeometricTolerance | None:
@@ -30,10 +70,25 @@ def drawn_form(declared: Toleranced, geometry: FeatureGeometry) -> GeometricTole
         and (tolerance.is_form or (tolerance.limits_form_alone and isinstance(declared, Feature)))
     ]  # fmt: skip
     for tolerance in tolerances:
-        if not is_drawn(type(tolerance), tolerance.per) or DRAWN[type(tolerance)] is not type(geometry):
+        if tolerance.per is not None or type(geometry) not in DRAWN.get(type(tolerance), {}):
             unit = " per unit" if tolerance.per is not None else ""
             raise GeometryFault(
-                f"the form of {tolerance.kind}{unit} of {geometry.in_words} cannot be drawn, only that of a whole plane; "
-                f"give the {tolerance.kind} form=None, and the feature keeps its shape"
+                f"the form of {tolerance.kind}{unit} of {geometry.in_words} cannot be drawn; give the {tolerance.kind} "
+                "form=None, and the feature keeps its shape"
+            )
+        if tolerance.form is not None and tolerance.form.lobes is not None and type(geometry) not in WITH_AXIS:
+            raise GeometryFault(
+                f"{tolerance.kind}: lobes are for cylinders and cones, and it is {geometry.in_words}; leave them out"
             )
     return min(tolerances, key=lambda tolerance: tolerance.width, default=None)
+
+
+def drawn_field(tolerance: GeometricTolerance, geometry: FeatureGeometry, face: Surface) -> FormField | None:
+    """Return the form field of a face by a tolerance; None for a tolerance without form. Raises GeometryFault."""
+    surface = analytic_surface(face)
+    if tolerance.form is None or surface is None:
+        return None
+    associated = DRAWN[type(tolerance)][type(geometry)].of(surface, face)
+    if tolerance.form.measured is not None:
+        return measured_field(tolerance.form, tolerance.form.measured, face, associated)
+    return form_field(tolerance.form, face, associated)

@@ -1,8 +1,11 @@
-"""The narrowest zone between two parallel planes that contains a face with form.
+"""The narrowest zone that contains a face with form: between two planes, coaxial cylinders, or concentric circles or spheres.
 
 Its width is the least, over displacements of the zone, of the largest distance of heights from its middle, doubled. That is a
 linear programme. Its dual has one more point than the zone has freedoms: points are exchanged until none is farther out.
 """
+
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -14,26 +17,33 @@ AT_ONCE = 512  # fields
 MIN_STEP = 1e-12
 
 
-def least_widths(places: np.ndarray, heights: np.ndarray) -> np.ndarray:
-    """Return the widths (n,) [mm] of the least zones of heights (n, place) [mm] of a plane face at places (place, 3) [mm]."""
-    rigid = rigid_rows(places)
+class ZoneMember(NamedTuple):
+    """A part of a face that has a zone of its own: a whole surface, a circle, a line.
+
+    numbers   (k,) of its places among those of the face
+    rows      (k, freedom): heights of displacements and growths of the zone, each at most 1, that of 1 everywhere first
+    """
+
+    numbers: np.ndarray
+    rows: np.ndarray
+
+
+def least_widths(zone: Sequence[ZoneMember], heights: np.ndarray) -> np.ndarray:
+    """Return the widths (n,) [mm] of the least zones of heights (n, place) [mm]: of the widest member each."""
+    return np.max([_widths(member.rows, heights[:, member.numbers]) for member in zone], axis=0)
+
+
+def _widths(rigid: np.ndarray, heights: np.ndarray) -> np.ndarray:
+    """Return the widths (n,) [mm] of the least zones of heights (n, place) [mm] of a member."""
     widths = np.concatenate([_exchanged(rigid, heights[k : k + AT_ONCE]) for k in range(0, len(heights), AT_ONCE)])
     for row in np.flatnonzero(np.isnan(widths)):
         widths[row] = _by_programme(rigid, heights[row])
     return widths
 
 
-def rigid_rows(places: np.ndarray) -> np.ndarray:
-    """Return the heights (place, 3) of displacements of a plane as a whole, each at most 1."""
-    middle = places.mean(axis=0)
-    _, _, directions = np.linalg.svd(places - middle, full_matrices=False)
-    tilts = (places - middle) @ directions[:2].T
-    return np.column_stack([np.ones(len(places)), tilts / np.abs(tilts).max(axis=0)])
-
-
 def _exchanged(rigid: np.ndarray, heights: np.ndarray) -> np.ndarray:
     """Return the widths (n,) by exchange; NaN where exchanges do not end."""
-    shifted = rigid + SHIFT * np.random.default_rng(0).uniform(-1, 1, rigid.shape) * [0, 1, 1]
+    shifted = rigid + SHIFT * np.random.default_rng(0).uniform(-1, 1, rigid.shape) * [0, *[1] * (rigid.shape[1] - 1)]
     count = rigid.shape[1] + 1
     chosen = np.tile(_spread_points(shifted), (len(heights), 1))
     signs = np.ones(chosen.shape)

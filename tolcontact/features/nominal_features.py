@@ -11,8 +11,8 @@ from tolcontact.errors import GeometryFault
 from tolcontact.features.face_deviation import FaceDeviation
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize, TargetPoint
 from tolcontact.features.feature_recognition import feature_geometry
-from tolcontact.features.form_field import FormField, form_field
-from tolcontact.features.forms import drawn_form
+from tolcontact.features.form_field import FormField
+from tolcontact.features.forms import drawn_field, drawn_form
 from tolcontact.features.pattern_geometry import MIXED, RELATIVE, SIZE_TOLERANCE, PatternGeometry, check_alike
 from tolcontact.features.tolerance_layers import Datum, Layer, Lean, padded, tolerance_layers
 from tolcontact.geometry.faces import FaceArea, Meshes, face_area, patch
@@ -303,8 +303,9 @@ def _form_fields(
     form, fields = None, dict[Feature, FormField]()
     for member, (geometry, (surface, *_)) in members.items():
         form = drawn_form(declared, geometry)
-        if form is not None and form.form is not None:
-            fields[member] = form_field(form.form, surface)
+        field = None if form is None else drawn_field(form, geometry, surface)
+        if field is not None:
+            fields[member] = field
     return form, fields
 
 

@@ -82,6 +82,19 @@ class BodyFace:
         row, point = np.nonzero(level < -ROUNDED)
         return row, point
 
+    def near(self, motion: np.ndarray, other: "BodyFace", outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return rows and numbers as `behind` does, of a round face those of points that lie out of their face by less.
+
+        outward   (row,) [mm]: bounds of how far the points lie out of their face
+        """
+        row, point = self.behind(motion, other, outward)
+        if self.plane is not None or len(self.face.pieces) != 1 or len(self.face.unknown.mesh.faces):
+            return row, point
+        ((surface, is_hollow, _),) = self.face.pieces
+        level = surface.distance(_moved(motion, row, other.points[point]))[0] * (-1.0 if is_hollow else 1.0)
+        is_near = level < np.abs(outward)[row]
+        return row[is_near], point[is_near]
+
     @cached_property
     def _bulge(self) -> float:
         """The largest distance [mm] of analytic surfaces from the body's flat triangles."""
@@ -147,7 +160,8 @@ class FacePair:
             rows = slice(start, start + POSES_PER_BLOCK)
             X, outward = X_RM[rows], heights[rows]
             for body, motion, side in ((self.reference, X, self.moving), (self.moving, pose.inverse(X), self.reference)):
-                row, point = (numbers[::every] for numbers in body.behind(motion, side, highest[rows]))
+                find = body.behind if form is None else body.near
+                row, point = (numbers[::every] for numbers in find(motion, side, highest[rows]))
                 if row.size:
                     raised = outward[row]
                     if form is not None:

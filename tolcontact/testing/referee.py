@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from tolcontact import vocabulary as terms
 from tolcontact.discretization import ContactPoints, are_over, face_points
 from tolcontact.geometry.meeting import Meeting
+from tolcontact.testing.archived_form import ArchivedForm
 
 DIRECTIONS = 72  # that are tried at first
 NARROWINGS = 60
@@ -149,17 +150,8 @@ class ArchivedFaces:
         """Return contributors (mode,), and their heights (..., mode) at places (..., 3) [mm], of the form of a face."""
         if face < 0 or terms.FORM_COVARIANCE.name not in self._contact or not self._contact[terms.FORM_COVARIANCE.name][face]:
             return np.zeros(0, dtype=int), np.zeros((*places.shape[:-1], 0))
-        own = self._contact[terms.FACE_OF_STATION.name] == face
-        stations, weights = (self._contact[variable.name][own] for variable in (terms.STATION, terms.STATION_WEIGHT))
-        columns, removed = (self._contact[variable.name][face] for variable in (terms.FORM_CONTRIBUTOR, terms.FORM_REMOVED))
-        r = np.sqrt(((places[..., None, :] - stations) ** 2).sum(axis=-1)) / self._contact[terms.FORM_LENGTH.name][face]
-        covariance = {
-            "squared exponential": np.exp(-r * r / 2),
-            "matern 5/2": (1 + 5**0.5 * r + 5 / 3 * r * r) * np.exp(-(5**0.5) * r),
-            "matern 3/2": (1 + 3**0.5 * r) * np.exp(-(3**0.5) * r),
-        }[str(self._contact[terms.FORM_COVARIANCE.name][face])]
-        heights = covariance @ weights - places @ removed[:, 1:].T - removed[:, 0]
-        return columns[columns >= 0], heights[..., columns >= 0]
+        columns = self._contact[terms.FORM_CONTRIBUTOR.name][face]
+        return columns[columns >= 0], ArchivedForm(self._contact, face).heights(places)[..., columns >= 0]
 
     def form(self, face: int, deviations: np.ndarray, places: np.ndarray) -> np.ndarray:
         """Return the heights (realization, place) [mm] of the form of a face at places (place, 3), or one place each."""
@@ -252,7 +244,8 @@ class ArchivedPair:
         gaps = (from_moving - from_reference) / np.sqrt(length)
         if self.facing is not None:
             gaps -= of_moving[:, None, None] * self.facing + of_reference[:, None, None]
-            gaps -= self._form(deviations, self.moving_point, self.reference_point)[:, None]
+            gaps -= (self.faces.form(self.moving_face, deviations, self.moving_point) * self.facing)[:, None]
+            gaps -= self.faces.form(self.reference_face, deviations, self.reference_point)[:, None]
         supports = self.locators >= 0
         if supports.any():
             gaps[..., supports] -= self.faces.pushes(self.locators[supports], deviations)[:, None]

@@ -70,8 +70,9 @@ least squares, and a wider tolerance with more datums draws that motion. "trunca
 deviate by themselves. A bonus goes by the size of each member, and for what moves several of them by the smallest of theirs.
 A population judges one member of each drawn pattern, in turn.
 
-Not covered are form (features stay planes, cylinders, ...), the envelope of ASME's Rule #1, and datum shift, which follows from
-contact.
+The form of a feature, if it is drawn, lies within the zones of the surface around it: of a plane within all, of a round face
+within those of a profile and of run-out. Sizes do not limit form, nor form sizes. Not covered are the envelope of ASME's Rule
+#1, and datum shift, which follows from contact.
 
 ## Draws depend only on the seed and the realization
 

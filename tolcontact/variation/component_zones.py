@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.declaration import GeometricTolerance
-from tolcontact.features import FeatureOfSize, Layer, NominalFeature, NominalPattern, PlaneFeature
+from tolcontact.declaration.feature_tolerance import AROUND_ROUND, RUNOUTS
+from tolcontact.features import FeatureGeometry, FeatureOfSize, Layer, NominalFeature, NominalPattern, PlaneFeature
 from tolcontact.variation.form_spreads import FormedZone
 from tolcontact.variation.zones import MemberZone
 
@@ -54,31 +55,46 @@ class MemberGroup:
         return np.array([member.size_column for member in self.members if member.size_column is not None], dtype=int)
 
 
-def member_zones(pattern: NominalPattern, layer: Layer, basis: np.ndarray, form_spreads: Sequence[float]) -> list[MemberZone]:
+def member_zones(
+    pattern: NominalPattern, layer: Layer, basis: np.ndarray, form_spreads: Sequence[np.ndarray]
+) -> list[MemberZone]:
     """Return the zones of a layer for the members, as their components (coordinate, component) move what it controls.
 
-    `form_spreads` (member,) [mm] are standard deviations of the coefficients of their forms; empty without form.
+    `form_spreads` are the standard deviations (mode,) [mm] of the coefficients of the form of each; empty without form.
     """
     coordinates = layer.controlled @ layer.controlled.T @ basis
     if len(pattern.members) > 1:
         coordinates = np.where(np.abs(coordinates) < MIN_PART, 0.0, coordinates)
     places = pattern.geometry.slices
-    if not len(form_spreads) or layer.tolerance.tangent:
+    if not len(form_spreads) or not includes_form(layer.tolerance, pattern.geometry.members[0]):
         return [MemberZone(rows, coordinates[place]) for rows, place in zip(layer.rows, places, strict=True)]
     return [
-        _formed_zone(member, rows, coordinates[place], spread)
+        _formed_zone(member, layer.tolerance, rows, coordinates[place], spread)
         for member, rows, place, spread in zip(pattern.members, layer.rows, places, form_spreads, strict=True)
     ]
 
 
-def _formed_zone(member: NominalFeature, rows: np.ndarray, coordinates: np.ndarray, spread: float) -> FormedZone:
-    """Return the zone of a plane with form."""
-    field, plane = member.form, member.geometry
-    assert field is not None and isinstance(plane, PlaneFeature)
-    along = np.broadcast_to(plane.normal, (len(field.places), 1, 3))
-    offsets = plane.rows((field.places, along))[:, 0]
-    # A zone that limits tilts alone does not measure the offset, the first coordinate of a plane.
-    return FormedZone(rows, coordinates, spread * field.heights(field.places), offsets, not rows[..., 0].any())
+def includes_form(tolerance: GeometricTolerance, geometry: FeatureGeometry) -> bool:
+    """Return whether the zone of a tolerance is one for the surface with its form: not for an axis, or a tangent plane."""
+    return not tolerance.tangent and (isinstance(geometry, PlaneFeature) or tolerance.kind in AROUND_ROUND)
+
+
+def floats(tolerance: GeometricTolerance, geometry: FeatureGeometry, rows: np.ndarray) -> bool:
+    """Return whether a zone with these rows may lie anywhere along the normals of the surface, a round one of any size."""
+    if isinstance(geometry, PlaneFeature):
+        return not rows[..., 0].any()  # it limits tilts alone, and not the offset, the first coordinate of a plane
+    return tolerance.kind in RUNOUTS
+
+
+def _formed_zone(
+    member: NominalFeature, tolerance: GeometricTolerance, rows: np.ndarray, coordinates: np.ndarray, spreads: np.ndarray
+) -> FormedZone:
+    """Return the zone of a surface with form."""
+    field, geometry = member.form, member.geometry
+    assert field is not None
+    offsets = geometry.rows((field.places, field.normals[:, None]))[:, 0]
+    heights = spreads * field.heights(field.places)
+    return FormedZone(rows, coordinates, heights, offsets, floats(tolerance, geometry, rows))
 
 
 def member_groups(pattern: NominalPattern, layer: Layer, zones: Sequence[MemberZone]) -> Iterator[MemberGroup]:

@@ -18,6 +18,7 @@ from tolcontact.variation.component_zones import (
     MemberGroup,
     bonus,
     component_zone,
+    includes_form,
     member_groups,
     member_zones,
     uneven_shifts,
@@ -198,17 +199,18 @@ class Contributors:
             for _ in pattern.members:
                 yield Contributor(next(labels), FEATURE, "mm", pattern.declared.size.tolerance)
         form = next((layer for layer in pattern.layers if layer.tolerance is pattern.form), None)
-        for member, spread in zip(pattern.members, form_spreads, strict=False):  # none without form
-            for _ in member.form_columns:
-                yield Contributor(next(labels), FORM, "mm", None, form, spread)
+        for member, spreads_of_form in zip(pattern.members, form_spreads, strict=False):  # none without form
+            means = np.zeros(len(spreads_of_form)) if member.form is None or member.form.means is None else member.form.means
+            for spread, mean in zip(spreads_of_form, means, strict=True):
+                yield Contributor(next(labels), FORM, "mm", None, form, float(spread), float(mean))
 
-    def _form_spreads(self, pattern: NominalPattern) -> list[float]:
-        """Return the standard deviation [mm] of the coefficients of each member's form; nothing without form."""
-        spreads = list[float]()
+    def _form_spreads(self, pattern: NominalPattern) -> list[np.ndarray]:
+        """Return the standard deviations (mode,) [mm] of the coefficients of each member's form; nothing without form."""
+        spreads = list[np.ndarray]()
         for member in pattern.members:
             if member.form is not None and pattern.form is not None:
                 form = FormSpread(member.form)
-                spreads.append(form.spread(pattern.form.width) / pattern.form.cp)
+                spreads.append(form.spreads(pattern.form.width, pattern.form.cp))
                 self.mean_zones[member.label] = form.mean_width(spreads[-1])
         return spreads
 
@@ -239,7 +241,7 @@ class Contributors:
                 f'{layer.tolerance.kind}: the rule "{rule}" is for members that deviate by themselves, and the datums leave '
                 f'members to deviate together; choose "{INSIDE}" or "{EXTREMES}", or add the datum that locks them',
             )
-        if pattern.form is not None and rule != INSIDE and not layer.tolerance.tangent:
+        if pattern.form is not None and rule != INSIDE and includes_form(layer.tolerance, group.members[0].geometry):
             raise self._error(
                 pattern,
                 f'{layer.tolerance.kind}: the rule "{rule}" is for features that keep their shape, and the form of this one is '

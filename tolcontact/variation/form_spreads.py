@@ -13,20 +13,26 @@ import numpy as np
 import scipy
 
 from tolcontact.features import FormField
-from tolcontact.features.least_zone import least_widths
+from tolcontact.features.least_zone import ZoneMember, least_widths
 from tolcontact.variation.zones import SHARE, MemberZone, directions
 
 DIRECTIONS = 1 << 12
 NESTED_DIRECTIONS = 1 << 13  # displacements have larger spreads than modes, so that fewer directions tell more
+FACES = 500  # that are drawn for the mean width of measured ones
 MIN_SPREAD, MAX_SPREAD = 1e-6, 1e3  # of the width
 
 
 @functools.lru_cache(64)
-def _unit_widths(places: bytes, heights: bytes) -> np.ndarray:
-    """Return the widths (direction,) [mm] of least zones of modes with heights (place, mode) at places (place, 3)."""
-    points = np.frombuffer(places).reshape(-1, 3)
-    modes = np.frombuffer(heights).reshape(len(points), -1)
-    return least_widths(points, directions(modes.shape[1])[:DIRECTIONS] @ modes.T)
+def _unit_widths(zone: tuple[tuple[bytes, bytes], ...], heights: bytes, modes: int) -> np.ndarray:
+    """Return the widths (direction,) [mm] of least zones of a number of modes with heights (place, mode).
+
+    The zone is given by the numbers and the rows of its members.
+    """
+    members = [
+        ZoneMember(numbers, np.frombuffer(rows).reshape(len(numbers), -1))
+        for numbers, rows in ((np.frombuffer(numbers, dtype=int), rows) for numbers, rows in zone)
+    ]
+    return least_widths(members, directions(modes)[:DIRECTIONS] @ np.frombuffer(heights).reshape(-1, modes).T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +44,8 @@ class FormSpread:
     @property
     def widths(self) -> np.ndarray:
         """The widths (direction,) of the zones for unit vectors of coefficients in all directions evenly."""
-        places = self.field.places
-        return _unit_widths(places.tobytes(), self.field.heights(places).tobytes())
+        zone = tuple((member.numbers.tobytes(), member.rows.tobytes()) for member in self.field.zone)
+        return _unit_widths(zone, self.field.heights(self.field.places).tobytes(), self.field.modes)
 
     def share_inside(self, spread: float, width: float) -> float:
         """Return the share of faces, with coefficients of a standard deviation [mm], inside a zone of a width [mm]."""
@@ -53,9 +59,18 @@ class FormSpread:
 
         return float(scipy.optimize.brentq(excess, MIN_SPREAD * width, MAX_SPREAD * width, xtol=1e-12 * width))
 
-    def mean_width(self, spread: float) -> float:
-        """Return the mean width [mm] of the least zones of faces, with coefficients of a standard deviation [mm]."""
-        return float(spread * scipy.stats.chi.mean(self.field.modes) * self.widths.mean())
+    def spreads(self, width: float, cp: float) -> np.ndarray:
+        """Return the standard deviations (mode,) [mm] of the coefficients, for a process capability: equal, or as measured."""
+        if self.field.spreads is not None:
+            return self.field.spreads
+        return np.full(self.field.modes, self.spread(width) / cp)
+
+    def mean_width(self, spreads: np.ndarray) -> float:
+        """Return the mean width [mm] of the least zones of faces, with coefficients of standard deviations (mode,) [mm]."""
+        if self.field.means is None:
+            return float(spreads[0] * scipy.stats.chi.mean(self.field.modes) * self.widths.mean())
+        faces = self.field.means + spreads * np.random.default_rng(0).normal(size=(FACES, len(spreads)))
+        return float(least_widths(self.field.zone, faces @ self.field.heights(self.field.places).T).mean())
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from tolcontact.discretization import Nominal
 from tolcontact.features import Datum, Layer, NominalFeature, NominalPattern, PlaneFeature, zone_of
 from tolcontact.features.feature_geometry import Probes
 from tolcontact.features.least_zone import least_widths
-from tolcontact.variation.component_zones import bonus
+from tolcontact.variation.component_zones import bonus, floats, includes_form
 from tolcontact.variation.draws import Draws
 
 MIN_NOTICED = 1e-4  # smallest singular value, relative to the largest, of a motion that datums notice
@@ -94,7 +94,7 @@ def _measured_tolerance(
     tolerance, centre = layer.tolerance, pattern.geometry.centre
     primary = system[0][0].geometry if system else None
     zones = [zone_of(tolerance, member.geometry, primary) for member in pattern.members]
-    has_form = pattern.form is not None and not tolerance.tangent
+    has_form = pattern.form is not None and includes_form(tolerance, pattern.members[0].geometry)
     probes = [_form_probes(member) if has_form else zone.probes for member, zone in zip(pattern.members, zones, strict=True)]
     measurements = [
         _measurement(member, *places, deviations, centre) for member, places in zip(pattern.members, probes, strict=True)
@@ -115,7 +115,8 @@ def _measured_tolerance(
     for member, zone, measurement, (_, directions) in zip(pattern.members, zones, measurements, probes, strict=True):
         end = start + len(measurement.rows)
         of_member = residuals[:, start:end].reshape(len(residuals), *directions.shape[:2])
-        needed.append(zone.needed_width(of_member))
+        has_any_size = has_form and floats(tolerance, member.geometry, zone.rows)
+        needed.append(np.ptp(of_member[..., 0], axis=1) if has_any_size else zone.needed_width(of_member))
         allowed.append(np.full(len(residuals), float(tolerance.width)))
         if tolerance.bonus != "none" and member.size_column is not None:
             allowed[-1] += bonus(member, tolerance, deviations[:, member.size_column])
@@ -127,7 +128,7 @@ def _measured_tolerance(
 def _measured_form(pattern: NominalPattern, layer: Layer, deviations: np.ndarray) -> MeasuredZone:
     """Measure the tolerance by which the form of a feature or pattern is drawn: the least zones of its faces."""
     widths = [
-        least_widths(member.form.places, _form_heights(member, deviations))
+        least_widths(member.form.zone, _form_heights(member, deviations))
         for member in pattern.members
         if member.form is not None
     ]
@@ -137,10 +138,9 @@ def _measured_form(pattern: NominalPattern, layer: Layer, deviations: np.ndarray
 
 
 def _form_probes(feature: NominalFeature) -> Probes:
-    """Return places all over a plane with form, and its normal at each."""
-    assert feature.form is not None and isinstance(feature.geometry, PlaneFeature)
-    places = feature.form.places
-    return places, np.broadcast_to(feature.geometry.normal, (len(places), 1, 3))
+    """Return places all over a face with form, and its normal at each."""
+    assert feature.form is not None
+    return feature.form.places, feature.form.normals[:, None]
 
 
 def _form_heights(feature: NominalFeature, deviations: np.ndarray) -> np.ndarray:

@@ -32,7 +32,7 @@ SURFACE_KINDS = ("plane", "cylinder", "cone", "sphere", "torus")  # in the order
 KINDS_MEAN = {"flag_values": list(range(len(SURFACE_KINDS))), "flag_meanings": " ".join(SURFACE_KINDS)}
 
 
-def _surface_variables(prefix: str, dim: str, surface: str) -> dict[str, ArchiveVariable]:
+def surface_variables(prefix: str, dim: str, surface: str) -> dict[str, ArchiveVariable]:
     """Return the variables of a surface, by the names of the attributes that they hold."""
     return {
         "kind": ArchiveVariable(f"{prefix}_kind", (dim,), "i1", f"kind of {surface}; -1: not known", "1", KINDS_MEAN),
@@ -55,7 +55,7 @@ def _surface_variables(prefix: str, dim: str, surface: str) -> dict[str, Archive
 
 
 BREP_OF_FACE = ArchiveVariable("brep_of_face", (FACE,), "i4", "number of the B-rep face of each triangle, counted from 0")
-OF_BREP_FACE = _surface_variables("surface", BREP_FACE, "the surface of a B-rep face, as the file stated it")
+OF_BREP_FACE = surface_variables("surface", BREP_FACE, "the surface of a B-rep face, as the file stated it")
 NAME_OF_BREP_FACE = ArchiveVariable(
     "surface_name", (BREP_FACE,), str, "what the file calls a B-rep face; empty: it has no name"
 )
@@ -63,7 +63,7 @@ NAME_OF_BREP_FACE = ArchiveVariable(
 POINT_OF_ROUND = ArchiveVariable(
     "point_of_round", (ROUND_POINT,), "i4", "number of the contact point that is one of round faces, counted from 0"
 )
-OF_WALL = _surface_variables("wall", ROUND_POINT, "the wall that a ball or shaft may touch, nominal")
+OF_WALL = surface_variables("wall", ROUND_POINT, "the wall that a ball or shaft may touch, nominal")
 OF_ROUND = {
     "is_hollow": ArchiveVariable("wall_is_hollow", (ROUND_POINT,), "i1", "1 if the wall is around the ball or shaft", "1"),
     "towards": ArchiveVariable(
