@@ -122,12 +122,12 @@ True
 ## Limits
 
 - There is no friction (see `tc.seating`). General surfaces have no form; they shift and tilt. With fixed points, gaps are
-  correct only to first order between faces that tilt and touch outside their nominal overlap; so are those of round faces with sampled points
-  that change in size. The pose is a local optimum, found step by step from the raw pose. On 1000 realizations of five models
-  ipopt, also started from the raw pose, found no lower one. In a chain of bodies with degrees of freedom that barely anything
-  holds, another optimum may lie a few mm away with an objective that differs in the fifth digit; a round part of flat
-  triangles has one optimum on each triangle. Other starts are tried only if the first start leads to a conflict, no solution,
-  or one far from the raw pose.
+  correct only to first order between faces that tilt and touch outside their nominal overlap; so are those of round faces with
+  sampled points that change in size. The pose is a local optimum, found step by step from the raw pose. On 1000 realizations
+  of five models ipopt, also started from the raw pose, found no lower one. In a chain of bodies with degrees of freedom that
+  barely anything holds, another optimum may lie a few mm away with an objective that differs in the fifth digit; a round part
+  of flat triangles has one optimum on each triangle. Other starts are tried only if the first start leads to a conflict, no
+  solution, or one far from the raw pose.
 - Linearized, or with `search="fixed"`, contact points and planes are those of the nominal state, and planes do not end.
   If rims of faces shift against each other *and* tilt, their edges may
   penetrate deeper than the points, by about shift times tilt; the check of `surfaces` measures this.

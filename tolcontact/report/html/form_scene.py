@@ -10,6 +10,7 @@ import xarray as xr
 from scipy.spatial import Delaunay, QhullError
 
 from tolcontact import vocabulary as terms
+from tolcontact.features.associated_features import displacement_terms
 from tolcontact.features.covariances import COVARIANCES
 
 MAX_GAPS = 1_000_000  # that a page holds: of all contact points in both states of the single realizations
@@ -68,7 +69,8 @@ class SingleStates:
     def forms(self, part: str, vertices: np.ndarray, faces: np.ndarray) -> Iterator[ShownForm]:
         """Yield the forms of a part with vertices (vertex, 3) [mm] and triangles (face, 3)."""
         for face, covariance in enumerate(self._contact.get(terms.FORM_COVARIANCE.name, []) if self.are_known else []):
-            if covariance and str(self._contact[terms.FEATURE_OF_FACE.name][face]).startswith(f"{part}."):
+            is_plane = terms.SURFACE_KINDS[int(self._contact[terms.FORM_SURFACE["kind"].name][face])] == "plane"
+            if covariance and is_plane and str(self._contact[terms.FEATURE_OF_FACE.name][face]).startswith(f"{part}."):
                 yield from self._shown(face, vertices, faces)
 
     def _shown(self, face: int, vertices: np.ndarray, faces: np.ndarray) -> Iterator[ShownForm]:
@@ -92,12 +94,13 @@ class SingleStates:
         return np.asarray(columns[columns >= 0])
 
     def _modes(self, face: int, places: np.ndarray) -> np.ndarray:
-        """Return heights (place, mode) of the form of a face at places (place, 3) [mm], for coefficients of 1."""
+        """Return heights (place, mode) of the form of a plane at places (place, 3) [mm], for coefficients of 1."""
         is_own, removed = self._contact[terms.FACE_OF_STATION.name] == face, self._contact[terms.FORM_REMOVED.name][face]
         stations, weights = self._contact[terms.STATION.name][is_own], self._contact[terms.STATION_WEIGHT.name][is_own]
         distance = scipy.spatial.distance.cdist(places, stations) / self._contact[terms.FORM_LENGTH.name][face]
         covariance = COVARIANCES[str(self._contact[terms.FORM_COVARIANCE.name][face])](distance)
-        heights = covariance @ weights - removed[:, 0] - places @ removed[:, 1:].T
+        normals = np.broadcast_to(self._contact[terms.FORM_SURFACE["axis"].name][face], places.shape)
+        heights = covariance @ weights - displacement_terms(normals, places) @ removed.T
         return np.asarray(heights[:, self._contact[terms.FORM_CONTRIBUTOR.name][face] >= 0])
 
     def gaps(self, pair: int) -> np.ndarray | None:
