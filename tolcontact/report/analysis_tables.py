@@ -303,9 +303,9 @@ def _relocation(dataset: xr.Dataset) -> AnalysisReport:
 
 def _seating(dataset: xr.Dataset) -> AnalysisReport:
     notes = [
-        "Least coefficient of friction, the same at all other contacts, that can hold a part short of a",
-        "seat: 0 if they hold it without friction, inf if they cannot with any; and the contacts that",
-        "then hold it, with their shares of the normal forces.",
+        "Least coefficient of friction, the same at all other contacts, that can hold",
+        "a part short of a seat: 0 if they hold it without friction, inf if they cannot",
+        "with any; and the contacts that then hold it, with shares of normal forces.",
         f"Parts stand {dataset.attrs['place']}.",
     ]
     if dataset.attrs["open_pairs"]:
@@ -323,7 +323,7 @@ def _seat(dataset: xr.Dataset) -> list[str]:
     names += [f"and {len(holders) - MAX_HOLDERS} more"] if len(holders) > MAX_HOLDERS else []
     warning = ", may stop short" if 0 < critical and reserve <= 1 else ""
     over = "-" if np.isnan(reserve) else f"{float(reserve):.3g}{warning}"
-    return [str(dataset["seat"].values), f"{float(critical):.4g}", over, ", ".join(names)]
+    return [str(dataset["seat"].values), f"{float(critical):.4g}", over, ",\n".join(names)]
 
 
 _REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {
