@@ -29,12 +29,11 @@ from tolcontact.method import Method
 
 MANY_MOVERS = 6  # from which on a group is assembled from elements
 MAX_ENTRIES = 1_000_000  # of the terms of all elements of a batch of realizations
-POINT_OBJECTIVES = ("active points", "all points")
 
 
 def has_elements(group: Group, method: Method) -> bool:
     """Return whether a group has many bodies, and its objective is a sum over its pairs."""
-    is_sum = method.objective in POINT_OBJECTIVES and method.regularization == "points"
+    is_sum = method.minimizes.counts_points and method.regularization == "points"
     return is_sum and len(group.free) >= MANY_MOVERS
 
 
