@@ -120,6 +120,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     """
     _check_forms(nominal, method)
     _check_placing(nominal, method)
+    _check_springs(nominal, method)
     draws = Draws(nominal)
     with CONSTRUCTION_LOCK:  # users' functions run here, too, and may print
         with quiet():
@@ -242,6 +243,21 @@ def _check_placing(nominal: Nominal, method: Method) -> None:
         'holds them to first order; leave placing out, or choose the objective "all points"'
         for index, part in enumerate(nominal.parts)
         if index in part.movers and part.locators.placing != FIRST_ORDER
+    ]
+    if faults:
+        raise ModelError(nominal.assembly.name, faults)
+
+
+def _check_springs(nominal: Nominal, method: Method) -> None:
+    """Raise ModelError for supports with a stiffness, where no forces weigh them, or steps do not look at true gaps."""
+    if method.minimizes.presses and method.is_exact and not method.is_iterated:
+        return
+    faults = [
+        f'{pair.name}: a support has a stiffness, which needs the objective "seating" with the resolution "exact" and no iterated '
+        f'search, and these are "{method.objective}", "{method.resolution}" and "{method.search}"; choose those, or leave '
+        "stiffness out"
+        for pair in nominal.pairs
+        if pair.is_springy
     ]
     if faults:
         raise ModelError(nominal.assembly.name, faults)
