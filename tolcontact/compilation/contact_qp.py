@@ -137,7 +137,7 @@ def contact_qp(
     poses = motion.by(rigid if method.is_exact else published)
     solution_symbols, results = outcome(setting, terms.scale, rows, poses, problem, inputs["stride"])
     pure_energy = ca.substitute(energy(setting, current).value, setting.firmness, 1)
-    for row in np.flatnonzero(rows.compliance):
+    for row in np.flatnonzero(rows.compliance).tolist():
         pure_energy += ca.fmin(rows.gaps[row], 0) ** 2 / (2 * rows.compliance[row] * terms.scale)
     return ContactQP(
         assemble=_function("assemble", inputs, problem),

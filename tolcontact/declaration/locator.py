@@ -29,10 +29,10 @@ class Locator(Readable):
 
     A positive deviation moves the part along `direction`. `tolerance=None` takes the tolerance of the `locate` call. A
     `one_sided` locator is a support: the part may lift off it along `direction`, but not pass through it. The objective
-    "locator stiffness" uses the `stiffness` [N/mm] of two-sided locators, by default 1. A support with a `stiffness` gives way
-    like a spring that pushes only, under the objective "seating"; without one it is rigid. A locator `on` a feature of its part touches this feature, and also moves the
-    part by the deviation of the feature at the point. A locator of a joint is at a point of any of its parts, which the point
-    itself states: part.point(x, y, z).
+    "locator stiffness" uses the `stiffness` [N/mm] of two-sided locators, by default 1. A support with a `stiffness` gives
+    way like a spring that pushes only, under the objective "seating"; without one it is rigid. A locator `on` a feature of
+    its part touches this feature, and also moves the part by the deviation of the feature at the point. A locator of a joint
+    is at a point of any of its parts, which the point itself states: part.point(x, y, z).
     """
 
     name: str
