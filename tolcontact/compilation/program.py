@@ -253,8 +253,8 @@ def _check_springs(nominal: Nominal, method: Method) -> None:
     if method.minimizes.presses and method.is_exact and not method.is_iterated:
         return
     faults = [
-        f'{pair.name}: a support has a stiffness, which needs the objective "seating", the resolution "exact", and a search that '
-        f'is not iterated; here they are "{method.objective}", "{method.resolution}" and "{method.search}"; choose those, or '
+        f'{pair.name}: a support has a stiffness, which needs the objective "seating", the resolution "exact", and a search '
+        f'that is not iterated; here they are "{method.objective}", "{method.resolution}" and "{method.search}"; choose those, or '
         "leave stiffness out"
         for pair in nominal.pairs
         if pair.is_springy
