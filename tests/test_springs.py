@@ -1,5 +1,7 @@
 """Supports that give way: a rigid table on four springy legs, against its closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import integrate, stats
@@ -28,9 +30,9 @@ def springy_table(stiffness, *, rotation=(0, 0, 0)):
     return model
 
 
-def closed_height(legs, stiffness):
+def closed_height(legs, stiffness, load=LOAD):
     """Return the height of the middle [mm] for heights of the legs (realization, leg)."""
-    sink, twist = LOAD / (4 * stiffness), legs @ [1, -1, 1, -1] / 4
+    sink, twist = load / (4 * stiffness), legs @ [1, -1, 1, -1] / 4
     return legs.mean(axis=1) - sink + np.maximum(0, np.abs(twist) - sink)
 
 
@@ -101,3 +103,35 @@ def test_forces_follow_from_the_archive_alone(tmp_path):
 def test_a_method_without_springs_is_refused(choices):
     with pytest.raises(tc.ModelError, match=r"supports of top: a support has a stiffness.*seating.*exact.*stiffness out"):
         tc.build(springy_table(1000.0), method=SEATED.with_choices(**choices))
+
+
+def test_rigid_and_springy_supports_share_a_table():
+    """Legs 0 and 2 are rigid: the table stands on them, unless the springy diagonal holds the load higher."""
+    model = springy_table(1000.0)
+    (location,) = model.locations
+    scheme = list(location.scheme)
+    for k in (0, 2):
+        leg = scheme[k]
+        scheme[k] = tc.Locator(leg.name, leg.point, leg.direction, leg.tolerance, one_sided=True)
+    model = model.replaced(locations=[replace(location, scheme=tuple(scheme))])
+    for solver in ("qpoases", "daqp", "graph"):
+        _, run = simulate(model, samples=100, solver=solver)
+        legs = run["deviations"][:, :4]
+        rigid, springy = legs[:, [0, 2]].mean(axis=1), legs[:, [1, 3]].mean(axis=1) - LOAD / 2000
+        assert run["measured"][:, CORRECTED, 0] == pytest.approx(np.maximum(rigid, springy), abs=1e-8)
+
+
+def test_a_table_springs_back_when_a_clamp_is_released():
+    line = tc.Assembly("line", method=SEATED)
+    clamped = springy_table(1000.0)
+    top = line.part("top", tc.Box(400, 400, 20))
+    scheme = clamped.locations[0].scheme
+    for name, load in (("clamp", 400.0), ("release", 100.0)):
+        station = line.station(name)
+        station.locate(top, scheme)
+        station.force(f"load of {name}", at=top.point(200, 200, 0), vector=(0, 0, -load))
+        station.measure(f"height in {name}", top.point(200, 200, 0), along="z")
+    _, run = simulate(line, samples=100, solver="daqp")
+    for k, load in enumerate((400.0, 100.0)):
+        legs = run["deviations"][:, 7 * k : 7 * k + 4]
+        assert run["measured"][:, CORRECTED, k] == pytest.approx(closed_height(legs, 1000.0, load), abs=1e-8)
