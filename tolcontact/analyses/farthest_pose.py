@@ -11,7 +11,7 @@ binary number for each row that may carry or be open; HiGHS bounds that, too, wh
 A measure with a kink at the nominal assembly (a minimum, a clearance, an angle that is nominally 0) has no linear model, and
 no bound.
 
-To first order in deviations and motions. Pairs of round faces have no rows, which only widens the bounds.
+To first order in deviations and motions. Pairs of round faces and springy supports have no rows, which only widens the bounds.
 """
 
 from dataclasses import dataclass

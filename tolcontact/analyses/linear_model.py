@@ -114,7 +114,7 @@ def _observed(program: Program, poses: np.ndarray, deviations: np.ndarray) -> tu
     relative = values["relative"].reshape(len(poses), len(program.nominal.pairs), pose.ENTRIES)
     rows = []
     for pair, gaps in enumerate(program.gaps):
-        if gaps is not None:
+        if gaps is not None and not program.nominal.pairs[pair].is_springy:  # springs let points inside
             by_pose, by_deviations = np.split(gaps.coordinates[:, gaps.corners], [gaps.basis.shape[1]])
             entries = np.column_stack([relative[:, pair], np.ones(len(poses))])
             rows.append(entries @ gaps.basis @ by_pose + deviations[:, gaps.columns] @ by_deviations)

@@ -24,10 +24,12 @@ class ConditionedRows(NamedTuple):
     length: ca.SX
 
 
-def conditioned(setting: Setting, Q: ca.SX, pull: ca.SX, rows: Rows, misfit: ca.SX) -> dict[str, ca.SX]:
+def conditioned(setting: Setting, Q: ca.SX, pull: ca.SX, rows: Rows, misfit: ca.SX, scale: ca.SX) -> dict[str, ca.SX]:
     """Return the QP min 1/2 y'Hy + g'y with lba <= a y <= uba, in y = (U z, slacks), and the `length` of the unscaled rows.
 
-    `misfit` (locator, 1) [mm] of exact two-sided locators gives the last rows, which are equations.
+    `misfit` (locator, 1) [mm] of exact two-sided locators gives the last rows, which are equations. A row that gives way has a
+    slack of its own without a price, after those of the pairs: with the opening sqrt(C) it opens the gap by C times the
+    multiplier. `scale` is that of the objective.
     """
     pairs, equations = len(setting.group.pairs), misfit.numel()
     H, to_z = unit_blocks(Q)
@@ -35,12 +37,21 @@ def conditioned(setting: Setting, Q: ca.SX, pull: ca.SX, rows: Rows, misfit: ca.
     idle = [idle_row(k, A[k, :].nnz()) for k in range(len(rows))]
     gap_rows = conditioned_rows(A, rows.gaps, rows.filled, idle, setting.group.length)
     B = setting.slope(misfit) @ to_z
-    opens = ca.sparsify(ca.DM(np.equal.outer(rows.pairs, range(pairs)).astype(float)))
+    gives = np.flatnonzero(rows.compliance)
+    owners = np.where(rows.compliance > 0, -1, rows.pairs)
+    owners[gives] = pairs + np.arange(len(gives))
+    slacks = pairs + len(gives)
+    opens = ca.sparsify(ca.DM(np.equal.outer(owners, range(slacks)).astype(float)))
+    opening = gap_rows.opening
+    if gives.size:
+        compliance = ca.DM(np.where(rows.compliance > 0, rows.compliance, 0.0))
+        opening = ca.if_else(compliance > 0, ca.sqrt(compliance * scale) / gap_rows.length, opening)
+    prices = np.where(np.isin(range(slacks), owners[rows.compliance == 0]), 1.0, 0.0) * setting.group.length
     targets = -setting.at_rest(misfit)
     return {
-        "h": ca.diagcat(H, ca.SX.eye(pairs)),
-        "g": ca.vertcat(to_z.T @ pull, ca.DM(np.full(pairs, setting.group.length))),
-        "a": ca.blockcat([[gap_rows.A, ca.diag(gap_rows.opening) @ opens], [B, ca.SX(equations, pairs)]]),
+        "h": ca.diagcat(H, ca.SX.eye(slacks)),
+        "g": ca.vertcat(to_z.T @ pull, ca.DM(prices)),
+        "a": ca.blockcat([[gap_rows.A, ca.diag(opening) @ opens], [B, ca.SX(equations, slacks)]]),
         "lba": ca.vertcat(gap_rows.lower, targets),
         "uba": ca.vertcat(ca.DM(np.full(len(rows), np.inf)), targets),
         "to_z": to_z,

@@ -133,10 +133,12 @@ def contact_qp(
     projects = method.is_iterated or bool(curved_pairs(nominal, group))
     terms = quadratic_terms(setting, rows, motion, reactions, ca.sum1(reactions), projects=projects)
     exact = misfit(setting, moved, linear=True) if method.minimizes.presses else ca.SX(0, 1)
-    problem = conditioned(setting, *terms.summed(inputs["newton"], inputs["caution"]), rows, exact)
+    problem = conditioned(setting, *terms.summed(inputs["newton"], inputs["caution"]), rows, exact, terms.scale)
     poses = motion.by(rigid if method.is_exact else published)
     solution_symbols, results = outcome(setting, terms.scale, rows, poses, problem, inputs["stride"])
     pure_energy = ca.substitute(energy(setting, current).value, setting.firmness, 1)
+    for row in np.flatnonzero(rows.compliance).tolist():
+        pure_energy += ca.fmin(rows.gaps[row], 0) ** 2 / (2 * rows.compliance[row] * terms.scale)
     return ContactQP(
         assemble=_function("assemble", inputs, problem),
         plugin=plugin,
@@ -147,7 +149,7 @@ def contact_qp(
             {name: inputs[name] for name in ("poses", "deviations")},
             {"relative": ca.vertcat(*(X.vector() for X in setting.relative(current)))},
         ),
-        slacks=len(group.pairs),
+        slacks=len(group.pairs) + int(np.count_nonzero(rows.compliance)),
         equations=exact.numel(),
         standing=standing,
     )

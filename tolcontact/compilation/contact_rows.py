@@ -41,6 +41,7 @@ class Rows:
     pairs       (row,): position of the row's pair in the group
     relative    (12 * pair, 1): X_RM of every pair, to first order in z
     bends       (12 * pair, 1): sums of the previous reactions times the gaps' gradients by the entries of X_RM
+    compliance  (row,) [mm/N]: of supports that give way; 0 for rigid rows
     bow, wrap   (z, z): sums of the previous reactions times the second derivatives of gaps that are not linear in X_RM
                 (see round_gaps)
     """
@@ -49,6 +50,7 @@ class Rows:
     gaps: ca.SX
     filled: ca.SX
     pairs: np.ndarray
+    compliance: np.ndarray
     relative: ca.SX
     bends: ca.SX
     bow: ca.SX
@@ -63,7 +65,7 @@ def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) ->
 
     Points of round faces always have a row. So have the points that can be the deepest, if they are few and fixed.
     """
-    if gaps is None:
+    if gaps is None or pair.is_springy:
         return np.arange(len(pair.P_m))
     return gaps.corners if method.corners_suffice and len(gaps.corners) <= SLOTS else SLOTS
 
@@ -81,6 +83,7 @@ def contact_rows(
     """
     slopes: list[ca.SX] = []
     pairs: list[int] = []
+    compliance: list[np.ndarray] = []
     gaps, filled, relative, bends = ([] for _ in range(4))
     bow, wrap = (ca.SX(setting.z.numel(), setting.z.numel()) for _ in range(2))
     for k, (start, end) in enumerate(zip(setting.relative(start_poses), setting.relative(end_poses), strict=True)):
@@ -96,6 +99,7 @@ def contact_rows(
             gaps.append(point_gaps)
             filled.append(ca.SX.ones(len(pair.round)))
             pairs += [k] * len(pair.round)
+            compliance.append(np.zeros(len(pair.round)))
             bends.append(by_entries.T @ of_pair)
             bow += by_z.T @ second_derivative @ by_z
             wrap += by_z.T @ closing @ by_z
@@ -112,11 +116,13 @@ def contact_rows(
             filled.append(is_filled)
             pairs.append(k)
         bends.append(total)
+        compliance.append(1 / pair.stiffness if pair.stiffness is not None and pair.is_springy else np.zeros(len(points)))
     return Rows(
         slopes=ca.vertcat(*slopes),
         gaps=ca.vertcat(*gaps),
         filled=ca.vertcat(*filled),
         pairs=np.array(pairs),
+        compliance=np.concatenate(compliance),
         relative=ca.vertcat(*relative),
         bends=ca.vertcat(*bends),
         bow=bow,

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 import casadi as ca
+import numpy as np
 
 from tolcontact.compilation.conditioning import SLACK
 from tolcontact.compilation.contact_rows import Rows
@@ -29,7 +30,8 @@ def outcome(
     the QP that was solved.
     """
     group, z, count = setting.group, setting.z, len(rows)
-    size, equations = z.numel() + len(group.pairs), problem["a"].size1() - count
+    slacks = len(group.pairs) + int(np.count_nonzero(rows.compliance))
+    size, equations = z.numel() + slacks, problem["a"].size1() - count
     symbols = {name: ca.SX.sym(name, problem[name].sparsity()) for name in QP_ENTRIES}
     symbols |= {"x": ca.SX.sym("x", size), "lam_a": ca.SX.sym("lam_a", count + equations), "lam_x": ca.SX.sym("lam_x", size)}
     x, lam_a, lam_x, length = symbols["x"], symbols["lam_a"], symbols["lam_x"], symbols["length"]
@@ -51,7 +53,7 @@ def outcome(
         "linearized": ca.substitute(rows.relative, z, step),
         "multipliers": reactions(lam_a[:count], length, rows.filled, scale),
         "residual": ca.mmax(ca.vertcat(*residuals)),
-        "slack": SLACK * s,
+        "slack": SLACK * s[: len(group.pairs)],
         "step": ca.vertcat(ca.norm_inf(step), ca.norm_inf(y)),
         **{name: ca.substitute(value, z, taken_step) for name, value in end_values.items()},
     }

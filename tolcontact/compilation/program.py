@@ -118,8 +118,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     Raises OptionError for a solver that cannot be used, ModelError for a user's measure that fails, or, if the objective
     is seating, for forces that are missing or move nothing.
     """
-    _check_forms(nominal, method)
-    _check_placing(nominal, method)
+    _check_method(nominal, method)
     draws = Draws(nominal)
     with CONSTRUCTION_LOCK:  # users' functions run here, too, and may print
         with quiet():
@@ -221,6 +220,12 @@ def _contact_group(
     return ContactGroup(group, qp, ContactSolver(qp))
 
 
+def _check_method(nominal: Nominal, method: Method) -> None:
+    """Raise ModelError for a method that does not suit the model."""
+    for check in (_check_forms, _check_placing, _check_springs):
+        check(nominal, method)
+
+
 def _check_forms(nominal: Nominal, method: Method) -> None:
     """Raise ModelError for a search that would not know the form of a reference face where it projects points again."""
     faults = [
@@ -242,6 +247,21 @@ def _check_placing(nominal: Nominal, method: Method) -> None:
         'holds them to first order; leave placing out, or choose the objective "all points"'
         for index, part in enumerate(nominal.parts)
         if index in part.movers and part.locators.placing != FIRST_ORDER
+    ]
+    if faults:
+        raise ModelError(nominal.assembly.name, faults)
+
+
+def _check_springs(nominal: Nominal, method: Method) -> None:
+    """Raise ModelError for supports with a stiffness, where no forces weigh them, or steps do not look at true gaps."""
+    if method.minimizes.presses and method.is_exact and not method.is_iterated:
+        return
+    faults = [
+        f'{pair.name}: a support has a stiffness, which needs the objective "seating", the resolution "exact", and a search '
+        f'that is not iterated; here they are "{method.objective}", "{method.resolution}" and "{method.search}"; choose '
+        "those, or leave stiffness out"
+        for pair in nominal.pairs
+        if pair.is_springy
     ]
     if faults:
         raise ModelError(nominal.assembly.name, faults)

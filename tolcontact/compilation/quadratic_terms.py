@@ -1,7 +1,7 @@
 """The objective of a contact QP to second order in the increments, and what Newton steps add to it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 
@@ -49,6 +49,8 @@ def quadratic_terms(
     projects    whether points may be projected in each step
     """
     size = setting.z.numel()
+    if rows.compliance.any():  # what holds weakly must not share the load with springs: it counts from the present poses
+        setting = replace(setting, raw=motion.poses)
     moved, nothing = motion.by(linear), ca.SX(size, size)
     goal = energy(setting, moved)
     Q, pull = (setting.at_rest(expression) for expression in ca.hessian(goal.value, setting.z))
@@ -60,8 +62,9 @@ def quadratic_terms(
     # A penalty holds the rows that carry. It does not change the answer, and restores convexity in most cases.
     hold = (1 + 2 * load / goal.scale / setting.group.length) * ca.if_else(reactions > 0, rows.filled, 0)
     curvature += rows.slopes.T @ ca.diag(hold) @ rows.slopes
+    give = rows.gaps + ca.DM(rows.compliance) * reactions if rows.compliance.any() else rows.gaps
     nearness = setting.curvature(proximity(setting, motion.poses, moved)) / setting.group.length if projects else nothing
-    return QuadraticTerms(Q, pull, curvature, rows.slopes.T @ (hold * rows.gaps), nearness, goal.scale)
+    return QuadraticTerms(Q, pull, curvature, rows.slopes.T @ (hold * give), nearness, goal.scale)
 
 
 def _lagrangian_hessian(setting: Setting, poses: Sequence[Pose], bends: ca.SX) -> ca.SX:

@@ -21,6 +21,7 @@ from tolcontact.contact.linear_step import MAX_ROUNDS, PENETRATION, LinearStep
 from tolcontact.contact.record import accumulate_starts
 from tolcontact.contact.repeated_steps import repeat
 from tolcontact.contact.scan import min_gaps, undone
+from tolcontact.contact.springs import spring_misfit
 from tolcontact.contact.state import Resolved, State, Task
 
 STRIDE, SMALL_STRIDE = 0.5, 0.05  # rad: the largest turn of a part in one step; linear rows are wrong long before
@@ -55,6 +56,8 @@ class ContactResolver:
         self._step = LinearStep(program, group, max_rounds)
         self._method = program.method
         self._candidates = Candidates(program, group)
+        self._pairs = [program.nominal.pairs[index] for index in group.group.pairs]
+        self._springy = [k for k, pair in enumerate(self._pairs) if pair.is_springy]
         size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
         self._limits = Limits(program.nominal, group.group, self._method, size)
 
@@ -132,6 +135,9 @@ class ContactResolver:
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
         if self._method.is_exact:
             depth = undone(task.scans, state.gap_min, state.relative, task.deviations, task.may_carry, state.slack)
+            for k in self._springy:
+                pair, reactions = self._pairs[k], state.multipliers[:, self.spans[k]]
+                depth[:, k] = spring_misfit(pair, state.relative[:, k], task.deviations, reactions) - state.slack[:, k]
             state.kkt_residual[:] = checked_residual(state, depth.max(axis=1))
         state.doubtful[:] = self._limits.is_doubtful(task, state, self._candidates)
         if not projected:

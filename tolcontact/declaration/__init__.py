@@ -76,8 +76,9 @@ that is not located must be `fixed=True`, and stays at its nominal place. Six lo
 rejected.
 
 A locator with `one_sided=True` is a support: its part may lift off it, and may not pass through it. A part with supports may
-have more than six locators, of which at most six are two-sided. `stiffness` (N/mm) is used by the objective
-"locator stiffness" alone.
+have more than six locators, of which at most six are two-sided. The objective "locator stiffness" uses
+the `stiffness` (N/mm) of two-sided locators. With "seating", a support with a `stiffness` is a spring that pushes only: its gap
+is negative by its compression, which is its force divided by its stiffness. Without one it is rigid.
 
 A part that contact alone holds in some directions (a shaft in a V, a lid over studs) is `floating=True` and has fewer
 locators, or none. In the directions that its locators leave open, it keeps its nominal position in the raw state. Contact then

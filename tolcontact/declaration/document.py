@@ -35,7 +35,7 @@ from tolcontact.declaration.force import Force
 from tolcontact.declaration.form import COVARIANCES, Form
 from tolcontact.declaration.geometry import UNITS, Box, Mesh, Pin
 from tolcontact.declaration.joint import Joint
-from tolcontact.declaration.locator import PLACINGS, Location, Locator, ThreeTwoOne
+from tolcontact.declaration.locator import PLACINGS, USUAL_STIFFNESS, Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, Tape, tape_of
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.measurement_entry import MEASURED
@@ -91,6 +91,18 @@ def _ground(entries: Mapping[str, Any], place: Place) -> Part | Feature | None:
     if part is None:
         raise place["on_feature"].error('it goes with "on", the part of the feature; give both')
     return feature_named(entries["on_feature"], replace(place["on_feature"], part=part))
+
+
+def _stiffness_entries(locator: Locator, writing: Writing) -> Document:
+    """Return the stiffness; rigid supports are written with the usual one, so that a springy one has a mark."""
+    stiffness = USUAL_STIFFNESS if locator.stiffness is None else float(locator.stiffness)
+    return {"stiffness": stiffness} | ({"springy": True} if locator.is_springy else {})
+
+
+def _stiffness(entries: Mapping[str, Any], place: Place) -> float | None:
+    """Return a declared stiffness; None for the usual one without a mark."""
+    stiffness = entries.get("stiffness", USUAL_STIFFNESS)
+    return stiffness if entries.get("springy") or stiffness != USUAL_STIFFNESS else None
 
 
 def _distribution_entries(thing: Any, writing: Writing) -> Document:
@@ -186,9 +198,10 @@ SHAPE = Shape(
     ),
     Wrapped("mesh", Plain(str, read=lambda text, place: _mesh(place))),
 )  # fmt: skip
+STIFFNESS = Inline({"stiffness": POSITIVE, "springy": bool}, _stiffness_entries, _stiffness)
 LOCATOR = Record(
     Locator, "name point direction one_sided stiffness tolerance part? on?",
-    direction=UNIT_VECTOR, stiffness=Plain(POSITIVE, write=floats),
+    direction=UNIT_VECTOR, stiffness=STIFFNESS,
 )  # fmt: skip
 SCHEME = Choice(
     "Scheme",

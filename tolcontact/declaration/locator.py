@@ -19,6 +19,7 @@ from tolcontact.declaration.values import (
 )
 from tolcontact.readable import Readable
 
+USUAL_STIFFNESS = 1.0  # N/mm, of locators that declare none
 FIRST_ORDER, EXACT, BEST_FIT = PLACINGS = ("first order", "exact", "best fit")
 
 
@@ -28,9 +29,10 @@ class Locator(Readable):
 
     A positive deviation moves the part along `direction`. `tolerance=None` takes the tolerance of the `locate` call. A
     `one_sided` locator is a support: the part may lift off it along `direction`, but not pass through it. The objective
-    "locator stiffness" uses `stiffness` [N/mm]. A locator `on` a feature of its part touches this feature, and also moves the
-    part by the deviation of the feature at the point. A locator of a joint is at a point of any of its parts, which the point
-    itself states: part.point(x, y, z).
+    "locator stiffness" uses the `stiffness` [N/mm] of two-sided locators, by default 1. A support with a `stiffness` gives
+    way like a spring that pushes only, under the objective "seating"; without one it is rigid. A locator `on` a feature of
+    its part touches this feature, and also moves the part by the deviation of the feature at the point. A locator of a joint
+    is at a point of any of its parts, which the point itself states: part.point(x, y, z).
     """
 
     name: str
@@ -38,7 +40,7 @@ class Locator(Readable):
     direction: Vector
     tolerance: Tolerance | None
     one_sided: bool
-    stiffness: float
+    stiffness: float | None
     on: Feature | None
     part: Part | None
 
@@ -50,7 +52,7 @@ class Locator(Readable):
         tolerance: Any = None,
         *,
         one_sided: bool = False,
-        stiffness: float = 1.0,
+        stiffness: float | None = None,
         on: Feature | None = None,
         part: Part | None = None,
     ) -> None:
@@ -74,12 +76,17 @@ class Locator(Readable):
             yield from self.tolerance.faults()
         if not isinstance(self.one_sided, bool):
             yield f"one_sided is {self.one_sided!r}; expected True or False"
-        if not (is_length(self.stiffness) and self.stiffness > 0):
+        if self.stiffness is not None and not (is_length(self.stiffness) and self.stiffness > 0):
             yield f"stiffness is {self.stiffness!r}; expected a number in N/mm above 0"
         if not isinstance(self.on, Feature | None):
             yield f"on is a {type(self.on).__name__}; expected a feature of the part, or None"
         if not isinstance(self.part, Part | None):
             yield f"part is a {type(self.part).__name__}; expected the part of the point, or None"
+
+    @property
+    def is_springy(self) -> bool:
+        """Whether it is a support that gives way."""
+        return self.one_sided and self.stiffness is not None
 
     def __str__(self) -> str:
         point, along = (", ".join(f"{c:g}" for c in v) for v in (self.point, self.direction))

@@ -22,7 +22,7 @@ from tolcontact.declaration import (
     is_free,
     movers,
 )
-from tolcontact.declaration.locator import FIRST_ORDER
+from tolcontact.declaration.locator import FIRST_ORDER, USUAL_STIFFNESS
 from tolcontact.discretization.contact_points import contact_points
 from tolcontact.discretization.locators import Locators, scheme_locators
 from tolcontact.discretization.measurements import nominal_measurements
@@ -242,7 +242,9 @@ def _support_pairs(parts: tuple[NominalPart, ...], scenes: Sequence[Scene]) -> I
             offsets = _support_offsets(part.locators, start, supports)
             scene = next(scene for scene in scenes if scene.station == part.station)
             name = _supports_name(scene, parts[owner].part)
-            yield ContactPoints(name, int(owner), part.parent, P, P, n, offsets, locators=start + supports)
+            stiffness = np.where(part.locators.springy, part.locators.stiffness, np.inf)[supports]
+            numbers = start + supports
+            yield ContactPoints(name, int(owner), part.parent, P, P, n, offsets, locators=numbers, stiffness=stiffness)
         start += len(part.locators)
 
 
@@ -323,8 +325,9 @@ def _locators(
         points=points,
         directions=directions,
         tolerances=tuple(locator.tolerance or common or Tolerance(0.0) for locator in declared),
-        stiffness=np.array([float(locator.stiffness) for locator in declared]),
+        stiffness=np.array([float(locator.stiffness or USUAL_STIFFNESS) for locator in declared]),
         one_sided=np.array([locator.one_sided for locator in declared], dtype=bool),
+        springy=np.array([locator.is_springy for locator in declared], dtype=bool),
         faces=(None,) * len(declared),
         grounds=(None,) * len(declared),
         placing=location.placing if location else FIRST_ORDER,

@@ -26,6 +26,7 @@ class Locators:
     tolerances   one for each locator
     stiffness    (locator,) [N/mm]
     one_sided    (locator,) bool: supports that the part may lift off
+    springy      (locator,) bool: supports that give way by their stiffness
     faces        for each locator the face of a feature that it stands against; None for a nominal face
     grounds      for each locator the feature of another part that it is on; None if it is on no feature
     floating     middle (3,) and size [mm] of a floating part; None for a part that its locators fix
@@ -38,6 +39,7 @@ class Locators:
     tolerances: tuple[Tolerance, ...]
     stiffness: np.ndarray
     one_sided: np.ndarray
+    springy: np.ndarray
     faces: tuple[FaceDeviation | None, ...]
     grounds: tuple[FaceDeviation | None, ...]
     floating: tuple[np.ndarray, float] | None = None
@@ -57,6 +59,7 @@ class Locators:
             tolerances=tuple(tolerance for part in parts for tolerance in part.tolerances),
             stiffness=np.concatenate([part.stiffness for part in parts]),
             one_sided=np.concatenate([part.one_sided for part in parts]),
+            springy=np.concatenate([part.springy for part in parts]),
             faces=tuple(face for part in parts for face in part.faces),
             grounds=tuple(ground for part in parts for ground in part.grounds),
         )

@@ -78,6 +78,7 @@ class ContactPoints:
     deviating   deviations of the moving and the reference face, if these belong to features; their heights at fixed points are
                 among the offsets
     locators    (point,) numbers of the one-sided locators
+    stiffness   (point,) [N/mm] of one-sided locators, infinite if they are rigid; None for faces
     """
 
     name: str
@@ -93,6 +94,7 @@ class ContactPoints:
     round: RoundPoints | None = None
     deviating: tuple[FaceDeviation | None, FaceDeviation | None] = (None, None)
     locators: np.ndarray | None = None
+    stiffness: np.ndarray | None = None
 
     @cached_property
     def facing(self) -> np.ndarray:
@@ -187,6 +189,11 @@ class ContactPoints:
         """The number and the kind of the points, and their accuracy."""
         text = f"{len(self.P_m)} contact points{', exact on round faces' if self.round else ''}"
         return text + (f"; triangles up to {self.bulge:.2g} mm inside" if self.bulge > 0 else "")
+
+    @property
+    def is_springy(self) -> bool:
+        """Whether some of the points give way."""
+        return self.stiffness is not None and bool(np.isfinite(self.stiffness).any())
 
     @property
     def is_supports(self) -> bool:

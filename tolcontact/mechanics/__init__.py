@@ -84,6 +84,11 @@ The objective determines the result, so every archive states it. For "seating" a
 all contact points keeps the problem convex. This term takes over part of the load: about 0.1 % times (travel / size of the
 contact).
 
+A one-sided locator with a `stiffness` k [N/mm] is a spring that pushes only. With the reactions lambda [N] and C = 1/k, the QP
+has 1/2 lambda' C lambda more in its objective, and the row g + A dq + C lambda >= 0. So `gap_min` of these supports is negative
+by the largest compression, and a realization is resolved only if poses and reactions obey lambda = k max(0, -g). The small
+multiple then counts from the pose of the last step, and takes no load.
+
 `regularization` holds the degrees of freedom that the objective leaves open. "points" (default) adds `eta` = 1e-6 times the
 squared displacements of all contact points, and does not depend on where the assembly lies in space. "identity" is the paper's
 eta I of (11), which mixes mm and rad and therefore depends on the origin. With the origin 1 m away, RA1's 6 sigma is 6 %

@@ -3,6 +3,8 @@
 import numpy as np
 from scipy import integrate, optimize, stats
 
+import tolcontact as tc
+from studies.benchmarks import answers as an
 from studies.benchmarks.problem import numbers
 
 N = numbers(__file__)
@@ -42,3 +44,28 @@ def check():
     mean = moment(1)
     carry = integrate.quad(lambda w: stats.norm.pdf(w, 0, N.s / 2), -SINK, SINK, epsabs=1e-14)[0]
     return mean, (N.s / 2) ** 2 + moment(2) - mean**2, carry
+
+
+def assembly():
+    model = tc.Assembly("springy table", method=tc.Method(resolution="exact", objective="seating"))
+    top = model.part("table", tc.Box(400, 400, 20))
+    corners = ((0, 0, 0), (400, 0, 0), (400, 400, 0), (0, 400, 0))
+    legs = [
+        tc.Locator(f"leg {k}", corner, "z", 6 * N.s, one_sided=True, stiffness=float(N.k)) for k, corner in enumerate(corners)
+    ]
+    guides = [
+        tc.Locator("B1", (100, 0, 0), "y", 0.0),
+        tc.Locator("B2", (300, 0, 0), "y", 0.0),
+        tc.Locator("C", (0, 200, 0), "x", 0.0),
+    ]
+    model.locate(top, [*legs, *guides])
+    model.force("load", at=top.point(200, 200, 0), vector=(0, 0, -N.F))
+    model.measure("middle", top.point(200, 200, 0), along="z")
+    return model
+
+
+def answers():
+    results = an.simulated(assembly(), 20_000)
+    middle = an.values(results, "middle")
+    all_carry = results.carrying.values[:, 0] == 4
+    return an.Answers([an.mean(middle), an.variance(middle), an.share(all_carry)], len(middle))
