@@ -24,8 +24,9 @@ from tolcontact.statistics.rare.searches import (
 )
 
 PILOT, MIN_COUNTED = 0.05, 50  # of all realizations; hits among them from which on the event is counted
-FIRST_LOOK, MIN_LOOK = 0.25, 3500  # share of realizations, and their number
-SUFFICIENT, NO_CONCERN = 1.5, 1e-7  # upper over lower bound that suffices, and an upper bound that does
+FIRST_LOOK, MIN_LOOK = 0.25, 1000  # share of realizations, and their number
+NO_CONCERN = 1e-7  # upper bound that suffices
+SUFFICIENT, MIN_SUFFICIENT = 1.5, 4000  # upper over lower bound that suffices, with this many realizations
 SEARCHABLE, MIN_PILOT, MIN_FEW = 10_000, 500, 3  # with fewer realizations a count is narrower than searches from few hits on
 SEARCHES = (0.25, 0.3)  # of all realizations: by levels, by inflation
 SCOUTING = 0.04  # of a search, for each inflation that is tried
@@ -57,7 +58,8 @@ def sufficient_tail(score: Score, dimensions: int, *, samples: int, rng: np.rand
     look = int(FIRST_LOOK * samples)
     if look >= MIN_LOOK:
         tail = tail_probability(score, dimensions, samples=look, rng=rng, leads=leads)
-        if tail.disagreement == 1.0 and tail.probability.upper <= max(SUFFICIENT * tail.probability.lower, NO_CONCERN):
+        sufficient = SUFFICIENT * tail.probability.lower if look >= MIN_SUFFICIENT else 0.0
+        if tail.disagreement == 1.0 and tail.probability.upper <= max(sufficient, NO_CONCERN):
             return tail
         samples -= look
     return tail_probability(score, dimensions, samples=samples, rng=rng, leads=leads)
