@@ -24,7 +24,7 @@ from tolcontact.statistics.rare.searches import (
 )
 
 PILOT, MIN_COUNTED = 0.05, 50  # of all realizations; hits among them from which on the event is counted
-FIRST_LOOK, MIN_LOOK = 0.25, 1500  # share of realizations, and their number
+FIRST_LOOK, MIN_LOOK = 0.25, 3500  # share of realizations, and their number
 NO_CONCERN = 1e-7  # upper bound that suffices
 SUFFICIENT, MIN_SUFFICIENT = 1.5, 4000  # upper over lower bound that suffices, with this many realizations
 SEARCHABLE, MIN_PILOT, MIN_FEW = 10_000, 500, 3  # with fewer realizations a count is narrower than searches from few hits on
@@ -52,7 +52,8 @@ class Tail(NamedTuple):
 def sufficient_tail(score: Score, dimensions: int, *, samples: int, rng: np.random.Generator, leads: bool = True) -> Tail:
     """Return the `tail_probability` from at most about `samples` realizations.
 
-    A quarter of them suffices if the searches agree, and the upper bound is at most 1.5 times the lower one, or at most 1e-7.
+    A quarter of them suffices if the searches agree, and the upper bound is at most 1e-7, or 1.5 times the lower one: the
+    latter with many realizations alone, since few may miss ways into the event.
     Otherwise the others answer alone.
     """
     look = int(FIRST_LOOK * samples)
