@@ -104,6 +104,24 @@ def test_a_quarter_of_the_realizations_suffices_for_many_contributors(seeds):
     assert covered >= 0.85 * len(seeds) - 1
 
 
+@pytest.mark.parametrize(("distance", "leads"), [(14.0, True), (9.0, False), (5.0, False)])
+def test_searches_keep_to_their_budget_and_end_where_the_event_is_negligible(distance, leads):
+    """Beyond a plane, 30 contributors: at 9 standard deviations or more the probability is at most 1e-19, at 5 it is 2.9e-7."""
+    used, rng = [], np.random.default_rng(3)
+
+    def score(u):
+        used.append(len(u))
+        excess = u.sum(axis=1) / np.sqrt(30) - distance
+        return excess if leads else np.sign(excess)
+
+    (estimate, lower, upper), disagreement = tail_probability(score, 30, samples=15_000, rng=rng, leads=leads)
+    assert sum(used) < 1.1 * 15_000 and disagreement == 1
+    if distance == 5.0:
+        assert lower < stats.norm.sf(5.0) < upper < 100 * lower
+    else:
+        assert (estimate, lower) == (0, 0) and 1e-12 < upper < 1e-6
+
+
 def test_what_is_never_seen_is_at_most_what_no_hit_says():
     rng = np.random.default_rng(1)
     (estimate, lower, upper), _ = tail_probability(lambda u: np.full(len(u), -1.0), 3, samples=20_000, rng=rng)

@@ -21,6 +21,9 @@ missing from it. So the estimate counts only if many realizations carry it, none
 significantly more; and where single strands alone came to a way, there may be others, for which the interval is widened (Good,
 1953). Otherwise the searches answer; where they disagree, the interval covers both, and `disagreement` says so.
 
+A search ends below 1e-9. The event is then said to have the probability 0, and as upper bound that of what was reached: a
+level, which contains the event, or the inflated event, where it is assumed that less inflation makes an event no more probable.
+
 With more than ten contributors, the means of those without influence are noise in a centre, which spreads the weights: what is
 smaller than five standard errors in a centre is taken for 0.
 """

@@ -31,7 +31,7 @@ SEARCHABLE, MIN_PILOT, MIN_FEW = 10_000, 500, 3  # with fewer realizations a cou
 SEARCHES = (0.25, 0.3)  # of all realizations: by levels, by inflation
 SCOUTING = 0.04  # of a search, for each inflation that is tried
 TRIAL, MIN_TRIAL = 0.01, 5  # of a search, at each level, to count its levels; and the least of each strand
-MIN_PILOT_OF_MANY, MIN_LOOKS = 50, 50
+MIN_LOOKS = 50  # for each inflation that is tried
 MIN_GROUP = 8  # realizations of a search that centres are found from
 AROUND_ZERO = 0.1  # share of the mixture that is drawn as it is
 REFITS = 2  # to what the searches found
@@ -72,9 +72,7 @@ def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.ran
     leads   whether scores outside of the event say how near it is; otherwise inflation alone is searched by
     """
     is_small = samples < SEARCHABLE
-    pilot = (
-        score(rng.standard_normal((MIN_PILOT if is_small else max(int(PILOT * samples), MIN_PILOT_OF_MANY), dimensions))) > 0
-    )
+    pilot = score(rng.standard_normal((max(int(PILOT * samples), MIN_PILOT), dimensions))) > 0
     if pilot.sum() >= (MIN_FEW if is_small else MIN_COUNTED):
         return Tail(_counted(score, dimensions, samples - len(pilot), rng), 1.0)
     budgets = [int(share * samples) for share in SEARCHES]
@@ -211,8 +209,8 @@ def _agreed(answers: Sequence[Estimate]) -> Tail:
     if len(answers) == 1:
         return Tail(best, 1.0)
     answer, alternative = answers
-    if best.value == 0.0:
-        return Tail(min(answers, key=lambda estimate: estimate.upper), 1.0)
+    if best.value == 0.0:  # negligible for all searches that found their way
+        return Tail(max((estimate for estimate in answers if estimate.upper < 1.0), key=lambda estimate: estimate.upper), 1.0)
     if min(answer.value, alternative.value) == 0.0 and best.value <= min(answer.upper, alternative.upper) < 1.0:
         return Tail(best, 1.0)  # the other search ended where the event was negligible
     if not (answer.value > 0 and alternative.value > 0):

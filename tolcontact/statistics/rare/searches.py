@@ -46,7 +46,10 @@ class Found(NamedTuple):
 
     @classmethod
     def nothing(cls, product: "Product") -> "Found":
-        """Return what a search says that did not find the event, or that ended where it was negligible."""
+        """Return what a search says that did not find the event, or that ended where it was negligible.
+
+        A level contains the event. An inflated event is taken to be no less probable than the event itself.
+        """
         return cls(Estimate(0.0, 0.0, product.estimate.upper if product.is_negligible else 1.0), [])
 
 
@@ -76,7 +79,7 @@ class Product:
 
     @property
     def is_negligible(self) -> bool:
-        """Whether the probability that is searched for is negligible; it is at most the product so far."""
+        """Whether the product so far, that of a level or of an inflated event, is negligible."""
         return self.log < math.log(NEGLIGIBLE)
 
     @property
@@ -120,10 +123,12 @@ class Walk:
         A strand of which nothing is left goes on from the others.
         """
         strands, places = [], []
-        for strand, own in enumerate(weights):
-            mine = own if own.any() else weights
-            source, place = np.divmod(_resampled(mine.ravel(), self.seeds, self.rng), weights.shape[1])
-            strands.append(source if mine is weights else np.full(self.seeds, strand))
+        for strand in range(STRANDS):
+            available = np.zeros_like(weights)
+            available[strand] = weights[strand]
+            numbers = _resampled((available if available.any() else weights).ravel(), self.seeds, self.rng)
+            source, place = np.divmod(numbers, weights.shape[1])
+            strands.append(source)
             places.append(place)
         return np.array(strands), np.array(places)
 
@@ -159,7 +164,7 @@ def by_inflation(walk: Walk, inflation: float, budget: int) -> Found:
 
 
 def nested_levels(inflation: float, share: float) -> float:
-    """Return how many levels with all their realizations a nested search has ahead.
+    """Return how many realizations a nested search has ahead, in those of one level.
 
     share   of an event in realizations with this inflation. It is taken for one beyond a plane, whose probability at the
             inflation s is Q(distance / s).
@@ -253,6 +258,8 @@ def _nested(walk: Walk, inflation: float, budget: int) -> Found:
             scores = walk.scores(np.concatenate([looks, t * z], axis=1))  # together: one question takes less time than two
             hits_before, hits = np.split(scores > 0, [looks.shape[1]], axis=1)
             product.over(hits_before)
+            if product.is_negligible:
+                return Found.nothing(product)
             looks = looks[:, :0]
             share = float(hits.mean())
             change = math.log(GOAL) / math.log(min(max(share, 1 / hits.size), 1 - 1 / hits.size))
@@ -262,8 +269,6 @@ def _nested(walk: Walk, inflation: float, budget: int) -> Found:
         if not share:
             return Found.nothing(product)
         product.times(hits.mean(axis=1))
-        if product.is_negligible:
-            return Found.nothing(product)
         walk.spread(budget, nested_levels(t, math.exp(product.log)))
         seeds = z[walk.chosen(hits)]
         z, _ = walk.on(seeds, np.ones(seeds.shape[:2]), 0.0, stretch=t)
