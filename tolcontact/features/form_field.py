@@ -107,13 +107,9 @@ def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> Form
     places, areas = associated.places(face, lengths)
     factor, pivots, rest = _cholesky(places, form, lengths, associated)
     stations, shares = places[pivots], areas / areas.sum()
-    root, centre = np.sqrt(shares), places.mean(axis=0)
     inverse = np.linalg.inv(factor[:, pivots])
-    functions = inverse.T @ associated_covariance(form, lengths, associated, places, stations).T
-    # Sections and lines without what displaces them are not displaced as a whole either.
-    terms = associated.is_whole * displacement_terms(associated.surface.distance(places)[1], places - centre)
-    removed, *_ = np.linalg.lstsq(terms * root[:, None], (functions * root).T, rcond=1e-10)
-    remainder = (functions.T - terms @ removed) * root[:, None]
+    functions = associated_covariance(form, lengths, associated, places, stations) @ inverse
+    remainder, removed = beside_displacements(functions, associated, places, shares)
     variances, directions = np.linalg.eigh(remainder.T @ remainder)
     count = min(form.modes, int((variances > MIN_VARIANCE * variances[-1]).sum()))
     modes = directions[:, : -count - 1 : -1]  # of the functions
@@ -125,11 +121,25 @@ def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> Form
         places=places,
         stations=stations,
         weights=inverse @ modes,
-        removed=displaced_about_origin(removed @ modes, centre),
+        removed=removed @ modes,
         left_out=float(1 - variances[-count:].sum() / (variances.sum() + rest @ shares)),
         spreads=None,
         means=None,
     )
+
+
+def beside_displacements(
+    functions: np.ndarray, associated: AssociatedFeature, places: np.ndarray, shares: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return functions (place, function) beside displacements and growths of the face, and these (7, function).
+
+    shares   (place,) of the area. Values of a place are returned times the root of its share.
+    """
+    root, centre = np.sqrt(shares)[:, None], places.mean(axis=0)
+    # Sections and lines without what displaces them are not displaced as a whole either.
+    terms = associated.is_whole * displacement_terms(associated.surface.distance(places)[1], places - centre)
+    removed, *_ = np.linalg.lstsq(terms * root, functions * root, rcond=1e-10)
+    return (functions - terms @ removed) * root, displaced_about_origin(removed, centre)
 
 
 def _lengths(form: Form, face: Surface, associated: AssociatedFeature) -> Lengths:

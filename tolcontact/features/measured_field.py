@@ -11,9 +11,9 @@ import scipy
 
 from tolcontact.declaration.form import Form
 from tolcontact.errors import GeometryFault
-from tolcontact.features.associated_features import AssociatedFeature, displacement_terms
+from tolcontact.features.associated_features import AssociatedFeature
 from tolcontact.features.covariances import Lengths, covariance
-from tolcontact.features.form_field import FormField, associated_covariance, displaced_about_origin
+from tolcontact.features.form_field import FormField, associated_covariance, beside_displacements
 from tolcontact.geometry.measured_points import measured_points
 from tolcontact.geometry.spreading import spread
 from tolcontact.geometry.surface import Surface
@@ -37,10 +37,7 @@ def measured_field(form: Form, pattern: str, face: Surface, associated: Associat
     heights = np.column_stack([_heights_at(stations, cloud, str(path), face, associated) for path, cloud in clouds.items()])
     weights = np.linalg.solve(covariance(form, lengths, associated.surface, stations, stations), heights)
     functions = associated_covariance(form, lengths, associated, places, stations) @ weights  # (place, part)
-    root, centre = np.sqrt(areas / areas.sum())[:, None], places.mean(axis=0)
-    terms = displacement_terms(associated.surface.distance(places)[1], places - centre)
-    removed, *_ = np.linalg.lstsq(terms * root, functions * root, rcond=1e-10)
-    remainder = (functions - terms @ removed) * root
+    remainder, removed = beside_displacements(functions, associated, places, areas / areas.sum())
     mean, count = remainder.mean(axis=1), remainder.shape[1]
     _, spreads, directions = np.linalg.svd((remainder - mean[:, None]) / np.sqrt(count - 1), full_matrices=False)
     kept = min(form.modes, int((spreads**2 > MIN_VARIANCE * spreads[0] ** 2).sum()))
@@ -56,7 +53,7 @@ def measured_field(form: Form, pattern: str, face: Surface, associated: Associat
         places=places,
         stations=stations,
         weights=weights @ mixes,
-        removed=displaced_about_origin(removed @ mixes, centre),
+        removed=removed @ mixes,
         left_out=float((spreads[kept:] ** 2).sum() / (spreads**2).sum()),
         spreads=np.array([0.0, *spreads[:kept]]),
         means=np.array([size, *[0.0] * kept]),
