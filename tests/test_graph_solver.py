@@ -71,10 +71,11 @@ class Problem:
         nonzeros = {name: np.array(ca.sparsify(ca.DM(M)).nonzeros())[None] for name, M in (("h", self.H), ("a", self.A))}
         return nonzeros | {"g": self.g[None], "lba": self.low[None]}
 
-    def solved(self, reactions=None):
+    def solved(self, reactions=None, opened=None):
         rows = len(self.low) - self.equations
         graph = GraphSolver(self.sparsities(), slacks=self.slacks, equations=self.equations)
-        answer, failed = graph(self.stored(), np.zeros((1, rows)) if reactions is None else reactions[None])
+        slacks = np.zeros((1, self.slacks)) if opened is None else opened[None]
+        answer, failed = graph(self.stored(), np.zeros((1, rows)) if reactions is None else reactions[None], slacks)
         assert not failed[0]
         return {name: values[0] for name, values in answer.items()}
 
@@ -145,7 +146,7 @@ def test_random_graphs_fulfil_the_optimality_conditions(start, count):
     for seed in range(start, start + count):
         problem, rng = random_problem(seed)
         guess = rng.random(len(problem.low) - problem.equations) * (rng.random() < 0.5)
-        answer = problem.solved(guess)
+        answer = problem.solved(guess, (rng.random(problem.slacks) < 0.5).astype(float) * guess.any())
         assert problem.residual(answer) < tolerance(answer), seed
         opened += answer["x"][problem.size :].max() > 0
     assert opened > count // 10
@@ -186,7 +187,7 @@ def test_equations_that_contradict_each_other_have_no_answer():
     problem = Problem(np.random.default_rng(0), [(0,)], 1, equations=2)
     problem.A[-1], problem.low[-2:] = problem.A[-2], (0.0, 1.0)
     graph = GraphSolver(problem.sparsities(), slacks=1, equations=2)
-    assert graph(problem.stored(), np.zeros((1, 4)))[1][0]
+    assert graph(problem.stored(), np.zeros((1, 4)), np.zeros((1, 1)))[1][0]
 
 
 def test_equations_that_repeat_each_other_hold():
@@ -208,13 +209,14 @@ def test_answers_do_not_depend_on_the_problems_before(kind):
         stored["h"][::3] = [row == column for row, column in zip(*identity.get_triplet(), strict=True)]
     reactions = np.maximum(rng.normal(size=(12, len(problems[0].low) - problems[0].equations)), 0)
     graph = GraphSolver(problems[0].sparsities(), slacks=4, equations=problems[0].equations)
-    together, _ = graph(stored, reactions)
+    slacks = np.maximum(rng.normal(size=(12, 4)), 0)
+    together, _ = graph(stored, reactions, slacks)
     for order in (np.arange(12)[::-1], rng.permutation(12)):
-        again, _ = graph({name: values[order] for name, values in stored.items()}, reactions[order])
+        again, _ = graph({name: values[order] for name, values in stored.items()}, reactions[order], slacks[order])
         for name, values in together.items():
             assert np.array_equal(again[name], values[order]), name
     for k in range(12):
-        alone, _ = graph({name: values[[k]] for name, values in stored.items()}, reactions[[k]])
+        alone, _ = graph({name: values[[k]] for name, values in stored.items()}, reactions[[k]], slacks[[k]])
         assert all(np.array_equal(alone[name][0], values[k]) for name, values in together.items())
 
 

@@ -119,13 +119,13 @@ def with_casadi(name: str, one: Problem) -> Solve:
 def on_graph(_: str, one: Problem) -> Solve:
     sparsities = {name: ca.sparsify(ca.DM(one[matrix])).sparsity() for name, matrix in (("h", "H"), ("a", "A"))}
     sparsities |= {name: ca.Sparsity.dense(len(one[vector]), 1) for name, vector in (("g", "g"), ("lba", "b"))}
-    rows = len(one["b"])
-    graph = GraphSolver(sparsities, slacks=int(np.isfinite(one["low"]).sum()), equations=0)
+    rows, slacks = len(one["b"]), int(np.isfinite(one["low"]).sum())
+    graph = GraphSolver(sparsities, slacks=slacks, equations=0)
     places = {name: tuple(map(list, sparsities[name].get_triplet())) for name in ("h", "a")}
 
     def solve(of: Problem) -> tuple[np.ndarray, bool]:
         stored = {"h": of["H"][places["h"]][None], "a": of["A"][places["a"]][None], "g": of["g"][None], "lba": of["b"][None]}
-        answer, failed = graph(stored, np.zeros((1, rows)))
+        answer, failed = graph(stored, np.zeros((1, rows)), np.zeros((1, slacks)))
         return answer["x"][0], not failed[0]
 
     return solve

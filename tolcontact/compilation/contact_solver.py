@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tolcontact.arrays import Array, Float
+from tolcontact.arrays import Array, Bool, Float
 from tolcontact.compilation.contact_qp import ContactQP
 from tolcontact.compilation.elements import ElementQP
 from tolcontact.compilation.functions import InterpretedFunction, flat
@@ -53,6 +53,7 @@ QP = ("h", "g", "a", "lba", "uba")  # outputs of `assemble` that a solver needs
 MAX_POLISHED_ENTRIES = 4_000_000  # of the linear systems that polish some answers together
 POLISHED_RESIDUAL = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is polished
 SMALL_STEP, SMALL_STEP_RESIDUAL = 1e-3, 1e-2 * ACCURACY  # mm: limits for small steps, which show noise
+CONFLICT_SHARE = 1e-3  # of the slack, which parts that contradict each other leave: a smaller residual needs no other plugin
 
 Arrays = dict[str, Float[Array, "_ _"]]  # by name, (realization, entry)
 
@@ -82,26 +83,38 @@ class ContactSolver:
     def __call__(self, **arrays: Float[Array, "realization ..."]) -> Arrays:
         """Return the outputs of contact_qp by name, (realization, entry), for its inputs by name, (realization, ...).
 
-        A further input is `guess` (realization, row): reactions that are probable, from which a solver may start.
-        A further output is `second` (realization, 1): whether another plugin had to answer. Other plugins solve the problems
-        that this plugin misses, without curvature. If all fail, `residual` is infinite, and other outputs may be NaN.
+        Further inputs are `guess` (realization, row) and `guessed_slack` (realization, slack): reactions and slacks that are
+        probable, from which a solver may start.
+        A further output is `second` (realization, 1): whether another plugin had to answer. Problems that this plugin misses
+        are solved without curvature, which may leave no minimum: by this plugin, and then by others. If all fail, `residual` is
+        infinite, and other outputs may be NaN.
         """
         inputs = {name: flat(values) for name, values in arrays.items()}
         answer = self._solved(self._solver, inputs)
         answer["second"] = np.zeros_like(answer["residual"])
+        self._retry(self._solver, answer, inputs, _is_lost(answer) & (inputs["newton"][:, 0] != 0), second=0.0)
         for name in self._plugin.fallbacks:
-            lost = np.flatnonzero(~(answer["residual"][:, 0] <= ACCURACY))
-            if not lost.size:
+            lost = _is_lost(answer)
+            if not lost.any():
                 break
             if name not in self._fallbacks:
                 self._fallbacks[name] = _new_solver(self._qp, PLUGINS[name])
-            retry = self._solved(self._fallbacks[name], _of(inputs, lost) | {"newton": np.zeros((len(lost), 1))})
-            retry["second"] = np.ones((len(lost), 1))
-            better = retry["residual"][:, 0] < answer["residual"][lost, 0]
-            _replace(answer, lost[better], _of(retry, better))
+            self._retry(self._fallbacks[name], answer, inputs, lost, second=1.0)
             if PLUGINS[name].remembers:
                 del self._fallbacks[name]
         return answer
+
+    def _retry(
+        self, solver: "_Solver", answer: Arrays, inputs: Arrays, lost: Bool[Array, " realization"], *, second: float
+    ) -> None:
+        """Solve the `lost` problems without curvature, and write what is better into `answer`."""
+        rows = np.flatnonzero(lost)
+        if not rows.size:
+            return
+        retry = self._solved(solver, _of(inputs, rows) | {"newton": np.zeros((len(rows), 1))})
+        retry["second"] = np.full((len(rows), 1), second)
+        better = retry["residual"][:, 0] < answer["residual"][rows, 0]
+        _replace(answer, rows[better], _of(retry, better))
 
     def energy(self, **arrays: Float[Array, "realization ..."]) -> Float[Array, " realization"]:
         """Return the objective (realization,) at poses, for raw poses, moments and deviations (see ContactQP)."""
@@ -119,7 +132,7 @@ class ContactSolver:
 
     def _solved_batch(self, solver: "_Solver", inputs: Arrays) -> Arrays:
         problem = self._assemble(**inputs)
-        solution, failed = solver(problem, inputs["guess"])
+        solution, failed = solver(problem, inputs["guess"], inputs["guessed_slack"])
         outputs = self._finished(inputs | problem | solution)
         outputs["residual"][failed] = np.inf
         residual = outputs["residual"][:, 0]
@@ -170,7 +183,7 @@ class _PluginSolver:
         with CONSTRUCTION_LOCK, quiet():
             self._solve = InterpretedFunction(conic, fixed_inputs)
 
-    def __call__(self, problem: Arrays, reactions: np.ndarray) -> tuple[Arrays, np.ndarray]:
+    def __call__(self, problem: Arrays, reactions: np.ndarray, slacks: np.ndarray) -> tuple[Arrays, np.ndarray]:
         """Return x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the solver gave up.
 
         A solver that starts from the previous problem is faster if similar problems follow each other. So they are sorted by
@@ -196,6 +209,12 @@ def _new_solver(qp: ContactQP | ElementQP, plugin: Plugin) -> _Solver:
         return _PluginSolver(qp, plugin)
     sparsities = {name: qp.sparsity(name) for name in ("h", "g", "a", "lba")}
     return GraphSolver(sparsities, slacks=qp.slacks, equations=qp.equations)
+
+
+def _is_lost(answer: Arrays) -> Bool[Array, " realization"]:
+    """Return which answers miss ACCURACY. Parts that contradict each other push so hard that rounding alone may exceed it."""
+    slack = answer["slack"].max(axis=1, initial=0)
+    return ~(answer["residual"][:, 0] <= np.maximum(ACCURACY, CONFLICT_SHARE * slack))
 
 
 def _of(arrays: Arrays, rows: np.ndarray | slice) -> Arrays:

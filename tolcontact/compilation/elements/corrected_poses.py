@@ -5,7 +5,7 @@ import numpy as np
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation.elements.element_batch import blocks
 from tolcontact.compilation.elements.element_functions import advance_function
-from tolcontact.compilation.functions import IndexedFunction
+from tolcontact.compilation.functions import IndexedFunction, located
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.groups import Group
 from tolcontact.mechanics.pose import ENTRIES
@@ -31,8 +31,9 @@ class CorrectedPoses:
             "pose": poses, "movers": poses, "steps": step, "centre": self._centres, "centres": self._centres,
             "length": self._length, "corrected": corrected,
         }  # fmt: skip
+        places = located(arrays)
         for function in self._functions:
-            function(len(poses), arrays)
+            function(len(poses), places)
         return corrected
 
 

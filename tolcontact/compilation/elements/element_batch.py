@@ -11,7 +11,7 @@ from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation.conditioning import idle_row
 from tolcontact.compilation.elements.element import Element
 from tolcontact.compilation.elements.element_functions import ElementFunctions
-from tolcontact.compilation.functions import IndexedFunction
+from tolcontact.compilation.functions import IndexedFunction, Located, located
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.pose import ENTRIES
@@ -124,11 +124,10 @@ class ElementBatch:
 
     elements   what they are
     own        arrays (1, column) that never change, by name
-    slopes     (1,): number of slopes of all elements, in an array of their own
     """
 
     elements: Elements
-    own: Arrays
+    own: dict[str, Located]
     terms: IndexedFunction
     newton: IndexedFunction | None
     rows: IndexedFunction
@@ -144,14 +143,16 @@ class ElementBatch:
         newton = functions.newton
         return cls(
             elements,
-            elements.constants(),
+            located(elements.constants()),
             newton=None if newton is None else newton.at(places),
             **{name: getattr(functions, name).at(places) for name in ("terms", "rows", "check", "advance", "relate", "energy")},
         )
 
-    def arrays(self, deviations: np.ndarray) -> Arrays:
-        """Return the arrays that are its own, (1, column) or (realization, column)."""
-        return self.own | self.elements.points(self.own.get("P_r"), deviations)
+    def arrays(self, deviations: np.ndarray) -> dict[str, Located]:
+        """Return the arrays that are its own, (1, column) or (realization, column); `slopes` are to be computed."""
+        slopes = np.empty((len(deviations), self.elements.rows.size * self.elements.size))
+        P_r = self.own["P_r"].array if "P_r" in self.own else None
+        return self.own | located({"slopes": slopes, **self.elements.points(P_r, deviations)})
 
 
 def blocks(numbers: Int[Array, "element block"], size: int) -> Columns:

@@ -14,7 +14,7 @@ from tolcontact.compilation.elements.element import elements_of
 from tolcontact.compilation.elements.element_batch import Arrays, ElementBatch, Elements, Numbers
 from tolcontact.compilation.elements.element_functions import element_functions, function_of
 from tolcontact.compilation.elements.element_layout import ElementLayout
-from tolcontact.compilation.functions import NamedFunction, flat
+from tolcontact.compilation.functions import NamedFunction, flat, located
 from tolcontact.compilation.outcome import step_share
 from tolcontact.compilation.plugins import Plugin
 from tolcontact.discretization import Nominal
@@ -60,7 +60,9 @@ class ElementQP:
         self._corrected_poses = CorrectedPoses(group, method)
         self._shared = _shared_function(nominal, group)
         self._share = _share_function(self._size)
-        self._values = {name: np.full((1, 1), value) for name, value in (("length", group.length), ("count", group.count))}
+        self._values = {
+            name: np.full((1, 1), float(value)) for name, value in (("length", group.length), ("count", group.count))
+        }
         self._no_moments = np.zeros((1, MOMENTS * len(group.sides)))
 
     @property
@@ -94,19 +96,20 @@ class ElementQP:
         filled[:, layout.slot_rows] = inputs["filled"]
         arrays = inputs | self._shared_arrays(inputs) | {"filled": filled, "gaps": np.empty((count, rows))}
         terms = {name: np.empty((count, size)) for name, size in layout.sizes_of_terms.items()}
-        local = [arrays | terms | batch.arrays(inputs["deviations"]) for batch in self._batches]
+        shared = located(arrays | terms)
+        local = [shared | batch.arrays(inputs["deviations"]) for batch in self._batches]
         for batch, own in zip(self._batches, local, strict=True):
-            own["slopes"] = np.empty((count, batch.elements.rows.size * batch.elements.size))
             function = batch.newton if newton and batch.newton is not None else batch.terms
             function(count, own)
         Q, between, pull = self._summed(terms, inputs, newton=newton)
         V, h, a = (np.ones((count, size)) for size in (Q.shape[1], len(layout.matrices["h"]), len(layout.matrices["a"])))
         g = np.full((count, self._size + self.slacks), self._values["length"][0, 0])  # the prices of slacks
-        self._movers.whiten(count, {"Q": Q, "pull": pull, "V": V, "g": g})
-        self._movers.couple(count, {"Q": between, "V_i": V, "V_j": V, "H": h, "mirrored": h})
+        self._movers.whiten(count, located({"Q": Q, "pull": pull, "V": V, "g": g}))
+        self._movers.couple(count, located({"Q": between, "V_i": V, "V_j": V, "H": h, "mirrored": h}))
         by_row = {name: np.empty((count, rows)) for name in ("lower", "row_length")}
+        of_rows = located(by_row | {"V": V, "a": a, "opening": a})
         for batch, own in zip(self._batches, local, strict=True):
-            batch.rows(count, own | by_row | {"V": V, "a": a, "opening": a})
+            batch.rows(count, own | of_rows)
         return {
             "h": h, "g": g, "a": a, "lba": by_row["lower"], "uba": np.full((count, rows), np.inf), "V": V, "filled": filled,
             "faces": arrays["faces"], "scale": arrays["scale"], "row_length": by_row["row_length"],
@@ -116,7 +119,7 @@ class ElementQP:
         """Return the outputs of contact_qp."""
         count, x, lam_x, layout = len(arrays["x"]), arrays["x"], arrays["lam_x"], self._layout
         slack, steps = x[:, self._size :], np.empty((count, self._size))
-        self._movers.step(count, {"V": arrays["V"], "y": x, "step": steps})
+        self._movers.step(count, located({"V": arrays["V"], "y": x, "step": steps}))
         stride = arrays["stride"] if self._method.is_exact else np.full((count, 1), np.inf)
         length = np.repeat(self._values["length"], count, axis=0)
         share = self._share(step=steps, y=x[:, : self._size], stride=stride, length=length)
@@ -129,12 +132,14 @@ class ElementQP:
         forces = np.empty((count, FREEDOMS * len(layout.force_sum.places)))
         checked = results | {"opening": arrays["a"], "y": x, "slack": x, "lam": arrays["lam_a"], "lower": arrays["lba"]}
         checked |= {name: arrays[name] for name in ("a", "row_length", "filled", "scale", "faces")} | {"force": forces}
+        before = located(checked | self._values | {"poses": arrays["poses"], "step": steps})
+        after = before | located({"poses": corrected})
         for batch in self._batches:
-            own = checked | batch.own | self._values
-            batch.check(count, own)
-            batch.advance(count, own | {"poses": arrays["poses"], "step": steps})
-            batch.relate(count, own | {"poses": corrected})
-        self._movers.pull(count, {"H": arrays["h"], "y_i": x, "y_j": x, "force_i": forces, "force_j": forces})
+            batch.check(count, before | batch.own)
+            batch.advance(count, before | batch.own)
+            batch.relate(count, after | batch.own)
+        pulls = {"H": arrays["h"], "y_i": x, "y_j": x, "force_i": forces, "force_j": forces}
+        self._movers.pull(count, located(pulls))
         force = np.concatenate([layout.force_sum(forces), results["slack_force"]], axis=1)
         stationarity = np.abs(x + arrays["g"] + force + lam_x)
         residuals = [stationarity, np.abs(np.minimum(slack, -lam_x[:, self._size :])), results["residual"]]
@@ -153,8 +158,9 @@ class ElementQP:
         """Return the objective of contact_qp."""
         inputs = {name: flat(values) for name, values in inputs.items()}
         arrays = inputs | self._shared_arrays(inputs) | {"energy": np.empty((len(inputs["poses"]), self.slacks))}
+        shared = located(arrays)
         for batch in self._batches:
-            batch.energy(len(inputs["poses"]), arrays | batch.own)
+            batch.energy(len(inputs["poses"]), shared | batch.own)
         return {"energy": arrays["energy"].sum(axis=1, keepdims=True)}
 
     def relate(self, **inputs: Float[Array, "realization ..."]) -> Arrays:
@@ -164,8 +170,9 @@ class ElementQP:
         moments = np.repeat(self._no_moments, count, axis=0)
         arrays = {"poses": poses, "faces": self._shared(deviations=deviations, moments=moments)["faces"]}
         arrays["relative"] = np.empty((count, ENTRIES * self.slacks))
+        shared = located(arrays)
         for batch in self._batches:
-            batch.relate(count, arrays)
+            batch.relate(count, shared)
         return {"relative": arrays["relative"]}
 
     def _shared_arrays(self, inputs: Arrays) -> Arrays:
@@ -182,7 +189,7 @@ class ElementQP:
         if newton:
             curvature, curvature_between = self._blocks("curvature", terms)
             convex = np.empty((count, self._size // FREEDOMS))
-            self._movers.factor(count, {"Q": Q, "curvature": curvature, "convex": convex})
+            self._movers.factor(count, located({"Q": Q, "curvature": curvature, "convex": convex}))
             counts = (inputs["newton"] != 0) & (convex > 0).all(axis=1, keepdims=True)
             Q, between = Q + np.where(counts, curvature, 0), between + np.where(counts, curvature_between, 0)
             pull = pull + np.where(counts, layout.mover_sum(terms["hold"]), 0)

@@ -10,7 +10,7 @@ import numpy as np
 
 from tolcontact.arrays import Array, Float, Int, Real
 from tolcontact.compilation.functions.native import NativeFunction, UnknownInstructionError
-from tolcontact.compilation.functions.places import Places
+from tolcontact.compilation.functions.places import Located, Places
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 
 WIDTHS = (256, 16)  # realizations in a call of CasADi
@@ -143,20 +143,20 @@ class AdaptiveFunction:
         with self._lock:
             return self._interpreted(inputs)[0]
 
-    def evaluate(self, count: int, arrays: Sequence[Float[Array, "_ _"]], places: Places) -> None:
+    def evaluate(self, count: int, arrays: Sequence[Located], places: Places) -> None:
         """Evaluate the Function for all elements of `count` realizations; see NativeFunction."""
         if native := self._compiled(count * places.elements):
             native.evaluate(count, arrays, places)
             return
         rows, cut = count * places.elements, len(arrays) - len(self.sizes_out)
         inputs = [
-            np.broadcast_to(array[:, columns], (count, *columns.shape)).reshape(rows, columns.shape[1])
-            for array, columns in zip(arrays[:cut], places.columns, strict=False)
+            np.broadcast_to(place.array[:, columns], (count, *columns.shape)).reshape(rows, columns.shape[1])
+            for place, columns in zip(arrays[:cut], places.columns, strict=False)
         ]
         with self._lock:
             results = self._interpreted(inputs)[0]
-        for array, columns, values in zip(arrays[cut:], places.columns[cut:], results, strict=True):
-            array[:, columns] = values.reshape(count, *columns.shape)
+        for place, columns, values in zip(arrays[cut:], places.columns[cut:], results, strict=True):
+            place.array[:, columns] = values.reshape(count, *columns.shape)
 
     def _compiled(self, count: int) -> NativeFunction | None:
         """Return the machine code for `count` more evaluations, None while CasADi interprets."""
@@ -218,7 +218,7 @@ class IndexedFunction:
     def __init__(self, function: AdaptiveFunction, names: Sequence[str], places: Places) -> None:
         self._function, self._names, self._places = function, names, places
 
-    def __call__(self, count: int, arrays: Mapping[str, Float[Array, "_ _"]]) -> None:
+    def __call__(self, count: int, arrays: Mapping[str, Located]) -> None:
         """Read inputs of `count` realizations from arrays by name, of one row if all share it; write results into others."""
         if self._places.elements:
             self._function.evaluate(count, [arrays[name] for name in self._names], self._places)

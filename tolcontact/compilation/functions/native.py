@@ -24,8 +24,7 @@ import numpy as np
 from llvmlite import binding, ir
 
 from tolcontact import code_cache
-from tolcontact.arrays import Array, Float
-from tolcontact.compilation.functions.places import Places, pointers
+from tolcontact.compilation.functions.places import Located, Places
 
 LANES = 4
 SEGMENT = 1000  # instructions
@@ -66,27 +65,21 @@ class NativeFunction:
         count = len(inputs[0])
         inputs = [np.ascontiguousarray(array, dtype=float) for array in inputs]
         results = [np.empty((count, size)) for size in self.sizes_out]
-        self.evaluate(count, [*inputs, *results], self._whole)
+        self.evaluate(count, [Located.of(array) for array in (*inputs, *results)], self._whole)
         return results
 
-    def evaluate(self, count: int, arrays: Sequence[Float[Array, "_ _"]], places: Places) -> None:
+    def evaluate(self, count: int, arrays: Sequence[Located], places: Places) -> None:
         """Read inputs from the first arrays, and write results into the others, at the `places` of all elements.
 
         Inputs of one row are the same for all realizations. Rows may be apart, as those of a slice of columns are. Raises
-        ValueError for arrays of another shape or order.
+        ValueError for arrays of another shape.
         """
-        steps = [_row_step(array, count, width) for array, width in zip(arrays, places.widths, strict=True)]
-        self._evaluate(count, places.elements, pointers(arrays), (ctypes.c_int64 * len(steps))(*steps), places.addresses)
-
-
-def _row_step(array: np.ndarray, count: int, width: int) -> int:
-    """Return by how many numbers the rows of an array are apart, 0 if it has one, or raise ValueError."""
-    (rows, columns), (row, entry) = array.shape, array.strides
-    if array.dtype != np.float64 or (entry != array.itemsize and columns > 1 and rows):
-        raise ValueError(f"rows of {array.dtype} with strides {array.strides}; expected rows of float64 without gaps")
-    if columns < width or rows not in (1, count):
-        raise ValueError(f"an array {array.shape}; expected {count} rows, or one, and at least {width} columns")
-    return row // array.itemsize if rows > 1 else 0
+        for (_, _, rows, columns, _), width in zip(arrays, places.widths, strict=True):
+            if columns < width or rows not in (1, count):
+                raise ValueError(f"an array ({rows}, {columns}); expected {count} rows, or one, and at least {width} columns")
+        addresses = (ctypes.c_void_p * len(arrays))(*[array.address for array in arrays])
+        steps = (ctypes.c_int64 * len(arrays))(*[array.step for array in arrays])
+        self._evaluate(count, places.elements, addresses, steps, places.addresses)
 
 
 def _module(function: ca.Function) -> ir.Module:

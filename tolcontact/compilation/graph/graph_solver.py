@@ -32,26 +32,28 @@ class GraphSolver:
         self._searches: dict[bool, _Search] = {}
 
     def __call__(
-        self, problem: Arrays, reactions: Float[Array, "realization row"]
+        self, problem: Arrays, reactions: Float[Array, "realization row"], slacks: Float[Array, "realization slack"]
     ) -> tuple[dict[str, Float[Array, "realization _"]], Bool[Array, " realization"]]:
         """Return x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the solver gave up.
 
-        Rows with `reactions` carry in the first guess.
+        In the first guess rows with `reactions` carry, and `slacks` above zero are open.
         """
         count = len(reactions)
         answer = {name: np.zeros((count, size)) for name, size in self._sizes().items()}
         failed = np.zeros(count, dtype=np.bool_)
         arrays = (problem["h"], problem["a"], self._full("g", problem["g"]), self._full("lba", problem["lba"]))
-        results = (*answer.values(), failed)
+        guess, results = (reactions, slacks), (*answer.values(), failed)
         coupled = (problem["h"] != self._identity).any(axis=1)
         for is_coupled in (False, True):
             rows = np.flatnonzero(coupled == is_coupled)
             if len(rows) == count:
-                self._search(is_coupled)(arrays, reactions, results)
+                self._search(is_coupled)(arrays, guess, results)
             elif rows.size:
-                part = tuple(array[rows] for array in results)
-                self._search(is_coupled)(tuple(array[rows] for array in arrays), reactions[rows], part)
-                for array, values in zip(results, part, strict=True):
+                own_problem, own_guess, own_results = (
+                    tuple(array[rows] for array in group) for group in (arrays, guess, results)
+                )
+                self._search(is_coupled)(own_problem, own_guess, own_results)
+                for array, values in zip(results, own_results, strict=True):
                     array[rows] = values
         return answer, failed
 
@@ -103,9 +105,12 @@ class _Search:
         )
 
     def __call__(
-        self, problem: tuple[np.ndarray, ...], reactions: np.ndarray, answer: tuple[np.ndarray, ...]
+        self, problem: tuple[np.ndarray, ...], guess: tuple[np.ndarray, ...], answer: tuple[np.ndarray, ...]
     ) -> Int[Array, "realization 2"]:
-        """Solve QPs (h, a, g, lba) into `answer` (x, lam_a, lam_x, failed); return the counters of `solve_batch`."""
+        """Solve QPs (h, a, g, lba) into `answer` (x, lam_a, lam_x, failed); return the counters of `solve_batch`.
+
+        guess   reactions and slacks
+        """
         h, *vectors = (np.ascontiguousarray(array) for array in problem)
         counters = np.zeros((len(h), 2), dtype=np.int64)
         solve_batch(
@@ -114,7 +119,7 @@ class _Search:
             self._work,
             (h if self._coupled else h[:, :0].copy(), self._blocks),
             (*vectors, self._buffer),
-            np.ascontiguousarray(reactions),
+            tuple(np.ascontiguousarray(array) for array in guess),
             self._limits,
             (*self._guesses, counters),
             answer,

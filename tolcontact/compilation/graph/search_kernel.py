@@ -27,6 +27,7 @@ JOINTS, RELEASE, ROWS = range(3)  # phases: all joints at once; drop rows that p
 ATTEMPTS = 3  # of the search for single rows, each from what the attempt before it ended with
 LOOSER = 10.0  # by which rows may be violated more in every further attempt
 EAGER_ROUNDS = 3  # afterwards, a row only enters if no row of a neighbouring joint is violated by more
+ROUNDS_IN_CONFLICT = 6  # of all joints at once: where a slack is open, they mostly go round
 ROUNDING = 1e-15  # of the largest multiplier
 COARSE = 1e-9  # mm: most that counts as rounding
 
@@ -84,7 +85,7 @@ def find_carrying(layout, work, limits, depths, deepest, counters):  # type: ign
             counters[0] += 1
             if _hold_joints(layout, work, tolerance, depths, deepest, counters[0] <= EAGER_ROUNDS):
                 return True
-            if counters[0] >= limits[0]:
+            if counters[0] >= limits[0] or (counters[0] >= ROUNDS_IN_CONFLICT and any_open(work)):
                 phase = RELEASE
         elif phase == RELEASE:
             if not release(layout, work, 0.0):

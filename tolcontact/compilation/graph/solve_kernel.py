@@ -40,12 +40,15 @@ def _load(layout, storage, work, problem, k, clears):  # type: ignore[no-untyped
     for j in range(work.joints.shape[0]):
         work.slacks[PRICE, j] = gradient[k, 6 * bodies + layout.joints[j, SLACK]] if layout.joints[j, SLACK] >= 0 else 0.0
         work.joints[j, COUNT], work.joints[j, FRESH] = 0, 0
-        work.joints[j, CHANGED], work.joints[j, OPEN] = 0, 0
+        work.joints[j, CHANGED] = 0
 
 
 @inlined_inner
-def _start(layout, work, reactions, k):  # type: ignore[no-untyped-def]
-    """Let equations carry, and the rows that carried before, as far as there are positions."""
+def _start(layout, work, reactions, slacks, k):  # type: ignore[no-untyped-def]
+    """Open the slacks that were open before, and let equations carry, and rows that did, as far as there are positions."""
+    for j in range(work.joints.shape[0]):
+        slack = layout.joints[j, SLACK]
+        work.joints[j, OPEN] = slack >= 0 and slacks[k, slack] > 0
     for row in range(layout.rows.shape[0]):
         j, source = layout.rows[row, JOINT], layout.rows[row, SOURCE]
         has_position = layout.joints[j, POSITION] + work.joints[j, COUNT] < layout.joints[j + 1, POSITION]
@@ -82,18 +85,19 @@ def _store(layout, storage, work, k, x, lam_a, lam_x):  # type: ignore[no-untype
 
 
 @uncounted
-def solve_batch(layout, storage, work, hessian, problem, reactions, limits, search, answer):  # type: ignore[no-untyped-def]
+def solve_batch(layout, storage, work, hessian, problem, guess, limits, search, answer):  # type: ignore[no-untyped-def]
     """Solve min x'Hx/2 + g'x, a x >= lba; write x, lam_a, lam_x (QP, entry), all zero before, and failed (QP,).
 
     hessian    nonzeros of h (QP, _), without columns if H is the identity, and a buffer (block, 6, 6)
     problem    nonzeros of a (QP, _), g (QP, n), lba (QP, m), the buffer of the rows
-    reactions  (QP, row) of the previous problem of each realization, or zero
+    guess      reactions (QP, row) and slacks (QP, slack) of the previous problem of each realization, or zero
     limits     rounds of all joints at once, steps of single rows
     search     buffers depths (joint,), deepest (joint,) and counters (QP, 2): rounds of joints, attempts by single rows
     """
     x, lam_a, lam_x, failed = answer
     depths, deepest, counters = search
     nonzeros, blocks = hessian
+    reactions, slacks = guess
     coupled = nonzeros.shape[1] > 0
     for k in range(x.shape[0]):
         _load(layout, storage, work, problem, k, coupled)
@@ -103,7 +107,7 @@ def solve_batch(layout, storage, work, hessian, problem, reactions, limits, sear
                 continue
             vectors_to_unit(storage, blocks, work.vectors[GRADIENT])
             rows_to_unit(layout.blocks, storage, blocks, work.slopes)
-        _start(layout, work, reactions, k)
+        _start(layout, work, reactions, slacks, k)
         if not find_carrying(layout, work, limits, depths, deepest, counters[k]):
             failed[k] = True
             continue
