@@ -1,6 +1,7 @@
 """What all analyses have in common: checks before any simulation, the dataset that is returned, and its place in an archive."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -8,11 +9,12 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.engine import Engine, Progress
+from tolcontact.analyses.engine import Engine, Progress, SharedProgress
 from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation.cluster import mapping, threads_of
+from tolcontact.simulation.threads import processors
 from tolcontact.workflow.forecast import check_affordable
 from tolcontact.workflow.models import Choice, Model, check_counts, program_of
 
@@ -117,6 +119,24 @@ class Analysis(Question):
         """
         self.check_affordable(self.samples if total is None else total)
         return Engine(self.program, self.blocks, progress=None if total is None else self.progress, total=total or 0)
+
+    @contextmanager
+    def engines(self, count: int, total: int) -> Iterator[list[Engine]]:
+        """Open engines for different threads, which report progress together, and stop when this ends.
+
+        Raises OptionError if `total` realizations cannot end.
+        """
+        self.check_affordable(total)
+        progress = SharedProgress(self.progress, total)
+        try:
+            yield [Engine(self.program, self.blocks, progress=progress.of_one(), total=total) for _ in range(count)]
+        finally:
+            progress.has_ended = True
+
+    @property
+    def threads(self) -> int:
+        """The number of threads of this process that may simulate at the same time; one if a client's workers do it."""
+        return processors() if self._client is None else 1
 
     def check_affordable(self, realizations: int) -> None:
         """Raise OptionError if so many realizations cannot end."""

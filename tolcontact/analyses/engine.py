@@ -1,6 +1,8 @@
 """The engine of all analyses: it simulates realizations in blocks, gathers what is observed and counts statuses."""
 
+import threading
 from collections.abc import Callable
+from concurrent.futures import CancelledError
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,34 @@ MIN_BLOCKS = 8  # of few realizations, so that these occupy all processors
 
 Progress = Callable[[int, int], None]  # is called with the number of finished steps, and of all
 Observer = Callable[[Block], tuple[Any, ...]]  # gives arrays of a block; the last one is the statuses (n,)
+
+
+class SharedProgress:
+    """The progress of several engines in different threads, reported as that of one.
+
+    has_ended   whether engines that still simulate shall stop
+    """
+
+    def __init__(self, progress: Progress | None, total: int) -> None:
+        self._progress, self._total = progress, total
+        self._finished: list[int] = []
+        self._lock = threading.Lock()
+        self.has_ended = False
+
+    def of_one(self) -> Progress:
+        """Return what another engine reports to. It raises CancelledError after the end."""
+        number = len(self._finished)
+        self._finished.append(0)
+
+        def report(finished: int, _: int) -> None:
+            if self.has_ended:
+                raise CancelledError
+            with self._lock:
+                self._finished[number] = finished
+                if self._progress:
+                    self._progress(min(sum(self._finished), self._total), self._total)
+
+        return report
 
 
 class Engine:

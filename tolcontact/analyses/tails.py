@@ -1,6 +1,7 @@
 """Probabilities that a measure is outside its limits, or that parts cannot be assembled, where this is rare."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,7 +16,7 @@ from tolcontact.analyses.engine import Engine, Progress
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
-from tolcontact.statistics.rare import Score, either, sufficient_tail
+from tolcontact.statistics.rare import Score, Tail, either, sufficient_tail
 from tolcontact.variation.draws import MIN_UNIFORM
 from tolcontact.workflow.models import Choice, Model
 
@@ -61,21 +62,20 @@ def tails(
     events = _events(program)
     if samples is None:
         samples = int(np.clip(BUDGET // len(events), *DEFAULT_RANGE))
-    engine = analysis.engine(len(events) * samples)
+    searches = [
+        _Search(event, number, side, samples // len(event.sides))
+        for number, event in enumerate(events.values())
+        for side in range(len(event.sides))  # each has its own way, and may hide that of the other
+    ]
+    answers = _answered(analysis, searches, len(events) * samples)
     found, statuses, stops = [], [], []
-    for number, event in enumerate(events.values()):
-        counted = engine.statuses.copy()
-        rng, dimensions = np.random.default_rng([seed, number]), len(program.draws.varying)
-        tails_of_sides, is_stop = [], []
-        for side in event.sides:  # each has its own way, and may hide that of the other
-            score, part = side(engine), samples // len(event.sides)
-            tails_of_sides.append(sufficient_tail(score, dimensions, samples=part, rng=rng, leads=event.leads))
-            is_stop.append(isinstance(score, _Beyond) and score.is_stop)
+    for number in range(len(events)):
+        sides = [answer for search, answer in zip(searches, answers, strict=True) if search.number == number]
         # Beside another side, one at which values stop would only add how seldom a run of this size can see it.
-        kept = [tail for tail, stop in zip(tails_of_sides, is_stop, strict=True) if not stop]
-        found.append(either(kept or tails_of_sides))
-        stops.append(any(is_stop))
-        statuses.append(engine.statuses - counted)
+        kept = [side.tail for side in sides if not side.is_stop]
+        found.append(either(kept or [side.tail for side in sides]))
+        stops.append(any(side.is_stop for side in sides))
+        statuses.append(np.sum([side.statuses for side in sides], axis=0))
     values = {
         "probability": [tail.probability for tail in found],
         "disagreement": [tail.disagreement for tail in found],
@@ -109,6 +109,42 @@ class _Event(NamedTuple):
 
     sides: list[Callable[[Engine], Score]]
     leads: bool
+
+
+class _Search(NamedTuple):
+    """A search for one side of an event, which has a number, with about so many realizations."""
+
+    event: _Event
+    number: int
+    side: int
+    samples: int
+
+    def answer(self, engine: Engine, seed: int) -> "_Answer":
+        """Return what was found."""
+        score, rng = self.event.sides[self.side](engine), np.random.default_rng([seed, self.number, self.side])
+        dimensions = len(engine.program.draws.varying)
+        tail = sufficient_tail(score, dimensions, samples=self.samples, rng=rng, leads=self.event.leads)
+        return _Answer(tail, isinstance(score, _Beyond) and score.is_stop, engine.statuses)
+
+
+class _Answer(NamedTuple):
+    """The answer of a search, whether values stop at the limit, and the number of realizations by their status."""
+
+    tail: Tail
+    is_stop: bool
+    statuses: np.ndarray
+
+
+def _answered(analysis: Analysis, searches: Sequence[_Search], total: int) -> list[_Answer]:
+    """Return the answers of all searches, which do not depend on each other: at the same time, in threads of this process."""
+    longest_first = sorted(range(len(searches)), key=lambda k: -searches[k].samples)
+    pool = ThreadPoolExecutor(analysis.threads)
+    with analysis.engines(len(searches), total) as engines:
+        try:
+            running = {k: pool.submit(searches[k].answer, engines[k], analysis.seed) for k in longest_first}
+            return [running[k].result() for k in range(len(searches))]
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)  # if all went well none is left; a stopped analysis does not wait
 
 
 def _events(program: Program) -> dict[str, _Event]:
