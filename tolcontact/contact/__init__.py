@@ -35,7 +35,8 @@ The exact resolution first takes steps like the paper's. Realizations that have 
 Newton steps, which take the curvature of the gaps and the objective into account. They end where twenty became no smaller, or
 where parts contradict each other and ten left no less penetration. If there is a conflict, no solution, or a
 solution far from the raw pose, other starts are tried: from the nominal pose, with small steps, or with contact points that
-are projected again. The best solution is kept; `starts` counts the starts.
+are projected again; the same conflict from two starts is not looked for from a third. The best solution is kept; `starts`
+counts the starts.
 
 ## Contact search
 

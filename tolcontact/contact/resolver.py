@@ -25,6 +25,7 @@ from tolcontact.contact.springs import spring_misfit
 from tolcontact.contact.state import Resolved, State, Task
 
 STRIDE, SMALL_STRIDE = 0.5, 0.05  # rad: the largest turn of a part in one step; linear rows are wrong long before
+SAME_CONFLICT = 1e-3  # share by which the penetration of two conflicts differs that are taken for the same
 MIN_GAIN = 1e-6  # of the objective, or mm of penetration: what another start must gain to be preferred
 
 
@@ -159,7 +160,10 @@ class ContactResolver:
                 state.doubtful[rolled] |= depth > self._limits.allowed(k)
 
     def _try_other_starts(self, task: Task, state: State) -> None:
-        """Try again, from other starts, realizations that are not certified, or far from their raw pose; keep the better."""
+        """Try again, from other starts, realizations that are not certified, or far from their raw pose; keep the better.
+
+        The same conflict from two starts is not looked for from a third one.
+        """
         rows = np.flatnonzero((state.rank > 0) | ~self._limits.is_near(task, state))
         for start in OTHER_STARTS_CURVED if self._candidates.curved else OTHER_STARTS:
             if not rows.size:
@@ -173,7 +177,7 @@ class ContactResolver:
             best = state.take(rows)
             better = is_better(attempt, self._energy_of(part, attempt), best, self._energy_of(part, best))
             state.put(rows[better], attempt.take(better))
-            rows = rows[state.rank[rows] > 0]
+            rows = rows[(state.rank[rows] > 0) & ~is_same_conflict(attempt, best)]
 
     def _energy_of(self, task: Task, state: State) -> Float[Array, " n"]:
         return self._energy(poses=state.poses, raw=task.raw, moments=task.moments, deviations=task.deviations)
@@ -198,6 +202,13 @@ def is_better(state: State, energy: Float[Array, " n"], best: State, best_energy
     is_lower = energy < best_energy - MIN_GAIN * np.abs(best_energy)
     gains = np.where(state.rank == 0, is_lower, (state.rank == 1) & (depth < best_depth - MIN_GAIN))
     return (state.rank < best.rank) | ((state.rank == best.rank) & gains)
+
+
+def is_same_conflict(state: State, best: State) -> Bool[Array, " n"]:
+    """Return whether answers, and the best ones so far, are conflicts that go equally deep (n,)."""
+    depth, best_depth = state.slack.max(axis=1), best.slack.max(axis=1)
+    goes_as_deep = np.abs(depth - best_depth) <= SAME_CONFLICT * np.maximum(depth, best_depth)
+    return (state.rank == 1) & (best.rank == 1) & goes_as_deep
 
 
 def checked_residual(state: State, depth: Float[Array, " n"]) -> Float[Array, " n"]:
