@@ -104,9 +104,12 @@ def test_a_quarter_of_the_realizations_suffices_for_many_contributors(seeds):
     assert covered >= 0.85 * len(seeds) - 1
 
 
-@pytest.mark.parametrize(("distance", "leads"), [(14.0, True), (9.0, False), (5.0, False)])
-def test_searches_keep_to_their_budget_and_end_where_the_event_is_negligible(distance, leads):
-    """Beyond a plane, 30 contributors: at 9 standard deviations or more the probability is at most 1e-19, at 5 it is 2.9e-7."""
+@pytest.mark.parametrize(
+    ("distance", "leads", "samples"),
+    [(14.0, True, 15_000), (9.0, False, 15_000), (5.0, False, 15_000), (7.0, True, 4000), (7.5, False, 5000)],
+)
+def test_searches_keep_to_their_budget_and_end_where_the_event_is_negligible(distance, leads, samples):
+    """Beyond a plane, 30 contributors: at 7 standard deviations or more the probability is at most 1e-12, at 5 it is 2.9e-7."""
     used, rng = [], np.random.default_rng(3)
 
     def score(u):
@@ -114,8 +117,8 @@ def test_searches_keep_to_their_budget_and_end_where_the_event_is_negligible(dis
         excess = u.sum(axis=1) / np.sqrt(30) - distance
         return excess if leads else np.sign(excess)
 
-    (estimate, lower, upper), disagreement = tail_probability(score, 30, samples=15_000, rng=rng, leads=leads)
-    assert sum(used) < 1.1 * 15_000 and disagreement == 1
+    (estimate, lower, upper), disagreement = tail_probability(score, 30, samples=samples, rng=rng, leads=leads)
+    assert sum(used) < 1.1 * max(samples, 6000) and disagreement == 1  # a level has a least number
     if distance == 5.0:
         assert lower < stats.norm.sf(5.0) < upper < 100 * lower
     else:

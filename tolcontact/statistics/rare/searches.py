@@ -171,7 +171,7 @@ def nested_levels(inflation: float, share: float) -> float:
     """
     distance = -inflation * special.ndtri(share)
     ratio = math.log(share) - max(float(special.log_ndtr(-distance)), math.log(NEGLIGIBLE))
-    return (2 + LOOKS_BACK) * (1 + ratio / -math.log(GOAL))
+    return (2 + LOOKS_BACK) * (1 + max(ratio, 0.0) / -math.log(GOAL))
 
 
 def first_inflation(score: Score, dimensions: int, count: int, rng: np.random.Generator) -> tuple[float, float]:
