@@ -30,7 +30,7 @@ from tolcontact.simulation.packing import (
     simulate_shard,
     versions,
 )
-from tolcontact.simulation.threads import Sampler, block_rows, map_blocks, processors
+from tolcontact.simulation.threads import Sampler, Threads, block_rows, processors
 
 dask = lazy_loader.load("dask", error_on_import=False)
 distributed = lazy_loader.load("distributed", error_on_import=False)
@@ -159,7 +159,7 @@ def needs_dask() -> Iterator[None]:
 
 def mapping(client: Any) -> MapBlocks:
     """Return `map_blocks`, or the same on the workers of a client. Raises ClusterError if they cannot be used."""
-    return map_blocks if client is None else Workers(client)
+    return Threads() if client is None else Workers(client)
 
 
 def threads_of(client: Any) -> int:

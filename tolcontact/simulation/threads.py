@@ -4,6 +4,7 @@ A block does not depend on the one before it, nor on the thread that simulates i
 number of threads, to the last bit.
 """
 
+import contextlib
 import os
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -22,6 +23,7 @@ CURVED_ROWS, MIN_ROWS = 512, 16
 MAX_BODIES = 24  # that are coupled; a whole block of more bodies would take longer than some ten seconds
 
 T = TypeVar("T")
+Resolvers = list[ContactResolver]  # of the groups of a program, for one block at a time
 
 
 @runtime_checkable
@@ -70,20 +72,21 @@ def map_blocks(
     block: int | None = None,
     threads: int | None = None,
     draws: Sampler | None = None,
+    unused: list[Resolvers] | None = None,
 ) -> Iterator[T]:
     """Yield what `function` makes of each block of `simulate_blocks`, in the thread that simulates it; in order.
 
-    A function that needs the program as well has `bound_to` (see BoundToProgram).
+    A function that needs the program as well has `bound_to` (see BoundToProgram). Resolvers that are `unused` are taken from
+    that list if there are any, and put back at the end.
     """
     if isinstance(function, BoundToProgram):
         function = function.bound_to(program)
     threads, block = threads or processors(), block or block_rows(program)
     starts = range(start, samples, block)
-    originals = [ContactResolver(program, group) for group in program.groups]
-    idle = [[resolver.twin() for resolver in originals] for _ in range(min(2 * threads, len(starts)))]
-    running: deque[tuple[Future[T], list[ContactResolver]]] = deque()
+    idle = _taken([] if unused is None else unused, program, min(2 * threads, len(starts)))
+    running: deque[tuple[Future[T], Resolvers]] = deque()
 
-    def simulate(begin: int, resolvers: list[ContactResolver]) -> T:
+    def simulate(begin: int, resolvers: Resolvers) -> T:
         deviations = (draws or program.draws)(seed=seed, start=begin, stop=min(begin + block, samples))
         return function(simulate_block(program, deviations, start=begin, resolvers=resolvers))
 
@@ -106,6 +109,32 @@ def map_blocks(
             yield finish_one()
     finally:
         pool.shutdown(wait=False, cancel_futures=True)  # if all went well none is left; a stopped run does not wait
+        if unused is not None:
+            unused.extend(idle)
+
+
+class Threads:
+    """`map_blocks` in threads of this process, which may be called in several. Resolvers of a program are made once."""
+
+    def __init__(self) -> None:
+        self._program: Program | None = None
+        self._unused: list[Resolvers] = []
+
+    def __call__(self, function: Callable[[Block], T], program: Program, **options: Any) -> Iterator[T]:
+        """Yield what `map_blocks` does, for its options."""
+        if self._program is not program:
+            self._program, self._unused = program, []
+        return map_blocks(function, program, unused=self._unused, **options)
+
+
+def _taken(unused: list[Resolvers], program: Program, count: int) -> list[Resolvers]:
+    """Return the resolvers of `count` blocks: unused ones, which other threads may take as well, and new ones."""
+    taken: list[Resolvers] = []
+    with contextlib.suppress(IndexError):
+        while len(taken) < count:
+            taken.append(unused.pop())
+    originals = [ContactResolver(program, group) for group in program.groups] if len(taken) < count else []
+    return taken + [[resolver.twin() for resolver in originals] for _ in range(count - len(taken))]
 
 
 def block_rows(program: Program) -> int:
