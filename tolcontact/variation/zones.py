@@ -14,7 +14,9 @@ from functools import cached_property
 
 import numpy as np
 import scipy
-from scipy.special import ndtri
+from scipy.special import gammainc, ndtri
+
+from tolcontact.variation.sobol_points import MAX_DIMENSIONS, scrambled_points
 
 SHARE = 0.9973002039367398  # of a normal distribution within three standard deviations
 LOG2_DIRECTIONS = 14
@@ -64,7 +66,7 @@ class MemberZone:
         if not len(varied):
             return 1.0
         longest = _longest(rows, directions(len(varied))[:count] * varied)
-        return float(scipy.stats.chi.cdf(width / 2 / np.maximum(longest, 1e-300), len(varied)).mean())
+        return float(chi_share(width / 2 / np.maximum(longest, 1e-300), len(varied)).mean())
 
 
 def share_inside(members: Sequence[MemberZone], spreads: np.ndarray, width: float) -> float:
@@ -77,6 +79,11 @@ def share_inside(members: Sequence[MemberZone], spreads: np.ndarray, width: floa
     count = max(MIN_DIRECTIONS, MEMBER_DIRECTIONS >> len(counts).bit_length())
     shares = [zones[key].share_inside(spreads, width, count) for key in counts]
     return shares[0] if len(shares) == 1 else float(np.average(shares, weights=list(counts.values())))
+
+
+def chi_share(lengths: np.ndarray, components: int) -> np.ndarray:
+    """Return the share of vectors of independent standard normal components that are shorter than some lengths."""
+    return np.asarray(gammainc(components / 2, lengths**2 / 2))
 
 
 def _root(covariance: np.ndarray) -> np.ndarray:
@@ -139,5 +146,9 @@ def directions(components: int) -> np.ndarray:
     """Return unit vectors (direction, component) in all directions evenly."""
     if components == 1:
         return np.ones((1, 1))
-    normal = ndtri(scipy.stats.qmc.Sobol(components, scramble=True, seed=0).random_base2(LOG2_DIRECTIONS))
+    if components <= MAX_DIMENSIONS:
+        points = scrambled_points(1 << LOG2_DIRECTIONS, components, np.random.default_rng(0))
+    else:
+        points = scipy.stats.qmc.Sobol(components, rng=0).random_base2(LOG2_DIRECTIONS)
+    normal = ndtri(points)
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
