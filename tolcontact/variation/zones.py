@@ -149,6 +149,6 @@ def directions(components: int) -> np.ndarray:
     if components <= MAX_DIMENSIONS:
         points = scrambled_points(1 << LOG2_DIRECTIONS, components, np.random.default_rng(0))
     else:
-        points = scipy.stats.qmc.Sobol(components, rng=0).random_base2(LOG2_DIRECTIONS)
+        points = scipy.stats.qmc.Sobol(components, seed=0).random_base2(LOG2_DIRECTIONS)
     normal = ndtri(points)
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
