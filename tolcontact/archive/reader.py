@@ -5,12 +5,12 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import netCDF4
 import numpy as np
 import pandas as pd
 import xarray as xr
 
 from tolcontact import vocabulary as terms
+from tolcontact.archive.file_tables import small_caches
 from tolcontact.archive.inspection import inspect
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.document import from_document
@@ -21,7 +21,6 @@ from tolcontact.method import Method
 
 FIRST_WITH_FORM = 5  # the first format of archives with faces that are not flat
 FORM_KINDS = [kind for kind, tolerance in KINDS.items() if tolerance.is_form]
-CACHE_BYTES = 1 << 20  # a chunk of most variables; with the size that is usual, all would take as much memory as all else
 
 
 def open_archive(path: str | Path) -> xr.DataTree:
@@ -39,15 +38,9 @@ def open_archive(path: str | Path) -> xr.DataTree:
 
 def opened(path: Path) -> xr.DataTree:
     """Open an archive that is known to be undamaged."""
-    usual = netCDF4.get_chunk_cache()
-    try:
-        netCDF4.set_chunk_cache(CACHE_BYTES)  # of each variable
+    with small_caches(path):
         # Numbers of realizations are not read, which takes as much memory as all else together: they are 0, 1, 2, ...
         tree = xr.open_datatree(path, engine="netcdf4", drop_variables=terms.REALIZATION)
-    except Exception as error:  # whatever a library finds that the inspection did not
-        raise ArchiveError(f'"{path}" cannot be read: {type(error).__name__}: {error}') from error
-    finally:
-        netCDF4.set_chunk_cache(*usual)
     numbers = pd.RangeIndex(tree.sizes[terms.REALIZATION])
     tree.coords[terms.REALIZATION] = (terms.REALIZATION, numbers, terms.NUMBERS.all_attributes)
     return tree

@@ -8,14 +8,15 @@ import typer
 from tolcontact import report as reports
 from tolcontact.archive import open_archive
 from tolcontact.cli.app import Archive, AsCsv, AsJson, Overwrite, app, examples, only_one
-from tolcontact.cli.output import check_page, check_spreadsheet, console, print_data, print_summary
+from tolcontact.cli.json_output import print_data
+from tolcontact.cli.output import check_page, check_spreadsheet, console, print_summary
 from tolcontact.cli.progress import waiting
 from tolcontact.cli.title_options import Author, Company, Date, PartNumber, Revision, Title, title_entries
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.errors import shown
 from tolcontact.report.text import capability_text
 from tolcontact.vocabulary import ESTIMATE, MEASURE_UNITS, STATISTIC, units_of
-from tolcontact.workflow.run import summarize
+from tolcontact.workflow.summaries import summarize
 
 
 @app.command(epilog=examples("summary run.nc", "summary run.nc --limits", "summary run.nc --csv > run.csv"))
