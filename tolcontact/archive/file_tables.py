@@ -61,6 +61,6 @@ def _entry(variable: netCDF4.Variable) -> tuple[tuple[str, ...], Any, dict[str, 
 def _texts(variable: netCDF4.Variable) -> np.ndarray:
     """Return the texts (...) of a variable of letters (..., length)."""
     variable.set_auto_chartostring(False)
-    letters = np.ascontiguousarray(variable[...])
-    texts = [row.tobytes().rstrip(b"\0").decode("utf-8") for row in letters.reshape(-1, max(letters.shape[-1], 1))]
+    letters, encoding = np.ascontiguousarray(variable[...]), getattr(variable, "_Encoding", "utf-8")
+    texts = [row.tobytes().rstrip(b"\0").decode(encoding) for row in letters.reshape(-1, max(letters.shape[-1], 1))]
     return np.array(texts, dtype=object).reshape(letters.shape[:-1])

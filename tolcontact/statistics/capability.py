@@ -165,7 +165,6 @@ def values_below(n: int) -> np.ndarray:
 
 def _hits(u: np.ndarray, n: np.ndarray, p: float) -> np.ndarray:
     """Return quantiles `u` of binomial distributions."""
-    k = np.maximum(np.ceil(special.bdtrik(u, np.maximum(n, 1), p)), 0).astype(np.int64)
-    k = np.where(np.isnan(special.bdtrik(u, np.maximum(n, 1), p)), 0, k)
+    k = np.maximum(np.ceil(np.nan_to_num(special.bdtrik(u, np.maximum(n, 1), p))), 0).astype(np.int64)
     k -= (k > 0) & (special.bdtr(np.maximum(k - 1, 0), np.maximum(n, 1), p) >= u)
     return np.where(n > 0, np.minimum(k, n), 0)
