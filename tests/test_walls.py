@@ -44,6 +44,7 @@ LAZY = {
     "dask.array": ("simulation/lazy.py",),
     "distributed": ("simulation/cluster.py",),
     "pandas": ("declaration/contributor.py",),
+    "trimesh": ("geometry/files/worker.py",),  # in a process that mostly reads STEP files
     "openpyxl": ("report/spreadsheet.py",),
     "tolcontact.kernel.step_bodies": ("geometry/files/worker.py",),  # in a process of its own
     "tolcontact.fasteners": ("__init__.py",),  # when a script asks
