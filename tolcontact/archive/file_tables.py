@@ -9,6 +9,7 @@ import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as terms
+from tolcontact.archive.inspection import check_archive
 from tolcontact.archive.library_lock import library_lock
 from tolcontact.errors import ArchiveError
 from tolcontact.labelled import Group, Table
@@ -27,6 +28,14 @@ def small_caches(path: Path) -> Iterator[None]:
         raise ArchiveError(f'"{path}" cannot be read: {type(error).__name__}: {error}') from error
     finally:
         netCDF4.set_chunk_cache(*usual)
+
+
+@contextlib.contextmanager
+def open_tables(path: Path) -> Iterator[Group]:
+    """Open an archive as tables that are read on demand. Raises ArchiveError as `open_archive` does."""
+    check_archive(path)
+    with opened_tables(path) as tables:
+        yield tables
 
 
 @contextlib.contextmanager

@@ -11,7 +11,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive.file_tables import small_caches
-from tolcontact.archive.inspection import inspect
+from tolcontact.archive.inspection import check_archive
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.document import from_document
 from tolcontact.declaration.feature_tolerance import KINDS
@@ -30,9 +30,7 @@ def open_archive(path: str | Path) -> xr.DataTree:
     read and compared with its checksums; `summarize` checks those of the realizations.
     """
     path = Path(path)
-    if not path.is_file():
-        raise ArchiveError(f'archive "{path}" does not exist; write one with: tolcontact run MODEL.py --out {path}')
-    inspect(path)
+    check_archive(path)
     return opened(path)
 
 

@@ -1,16 +1,19 @@
 """Datasets as JSON on standard output."""
 
 import json
+from typing import TYPE_CHECKING
 
 import numpy as np
 import typer
-import xarray as xr
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
-def print_data(dataset: xr.Dataset) -> None:
+def print_data(dataset: "xr.Dataset") -> None:
     """Print a dataset as JSON, which has no NaN or infinity: they are null, and the texts "Infinity" and "-Infinity"."""
     data = dataset.reset_coords()
-    numbers = {name: xr.apply_ufunc(_as_json, values) for name, values in data.items() if values.dtype.kind == "f"}
+    numbers = {name: values.copy(data=_as_json(values.values)) for name, values in data.items() if values.dtype.kind == "f"}
     typer.echo(json.dumps(data.assign(numbers).to_dict(), allow_nan=False, default=_plain))
 
 
