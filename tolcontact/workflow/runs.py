@@ -16,6 +16,7 @@ from tolcontact.workflow.models import Choice, Model
 
 __all__ = ["open_archive", "run"]
 
+# Whoever runs a model or opens an archive finds the verbs of results on them.
 xr.register_datatree_accessor("tolcontact")(Results)  # type: ignore[no-untyped-call]
 
 
