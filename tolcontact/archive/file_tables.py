@@ -10,24 +10,19 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive.inspection import check_archive
-from tolcontact.archive.library_lock import library_lock
+from tolcontact.archive.netcdf_library import library_lock, small_caches
 from tolcontact.errors import ArchiveError
 from tolcontact.labelled import Group, Table
 
-CACHE_BYTES = 1 << 20  # a chunk of most variables; with the size that is usual, all would take as much memory as all else
-
 
 @contextlib.contextmanager
-def small_caches(path: Path) -> Iterator[None]:
-    """Give each variable of a file that is being opened a small cache. Raises ArchiveError for an error of a library."""
-    usual = netCDF4.get_chunk_cache()
+def opening(path: Path) -> Iterator[None]:
+    """Give each variable of an archive that is being opened a small cache. Raises ArchiveError for an error of a library."""
     try:
-        netCDF4.set_chunk_cache(CACHE_BYTES)
-        yield
+        with small_caches():
+            yield
     except Exception as error:  # whatever a library finds that the inspection did not
         raise ArchiveError(f'"{path}" cannot be read: {type(error).__name__}: {error}') from error
-    finally:
-        netCDF4.set_chunk_cache(*usual)
 
 
 @contextlib.contextmanager
@@ -42,7 +37,7 @@ def open_tables(path: Path) -> Iterator[Group]:
 def opened_tables(path: Path) -> Iterator[Group]:
     """Open an archive that is known to be undamaged, as tables that are read on demand."""
     with library_lock():
-        with small_caches(path):
+        with opening(path):
             file = netCDF4.Dataset(path)
             file.set_auto_maskandscale(False)
             tables = _group(file, {})

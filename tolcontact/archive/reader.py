@@ -10,7 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.file_tables import small_caches
+from tolcontact.archive.file_tables import opening
 from tolcontact.archive.inspection import check_archive
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.document import from_document
@@ -36,7 +36,7 @@ def open_archive(path: str | Path) -> xr.DataTree:
 
 def opened(path: Path) -> xr.DataTree:
     """Open an archive that is known to be undamaged."""
-    with small_caches(path):
+    with opening(path):
         # Numbers of realizations are not read, which takes as much memory as all else together: they are 0, 1, 2, ...
         tree = xr.open_datatree(path, engine="netcdf4", drop_variables=terms.REALIZATION)
     numbers = pd.RangeIndex(tree.sizes[terms.REALIZATION])

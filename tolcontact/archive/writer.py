@@ -22,7 +22,7 @@ from tolcontact.archive.disk_space import check_room, lay_out_rows
 from tolcontact.archive.file_tables import opened_tables
 from tolcontact.archive.header import empty_field, empty_touching, write_header
 from tolcontact.archive.inspection import inspect
-from tolcontact.archive.library_lock import library_lock
+from tolcontact.archive.netcdf_library import library_lock, small_caches
 from tolcontact.archive.raw_file import LaidOut
 from tolcontact.archive.resuming import check_same_run
 from tolcontact.archive.rows import kept_rows
@@ -220,7 +220,7 @@ def _as_archive_error(path: Path) -> Iterator[None]:
 @contextlib.contextmanager
 def opened_locked(path: Path, mode: Literal["w", "r+", "r"]) -> Iterator[netCDF4.Dataset]:
     """Open a file while no other thread may use the netCDF library: garbage collection there could close a file."""
-    with library_lock(), netCDF4.Dataset(path, mode, format="NETCDF4") as file:
+    with library_lock(), small_caches(), netCDF4.Dataset(path, mode, format="NETCDF4") as file:
         file.set_auto_maskandscale(False)  # values are what they are; looking for masks takes longer than writing them
         yield file
 
