@@ -131,7 +131,7 @@ def _penetration(rows: Rows) -> np.ndarray:
     """Return the largest penetration of any contact point in each state [mm]."""
     if not rows[terms.GAP_MIN.name].size:
         return np.zeros(len(terms.STATES))
-    gaps = [piece[terms.GAP_MIN.name].transpose(terms.STATE, ...).values for piece in pieces(rows)]
+    gaps = (piece[terms.GAP_MIN.name].transpose(terms.STATE, ...).values for piece in pieces(rows))
     return np.maximum(-np.min([np.fmin.reduce(gap, axis=(1, 2)) for gap in gaps], axis=0), 0)
 
 
