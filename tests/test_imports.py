@@ -10,7 +10,7 @@ from scipy.stats import qmc
 from tests.helpers import call, finish, start
 from tolcontact.cli.app import app
 from tolcontact.cli.commands import COMMANDS, declared_command
-from tolcontact.statistics.sobol_points import scrambled_points
+from tolcontact.variation.sobol_points import MAX_DIMENSIONS, scrambled_points
 
 LISTING = "import sys; from tolcontact.cli import command_line\ntry: command_line({})\nexcept SystemExit: print(*sys.modules)"
 
@@ -31,9 +31,10 @@ def test_a_run_imports_what_it_needs(tmp_path):
     call(tmp_path, "new", "small")
     modules = imported(tmp_path, "run", "small.py", "--samples", "20")
     assert "casadi" in modules
-    assert (
-        not {"scipy.stats", "distributed.client", "tolcontact.analyses", "tolcontact.pmi", "tolcontact.report.html"} & modules
-    )
+    assert not {
+        "xarray", "pandas", "dask.base", "scipy.stats", "distributed.client", "tolcontact.analyses", "tolcontact.pmi",
+        "tolcontact.report.html",
+    } & modules  # fmt: skip
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -51,7 +52,8 @@ def test_every_command_is_listed():
 
 
 @pytest.mark.parametrize("seed", [0, 5])
+@pytest.mark.parametrize("dimensions", [1, 3, MAX_DIMENSIONS])
 @pytest.mark.parametrize("count", [1, 2, 1000, 2048])
-def test_scrambled_points_are_those_of_scipy(seed, count):
-    expected = qmc.Sobol(3, rng=np.random.default_rng(seed)).random(2048)[:count]
-    np.testing.assert_array_equal(scrambled_points(count, np.random.default_rng(seed)), expected)
+def test_scrambled_points_are_those_of_scipy(seed, dimensions, count):
+    expected = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(2048)[:count]
+    np.testing.assert_array_equal(scrambled_points(count, dimensions, np.random.default_rng(seed).spawn(1)[0]), expected)

@@ -44,6 +44,7 @@ LAZY = {
     "dask.array": ("simulation/lazy.py",),
     "distributed": ("simulation/cluster.py",),
     "pandas": ("declaration/contributor.py",),
+    "trimesh": ("geometry/files/worker.py",),  # in a process that mostly reads STEP files
     "openpyxl": ("report/spreadsheet.py",),
     "tolcontact.kernel.step_bodies": ("geometry/files/worker.py",),  # in a process of its own
     "tolcontact.fasteners": ("__init__.py",),  # when a script asks
@@ -62,7 +63,8 @@ APART = {
 }
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
-    "version", "errors", "interrupts", "later", "readable", "child", "kernel", "vocabulary", "checksums", "realizations",
+    "version", "errors", "interrupts", "later", "readable", "child", "kernel", "vocabulary", "checksums", "labelled",
+    "realizations",
     "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "features",
     "fasteners", "pmi", "discretization", "variation", "mechanics", "compilation", "statics", "plausibility", "contact",
     "simulation", "statistics", "archive", "report", "plot", "workflow", "analyses", "testing", "cli", "__init__", "__main__",

@@ -19,6 +19,7 @@ def command_line() -> None:
         with interrupts.stoppable(at_once=STOPPED):
             open_streams()
             check_address_space()
+            limit_threads()
             _imported()()
     except KeyboardInterrupt:  # between the end of a command and that of the process
         interrupts.end(STOPPED)
@@ -47,6 +48,14 @@ def check_address_space() -> None:
     if limit != resource.RLIM_INFINITY and limit < MIN_ADDRESS_SPACE:
         needed = f"{MIN_ADDRESS_SPACE / 1e9:g} GB"
         _refuse(f"this process may use {limit / 1e9:g} GB of address space, and its libraries need {needed}; raise ulimit -v")
+
+
+def limit_threads() -> None:
+    """Give NumPy's and SciPy's linear algebra one thread each, unless the user chose: starting more takes longer than a run.
+
+    The blocks of a run have threads of their own.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def _refuse(message: str) -> NoReturn:

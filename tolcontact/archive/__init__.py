@@ -148,35 +148,6 @@ arguments are numbers.
 >>> folder.cleanup()
 """
 
-from tolcontact.archive.analyses import check_room_for, keep
-from tolcontact.archive.archive_lock import taken
-from tolcontact.archive.disk_space import bytes_of_rows, size_in_words
-from tolcontact.archive.reader import method_of_run, model_of, open_archive, opened
-from tolcontact.archive.rows import Row, kept_rows, row_values
-from tolcontact.archive.settings import Run, run_settings
-from tolcontact.archive.stored_rows import check_rows, stored
-from tolcontact.archive.variables import labelled, sizes_of_rows
-from tolcontact.archive.writer import ArchiveWriter, replacing_archive
+import lazy_loader
 
-__all__ = [
-    "ArchiveWriter",
-    "Row",
-    "Run",
-    "bytes_of_rows",
-    "check_room_for",
-    "check_rows",
-    "keep",
-    "kept_rows",
-    "labelled",
-    "method_of_run",
-    "model_of",
-    "open_archive",
-    "opened",
-    "replacing_archive",
-    "row_values",
-    "run_settings",
-    "size_in_words",
-    "sizes_of_rows",
-    "stored",
-    "taken",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -3,8 +3,7 @@
 import os
 import shutil
 from pathlib import Path
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive.archive_lock import taken
@@ -14,6 +13,9 @@ from tolcontact.archive.writer import opened_locked, replacing_archive
 from tolcontact.checksums import crc32
 from tolcontact.compilation import Program
 from tolcontact.errors import ArchiveError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def check_room_for(path: str | Path, record: terms.AnalysisRecord, program: Program) -> None:
@@ -29,7 +31,7 @@ def check_room_for(path: str | Path, record: terms.AnalysisRecord, program: Prog
             raise ArchiveError(f'"{path}" already has {group}, which is not replaced; choose another archive')
 
 
-def keep(path: str | Path, record: terms.AnalysisRecord, dataset: xr.Dataset, program: Program) -> None:
+def keep(path: str | Path, record: terms.AnalysisRecord, dataset: "xr.Dataset", program: Program) -> None:
     """Add an analysis to an archive of the same model (see `check_room_for`).
 
     The file is replaced only when all of the new one is written.

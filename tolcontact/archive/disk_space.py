@@ -64,7 +64,9 @@ def lay_out_rows(file: netCDF4.Dataset, start: int, stop: int) -> None:
             for begin in range(start, stop, rows):
                 end = min(begin + rows, stop)
                 stored[begin:end] = piece[: end - begin]
-    file[terms.REALIZATION][start:stop] = np.arange(start, stop)
+    for begin in range(start, stop, terms.PIECE_ROWS):
+        end = min(begin + terms.PIECE_ROWS, stop)
+        file[terms.REALIZATION][begin:end] = np.arange(begin, end)
     sums = file[terms.ROW_CHECKSUM.name]
     blocks = slice(len(sums), -(-stop // int(file.block_rows)))
     if blocks.stop > blocks.start:

@@ -68,6 +68,13 @@ class DamagedError(Exception):
     """A fault of a file."""
 
 
+def check_archive(path: Path) -> None:
+    """Raise ArchiveError if there is no file at a path, or it does not stand the inspection."""
+    if not path.is_file():
+        raise ArchiveError(f'archive "{path}" does not exist; write one with: tolcontact run MODEL.py --out {path}')
+    inspect(path)
+
+
 def inspect(path: Path) -> None:
     """Raise ArchiveError if a file is not an archive, is damaged, or claims what it cannot hold."""
     check_name(path)

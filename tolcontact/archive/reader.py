@@ -5,13 +5,13 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import netCDF4
 import numpy as np
 import pandas as pd
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.inspection import inspect
+from tolcontact.archive.file_tables import opening
+from tolcontact.archive.inspection import check_archive
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.document import from_document
 from tolcontact.declaration.feature_tolerance import KINDS
@@ -21,7 +21,6 @@ from tolcontact.method import Method
 
 FIRST_WITH_FORM = 5  # the first format of archives with faces that are not flat
 FORM_KINDS = [kind for kind, tolerance in KINDS.items() if tolerance.is_form]
-CACHE_BYTES = 1 << 20  # a chunk of most variables; with the size that is usual, all would take as much memory as all else
 
 
 def open_archive(path: str | Path) -> xr.DataTree:
@@ -31,23 +30,15 @@ def open_archive(path: str | Path) -> xr.DataTree:
     read and compared with its checksums; `summarize` checks those of the realizations.
     """
     path = Path(path)
-    if not path.is_file():
-        raise ArchiveError(f'archive "{path}" does not exist; write one with: tolcontact run MODEL.py --out {path}')
-    inspect(path)
+    check_archive(path)
     return opened(path)
 
 
 def opened(path: Path) -> xr.DataTree:
     """Open an archive that is known to be undamaged."""
-    usual = netCDF4.get_chunk_cache()
-    try:
-        netCDF4.set_chunk_cache(CACHE_BYTES)  # of each variable
+    with opening(path):
         # Numbers of realizations are not read, which takes as much memory as all else together: they are 0, 1, 2, ...
         tree = xr.open_datatree(path, engine="netcdf4", drop_variables=terms.REALIZATION)
-    except Exception as error:  # whatever a library finds that the inspection did not
-        raise ArchiveError(f'"{path}" cannot be read: {type(error).__name__}: {error}') from error
-    finally:
-        netCDF4.set_chunk_cache(*usual)
     numbers = pd.RangeIndex(tree.sizes[terms.REALIZATION])
     tree.coords[terms.REALIZATION] = (terms.REALIZATION, numbers, terms.NUMBERS.all_attributes)
     return tree

@@ -31,7 +31,7 @@ class Run(NamedTuple):
     samples: int
     keep: str
     surfaces: int
-    fields: str
+    fields: int | str
     plan: str = terms.MONTE_CARLO
     checkpoint_interval: float = 2.0  # checkpoint and fields take some 50 ms for a part with 100 000 vertices
 
@@ -59,7 +59,7 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
         "seed": np.int64(run.seed),
         "samples": np.int64(run.samples),
         "kept": run.keep,
-        "fields": run.fields,
+        "fields": str(run.fields),
         "block_rows": np.int64(block_rows(program)),
     }
 

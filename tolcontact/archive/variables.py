@@ -1,13 +1,11 @@
 """Variables of the vocabulary in a netCDF file."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import netCDF4
 import numpy as np
-import pandas as pd
-import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
@@ -118,19 +116,8 @@ def units_of_rows(program: Program) -> dict[ArchiveVariable, str]:
     }
 
 
-def labelled(program: Program, values: Mapping[ArchiveVariable, Any], attributes: Mapping[str, Any]) -> xr.Dataset:
-    """Return arrays of any kind as variables of realizations, with the labels and attributes of an archive."""
-    texts = {**labels_of_rows(program.nominal), terms.CONTRIBUTOR: program.nominal.contributors}
-    labels: dict[str, Any] = {name: np.array(list(names), dtype=object) for name, names in texts.items()}  # text of any length
-    labels[terms.REALIZATION] = pd.RangeIndex(len(values[terms.STATUS]))
-    return xr.Dataset(
-        {variable.name: (variable.dims, array, _attributes(variable, program)) for variable, array in values.items()},
-        {label.name: label.entry(labels[label.name]) for label in (*terms.COORDINATES, terms.CONTRIBUTOR_LABEL)},
-        attributes,
-    )
-
-
-def _attributes(variable: ArchiveVariable, program: Program) -> dict[str, Any]:
+def attributes_of(variable: ArchiveVariable, program: Program) -> dict[str, Any]:
+    """Return the attributes of a variable of realizations, for a model."""
     attributes = variable.all_attributes
     if "flag_values" in attributes:
         attributes["flag_values"] = np.array(attributes["flag_values"], dtype=variable.kind)

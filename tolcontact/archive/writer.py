@@ -16,14 +16,14 @@ from typing import Any, Literal, NamedTuple
 
 import netCDF4
 import numpy as np
-from xarray.backends.locks import HDF5_LOCK, NETCDFC_LOCK, combine_locks
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive.disk_space import check_room, lay_out_rows
+from tolcontact.archive.file_tables import opened_tables
 from tolcontact.archive.header import empty_field, empty_touching, write_header
 from tolcontact.archive.inspection import inspect
+from tolcontact.archive.netcdf_library import library_lock, small_caches
 from tolcontact.archive.raw_file import LaidOut
-from tolcontact.archive.reader import opened
 from tolcontact.archive.resuming import check_same_run
 from tolcontact.archive.rows import kept_rows
 from tolcontact.archive.settings import Run, now, run_settings, versions
@@ -33,8 +33,6 @@ from tolcontact.compilation import Program
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
 from tolcontact.replacing import replacing
-
-_XARRAYS_LOCK = combine_locks([NETCDFC_LOCK, HDF5_LOCK])  # its engine "netcdf4" holds it while it reads and closes
 
 
 class ArchiveWriter:
@@ -67,7 +65,7 @@ class ArchiveWriter:
         with replacing_archive(path) as copy:
             # Only the copy is opened: the old file may be open in this process, and HDF5 does not open a file twice.
             shutil.copyfile(path, copy)
-            with opened(copy) as results:
+            with opened_tables(copy) as results:
                 check_rows(results)
             with opened_locked(copy, "r+") as file:
                 check_same_run(file, path, program, run_settings(program, run), run.surfaces)
@@ -222,7 +220,7 @@ def _as_archive_error(path: Path) -> Iterator[None]:
 @contextlib.contextmanager
 def opened_locked(path: Path, mode: Literal["w", "r+", "r"]) -> Iterator[netCDF4.Dataset]:
     """Open a file while no other thread may use the netCDF library: garbage collection there could close a file."""
-    with _XARRAYS_LOCK, netCDF4.Dataset(path, mode, format="NETCDF4") as file:
+    with library_lock(), small_caches(), netCDF4.Dataset(path, mode, format="NETCDF4") as file:
         file.set_auto_maskandscale(False)  # values are what they are; looking for masks takes longer than writing them
         yield file
 

@@ -20,7 +20,8 @@ from tolcontact.analyses.tails import tails
 from tolcontact.analyses.worst_case import worst_case
 from tolcontact.archive import open_archive
 from tolcontact.cli import app as common
-from tolcontact.cli.output import console, print_data
+from tolcontact.cli.json_output import print_data
+from tolcontact.cli.output import console
 from tolcontact.cli.progress import shown_progress
 from tolcontact.errors import OptionError
 from tolcontact.report.text import analysis_text

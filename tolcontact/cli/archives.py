@@ -5,17 +5,16 @@ from typing import Annotated
 
 import typer
 
-from tolcontact import report as reports
-from tolcontact.archive import open_archive
+from tolcontact import archive as archives, report as reports, statistics, workflow
 from tolcontact.cli.app import Archive, AsCsv, AsJson, Overwrite, app, examples, only_one
-from tolcontact.cli.output import check_page, check_spreadsheet, console, print_data, print_summary
+from tolcontact.cli.json_output import print_data
+from tolcontact.cli.output import check_page, check_spreadsheet, console, print_summary
 from tolcontact.cli.progress import waiting
 from tolcontact.cli.title_options import Author, Company, Date, PartNumber, Revision, Title, title_entries
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.errors import shown
 from tolcontact.report.text import capability_text
 from tolcontact.vocabulary import ESTIMATE, MEASURE_UNITS, STATISTIC, units_of
-from tolcontact.workflow.run import summarize
 
 
 @app.command(epilog=examples("summary run.nc", "summary run.nc --limits", "summary run.nc --csv > run.csv"))
@@ -27,18 +26,20 @@ def summary(
 ) -> None:
     """Print the statistics of an archive."""
     only_one(json=as_json, csv=as_csv, limits=limits)
-    with open_archive(archive) as results:
-        if as_csv:
-            values = summarize(results)["statistic_value"].to_dataset("interval").to_dataframe()
-            statistics = values.index.get_level_values(STATISTIC)
-            values["units"] = [units_of(*each) for each in zip(statistics, values[MEASURE_UNITS.name], strict=True)]
-            typer.echo(values[[*ESTIMATE, "units"]].to_csv(lineterminator="\n"), nl=False)
-        elif as_json:
-            print_data(summarize(results))
-        elif limits:
-            console().print(capability_text(summarize(results)))
-        else:
-            print_summary(summarize(results))
+    with archives.open_tables(archive) as results:
+        archives.check_rows(results)
+        table = statistics.summary_table(results)
+    if as_csv:
+        values = statistics.dataset_of(table)["statistic_value"].to_dataset("interval").to_dataframe()
+        names = values.index.get_level_values(STATISTIC)
+        values["units"] = [units_of(*each) for each in zip(names, values[MEASURE_UNITS.name], strict=True)]
+        typer.echo(values[[*ESTIMATE, "units"]].to_csv(lineterminator="\n"), nl=False)
+    elif as_json:
+        print_data(statistics.dataset_of(table))
+    elif limits:
+        console().print(capability_text(table))
+    else:
+        print_summary(table)
 
 
 @app.command(epilog=examples("report run.nc", "report run.nc --out page.html", "report run.nc --xlsx tables.xlsx"))
@@ -64,8 +65,8 @@ def report(
     if xlsx is not None:
         check_spreadsheet(xlsx, overwrite=overwrite)
     entries = title_entries(title, part_number, author, revision, date, company)
-    with waiting(f"writing the report of {archive}"), open_archive(archive) as results:
-        summary, titles = summarize(results), title_block_of(results.attrs).overridden(entries)
+    with waiting(f"writing the report of {archive}"), archives.open_archive(archive) as results:
+        summary, titles = workflow.summarize(results), title_block_of(results.attrs).overridden(entries)
         if page is not None:
             reports.write_page(results, summary, page, titles)
         if xlsx is not None:

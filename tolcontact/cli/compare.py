@@ -11,7 +11,8 @@ import xarray as xr
 from tolcontact import report as reports
 from tolcontact.archive import open_archive, replacing_archive, taken
 from tolcontact.cli.app import AsJson, Overwrite, Samples, Scheduler, Seed, Workers, app, chosen, examples, or_, set_options
-from tolcontact.cli.output import check_page, console, print_data
+from tolcontact.cli.json_output import print_data
+from tolcontact.cli.output import check_page, console
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS

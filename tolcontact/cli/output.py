@@ -1,16 +1,14 @@
 """Output of results on standard output, and names of pages."""
 
-import json
 import sys
 from pathlib import Path
 
-import numpy as np
 import typer
-import xarray as xr
 from rich.console import Console
 
 from tolcontact import report
 from tolcontact.errors import OptionError
+from tolcontact.labelled import Rows
 from tolcontact.report.text import summary_text
 from tolcontact.vocabulary import BY_STATUS, UNRESOLVED
 
@@ -21,25 +19,6 @@ UNBOUNDED = 10_000  # columns outside of a terminal
 def console() -> Console:
     """Return a console on standard output; files and pipes have unlimited columns."""
     return Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else UNBOUNDED)
-
-
-def print_data(dataset: xr.Dataset) -> None:
-    """Print a dataset as JSON, which has no NaN or infinity: they are null, and the texts "Infinity" and "-Infinity"."""
-    data = dataset.reset_coords()
-    numbers = {name: xr.apply_ufunc(_as_json, values) for name, values in data.items() if values.dtype.kind == "f"}
-    typer.echo(json.dumps(data.assign(numbers).to_dict(), allow_nan=False, default=_plain))
-
-
-def _as_json(values: np.ndarray) -> np.ndarray:
-    objects = values.astype(object)
-    for word, places in ((None, np.isnan(values)), ("Infinity", values == np.inf), ("-Infinity", values == -np.inf)):
-        objects[places] = word
-    return objects
-
-
-def _plain(value: object) -> object:
-    """Return a number of NumPy as JSON has it."""
-    return value.item() if isinstance(value, np.generic) else str(value)
 
 
 def check_page(path: Path, *, overwrite: bool = False) -> None:
@@ -62,7 +41,7 @@ def check_spreadsheet(path: Path, *, overwrite: bool = False) -> None:
         raise OptionError(f'"{path}" exists; choose another name, or replace it with --overwrite')
 
 
-def print_summary(summary: xr.Dataset) -> None:
+def print_summary(summary: Rows) -> None:
     """Print the summary of a run. Raises typer.Exit with code 1 if too many realizations were not resolved."""
     console().print(summary_text(summary))
     failed = sum(int(summary[BY_STATUS.name][status]) for status in UNRESOLVED)

@@ -1,13 +1,14 @@
 """tolcontact run."""
 
 import functools
+import tempfile
 from pathlib import Path
 from typing import Annotated
 
 import typer
-import xarray as xr
 
-from tolcontact import report as reports
+from tolcontact import archive, report as reports, statistics
+from tolcontact.archive import Run
 from tolcontact.cli.app import (
     Model,
     Objective,
@@ -38,10 +39,11 @@ from tolcontact.cli.title_options import (
     titled_model,
 )
 from tolcontact.errors import OptionError, shown
+from tolcontact.labelled import Table
 from tolcontact.simulation.cluster import client_of
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
+from tolcontact.workflow.archived_run import SURFACES, write_run
 from tolcontact.workflow.models import DEFAULT_SOLVER
-from tolcontact.workflow.run import SURFACES, run as run_model, summarize
 from tolcontact.workflow.until import Target
 
 Until = Annotated[
@@ -96,10 +98,7 @@ def run(
     The exit code is 1 if more than 0.1 % of the realizations were not resolved (not converged, not assemblable, or doubtful),
     and if an interval is not as narrow as --until states.
     """
-    if out is None and (resume or (overwrite and report is None)):
-        raise OptionError("--overwrite and --resume need an archive; name one: --out FILE.nc")
-    if report is not None:
-        check_page(report, overwrite=overwrite)
+    _check_files(out, report, overwrite=overwrite, resume=resume)
     method = chosen(resolution=resolution, objective=objective)
     titles = title_entries(title, part_number, author, revision, date, company)
     note_kept_title(out if resume else None, titles)
@@ -108,28 +107,46 @@ def run(
         stopped(out, done := [0, samples]),
         shown_progress(model.stem, samples, quiet=quiet) as show,
         client_of(workers, scheduler) as client,
+        tempfile.TemporaryDirectory() as folder,
     ):
 
         def progress(rows: int) -> None:
             done[:] = rows, max(samples, rows)
             show(*done)
 
-        results = run_model(
-            functools.partial(titled_model, model, titles), samples=samples, seed=seed, solver=solver, method=method, out=out,
-            overwrite=overwrite and out is not None, resume=resume, keep=keep, surfaces=surfaces, plan=plan, until=until,
-            client=client, fields=int(fields) if fields.isdigit() else fields, progress=progress,
+        path = write_run(
+            functools.partial(titled_model, model, titles),
+            Run(seed, samples, keep, surfaces, int(fields) if fields.isdigit() else fields, plan),
+            out or Path(folder) / "results.nc", solver=solver, method=method, overwrite=overwrite and out is not None,
+            resume=resume, until=until, client=client, progress=progress,
         )  # fmt: skip
-    _print_results(results, out, report, until, quiet=quiet)
+        summary, shortfall = _summed_up(path, until, report)
+    _print_results(summary, out, shortfall, quiet=quiet)
 
 
-def _print_results(results: xr.DataTree, out: Path | None, report: Path | None, until: str | None, *, quiet: bool) -> None:
-    """Print the summary of results, and write their page. Raises typer.Exit with code 1 if they lack something."""
-    with results:
-        summary = summarize(results)
-        if report is not None:
-            reports.write_page(results, summary, report)
+def _check_files(out: Path | None, report: Path | None, *, overwrite: bool, resume: bool) -> None:
+    """Raise OptionError for options of files that are not written, and for a page that must not be."""
+    if out is None and (resume or (overwrite and report is None)):
+        raise OptionError("--overwrite and --resume need an archive; name one: --out FILE.nc")
+    if report is not None:
+        check_page(report, overwrite=overwrite)
+
+
+def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Table, str]:
+    """Return the summary of the archive at a path, and what it lacks that `until` states; write its page."""
+    with archive.opened_tables(path) as results:
+        archive.check_rows(results)
+        summary = statistics.summary_table(results)
         shortfall = Target.of(until).shortfall(results) if until is not None else ""
-        print_summary(summary)
+    if report is not None:
+        with archive.opened(path) as tree:
+            reports.write_page(tree, statistics.dataset_of(summary), report)
+    return summary, shortfall
+
+
+def _print_results(summary: Table, out: Path | None, shortfall: str, *, quiet: bool) -> None:
+    """Print the summary of results. Raises typer.Exit with code 1 if they lack something."""
+    print_summary(summary)
     if out is not None:
         typer.echo(f"\narchive: {shown(str(out))}")
     if shortfall:

@@ -11,7 +11,7 @@ import trimesh
 from tolcontact import poses as pose
 from tolcontact.geometry.curvature import chord_height
 from tolcontact.geometry.edges import rim
-from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.surface import Piece, Surface
 from tolcontact.vocabulary import ROUNDED
 
 MIN_POINTS = 2000  # of a face, beside the corners of its triangles
@@ -66,14 +66,14 @@ class BodyFace:
     def behind(self, motion: np.ndarray, other: "BodyFace", outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return rows and numbers of points of another face that may lie behind this one when it is moved.
 
-        Of a flat face these are points more than ROUNDED behind its plane, which few are where faces touch; else all points.
+        Of a flat face these are points more than ROUNDED behind its plane, which few are where faces touch; of a face all of
+        whose triangles stand for analytic surfaces those behind any of these; else all points.
 
         motion    (row, 12)
-        outward   (row,) [mm]: how far the points lie out of their face
+        outward   (row,) [mm]: how far the points lie out of their face, or bounds of that
         """
         if self.plane is None:
-            row, point = np.indices((len(motion), len(other.points)))
-            return row.ravel(), point.ravel()
+            return self._behind_round(motion, other, outward)
         n, height = self.plane
         turned = n @ pose.rotation(motion)
         level = turned @ other.points.T + (pose.translation(motion) @ n - height)[:, None]
@@ -82,23 +82,28 @@ class BodyFace:
         row, point = np.nonzero(level < -ROUNDED)
         return row, point
 
-    def near(self, motion: np.ndarray, other: "BodyFace", outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return rows and numbers as `behind` does, of a round face those of points that lie out of their face by less.
-
-        outward   (row,) [mm]: bounds of how far the points lie out of their face
-        """
-        row, point = self.behind(motion, other, outward)
-        if self.plane is not None or len(self.face.pieces) != 1 or len(self.face.unknown.mesh.faces):
+    def _behind_round(self, motion: np.ndarray, other: "BodyFace", outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return rows and numbers as `behind` does, of a face that is not flat."""
+        row, point = (numbers.ravel() for numbers in np.indices((len(motion), len(other.points))))
+        if len(self._unknown.mesh.faces):
             return row, point
-        ((surface, is_hollow, _),) = self.face.pieces
-        level = surface.distance(_moved(motion, row, other.points[point]))[0] * (-1.0 if is_hollow else 1.0)
-        is_near = level < np.abs(outward)[row]
+        moved = _moved(motion, row, other.points[point])
+        levels = [surface.distance(moved)[0] * (-1.0 if is_hollow else 1.0) for surface, is_hollow, _ in self._pieces]
+        is_near = np.min(levels, axis=0) < np.abs(outward)[row]
         return row[is_near], point[is_near]
 
     @cached_property
     def _bulge(self) -> float:
         """The largest distance [mm] of analytic surfaces from the body's flat triangles."""
-        return max((chord_height(piece.face) for piece in self.face.pieces), default=0.0)
+        return max((chord_height(piece.face) for piece in self._pieces), default=0.0)
+
+    @cached_property
+    def _pieces(self) -> list[Piece]:
+        return self.face.pieces
+
+    @cached_property
+    def _unknown(self) -> Surface:
+        return self.face.unknown
 
     @cached_property
     def plane(self) -> tuple[np.ndarray, float] | None:
@@ -160,8 +165,7 @@ class FacePair:
             rows = slice(start, start + POSES_PER_BLOCK)
             X, outward = X_RM[rows], heights[rows]
             for body, motion, side in ((self.reference, X, self.moving), (self.moving, pose.inverse(X), self.reference)):
-                find = body.behind if form is None else body.near
-                row, point = (numbers[::every] for numbers in find(motion, side, highest[rows]))
+                row, point = (numbers[::every] for numbers in body.behind(motion, side, highest[rows]))
                 if row.size:
                     raised = outward[row]
                     if form is not None:

@@ -7,6 +7,8 @@ The cut is an ellipse about the point c of the axis, and extends to e.c + r sqrt
 hollow cylinder the nearest one counts.
 """
 
+import functools
+
 import casadi as ca
 import numpy as np
 
@@ -24,6 +26,7 @@ TANGENT_TOLERANCE = 0.05  # rad: tangents within this angle count as one
 Terms = tuple[ca.SX, ca.SX, ca.SX, ca.SX]  # of a point: gap, slope, second derivative, and how its wall closes in
 
 
+@functools.lru_cache(64)  # rows of the QP and gaps of all points are made of the same expressions
 def round_gaps(points: RoundPoints) -> ca.Function:
     """Return the gaps of round points as a Function.
 

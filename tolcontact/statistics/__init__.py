@@ -92,14 +92,6 @@ at each point.
 ('vertex',)
 """
 
-from tolcontact.statistics.contact import TouchingShares, touching
-from tolcontact.statistics.fields import BlockSums, DisplacementFields
-from tolcontact.statistics.measure_statistics import STATISTICS, limits
-from tolcontact.statistics.run_comparison import compare_runs
-from tolcontact.statistics.summary import Summary, estimate_of, summarize
+import lazy_loader
 
-__all__ = [
-    "STATISTICS",
-    "BlockSums", "DisplacementFields", "Summary", "TouchingShares", "compare_runs", "estimate_of", "limits",
-    "summarize", "touching",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

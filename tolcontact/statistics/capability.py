@@ -28,7 +28,7 @@ from tolcontact.statistics.intervals import (
     proportion,
 )
 from tolcontact.statistics.sample import Sample
-from tolcontact.statistics.sobol_points import scrambled_points
+from tolcontact.variation.sobol_points import scrambled_points
 
 LOW, MEDIAN, HIGH = PERCENTS = 0.135, 50.0, 99.865
 TRIALS = 1 << 11  # simulated triples of percentiles, of which an interval covers 95 %
@@ -155,7 +155,7 @@ def _simulated_percentiles(x: Sample) -> tuple[np.ndarray, np.ndarray]:
 @lru_cache
 def values_below(n: int) -> np.ndarray:
     """Return simulated numbers of the values below the percentiles, among `n` values, (percentile, trial)."""
-    u = scrambled_points(TRIALS, np.random.default_rng(0)).T
+    u = scrambled_points(TRIALS, len(PERCENTS), np.random.default_rng(0).spawn(1)[0]).T
     p = np.array(PERCENTS) / 100
     below_low = _hits(u[0], np.full(TRIALS, n), p[0])
     below_median = below_low + _hits(u[1], n - below_low, (p[1] - p[0]) / (1 - p[0]))
@@ -165,7 +165,6 @@ def values_below(n: int) -> np.ndarray:
 
 def _hits(u: np.ndarray, n: np.ndarray, p: float) -> np.ndarray:
     """Return quantiles `u` of binomial distributions."""
-    k = np.maximum(np.ceil(special.bdtrik(u, np.maximum(n, 1), p)), 0).astype(np.int64)
-    k = np.where(np.isnan(special.bdtrik(u, np.maximum(n, 1), p)), 0, k)
+    k = np.maximum(np.ceil(np.nan_to_num(special.bdtrik(u, np.maximum(n, 1), p))), 0).astype(np.int64)
     k -= (k > 0) & (special.bdtr(np.maximum(k - 1, 0), np.maximum(n, 1), p) >= u)
     return np.where(n > 0, np.minimum(k, n), 0)

@@ -3,17 +3,17 @@
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from tolcontact import vocabulary as terms
+from tolcontact.labelled import Results, Table
 from tolcontact.statistics import intervals
 from tolcontact.vocabulary import ArchiveVariable
 
 
-def surface_values(results: xr.DataTree, limit: float) -> dict[ArchiveVariable, Any]:
+def surface_values(results: Results, limit: float) -> dict[ArchiveVariable, Any]:
     """Return what the check found, with shares of depths above `limit` [mm]; NaN for archives that lack a variable of it."""
     pairs = results.sizes[terms.PAIR]
-    surface = results["surface"].to_dataset() if "surface" in results.children else xr.Dataset()
+    surface = results["surface"].to_dataset() if "surface" in results.children else Table({})
 
     def depths(variable: ArchiveVariable) -> np.ndarray:
         return surface[variable.name].values if variable.name in surface else np.full((0, pairs), np.nan)

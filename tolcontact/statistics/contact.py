@@ -3,9 +3,9 @@
 from collections import Counter
 
 import numpy as np
-import xarray as xr
 
 from tolcontact import vocabulary as terms
+from tolcontact.labelled import Rows
 from tolcontact.realizations import pieces
 from tolcontact.statistics import intervals
 from tolcontact.statistics.sample import Sample
@@ -13,14 +13,14 @@ from tolcontact.statistics.sample import Sample
 MAX_COMBINATIONS = 10  # of pairs that carry together
 
 
-def carried(rows: xr.Dataset) -> np.ndarray:
+def carried(rows: Rows) -> np.ndarray:
     """Return the share of realizations in which each pair carries, (pair, interval)."""
     counts = np.sum([(piece[terms.CARRYING.name].values > 0).sum(axis=0) for piece in pieces(rows)], axis=0)
     total = rows.sizes[terms.REALIZATION]
     return np.array([intervals.proportion_of(int(k), total) for k in counts]).reshape(-1, len(terms.ESTIMATE))
 
 
-def reactions(rows: xr.Dataset) -> np.ndarray:
+def reactions(rows: Rows) -> np.ndarray:
     """Return mean and percentiles of the reaction of each pair over all realizations, (pair, of_reaction, interval)."""
     estimates = []
     for pair in range(rows.sizes[terms.PAIR]):
@@ -30,7 +30,7 @@ def reactions(rows: xr.Dataset) -> np.ndarray:
     return np.array(estimates).reshape(-1, 1 + len(terms.REACTION_PERCENTILES), len(terms.ESTIMATE))
 
 
-def combinations(rows: xr.Dataset) -> list[tuple[tuple[str, ...], int]]:
+def combinations(rows: Rows) -> list[tuple[tuple[str, ...], int]]:
     """Return which pairs carry together, and in how many realizations: the most frequent combinations."""
     names, counts = [str(name) for name in rows[terms.PAIR].values], Counter[tuple[bool, ...]]()
     for piece in pieces(rows):
@@ -65,36 +65,3 @@ class TouchingShares:
         estimates = np.array([intervals.proportion_of(int(count), self._realizations) for count in counts])
         estimates = estimates.reshape(-1, len(terms.ESTIMATE))[place]
         return estimates[:, 0], estimates[:, 1:], self._realizations
-
-
-def touching(results: xr.DataTree) -> xr.Dataset:
-    """Return the share of realizations in which each contact point touches, corrected, with its interval, as it is archived.
-
-    touching   (point, interval): gaps below 1e-4 mm, in the first 2048 realizations at most (fewer of more than 10 000 points),
-               without those that are `searched`
-    pair       (point) name of its pair
-    point      (point, axis) of the moving part, nominal [mm]
-
-    The attribute `realizations` is their number. It is 0, and shares are NaN, if the archive does not keep the poses (or, where
-    gaps depend on them, the deviations), or is of an earlier version.
-    """
-    contact, names = results["contact"].to_dataset(), results.to_dataset()[terms.PAIR].values
-    pair_of_point, points = np.zeros(0, dtype=int), np.zeros((0, len(terms.AXES)))  # of a model without contact
-    if terms.PAIR_OF_POINT.name in contact:
-        pair_of_point, points = contact[terms.PAIR_OF_POINT.name].values, contact[terms.MOVING_POINT.name].values
-    values, count = np.full((len(pair_of_point), len(terms.ESTIMATE)), np.nan), 0
-    if len(points) and all(variable.name in contact for variable in terms.TOUCHING):
-        share, interval, realizations = (contact[variable.name].values for variable in terms.TOUCHING)
-        values, count = np.column_stack([share, interval]), int(realizations)
-    return xr.Dataset(
-        {
-            "touching": ((terms.POINT, terms.INTERVAL), values, {"units": "1"}),
-            "point": ((terms.POINT, terms.AXIS), points, {"units": "mm"}),
-        },
-        coords={
-            "pair": (terms.POINT, names.astype(str)[pair_of_point]),
-            terms.AXIS: list(terms.AXES),
-            terms.INTERVAL: list(terms.ESTIMATE),
-        },
-        attrs={"realizations": count},
-    )

@@ -4,11 +4,10 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.errors import ArchiveError
-from tolcontact.later import HTML, LATER
+from tolcontact.labelled import Results, Rows, Table
 from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import contact, intervals
 from tolcontact.statistics.checked_surfaces import surface_values
@@ -19,46 +18,8 @@ from tolcontact.vocabulary import ArchiveVariable
 MIN_REALIZATIONS = 2
 
 
-class Summary(xr.Dataset):  # type: ignore[no-untyped-call]
-    """A dataset that a notebook shows as tables."""
-
-    __slots__ = ()
-
-    def _repr_html_(self) -> str:
-        return str(LATER[HTML](self))
-
-
-def summarize(results: xr.DataTree) -> Summary:
-    """Return the statistics of a run, each as (estimate, lower, upper) with a 95 % interval.
-
-    statistic_value (measure, state, statistic, interval) in the measure's units; shares are of 1
-    change          (measure, change_of, interval)         corrected against raw, from the same realizations
-    touched         (interval)                           share of realizations that contact touched
-    by_status       (status_meaning)                     number of realizations
-    not_assemblable (interval)                           share of realizations without a pose free of penetration
-    conflicts       (pair)                               in how many of these a pair is among those in conflict
-    penetration     (state)                              largest true penetration of any contact point [mm]
-    surface_penetration, beside   largest of the realizations that were checked against the surfaces [mm]: how deep a face lies
-                                  in the other body, and how far contact points that touch stand beside the face
-    surfaces_checked              number of these realizations
-    penetrating_share, false_contact_share   (interval)  shares of realizations whose surfaces penetrate each other, or were
-                                  apart in the raw state where contact was resolved, by more than 1 % of the smallest range;
-                                  from those realizations that were checked at random
-    contacts, contacts_ended      of the realizations checked: how many contact points touch, and how many of them a plane where
-                                  its face has ended; NaN where that is not known
-    false_contact   (pair)                               of these: how deep contact points lay inside in the raw state, where
-                                                         the surfaces were apart [mm]; NaN where that is not known
-    carried         (pair, interval)                     share of realizations in which a pair carries
-    reaction        (pair, of_reaction, interval)        mean and percentiles of its reaction, in the objective's units
-    together        (combination, interval)              share of realizations in which exactly these pairs carry
-    iterations      (of_iterations)                      median and largest number of linear steps of those touched
-    field_extreme   (part, state, extreme, interval)     least and largest 6 sigma of the displacement magnitude [mm]
-    field_realizations                                   number of realizations in the displacement fields,
-    magnitude_realizations                               and in their magnitudes
-
-    The attribute `realizations` is the number of finished realizations, `samples` the number that the run was started with.
-    Raises ArchiveError if fewer than MIN_REALIZATIONS realizations are finished.
-    """
+def summary_table(results: Results) -> Table:
+    """Return the statistics of a run as a table (see summarize)."""
     count = finished(results)
     if count < MIN_REALIZATIONS:
         raise ArchiveError(f"{count} realizations are finished, too few for statistics; continue with --resume")
@@ -75,10 +36,10 @@ def summarize(results: xr.DataTree) -> Summary:
         **_field_values(results),
     }
     units = {terms.PAIR_REACTION: {"units": rows[terms.REACTION.name].attrs.get("units", "1")}}
-    return Summary(
+    return Table(
         {variable.name: variable.entry(array, **units.get(variable, {})) for variable, array in values.items()},
-        coords=_coordinates(rows, combinations) | {terms.MEASURE_STOPS: (terms.MEASURE, of_measures.stops)},
-        attrs={
+        _coordinates(rows, combinations) | {terms.MEASURE_STOPS: (terms.MEASURE, of_measures.stops)},
+        {
             "title": results.attrs.get("title", ""),
             "realizations": count,
             "samples": _planned_samples(results, count),
@@ -90,14 +51,14 @@ def summarize(results: xr.DataTree) -> Summary:
     )
 
 
-def estimate_of(results: xr.DataTree, measure: str, statistic: str) -> Estimate:
+def estimate_of(results: Results, measure: str, statistic: str) -> Estimate:
     """Return one of `STATISTICS` of a corrected measure."""
     rows = results.to_dataset().isel({terms.REALIZATION: slice(finished(results))})
     number = rows[terms.MEASURE].values.tolist().index(measure)
     return STATISTICS[statistic](MeasuredValues(rows, number, terms.STATES[terms.CORRECTED], limits(rows)[number]))
 
 
-def in_conflict(rows: xr.Dataset) -> np.ndarray:
+def in_conflict(rows: Rows) -> np.ndarray:
     """Return which pairs contradict each other where no pose is free of penetration, (realization, pair) bool.
 
     These are the pairs that still penetrate at the pose of least penetration.
@@ -107,7 +68,7 @@ def in_conflict(rows: xr.Dataset) -> np.ndarray:
     return stuck[:, None] & (gap < -rows.attrs["solver_accuracy"])
 
 
-def _coordinates(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int]]) -> dict[str, Any]:
+def _coordinates(rows: Rows, combinations: list[tuple[tuple[str, ...], int]]) -> dict[str, Any]:
     """Return the labels of all dimensions, and what describes each measure."""
     return {
         terms.MEASURE: rows[terms.MEASURE].values,
@@ -133,7 +94,7 @@ def _coordinates(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int
     }
 
 
-def _status_values(rows: xr.Dataset) -> dict[ArchiveVariable, Any]:
+def _status_values(rows: Rows) -> dict[ArchiveVariable, Any]:
     """Return how many realizations have each status, and the shares and conflicts that follow."""
     by_status = np.sum([np.bincount(piece, minlength=len(terms.STATUS_MEANINGS)) for piece in statuses(rows)], axis=0)
     total, not_assemblable = int(by_status.sum()), by_status[terms.Status.NOT_ASSEMBLABLE]
@@ -145,7 +106,7 @@ def _status_values(rows: xr.Dataset) -> dict[ArchiveVariable, Any]:
     }
 
 
-def _contact_values(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int]]) -> dict[ArchiveVariable, Any]:
+def _contact_values(rows: Rows, combinations: list[tuple[tuple[str, ...], int]]) -> dict[ArchiveVariable, Any]:
     """Return how often pairs carry, alone and in combinations, and their reactions."""
     total = rows.sizes[terms.REALIZATION]
     shares = np.array([intervals.proportion_of(count, total) for _, count in combinations])
@@ -156,7 +117,7 @@ def _contact_values(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], 
     }
 
 
-def _field_values(results: xr.DataTree) -> dict[ArchiveVariable, Any]:
+def _field_values(results: Results) -> dict[ArchiveVariable, Any]:
     """Return the extremes of the displacement fields, and how many realizations all of them cover."""
     parts = [str(part) for part in results.to_dataset()[terms.PART].values]
     return {
@@ -166,15 +127,15 @@ def _field_values(results: xr.DataTree) -> dict[ArchiveVariable, Any]:
     }
 
 
-def _penetration(rows: xr.Dataset) -> np.ndarray:
+def _penetration(rows: Rows) -> np.ndarray:
     """Return the largest penetration of any contact point in each state [mm]."""
     if not rows[terms.GAP_MIN.name].size:
         return np.zeros(len(terms.STATES))
-    gaps = [piece[terms.GAP_MIN.name].min([terms.REALIZATION, terms.PAIR]).values for piece in pieces(rows)]
-    return np.maximum(-np.min(gaps, axis=0), 0)
+    gaps = (piece[terms.GAP_MIN.name].transpose(terms.STATE, ...).values for piece in pieces(rows))
+    return np.maximum(-np.min([np.fmin.reduce(gap, axis=(1, 2)) for gap in gaps], axis=0), 0)
 
 
-def _steps(rows: xr.Dataset) -> list[float]:
+def _steps(rows: Rows) -> list[float]:
     """Return the median and the largest number of linear steps, of the realizations that took any."""
     counts: Counter[int] = Counter()
     for piece in pieces(rows[[terms.ITERATIONS.name]]):
@@ -188,7 +149,7 @@ def _steps(rows: xr.Dataset) -> list[float]:
     return [float(np.mean([positive[k] for k in middle])), float(positive[-1])]
 
 
-def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
+def _smallest_range(results: Results, rows: Rows) -> float:
     """Return the smallest tolerance range above 0 of any contributor or measure [mm]; infinite if there is none."""
     sample = results["sample"].to_dataset()
     contributors = sample[terms.TOLERANCE_RANGE.name].values
@@ -200,7 +161,7 @@ def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
     return float(np.min(ranges, where=ranges > 0, initial=np.inf))
 
 
-def _datum_shifts(results: xr.DataTree) -> list[str]:
+def _datum_shifts(results: Results) -> list[str]:
     """Return the features with a datum at maximum or least material, as part.feature."""
     sample = results["sample"].to_dataset()
     if terms.DISTRIBUTION.name not in sample or terms.CONTRIBUTOR not in sample[terms.DISTRIBUTION.name].dims:
@@ -214,20 +175,20 @@ def _datum_shifts(results: xr.DataTree) -> list[str]:
     return list(dict.fromkeys(shifted))
 
 
-def _planned_samples(results: xr.DataTree, count: int) -> int:
+def _planned_samples(results: Results, count: int) -> int:
     """Return the number of realizations that the run was started with, or `count` if rows were selected from an archive."""
     samples, size = int(results.attrs["samples"]), results.to_dataset().sizes[terms.REALIZATION]
     is_unfinished = size > count or size == terms.FIRST_ROWS
     return max(samples, count) if is_unfinished else count
 
 
-def _quantities(rows: xr.Dataset) -> np.ndarray:
+def _quantities(rows: Rows) -> np.ndarray:
     """Return the quantity of each measure; empty in archives before format 4, which do not state it."""
     is_stated = terms.QUANTITY.name in rows
     return np.asarray(rows[terms.QUANTITY.name].values if is_stated else [""] * rows.sizes[terms.MEASURE], dtype=object)
 
 
-def _field_extremes(results: xr.DataTree, part: str) -> np.ndarray:
+def _field_extremes(results: Results, part: str) -> np.ndarray:
     """Return 6 sigma of |u|, and its interval, where the archived field is least and largest, (state, extreme, interval)."""
     extremes = np.full((len(terms.STATES), len(terms.EXTREMES), len(terms.ESTIMATE)), np.nan)
     if not _summed(results, part):
@@ -242,7 +203,7 @@ def _field_extremes(results: xr.DataTree, part: str) -> np.ndarray:
     return extremes
 
 
-def _summed(results: xr.DataTree, part: str) -> int:
+def _summed(results: Results, part: str) -> int:
     """Return the number of realizations in the field of a part; 0 while the field is being written."""
     field = _field(results, part)
     if terms.FIELD_REALIZATIONS.name not in field:  # archives of format 1 have fields of all their rows, or none
@@ -251,12 +212,12 @@ def _summed(results: xr.DataTree, part: str) -> int:
     return int(field[terms.FIELD_REALIZATIONS.name]) if is_written else 0
 
 
-def _magnitudes(results: xr.DataTree, part: str) -> int:
+def _magnitudes(results: Results, part: str) -> int:
     """Return the number of realizations in the magnitude of a part's field; before format 3 all of the field's."""
     field, summed = _field(results, part), _summed(results, part)
     is_stated = terms.MAGNITUDE_REALIZATIONS.name in field
     return min(int(field[terms.MAGNITUDE_REALIZATIONS.name]), summed) if is_stated else summed
 
 
-def _field(results: xr.DataTree, part: str) -> xr.Dataset:
+def _field(results: Results, part: str) -> Rows:
     return results["field"].children[terms.group_of(part)].to_dataset()

@@ -14,7 +14,7 @@ import scipy
 
 from tolcontact.features import FormField
 from tolcontact.features.least_zone import ZoneMember, least_widths
-from tolcontact.variation.zones import SHARE, MemberZone, directions
+from tolcontact.variation.zones import SHARE, MemberZone, chi_share, directions
 
 DIRECTIONS = 1 << 12
 NESTED_DIRECTIONS = 1 << 13  # displacements have larger spreads than modes, so that fewer directions tell more
@@ -49,7 +49,7 @@ class FormSpread:
 
     def share_inside(self, spread: float, width: float) -> float:
         """Return the share of faces, with coefficients of a standard deviation [mm], inside a zone of a width [mm]."""
-        return float(scipy.stats.chi.cdf(width / spread / np.maximum(self.widths, 1e-300), self.field.modes).mean())
+        return float(chi_share(width / spread / np.maximum(self.widths, 1e-300), self.field.modes).mean())
 
     def spread(self, width: float) -> float:
         """Return the standard deviation [mm] of the coefficients with which 99.73 % of the faces lie inside a zone."""
@@ -68,7 +68,8 @@ class FormSpread:
     def mean_width(self, spreads: np.ndarray) -> float:
         """Return the mean width [mm] of the least zones of faces, with coefficients of standard deviations (mode,) [mm]."""
         if self.field.means is None:
-            return float(spreads[0] * scipy.stats.chi.mean(self.field.modes) * self.widths.mean())
+            mean_length = np.sqrt(2) * scipy.special.poch(self.field.modes / 2, 0.5)  # of the chi distribution
+            return float(spreads[0] * mean_length * self.widths.mean())
         faces = self.field.means + spreads * np.random.default_rng(0).normal(size=(FACES, len(spreads)))
         return float(least_widths(self.field.zone, faces @ self.field.heights(self.field.places).T).mean())
 
@@ -100,4 +101,4 @@ class FormedZone(MemberZone):
         displacements = self.offsets @ (self.coordinates[:, varying] * spreads[varying])
         heights = unit[:, :modes] @ self.heights.T + unit[:, modes:] @ displacements.T
         needed = np.ptp(heights, axis=1) if self.floats else 2 * np.abs(heights).max(axis=1)
-        return float(scipy.stats.chi.cdf(width / np.maximum(needed, 1e-300), unit.shape[1]).mean())
+        return float(chi_share(width / np.maximum(needed, 1e-300), unit.shape[1]).mean())

@@ -7,14 +7,18 @@ quasi-random sequence of directions gives it to some 1e-5, without draws of feat
 """
 
 import functools
+import hashlib
+import pickle
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
 import scipy
-from scipy.special import ndtri
+from scipy.special import gammainc, ndtri
+
+from tolcontact.variation.sobol_points import MAX_DIMENSIONS, scrambled_points
 
 SHARE = 0.9973002039367398  # of a normal distribution within three standard deviations
 LOG2_DIRECTIONS = 14
@@ -64,7 +68,7 @@ class MemberZone:
         if not len(varied):
             return 1.0
         longest = _longest(rows, directions(len(varied))[:count] * varied)
-        return float(scipy.stats.chi.cdf(width / 2 / np.maximum(longest, 1e-300), len(varied)).mean())
+        return float(chi_share(width / 2 / np.maximum(longest, 1e-300), len(varied)).mean())
 
 
 def share_inside(members: Sequence[MemberZone], spreads: np.ndarray, width: float) -> float:
@@ -79,6 +83,11 @@ def share_inside(members: Sequence[MemberZone], spreads: np.ndarray, width: floa
     return shares[0] if len(shares) == 1 else float(np.average(shares, weights=list(counts.values())))
 
 
+def chi_share(lengths: np.ndarray, components: int) -> np.ndarray:
+    """Return the share of vectors of independent standard normal components that are shorter than some lengths."""
+    return np.asarray(gammainc(components / 2, lengths**2 / 2))
+
+
 def _root(covariance: np.ndarray) -> np.ndarray:
     """Return the symmetric root of a matrix without negative eigenvalues."""
     variances, directions = np.linalg.eigh(covariance)
@@ -89,8 +98,19 @@ def equal_spread(members: Sequence[MemberZone], inner_spreads: np.ndarray, count
     """Return the standard deviation of `count` more components with which 99.73 % of the members lie inside their zones.
 
     The components of `members` are those with `inner_spreads` (component,), which are standard deviations, and then these.
+    Features with the same zones, as holes of one size have, have the same spread: it is computed once.
     """
+    contents = [[type(member), *(getattr(member, field.name) for field in fields(member))] for member in members]
+    key = hashlib.blake2b(pickle.dumps((contents, inner_spreads, count, width))).digest()
+    if key not in _known_spreads:
+        _known_spreads[key] = _equal_spread(members, inner_spreads, count, width)
+    return _known_spreads[key]
 
+
+_known_spreads: dict[bytes, float] = {}
+
+
+def _equal_spread(members: Sequence[MemberZone], inner_spreads: np.ndarray, count: int, width: float) -> float:
     def excess(spread: float) -> float:
         return share_inside(members, np.concatenate([inner_spreads, np.full(count, spread)]), width) - SHARE
 
@@ -139,5 +159,9 @@ def directions(components: int) -> np.ndarray:
     """Return unit vectors (direction, component) in all directions evenly."""
     if components == 1:
         return np.ones((1, 1))
-    normal = ndtri(scipy.stats.qmc.Sobol(components, scramble=True, seed=0).random_base2(LOG2_DIRECTIONS))
+    if components <= MAX_DIMENSIONS:
+        points = scrambled_points(1 << LOG2_DIRECTIONS, components, np.random.default_rng(0))
+    else:
+        points = scipy.stats.qmc.Sobol(components, seed=0).random_base2(LOG2_DIRECTIONS)
+    normal = ndtri(points)
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)

@@ -102,14 +102,6 @@ Traceback (most recent call last):
 tolcontact.errors.OptionError: resolution is 'precise'; expected one of: linearized, exact
 """
 
-from tolcontact.archive import open_archive
-from tolcontact.workflow import accessor
-from tolcontact.workflow.comparison import compare, compare_runs, study
-from tolcontact.workflow.models import build, check, check_population, write_model
-from tolcontact.workflow.run import run, summarize
-from tolcontact.workflow.simulate import simulate
+import lazy_loader
 
-__all__ = [
-    "accessor", "build", "check", "check_population", "compare", "compare_runs", "open_archive", "run", "simulate", "study",
-    "summarize", "write_model",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -10,7 +10,7 @@ from tolcontact import plot, report, vocabulary as terms
 from tolcontact.errors import OptionError
 from tolcontact.realizations import finished
 from tolcontact.statistics import Summary, touching
-from tolcontact.workflow.run import summarize
+from tolcontact.workflow.summaries import summarize
 
 
 class Plots:
@@ -32,7 +32,6 @@ class Plots:
         return plot.assembly(self._results, **options)
 
 
-@xr.register_datatree_accessor("tolcontact")  # type: ignore[no-untyped-call]
 class Results:
     """The verbs of results. A notebook shows them as figures and a report."""
 

@@ -23,8 +23,8 @@ from tolcontact.simulation.cluster import MapBlocks, Workers, mapping, threads_o
 from tolcontact.statistics import compare_runs as compare_results
 from tolcontact.vocabulary import CORRECTED
 from tolcontact.workflow.forecast import check_affordable
+from tolcontact.workflow.lazy_runs import simulate
 from tolcontact.workflow.models import Choice, Model, assembly_of, check_counts, method_of, program_of
-from tolcontact.workflow.simulate import simulate
 
 WARM_UP_ROWS = 64  # realizations before the clock starts
 SELF_EXPLANATORY = ("resolution", "objective")  # choices whose values need no name beside them

@@ -5,11 +5,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import xarray as xr
-
-from tolcontact import vocabulary as terms
-from tolcontact.archive import method_of_run, model_of, open_archive
+from tolcontact import archive
 from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.json_model import write_json
@@ -18,10 +14,6 @@ from tolcontact.discretization import discretize
 from tolcontact.errors import ArchiveError, ModelError, OptionError, TolcontactError
 from tolcontact.method import Method
 from tolcontact.plausibility import warn_of_nominal
-from tolcontact.statistics.intervals import proportion_of
-from tolcontact.variation import Draws
-from tolcontact.variation.measured_population import measured_population
-from tolcontact.workflow.forecast import check_memory
 
 DEFAULT_SOLVER = "qpoases"
 COUNTS = {"samples": (2, 10**12), "seed": (0, 2**63 - 1), "surfaces": (0, 10**6)}  # smallest and largest
@@ -95,9 +87,9 @@ def _loaded(path: str | Path) -> tuple[Assembly, Method | None]:
     """Return the assembly of a script, a JSON file or an archive, and the method of the archive's run."""
     if not is_archive(path):
         return load_model(Path(path)), None
-    with open_archive(path) as results:
+    with archive.open_archive(path) as results:
         try:
-            return model_of(results), method_of_run(results)
+            return archive.model_of(results), archive.method_of_run(results)
         except TolcontactError as error:
             raise ArchiveError(
                 f'the model in "{path}" cannot be rebuilt, so name its script instead of the archive: {error}'
@@ -132,35 +124,3 @@ def check_counts(**counts: int) -> None:
         least, most = COUNTS[option]
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
             raise OptionError(f"{option} is {value!r}; expected a whole number from {least} to {most}")
-
-
-def check_population(model: Model, *, samples: int = 10_000, seed: int = 1) -> xr.Dataset:
-    """Draw `samples` of every feature, and measure them as a coordinate measuring machine would.
-
-    The result has one zone for each size and each tolerance:
-
-        share_inside  (zone, interval)  estimate, and its exact 95 % interval
-        stated_share  (zone)            share that the rule from zone to spread states; NaN if it states none
-        needed_width  (zone) [mm]       width of the zone that 99.73 % of the features need
-
-    Nested tolerances, and tolerances that fill a bonus, may have a larger share inside than stated.
-    """
-    check_counts(samples=samples, seed=seed)
-    nominal = discretize(assembly_of(model))
-    check_memory(samples, len(nominal.contributors))
-    zones = list(measured_population(nominal, Draws(nominal), seed=seed, count=samples))
-    values = {
-        terms.ZONE_FEATURE: [zone.feature for zone in zones],
-        terms.ZONE_TOLERANCE: [zone.tolerance for zone in zones],
-        terms.STATED_SHARE: [zone.stated for zone in zones],
-        terms.SHARE_INSIDE: np.array([proportion_of(zone.inside, zone.drawn) for zone in zones]).reshape(
-            -1, len(terms.ESTIMATE)
-        ),
-        terms.NEEDED_WIDTH: [zone.needed for zone in zones],
-    }
-    population = xr.Dataset(
-        {v.name: (v.dims, np.array(column, dtype=v.kind), v.all_attributes) for v, column in values.items()},
-        coords={terms.INTERVAL: list(terms.ESTIMATE)},
-        attrs={"title": f"population of {nominal.assembly.name}", "realizations": samples, "seed": seed},
-    )
-    return population.set_coords([terms.ZONE_FEATURE.name, terms.ZONE_TOLERANCE.name])

@@ -111,7 +111,7 @@ class RunSums:
 
     def __init__(self, program: Program, run: Run) -> None:
         self._program, self._seed = program, run.seed
-        self._fields = DisplacementFields(program.nominal, run.fields)
+        self._fields = DisplacementFields(program.nominal, str(run.fields))
         self._points = sum(len(pair.P_m) for pair in program.nominal.pairs)
 
     @property

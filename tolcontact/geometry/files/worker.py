@@ -14,8 +14,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import lazy_loader
 import numpy as np
-import trimesh
 
 from tolcontact.child import Refusal, limit_resources
 
@@ -23,8 +23,11 @@ Arrays = dict[str, np.ndarray]
 ENCODING_GUESSERS = ("charset_normalizer", "chardet")  # trimesh would ask one for the encoding of binary content
 
 
-class FolderResolver(trimesh.resolvers.Resolver):  # type: ignore[misc]
-    """The files in the folder of a glTF file, which may name no others."""
+trimesh = lazy_loader.load("trimesh")  # when a mesh file comes: STEP files do not need it
+
+
+class FolderResolver:
+    """The files in the folder of a glTF file, which may name no others: one of trimesh's resolvers."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder.resolve()
@@ -36,6 +39,8 @@ class FolderResolver(trimesh.resolvers.Resolver):  # type: ignore[misc]
         if not path.is_file():
             raise Refusal(f'refers to "{name}", which does not exist; put it beside it, or export all as one file (GLB)')
         return path.read_bytes()
+
+    __getitem__ = get
 
     def write(self, name: str, data: Any) -> None:
         raise Refusal("is read only")

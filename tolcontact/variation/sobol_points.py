@@ -1,4 +1,4 @@
-"""Scrambled Sobol' points in three dimensions, as `scipy.stats.qmc.Sobol` gives them, whose import takes longer than a summary.
+"""Scrambled Sobol' points in few dimensions, as `scipy.stats.qmc.Sobol` gives them, whose import takes longer than a summary.
 
 Sobol', USSR Computational Mathematics and Mathematical Physics 7 (1967); the direction numbers are those of Joe and Kuo (2008),
 the scrambling is Matoušek's (1998): a random lower triangular matrix of bits, and a random shift.
@@ -10,34 +10,42 @@ from tolcontact.arrays import Array, Float, Int
 
 BITS = 30
 # Of each dimension after the first: the inner coefficients of its primitive polynomial, and its initial direction numbers.
-DIMENSIONS = (((), (1,)), ((1,), (1, 3)))
+DIMENSIONS = (
+    ((), (1,)),
+    ((1,), (1, 3)),
+    ((0, 1), (1, 3, 1)),
+    ((1, 0), (1, 1, 1)),
+    ((0, 0, 1), (1, 1, 3, 3)),
+    ((1, 0, 0), (1, 3, 5, 13)),
+)
+MAX_DIMENSIONS = 1 + len(DIMENSIONS)
 
 
-def scrambled_points(count: int, rng: np.random.Generator) -> Float[Array, "count 3"]:
-    """Return the leading points of a randomly scrambled sequence in the unit cube."""
-    dimensions, rng = 1 + len(DIMENSIONS), rng.spawn(1)[0]
+def scrambled_points(count: int, dimensions: int, rng: np.random.Generator) -> Float[Array, "count dimension"]:
+    """Return the leading points of a randomly scrambled sequence in the unit cube, of at most MAX_DIMENSIONS."""
     powers = np.int64(1) << np.arange(BITS)
     shift = _random_bits(rng, (dimensions, BITS)) @ powers
     matrix = np.tril(_random_bits(rng, (dimensions, BITS, BITS)))
     matrix[:, range(BITS), range(BITS)] = 1
-    directions = _direction_bits()  # the most significant bit comes first, as in the rows of the matrix
+    directions = _direction_bits(dimensions)  # the most significant bit comes first, as in the rows of the matrix
     scrambled = np.einsum("dab,djb->dja", matrix, directions) % 2 @ powers[::-1]
-    numbers = np.empty((count, dimensions), dtype=np.int64)
-    point = shift.copy()
-    for k in range(count):
-        numbers[k] = point
-        point ^= scrambled[:, (~k & (k + 1)).bit_length() - 1]  # Gray code: the lowest bit of k that is 0
-    return numbers / 2.0**BITS
+    numbers = shift[None]
+    for direction in scrambled.T:
+        if len(numbers) >= count:
+            break
+        # In the order of the Gray code, the points that one more bit gives are the mirrored ones of before.
+        numbers = np.concatenate([numbers, numbers[::-1] ^ direction])
+    return numbers[:count] / 2.0**BITS
 
 
 def _random_bits(rng: np.random.Generator, shape: tuple[int, ...]) -> Int[Array, "..."]:
     return rng.integers(2, size=shape, dtype=np.uint32).astype(np.int64)
 
 
-def _direction_bits() -> Int[Array, "3 direction bit"]:
+def _direction_bits(dimensions: int) -> Int[Array, "dimension direction bit"]:
     """Return the bits of the direction numbers of each dimension, the most significant one first."""
     numbers = [[1] * BITS]
-    for coefficients, initial in DIMENSIONS:
+    for coefficients, initial in DIMENSIONS[: dimensions - 1]:
         degree, of_dimension = len(initial), list(initial)
         for _ in range(degree, BITS):
             number = of_dimension[-degree] ^ (of_dimension[-degree] << degree)
