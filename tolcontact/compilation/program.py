@@ -253,11 +253,11 @@ def _check_placing(nominal: Nominal, method: Method) -> None:
 
 
 def _check_springs(nominal: Nominal, method: Method) -> None:
-    """Raise ModelError for supports with a stiffness, where no forces weigh them, or steps do not look at true gaps."""
+    """Raise ModelError for contact with a stiffness, where no forces weigh it, or steps do not look at true gaps."""
     if method.minimizes.presses and method.is_exact and not method.is_iterated:
         return
     faults = [
-        f'{pair.name}: a support has a stiffness, which needs the objective "seating", the resolution "exact", and a search '
+        f'{_springy_name(pair)} has a stiffness, which needs the objective "seating", the resolution "exact", and a search '
         f'that is not iterated; here they are "{method.objective}", "{method.resolution}" and "{method.search}"; choose '
         "those, or leave stiffness out"
         for pair in nominal.pairs
@@ -265,6 +265,10 @@ def _check_springs(nominal: Nominal, method: Method) -> None:
     ]
     if faults:
         raise ModelError(nominal.assembly.name, faults)
+
+
+def _springy_name(pair: ContactPoints) -> str:
+    return f"{pair.name}: a support" if pair.is_supports else f'contact pair "{pair.name}": it'
 
 
 def _check_forces(nominal: Nominal, groups: list[Group]) -> None:

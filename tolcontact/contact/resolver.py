@@ -136,8 +136,9 @@ class ContactResolver:
         if self._method.is_exact:
             depth = undone(task.scans, state.gap_min, state.relative, task.deviations, task.may_carry, state.slack)
             for k in self._springy:
-                pair, reactions = self._pairs[k], state.multipliers[:, self.spans[k]]
-                depth[:, k] = spring_misfit(pair, state.relative[:, k], task.deviations, reactions) - state.slack[:, k]
+                reactions = state.multipliers[:, self.spans[k]]
+                misfit = spring_misfit(self._pairs[k], task.scans[k], state.relative[:, k], task.deviations, reactions)
+                depth[:, k] = misfit - state.slack[:, k]
             state.kkt_residual[:] = checked_residual(state, depth.max(axis=1))
         state.doubtful[:] = self._limits.is_doubtful(task, state, self._candidates)
         if not projected:

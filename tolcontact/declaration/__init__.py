@@ -80,6 +80,10 @@ have more than six locators, of which at most six are two-sided. The objective "
 the `stiffness` (N/mm) of two-sided locators. With "seating", a support with a `stiffness` is a spring that pushes only: its gap
 is negative by its compression, which is its force divided by its stiffness. Without one it is rigid.
 
+A contact pair with a `stiffness` (N/mm) gives way, too: `contact(..., stiffness=5000)` states the force that presses its faces
+into each other evenly by 1 mm, as the data sheet of a pad or a press test does, whatever the number of contact points. These
+share it by the areas that they stand for, and push only. The faces must be flat, or those of balls and shafts against walls.
+
 A part that contact alone holds in some directions (a shaft in a V, a lid over studs) is `floating=True` and has fewer
 locators, or none. In the directions that its locators leave open, it keeps its nominal position in the raw state. Contact then
 moves it as the objective requires: with "active points" or "all points" only as far as needed to avoid penetration, with

@@ -71,12 +71,14 @@ class Declarations:
         spacing: float | None = None,
         within: float | None = None,
         mu: float | None = None,
+        stiffness: float | None = None,
     ) -> ContactPair:
         """Declare that points of the `moving` face stay outside the `reference` face (see ContactPair)."""
         for side, face in (("moving", moving), ("reference", reference)):
             expect(f'contact "{name}": {side}', face, Face | Feature, 'part.face("+z"), or a feature')
         sides = face_of(moving), face_of(reference)
-        return self._add("pairs", ContactPair(name, *sides, points, spacing, within, script_line(), mu, self._station))
+        line, station = script_line(), self._station
+        return self._add("pairs", ContactPair(name, *sides, points, spacing, within, line, mu, station, stiffness))
 
     def force(self, name: str, *, at: Point, vector: Any) -> Force:
         """Declare a force `vector` [N], in the assembly frame, at a point of a part (see Force)."""

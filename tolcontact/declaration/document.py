@@ -234,9 +234,10 @@ RECORDS = {
         scheme=SCHEME, on=GROUND, placing=Plain(text_type(PLACINGS)),
     ),
     "pairs": Record(
-        ContactPair, "moving reference name points spacing within declared_at mu? station?",
+        ContactPair, "moving reference name points spacing within declared_at mu? station? stiffness?",
         points=Plain(INDEX | text_type([VERTICES]) | None, read=indices_of),
         spacing=Plain(POSITIVE | None), within=Plain(POSITIVE | None), mu=Plain(NOT_NEGATIVE | None, write=floats),
+        stiffness=Plain(POSITIVE | None, write=floats),
     ),
     "measures": Record(
         Measure, "name of to? along tolerance units declared_at absolute? limits? station?", of=Inline(

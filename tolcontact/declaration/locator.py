@@ -14,6 +14,7 @@ from tolcontact.declaration.values import (
     is_finite,
     is_length,
     repetitions,
+    stiffness_faults,
     text_faults,
     vector as _vector,
 )
@@ -76,8 +77,7 @@ class Locator(Readable):
             yield from self.tolerance.faults()
         if not isinstance(self.one_sided, bool):
             yield f"one_sided is {self.one_sided!r}; expected True or False"
-        if self.stiffness is not None and not (is_length(self.stiffness) and self.stiffness > 0):
-            yield f"stiffness is {self.stiffness!r}; expected a number in N/mm above 0"
+        yield from stiffness_faults(self.stiffness)
         if not isinstance(self.on, Feature | None):
             yield f"on is a {type(self.on).__name__}; expected a feature of the part, or None"
         if not isinstance(self.part, Part | None):

@@ -78,7 +78,7 @@ class ContactPoints:
     deviating   deviations of the moving and the reference face, if these belong to features; their heights at fixed points are
                 among the offsets
     locators    (point,) numbers of the one-sided locators
-    stiffness   (point,) [N/mm] of one-sided locators, infinite if they are rigid; None for faces
+    stiffness   (point,) [N/mm] of springs, infinite for rigid one-sided locators; None for rigid faces
     """
 
     name: str

@@ -84,8 +84,9 @@ The objective determines the result, so every archive states it. For "seating" a
 all contact points keeps the problem convex. This term takes over part of the load: about 0.1 % times (travel / size of the
 contact).
 
-A one-sided locator with a `stiffness` k [N/mm] is a spring that pushes only. With the reactions lambda [N] and C = 1/k, the QP
-has 1/2 lambda' C lambda more in its objective, and the row g + A dq + C lambda >= 0. So `gap_min` of these supports is negative
+A one-sided locator with a `stiffness` k [N/mm] is a spring that pushes only, and so is each point of a contact pair with a
+`stiffness`, by the share of the area that it stands for. With the reactions lambda [N] and C = 1/k, the QP
+has 1/2 lambda' C lambda more in its objective, and the row g + A dq + C lambda >= 0. So `gap_min` of such a pair is negative
 by the largest compression, and a realization is resolved only if poses and reactions obey lambda = k max(0, -g). The small
 multiple then counts from the pose of the last step, and takes no load.
 
