@@ -142,7 +142,8 @@ class RelocatedTrials:
         analysis, scheme = self.analysis, list(self._scheme)
         scheme[self._number] = at_point(scheme[self._number], point)
         solver, method = analysis.program.plugin.name, analysis.program.method
-        program = compile_program(discretize(self._with_locators(tuple(scheme))), solver, method)
+        nominal = discretize(self._with_locators(tuple(scheme)), presses=method.minimizes.presses)
+        program = compile_program(nominal, solver, method)
         engine = Engine(program, analysis.blocks)
         start = VERIFICATION_FACTOR * analysis.samples if fresh else 0
         measured, _ = engine.simulate(start or analysis.samples, start=start, seed=analysis.seed)

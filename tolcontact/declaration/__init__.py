@@ -77,8 +77,10 @@ rejected.
 
 A locator with `one_sided=True` is a support: its part may lift off it, and may not pass through it. A part with supports may
 have more than six locators, of which at most six are two-sided. The objective "locator stiffness" uses
-the `stiffness` (N/mm) of two-sided locators. With "seating", a support with a `stiffness` is a spring that pushes only: its gap
-is negative by its compression, which is its force divided by its stiffness. Without one it is rigid.
+the `stiffness` (N/mm) of two-sided locators. With "seating", a locator with a `stiffness` is a spring, and without one it is
+rigid. The spring of a support pushes only: its gap is negative by its compression, which is its force divided by its stiffness.
+That of a two-sided locator pulls, too. It is a pair of its own in results, "part.locator", whose reaction is negative if it
+pulls; its gap is minus its elongation or compression.
 
 A contact pair with a `stiffness` (N/mm) gives way, too: `contact(..., stiffness=5000)` states the force that presses its faces
 into each other evenly by 1 mm, as the data sheet of a pad or a press test does, whatever the number of contact points. These

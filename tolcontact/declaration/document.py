@@ -94,9 +94,11 @@ def _ground(entries: Mapping[str, Any], place: Place) -> Part | Feature | None:
 
 
 def _stiffness_entries(locator: Locator, writing: Writing) -> Document:
-    """Return the stiffness; rigid supports are written with the usual one, so that a springy one has a mark."""
-    stiffness = USUAL_STIFFNESS if locator.stiffness is None else float(locator.stiffness)
-    return {"stiffness": stiffness} | ({"springy": True} if locator.is_springy else {})
+    """Return the stiffness, by default the usual one: a support that gives way, and a declared usual one, have a mark."""
+    if locator.stiffness is None:
+        return {"stiffness": USUAL_STIFFNESS}
+    mark = {"springy": True} if locator.one_sided or locator.stiffness == USUAL_STIFFNESS else {}
+    return {"stiffness": float(locator.stiffness), **mark}
 
 
 def _stiffness(entries: Mapping[str, Any], place: Place) -> float | None:

@@ -30,10 +30,10 @@ class Locator(Readable):
 
     A positive deviation moves the part along `direction`. `tolerance=None` takes the tolerance of the `locate` call. A
     `one_sided` locator is a support: the part may lift off it along `direction`, but not pass through it. The objective
-    "locator stiffness" uses the `stiffness` [N/mm] of two-sided locators, by default 1. A support with a `stiffness` gives
-    way like a spring that pushes only, under the objective "seating"; without one it is rigid. A locator `on` a feature of
-    its part touches this feature, and also moves the part by the deviation of the feature at the point. A locator of a joint
-    is at a point of any of its parts, which the point itself states: part.point(x, y, z).
+    "locator stiffness" uses the `stiffness` [N/mm] of two-sided locators, by default 1. Under the objective "seating" a locator
+    with a `stiffness` gives way, like a spring that pulls, too, unless it is one-sided; without one it is rigid. A locator
+    `on` a feature of its part touches this feature, and also moves the part by the deviation of the feature at the point. A
+    locator of a joint is at a point of any of its parts, which the point itself states: part.point(x, y, z).
     """
 
     name: str
@@ -82,11 +82,6 @@ class Locator(Readable):
             yield f"on is a {type(self.on).__name__}; expected a feature of the part, or None"
         if not isinstance(self.part, Part | None):
             yield f"part is a {type(self.part).__name__}; expected the part of the point, or None"
-
-    @property
-    def is_springy(self) -> bool:
-        """Whether it is a support that gives way."""
-        return self.one_sided and self.stiffness is not None
 
     def __str__(self) -> str:
         point, along = (", ".join(f"{c:g}" for c in v) for v in (self.point, self.direction))

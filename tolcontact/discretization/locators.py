@@ -26,7 +26,7 @@ class Locators:
     tolerances   one for each locator
     stiffness    (locator,) [N/mm]
     one_sided    (locator,) bool: supports that the part may lift off
-    springy      (locator,) bool: supports that give way by their stiffness
+    springy      (locator,) bool: locators that give way by their stiffness
     faces        for each locator the face of a feature that it stands against; None for a nominal face
     grounds      for each locator the feature of another part that it is on; None if it is on no feature
     floating     middle (3,) and size [mm] of a floating part; None for a part that its locators fix
@@ -63,6 +63,11 @@ class Locators:
             faces=tuple(face for part in parts for face in part.faces),
             grounds=tuple(ground for part in parts for ground in part.grounds),
         )
+
+    @property
+    def exact(self) -> np.ndarray:
+        """Whether locators hold both ways, and do not give way (locator,)."""
+        return ~self.one_sided & ~self.springy
 
     def pushes(self, locator: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the columns (k,) of deviations by which features push the part at a locator, and how far for 1 (k,).

@@ -68,7 +68,7 @@ measured from the raw state.
 | "all points" (default if exact) | 1/2 sum of squared displacements of all contact points |
 | "active points" (default if linearized) | the same sum over the contact points that penetrated |
 | "locator stiffness" | energy 1/2 sum k e^2 of the two-sided locators as springs |
-| "seating" | potential energy of the declared forces, with two-sided locators exact |
+| "seating" | potential energy of the declared forces and of springs, with other two-sided locators exact |
 
 | objective | choose it if |
 |---|---|
@@ -85,10 +85,11 @@ all contact points keeps the problem convex. This term takes over part of the lo
 contact).
 
 A one-sided locator with a `stiffness` k [N/mm] is a spring that pushes only, and so is each point of a contact pair with a
-`stiffness`, by the share of the area that it stands for. With the reactions lambda [N] and C = 1/k, the QP
-has 1/2 lambda' C lambda more in its objective, and the row g + A dq + C lambda >= 0. So `gap_min` of such a pair is negative
-by the largest compression, and a realization is resolved only if poses and reactions obey lambda = k max(0, -g). The small
-multiple then counts from the pose of the last step, and takes no load.
+`stiffness`, by the share of the area that it stands for. A two-sided locator with a `stiffness` is two springs at its point, of
+which one pushes and one pulls. With the reactions lambda [N] and C = 1/k, the QP has 1/2 lambda' C lambda more in its
+objective, and the row g + A dq + C lambda >= 0. So `gap_min` of such a pair is negative by the largest compression, and a
+realization is resolved only if poses and reactions obey lambda = k max(0, -g). The small multiple then counts from the pose of
+the last step, and takes no load.
 
 `regularization` holds the degrees of freedom that the objective leaves open. "points" (default) adds `eta` = 1e-6 times the
 squared displacements of all contact points, and does not depend on where the assembly lies in space. "identity" is the paper's
