@@ -1,7 +1,10 @@
 """Two-sided locators that give way under forces: a bar on springs by its stiffness matrix, and what the archive says."""
 
+import json
+
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
@@ -82,6 +85,21 @@ def test_forces_follow_from_the_archive_alone(tmp_path):
         assert forces[:, [0, 2]].sum(axis=1) + np.maximum(forces[:, 1], 0) == pytest.approx(LOAD, rel=1e-6)
         rebuilt = tc.model_of(tree)
     assert [locator.stiffness for locator in rebuilt.locations[0].scheme] == [*STIFFNESS, None, None, None, None]
+
+
+def test_a_stiffness_in_an_older_archive_lets_nothing_give_way(tmp_path):
+    path = tmp_path / "bar.nc"
+    tc.run(bar_on_springs(), samples=2, out=path)
+    with tc.open_archive(path) as tree:
+        assert tree.attrs["format"] == 7
+        document = json.loads(str(tree["model/declaration"].values))
+        for locator in document["locations"][0]["scheme"]:
+            locator.pop("springy", None)
+        older = xr.DataTree.from_dict({"model": xr.Dataset({"declaration": json.dumps(document)})})
+        older.attrs = tree.attrs | {"format": 6}
+        models = tc.model_of(older), tc.model_of(tree)
+    stiffness = [[locator.stiffness for locator in model.locations[0].scheme[:3]] for model in models]
+    assert stiffness == [[None, None, None], list(STIFFNESS)]
 
 
 def test_stiff_springs_are_rigid_locators():
