@@ -24,7 +24,7 @@ def padded_block(offset=(8, -3), *, unit=1.0, rotation=(0, 0, 0), points=None, s
     sides = [tc.Locator(name, end, "y", 0.2 * unit) for name, end in ends.items()]
     model.locate(block, [*sides, tc.Locator("C1", (0, 30 * unit, 0), "x", 0.2 * unit)], floating=True)
     faces = {"moving": block.face("-z"), "reference": base.face("+z")}
-    model.contact("pad", **faces, stiffness=stiffness / unit, points=points)
+    model.contact("pad", **faces, stiffness=stiffness and stiffness / unit, points=points)
     pressed = block.point((WIDTH / 2 + offset[0]) * unit, (DEPTH / 2 + offset[1]) * unit, 0)
     model.force("load", at=pressed, vector=tuple(turn.apply([0, 0, -LOAD])))
     up = tuple(turn.apply([0, 0, 1]))

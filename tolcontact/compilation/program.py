@@ -23,6 +23,7 @@ from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
 from tolcontact.errors import ModelError
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.limits import Limits
+from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.gap import GapMap, gap_map, gap_matrix
 from tolcontact.mechanics.groups import Group, contact_groups
 from tolcontact.mechanics.measures import measured, record
@@ -239,14 +240,13 @@ def _check_forms(nominal: Nominal, method: Method) -> None:
 
 
 def _check_placing(nominal: Nominal, method: Method) -> None:
-    """Raise ModelError for an objective that holds locators to first order, where contact moves a part placed otherwise."""
-    if method.minimizes.counts_points:
-        return
+    """Raise ModelError for placed parts that forces would press, if springs, or too many locators, hold them."""
     faults = [
-        f'part "{part.name}": its locators are placed by "{part.locators.placing}", and the objective "{method.objective}" '
-        'holds them to first order; leave placing out, or choose the objective "all points"'
+        f'part "{part.name}": its locators are placed by "{part.locators.placing}", and if forces press, they have to be at '
+        "most six, without a stiffness; leave placing out, or declare the part fixed=True"
         for index, part in enumerate(nominal.parts)
-        if index in part.movers and part.locators.placing != FIRST_ORDER
+        if index in part.movers and part.locators.placing != FIRST_ORDER and method.minimizes.presses
+        if len(part.locators) > FREEDOMS or part.locators.springy.any()
     ]
     if faults:
         raise ModelError(nominal.assembly.name, faults)

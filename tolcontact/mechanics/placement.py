@@ -108,11 +108,15 @@ def elongation(setting: Setting, part: int, poses: Sequence[Pose], *, linear: bo
 
 
 def misfit(setting: Setting, poses: Sequence[Pose], *, linear: bool = False) -> ca.SX:
-    """Return the elongations of the movers' two-sided locators less their deviations (locator, 1) [mm]."""
+    """Return the elongations of the movers' two-sided locators less their deviations (locator, 1) [mm].
+
+    Locators whose faces slide over them, or that a best fit averages, hold their part where they have placed it.
+    """
     errors = []
     for part in setting.group.free:
-        exact = setting.nominal.parts[part].locators.exact
-        if exact.any():
-            expected = locator_steps(setting.nominal, part, setting.deviations)[np.flatnonzero(exact).tolist()]
+        locators = setting.nominal.parts[part].locators
+        if locators.exact.any():
+            steps = locator_steps(setting.nominal, part, setting.deviations)[np.flatnonzero(locators.exact).tolist()]
+            expected = steps if locators.placing == FIRST_ORDER else elongation(setting, part, setting.raw)
             errors.append(elongation(setting, part, poses, linear=linear) - expected)
     return ca.vertcat(*errors) if errors else ca.SX(0, 1)
