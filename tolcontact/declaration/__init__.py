@@ -209,10 +209,10 @@ derivatives, so `sensitivities` and `contributions` state none for them by a lin
 ## Stations and joints
 
 Products are located, joined, and located again before anybody measures them. `station(name)` declares the next step of such a
-sequence, and has the methods `locate`, `contact`, `force` and `measure` of an assembly, and `join`. Locators belong to a
-station and vary there ("weld.left.A1"); features belong to parts, and deviate alike in all stations. A joint keeps the poses
-of its parts relative to each other that they had in the station that joined them: raw states follow from raw states, and
-corrected states from corrected states. Later stations locate the joint by points of any of its parts.
+sequence, and has the methods `locate`, `contact`, `fasten`, `force` and `measure` of an assembly, and `join`. Locators belong
+to a station and vary there ("weld.left.A1"); features belong to parts, and deviate alike in all stations. A joint keeps the
+poses of its parts relative to each other that they had in the station that joined them: raw states follow from raw states, and
+corrected states from corrected states. Later stations locate the joint by points, or by three faces, of any of its parts.
 
 >>> line = tc.Assembly("line")
 >>> left, right = line.part("left", tc.Box(100, 50, 10)), line.part("right", tc.Box(100, 50, 10), at=(80, 0, 10))

@@ -254,7 +254,8 @@ class Assembly(Declarations, Pictured):
     def _location_faults(self, part: Part) -> Iterator[str]:
         location = self.location_of(part)
         if location is not None and location.floating:
-            if not any(part in (pair.moving.part, pair.reference.part) for pair in self.pairs):
+            body = self.body_of(part)
+            if not any(side.part in body for pair in self.pairs for side in (pair.moving, pair.reference)):
                 yield "it is floating, and in no contact pair, so nothing decides its place; declare its contacts"
             if part.fixed is True:
                 yield "it is floating, so contact has to move it; leave fixed out"

@@ -169,10 +169,19 @@ class Location(Readable):
         return (self.part, *([] if self.parent is None else [self.parent]), *self.mentioned)
 
     @property
+    def locators(self) -> tuple[Locator, ...]:
+        """The locators of a scheme that states them."""
+        return () if isinstance(self.scheme, ThreeTwoOne) else self.scheme
+
+    @property
+    def faces(self) -> tuple[Face, ...]:
+        """The faces of a 3-2-1 scheme."""
+        return self.scheme.faces if isinstance(self.scheme, ThreeTwoOne) else ()
+
+    @property
     def mentioned(self) -> tuple[Part, ...]:
         """The parts to which the faces of the scheme refer."""
-        faces = self.scheme.faces if isinstance(self.scheme, ThreeTwoOne) else ()
-        return tuple(part for face in faces for part in face.parts)
+        return tuple(part for face in self.faces for part in face.parts)
 
     def faults(self) -> Iterator[str]:
         yield from self._faces_faults() if isinstance(self.scheme, ThreeTwoOne) else self._locator_faults(self.scheme)
@@ -187,11 +196,9 @@ class Location(Readable):
 
     def _faces_faults(self) -> Iterator[str]:
         yield from self.scheme.faults() if isinstance(self.scheme, ThreeTwoOne) else ()
-        for face in self.scheme.faces if isinstance(self.scheme, ThreeTwoOne) else ():
-            if face.part is not self.part:
+        for face in self.faces:
+            if face.part is not self.part and not self.joint:
                 yield f'face {face} belongs to part "{face.part.name}", not to part "{self.part.name}"'
-        if self.joint:
-            yield f'joint "{self.joint}" needs locators at points of its parts: tc.Locator(name, part.point(...), ...)'
         if self.floating:
             yield "a 3-2-1 scheme leaves nothing open; leave floating out, or give it fewer locators"
         if self.tolerance is None:
@@ -227,8 +234,6 @@ class Location(Readable):
                 f"it is over-constrained: {len(two_sided)} of its {count} hold it both ways, and {', '.join(idle)} {verb} "
                 f"redundant with {sufficient}; make the redundant ones one_sided=True, or leave them out"
             )
-        elif self.floating and self.joint:
-            yield f'joint "{self.joint}" cannot be floating; give it six locators'
         elif self.floating and len(two_sided) == 6:
             yield "it is floating, but six locators hold it both ways; leave floating out, or some of them"
 

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from tolcontact.declaration import (
     Assembly,
     DatumTargets,
+    Face,
     Feature,
     Location,
     Locator,
@@ -23,7 +24,7 @@ from tolcontact.declaration import (
 )
 from tolcontact.declaration.locator import FIRST_ORDER, USUAL_STIFFNESS
 from tolcontact.discretization.contact_points import contact_points
-from tolcontact.discretization.locators import Locators, scheme_locators
+from tolcontact.discretization.locators import FACES_OF_SCHEME, Locators, scheme_locators
 from tolcontact.discretization.measurements import nominal_measurements
 from tolcontact.discretization.nominal import ContactPoints, Nominal
 from tolcontact.discretization.nominal_part import NominalPart
@@ -165,12 +166,15 @@ def _add_features(assembly: Assembly, indices: Mapping[Part, int], meshes: Meshe
 def _on_features(part: NominalPart, features: Features, meshes: Meshes, faults: _Faults) -> NominalPart:
     """Return the part with the faces of features that its locators stand against."""
     scheme = part.scheme
-    if scheme is None or not part.part.features:
+    if scheme is None:
+        return part
+    sides: Sequence[Face | Locator] = scheme.faces if isinstance(scheme, ThreeTwoOne) else scheme
+    if not any((side.part or part.part).features for side in sides):
         return part
     if isinstance(scheme, ThreeTwoOne):
         place = designation("part", part.part)
-        deviations = [faults.attempt(place, features.face_at, face, meshes, part.placement) for face in scheme.faces]
-        faces = tuple(deviations[k] for k in (0, 0, 0, 1, 1, 2))
+        deviations = [faults.attempt(place, features.face_at, face, meshes, placement_of(face.part)) for face in scheme.faces]
+        faces = tuple(deviations[k] for k in FACES_OF_SCHEME)
     else:
         faces = tuple(
             locator.on and features.face_of(locator.on, np.array(locator.point), placement_of(locator.part or part.part))
@@ -242,7 +246,9 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> 
     if location is not None and not any(location.faults()):
         if isinstance(location.scheme, ThreeTwoOne):
             if all(mentioned in meshes for mentioned in location.mentioned):
-                locators = faults.attempt(designation("part", part), scheme_locators, location.scheme, meshes) or ()
+                placements = [placement_of(face.part) for face in location.faces] if location.joint else ()
+                place = designation(location.noun, location if location.joint else part)
+                locators = faults.attempt(place, scheme_locators, location.scheme, meshes, placements) or ()
         else:
             locators = location.scheme
     common = location.tolerance if location else None

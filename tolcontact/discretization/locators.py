@@ -1,6 +1,6 @@
 """Locators with numbers, the locator matrix by which they place their part, and the locators of a 3-2-1 scheme."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,12 +8,13 @@ import numpy as np
 from tolcontact.declaration import Face, Locator, ThreeTwoOne, Tolerance
 from tolcontact.declaration.locator import BEST_FIT, FIRST_ORDER
 from tolcontact.errors import GeometryFault
-from tolcontact.features import FaceDeviation
+from tolcontact.features import FaceDeviation, Placement
 from tolcontact.geometry.faces import Meshes, patch
 
 MAX_CONDITION = 1e8
 MIN_DETERMINANT = 0.1  # of the normals of three faces that count as independent
 SCHEME_NAMES = ("A1", "A2", "A3", "B1", "B2", "C1")
+FACES_OF_SCHEME = (0, 0, 0, 1, 1, 2)  # primary, secondary, tertiary
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,13 +154,17 @@ class Locators:
             )
 
 
-def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes) -> tuple[Locator, ...]:
+def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Placement] = ()) -> tuple[Locator, ...]:
     """Return the six locators of a 3-2-1 scheme, in the part's own frame; directions point into the part.
+
+    Each face of a joint belongs to a part of its own, with these `placements`; so do its locators.
 
     Each face is taken as its bounding rectangle along the edges that it shares with the other two. Raises GeometryFault if the
     three faces are not independent, or the inset leaves no room.
     """
-    corners, normals = zip(*(_vertices_and_normal(face, meshes) for face in scheme.faces), strict=True)
+    local = [_vertices_and_normal(face, meshes) for face in scheme.faces]
+    placed = [(v @ R.T + t, R @ n) for (v, n), (R, t) in zip(local, placements, strict=True)] if placements else local
+    corners, normals = zip(*placed, strict=True)
     outward = np.array(normals)
     if abs(np.linalg.det(outward)) < MIN_DETERMINANT:
         raise GeometryFault(
@@ -181,8 +186,13 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes) -> tuple[Locator, ...]:
         _place(edges, outward, secondary, 1, {0: _middle(secondary, a), 2: side_far}),
         _place(edges, outward, tertiary, 2, {0: _middle(tertiary, a), 1: _middle(tertiary, b)}),
     ]
-    directions = -outward[[0, 0, 0, 1, 1, 2]]
-    return tuple(Locator(name, p, n) for name, p, n in zip(SCHEME_NAMES, points, directions, strict=True))
+    directions = -outward[list(FACES_OF_SCHEME)]
+    if not placements:
+        return tuple(Locator(name, p, n) for name, p, n in zip(SCHEME_NAMES, points, directions, strict=True))
+    return tuple(
+        Locator(name, (p - placements[face][1]) @ placements[face][0], n @ placements[face][0], part=scheme.faces[face].part)
+        for name, p, n, face in zip(SCHEME_NAMES, points, directions, FACES_OF_SCHEME, strict=True)
+    )
 
 
 def _vertices_and_normal(face: Face, meshes: Meshes) -> tuple[np.ndarray, np.ndarray]:
