@@ -12,7 +12,7 @@ REALIZATIONS = {"table": 2000, "pad": 400}
 
 
 def table(stiffness: float | None) -> tc.Assembly:
-    """A table on four legs, with a load in its middle."""
+    """Return a table on four legs, with a load in its middle."""
     model = tc.Assembly("table", method=tc.Method(objective="seating"))
     top = model.part("top", tc.Box(400, 400, 20))
     corners = [(0, 0, 0), (400, 0, 0), (400, 400, 0), (0, 400, 0)]
@@ -25,7 +25,7 @@ def table(stiffness: float | None) -> tc.Assembly:
 
 
 def pad(stiffness: float | None) -> tc.Assembly:
-    """A block on a base, pressed beside its middle."""
+    """Return a block on a base, pressed beside its middle."""
     model = tc.Assembly("pad", method=tc.Method(objective="seating"))
     base = model.part("base", tc.Box(400, 300, 50))
     model.locate(base, tc.three_two_one(*map(base.face, ("-z", "-y", "-x")), inset=5), tolerance=0.3)
