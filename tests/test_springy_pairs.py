@@ -72,6 +72,7 @@ def test_a_block_lifts_off_its_pad_as_a_layer_without_tension_says(tmp_path):
         assert forces.sum(axis=1) == pytest.approx(LOAD, rel=1e-6)
         heights = tree["measured"].sel(state="corrected").values
         rebuilt = tc.model_of(tree)
+    assert (tc.summarize(path)["penetration"] == 0).all()  # what gives way does not penetrate
     assert stiffness.sum() == pytest.approx(STIFFNESS)
     assert rebuilt.pairs[0].stiffness == STIFFNESS
     places = springs - [100, 100, 50]

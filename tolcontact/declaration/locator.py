@@ -86,7 +86,8 @@ class Locator(Readable):
     def __str__(self) -> str:
         point, along = (", ".join(f"{c:g}" for c in v) for v in (self.point, self.direction))
         kind = "one-sided locator" if self.one_sided else "locator"
-        return f"{kind} {self.name}: ({point}) along ({along}), {self.tolerance}"
+        stiffness = "" if self.stiffness is None else f", {self.stiffness:g} N/mm"
+        return f"{kind} {self.name}: ({point}) along ({along}), {self.tolerance}{stiffness}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

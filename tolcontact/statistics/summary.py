@@ -37,7 +37,7 @@ def summarize(results: xr.DataTree) -> Summary:
     by_status       (status_meaning)                     number of realizations
     not_assemblable (interval)                           share of realizations without a pose free of penetration
     conflicts       (pair)                               in how many of these a pair is among those in conflict
-    penetration     (state)                              largest true penetration of any contact point [mm]
+    penetration     (state)                              largest true penetration in a pair that does not give way [mm]
     surface_penetration, beside   largest of the realizations that were checked against the surfaces [mm]: how deep a face lies
                                   in the other body, and how far contact points that touch stand beside the face
     surfaces_checked              number of these realizations
@@ -70,7 +70,7 @@ def summarize(results: xr.DataTree) -> Summary:
         **_status_values(rows),
         **_contact_values(rows, combinations),
         terms.STEPS: _steps(rows),
-        terms.PENETRATION: _penetration(rows),
+        terms.PENETRATION: _penetration(rows, _is_rigid(results)),
         **surface_values(results, terms.NOTICED_SHARE * smallest),
         **_field_values(results),
     }
@@ -166,10 +166,20 @@ def _field_values(results: xr.DataTree) -> dict[ArchiveVariable, Any]:
     }
 
 
-def _penetration(rows: xr.Dataset) -> np.ndarray:
-    """Return the largest penetration of any contact point in each state [mm]."""
-    if not rows[terms.GAP_MIN.name].size:
+def _is_rigid(results: xr.DataTree) -> np.ndarray:
+    """Return whether no point of a pair gives way (pair,)."""
+    rigid = np.ones(results.to_dataset().sizes[terms.PAIR], dtype=bool)
+    if terms.POINT_STIFFNESS.name in (contact := results["contact"].to_dataset()):
+        gives = np.isfinite(contact[terms.POINT_STIFFNESS.name].values)
+        rigid[contact[terms.PAIR_OF_POINT.name].values[gives]] = False
+    return rigid
+
+
+def _penetration(rows: xr.Dataset, rigid: np.ndarray) -> np.ndarray:
+    """Return the largest penetration of any contact point of the `rigid` pairs (pair,) in each state [mm]."""
+    if not (rows[terms.GAP_MIN.name].size and rigid.any()):
         return np.zeros(len(terms.STATES))
+    rows = rows if rigid.all() else rows[[terms.GAP_MIN.name]].isel({terms.PAIR: rigid})
     gaps = [piece[terms.GAP_MIN.name].min([terms.REALIZATION, terms.PAIR]).values for piece in pieces(rows)]
     return np.maximum(-np.min(gaps, axis=0), 0)
 
