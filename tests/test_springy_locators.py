@@ -1,6 +1,8 @@
 """Two-sided locators that give way under forces: a bar on springs by its stiffness matrix, and what the archive says."""
 
+import gzip
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -100,6 +102,17 @@ def test_a_stiffness_in_an_older_archive_lets_nothing_give_way(tmp_path):
         models = tc.model_of(older), tc.model_of(tree)
     stiffness = [[locator.stiffness for locator in model.locations[0].scheme[:3]] for model in models]
     assert stiffness == [[None, None, None], list(STIFFNESS)]
+
+
+def test_an_archive_of_the_first_format_with_springs_is_read(tmp_path):
+    path = tmp_path / "bar.nc"
+    path.write_bytes(gzip.decompress((Path(__file__).parent / "archives/springs_7.nc.gz").read_bytes()))
+    assert_gaps_recompute(path)
+    with tc.open_archive(path) as then:
+        forces = then.reaction.mean("realization").values
+        assert forces == pytest.approx([19.150274, -26.998281, 87.848006], abs=1e-6)
+        now = tc.run(tc.model_of(then), samples=8, seed=1, solver="daqp", surfaces=4)
+        assert np.abs(now.measured - then.measured).max() < 1e-9
 
 
 def test_stiff_springs_are_rigid_locators():
