@@ -1,14 +1,15 @@
-"""What springs cost beside rigid supports and pairs: python studies/speed/springs.py (half a minute).
+"""What springs cost beside rigid supports and pairs: python studies/speed/springs.py [REALIZATIONS] (half a minute).
 
 Processor time of one thread from draws to measures, the least of three turns, in microseconds per realization.
 """
 
+import sys
 import time
 
 import tolcontact as tc
 
 SOLVERS = ("daqp", "qpoases", "graph")
-REALIZATIONS = {"table": 2000, "pad": 400}
+REALIZATIONS = 400
 
 
 def table(stiffness: float | None) -> tc.Assembly:
@@ -51,9 +52,9 @@ def microseconds(model: tc.Assembly, solver: str, count: int) -> float:
 
 
 if __name__ == "__main__":
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else REALIZATIONS
     print("| model | solver | springs [us] | rigid [us] | ratio |\n|---|---|---:|---:|---:|")
     for declare in (table, pad):
-        count = REALIZATIONS[declare.__name__]
         for solver in SOLVERS:
             springs, rigid = (microseconds(declare(stiffness), solver, count) for stiffness in (1000.0, None))
             print(f"| {declare.__name__} | {solver} | {springs:.1f} | {rigid:.1f} | {springs / rigid:.2f} |")
