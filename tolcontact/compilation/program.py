@@ -268,6 +268,8 @@ def _check_springs(nominal: Nominal, method: Method) -> None:
 
 
 def _springy_name(pair: ContactPoints) -> str:
+    if pair.pulls is not None:
+        return f'locator "{pair.name}": it'
     return f"{pair.name}: a support" if pair.is_supports else f'contact pair "{pair.name}": it'
 
 
