@@ -39,7 +39,8 @@ def worst_case(
         bound       (measure, state, end)               linear estimate. Raw: the sum of all tolerances times their nominal
                                                         sensitivities. Corrected: in the linear model no pose free of
                                                         penetration lies beyond (see tolcontact.analyses.farthest_pose);
-                                                        infinite if contact alone would have to hold the part
+                                                        infinite if contact or springs alone would have to hold
+                                                        the part
         random      (measure, state, end)               the worst of `samples` random combinations
         agreeing    (measure, state, end)               number of searches that met: they ended at the value of the best one, or
                                                         the measure grows from their end all the straight way to its end

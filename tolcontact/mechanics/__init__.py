@@ -89,7 +89,21 @@ A one-sided locator with a `stiffness` k [N/mm] is a spring that pushes only, an
 which one pushes and one pulls. With the reactions lambda [N] and C = 1/k, the QP has 1/2 lambda' C lambda more in its
 objective, and the row g + A dq + C lambda >= 0. So `gap_min` of such a pair is negative by the largest compression, and a
 realization is resolved only if poses and reactions obey lambda = k max(0, -g). The small multiple then counts from the pose of
-the last step, and takes no load.
+the last step, and takes no load. A load beside the middle of a pad sinks and tilts a machine:
+
+>>> import tolcontact as tc
+>>> pads = tc.Assembly("pads", method=tc.Method(objective="seating"))
+>>> floor = pads.part("floor", tc.Box(400, 300, 20), fixed=True)
+>>> machine = pads.part("machine", tc.Box(200, 100, 50), at=(0, 0, 20))
+>>> stops = [tc.Locator("B1", (20, 0, 0), "y"), tc.Locator("B2", (180, 0, 0), "y"), tc.Locator("C", (0, 50, 0), "x")]
+>>> location = pads.locate(machine, stops, tolerance=1, floating=True)
+>>> pad = pads.contact("pad", moving=machine.face("-z"), reference=floor.face("+z"), stiffness=5000)
+>>> weight = pads.force("weight", at=machine.point(120, 50, 0), vector=(0, 0, -1000))
+>>> for name, x in (("left", 0), ("right", 200)):
+...     measure = pads.measure(name, machine.point(x, 50, 0), along="z")
+>>> sunk = tc.run(pads, samples=8, fields="none", surfaces=0).measured.sel(state="corrected").mean("realization")
+>>> [round(float(height), 3) for height in sunk]  # F/k, and F e (b/2) / (k b^2/12)
+[-0.08, -0.32]
 
 `regularization` holds the degrees of freedom that the objective leaves open. "points" (default) adds `eta` = 1e-6 times the
 squared displacements of all contact points, and does not depend on where the assembly lies in space. "identity" is the paper's
