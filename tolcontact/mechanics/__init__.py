@@ -91,7 +91,6 @@ objective, and the row g + A dq + C lambda >= 0. So `gap_min` of such a pair is 
 realization is resolved only if poses and reactions obey lambda = k max(0, -g). The small multiple then counts from the pose of
 the last step, and takes no load. A load beside the middle of a pad sinks and tilts a machine:
 
->>> import tolcontact as tc
 >>> pads = tc.Assembly("pads", method=tc.Method(objective="seating"))
 >>> floor = pads.part("floor", tc.Box(400, 300, 20), fixed=True)
 >>> machine = pads.part("machine", tc.Box(200, 100, 50), at=(0, 0, 20))
