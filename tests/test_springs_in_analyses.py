@@ -19,6 +19,7 @@ def limited_table():
     return model.replaced(measures=[tc.Measure(height.name, height.of, height.to, height.along, None, limits=(-LIMIT, LIMIT))])
 
 
+@pytest.mark.nightly
 def test_worst_cases_of_a_springy_table_are_its_highest_and_lowest_legs():
     worst = tc.worst_case(limited_table(), samples=64)["worst"].sel(state="corrected", measure="height")
     assert worst.values == pytest.approx([-3 * SIGMA - SINK, 3 * SIGMA - SINK], abs=1e-6)
@@ -31,6 +32,7 @@ def test_worst_cases_of_a_bar_agree_with_its_stiffness_matrix_at_all_corners():
     assert worst == pytest.approx(np.column_stack([ends.min(axis=0), ends.max(axis=0)]), abs=1e-5)
 
 
+@pytest.mark.nightly
 def test_legs_contribute_alike():
     shares = tc.contributions(limited_table(), samples=1024)["total"].sel(state="corrected", measure="height").values
     legs, others = shares[:4], shares[4:]
@@ -56,6 +58,7 @@ def test_tails_of_a_springy_table_agree_with_a_quadrature():
     assert tails[1] < expected < tails[2] and tails[0] == pytest.approx(expected, rel=0.1)
 
 
+@pytest.mark.nightly
 def test_a_seat_on_a_pad_is_that_on_a_rigid_one():
     springy, rigid = (tc.seating(padded_block(stiffness=stiffness))["critical"].values for stiffness in (1e9, None))
     assert np.isfinite(rigid).any() and springy == pytest.approx(rigid, abs=1e-6)

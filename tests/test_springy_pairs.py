@@ -59,7 +59,7 @@ def test_turned_frames_and_other_units_change_nothing():
 def test_a_block_lifts_off_its_pad_as_a_layer_without_tension_says(tmp_path):
     """Pressed near an end it carries over a length 3 (b/2 - e); also by a second method from the archived springs."""
     offset, path = 40.0, tmp_path / "pad.nc"
-    tc.run(padded_block((offset, 0), points=120), samples=10, out=path)
+    tc.run(padded_block((offset, 0), points=80), samples=3, out=path, solver="daqp")
     assert_gaps_recompute(path)
     with tc.open_archive(path) as tree:
         assert (tree["status"].values == Status.RESOLVED).all()
