@@ -89,7 +89,8 @@ A one-sided locator with a `stiffness` k [N/mm] is a spring that pushes only, an
 which one pushes and one pulls. With the reactions lambda [N] and C = 1/k, the QP has 1/2 lambda' C lambda more in its
 objective, and the row g + A dq + C lambda >= 0. So `gap_min` of such a pair is negative by the largest compression, and a
 realization is resolved only if poses and reactions obey lambda = k max(0, -g). The small multiple then counts from the pose of
-the last step, and takes no load. A load beside the middle of a pad sinks and tilts a machine:
+the last step, and takes no load. Springs of a pair stay at their points of the moving face, and push against the plane of the
+other face, also beyond its end. A load beside the middle of a pad sinks and tilts a machine:
 
 >>> pads = tc.Assembly("pads", method=tc.Method(objective="seating"))
 >>> floor = pads.part("floor", tc.Box(400, 300, 20), fixed=True)
