@@ -54,9 +54,8 @@ class Method:
                         state, of all contact points; "active points": of those that are active in the raw state (the
                         paper's); "locator stiffness": the energy of the two-sided locators as springs; "seating": the
                         potential energy of the declared forces, and of locators and pairs with a stiffness, with other
-                        two-sided locators exact. If it is not given, "all
-                        points" with "exact", and "active points" with "linearized": a single active point holds hardly
-                        any turn of its part
+                        two-sided locators exact. If it is not given, "all points" with "exact", and "active points" with
+                        "linearized": a single active point holds hardly any turn of its part
         regularization  what holds the degrees of freedom that the objective leaves open. "points": eta times the squared
                         displacements of all contact points, the same in every frame; "identity": the paper's eta I, which
                         mixes mm and rad and so depends on the origin
