@@ -50,6 +50,11 @@ def test_a_block_sinks_and_tilts_on_its_pad_by_the_closed_form(solver):
     assert heights(padded_block(), samples=samples, solver=solver) == pytest.approx(np.tile(expected, (samples, 1)), abs=2e-6)
 
 
+@pytest.mark.parametrize("solver", ["qpoases", "daqp"])
+def test_a_stiff_pad_is_a_floor(solver):
+    assert np.abs(heights(padded_block((0, 0), stiffness=1e12), samples=20, solver=solver)).max() < 1e-9
+
+
 def test_turned_frames_and_other_units_change_nothing():
     plain = heights(padded_block(), samples=20)
     assert heights(padded_block(rotation=(0.3, -0.5, 0.2)), samples=20) == pytest.approx(plain, abs=1e-8)
