@@ -13,8 +13,8 @@ from studies.benchmarks.problem import FOLDER, names, problems, read
 from tests.helpers import nightly, run
 
 QUICK = (
-    "beam_on_three_pegs", "block_on_plane", "clutch_percentages", "hole_at_maximum_material", "ishigami", "linear_stack",
-    "rectangular_pocket", "shaft_in_v", "touching_tips", "worst_clutch",
+    "beam_on_three_pegs", "beam_on_three_supports", "block_on_plane", "clutch_percentages", "hole_at_maximum_material",
+    "ishigami", "linear_stack", "rectangular_pocket", "shaft_in_v", "worst_clutch",
 )  # fmt: skip
 REFERENCES = [sys.executable, "-m", "studies.benchmarks.references"]
 

@@ -144,3 +144,34 @@ def test_the_command_prints_seats_and_what_holds_them_and_keeps_them_for_the_pag
     assert table["title"] == "Seating" and ["block.stop", "0.364", "-", "plane 100 %"] in table["rows"]
     rows = [line.split() for line in done.stdout.splitlines()]
     assert ["block.stop", "0.364", "-", "plane", "100", "%"] in rows
+
+
+def pushed_blocks(pushes, joined=False):
+    """A block that a force pushes towards a stop over a floor; with stations in each of them, alone or in a joint."""
+    line = tc.Assembly("pushed")
+    floor = line.part("floor", tc.Box(400, 200, 10), at=(-100, -50, -10), fixed=True)
+    block = line.part("block", tc.Box(100, 50, 20))
+    cover = line.part("cover", tc.Box(100, 50, 20), at=(0, 0, 20)) if joined else block
+    body = block
+    if joined:
+        weld = line.station("weld")
+        for part in (block, cover):
+            weld.locate(part, tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x")), tolerance=0.1)
+        body = weld.join("stack", block, cover)
+    for name, push in pushes.items():
+        station = line.station(name)
+        stop = tc.Locator("stop", cover.point(0, 25, 5), "x", 0.1, one_sided=True)
+        sides = [tc.Locator(f"side {x}", block.point(x, 0, 5), "y", 0.1) for x in (10, 90)]
+        station.locate(body, [stop, *sides], floating=True)
+        station.contact(f"floor of {name}", moving=block.face("-z"), reference=floor.face("+z"))
+        station.force(f"push of {name}", at=cover.point(50, 25, 0), vector=(-push, 0, -10))
+        station.measure(f"x in {name}", block.point(0, 0, 0), along="x")
+    return line
+
+
+@pytest.mark.parametrize("joined", [False, True])
+def test_each_station_has_seats_with_its_own_forces(joined):
+    found = critical(pushed_blocks({"first": 3.0, "second": 7.0}, joined))
+    body = "stack" if joined else "block"
+    assert found[f"first.{body}.stop"] == pytest.approx(0.3, abs=1e-5)
+    assert found[f"second.{body}.stop"] == pytest.approx(0.7, abs=1e-5)

@@ -113,3 +113,45 @@ def test_an_inspection_reports_deviations_from_the_best_fit_of_a_joint():
     step = block.deviations[:, program.nominal.contributors.index("step")]
     expected = np.column_stack([-height * step, (1 - height - 200 * slope) * step])
     assert np.abs(block.measured[:, 0] - expected).max() < 2e-6 and step.std() > 0.005
+
+
+def ridden_plate(placing, objective, points=POINTS, fixed=None, **choices):
+    """A plate that contact may move, under a rider: one that a force presses onto it, or a `fixed` one."""
+    model = tc.Assembly("ridden plate", method=tc.Method(objective=objective))
+    part = model.part("plate", tc.Box(100, 50, 10), fixed=False)
+    locators = [tc.Locator(f"L{k}", p, along, **choices) for k, (*p, along) in enumerate(points)]
+    model.locate(part, locators, tolerance=2, placing=placing)
+    rider = model.part("rider", tc.Box(20, 20, 10), at=(40, 15, 10), fixed=fixed)
+    sides = {"B1": ((0, 0, 5), "y"), "B2": ((20, 0, 5), "y"), "C": ((0, 10, 5), "x")}
+    if not fixed:
+        model.locate(rider, [tc.Locator(name, p, along, 0.1) for name, (p, along) in sides.items()], floating=True)
+    model.contact("ride", moving=rider.face("-z"), reference=part.face("+z"))
+    if not fixed:
+        model.force("weight", at=rider.point(10, 10, 0), vector=(0, 0, -5))
+    model.measure("corner", part.point(100, 50, 10), along="z")
+    return model
+
+
+@pytest.mark.parametrize("placing", ["exact", "best fit"])
+def test_forces_leave_a_part_where_its_locators_have_placed_it(placing):
+    program = tc.build(ridden_plate(placing, "seating"), solver="daqp")
+    block = next(iter(tc.simulate_blocks(program, samples=50, seed=1)))
+    assert (block.status == tc.Status.RESOLVED).all()
+    assert np.abs(block.measured[:, 1] - block.measured[:, 0]).max() < 1e-9
+
+
+def test_springs_and_many_locators_are_not_placed_under_forces():
+    for choices in ({"stiffness": 100.0}, {"points": POINTS + MORE}):
+        with pytest.raises(ModelError, match=r"at most six, without a stiffness; leave placing out, or declare"):
+            tc.build(ridden_plate("best fit", "seating", **choices))
+
+
+def test_springs_of_locators_count_from_where_these_have_placed_a_part():
+    """Contact pushes the plate off its place: both placings give it the same push, to first order."""
+    moves = {}
+    for placing in ("first order", "exact"):
+        program = tc.build(ridden_plate(placing, "locator stiffness", fixed=True), solver="daqp")
+        block = next(iter(tc.simulate_blocks(program, samples=50, seed=1)))
+        moves[placing] = block.measured[:, 1] - block.measured[:, 0]
+    assert np.abs(moves["exact"]).max() > 0.05
+    assert moves["exact"] == pytest.approx(moves["first order"], abs=0.02)

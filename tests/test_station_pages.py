@@ -1,10 +1,11 @@
 """Pages of assemblies with stations: one scene for each, and a play that goes through them."""
 
+import numpy as np
 import pytest
 
 import tolcontact as tc
 from tests.cases import stations as cases
-from tests.test_report import browser, data_of, needs_browser, open_page  # noqa: F401 (fixtures)
+from tests.test_report import browser, data_of, needs_browser, open_page, unpacked  # noqa: F401 (fixtures)
 from tolcontact.discretization import discretize
 from tolcontact.report import write_page, write_view
 
@@ -28,6 +29,26 @@ def test_a_page_has_one_scene_for_each_station(kind, pages):
     assert [len(scene["locators"]) for scene in scenes] == [12, 12]
     assert all(label.startswith(f"{scene['name']}.") for scene in scenes for label in scene["locators"])
     assert kind == "view" or all(scene["motions"]["shape"][1:] == [2, 3, 12] for scene in scenes)
+
+
+def test_worst_cases_stand_in_their_stations(tmp_path):
+    """The scene of a station has the poses of worst cases: those that give the measure again, of the last station too."""
+    path, model = tmp_path / "rail.nc", cases.rail()
+    tc.run(model, samples=20, seed=1, solver="daqp", surfaces=0, out=path).close()
+    worst = tc.worst_case(model, samples=64, solver="daqp", into=path)
+    with tc.open_archive(path) as tree:
+        write_page(tree, tc.summarize(tree), tmp_path / "report.html")
+    scenes = data_of((tmp_path / "report.html").read_text(encoding="utf-8"))["scene"]["stations"]
+    motions = {scene["name"]: unpacked(scene["motions"])[: worst.sizes["case"]] for scene in scenes}
+    assert np.isfinite(motions["weld"]).all() and not motions["weld"][:, :, 2].any()  # the station does not hold part c
+    case, point = worst["case"].values.tolist().index("largest step"), np.array([60.0, 10.0, 10.0])
+    moved = motions["weld"][case, 1, :2]
+    a_up, b_up = (motion[:9].reshape(3, 3) @ point + motion[9:] for motion in moved)
+    assert b_up[2] - a_up[2] == pytest.approx(
+        float(worst["worst"].sel(measure="step", state="corrected", end="largest")), abs=1e-5
+    )
+    last = [worst[name].values for name in ("rotation", "translation")]
+    assert motions["check"][..., 9:] == pytest.approx(last[1], abs=1e-6)
 
 
 @pytest.mark.slow

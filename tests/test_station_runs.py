@@ -205,13 +205,6 @@ def test_an_archive_of_the_first_format_with_stations_is_read(tmp_path):
     assert_gaps_recompute(path)
 
 
-def test_stations_take_no_fasteners():
-    line = cases.rail()
-    a, b, _ = line.parts
-    with pytest.raises(ModelError, match=r'fastener "bolt" \(test_station_runs.py:\d+\): stations take no fasteners yet'):
-        line.fasten("bolt", 5, through=[a.face("+z"), b.face("+z")])
-
-
 def test_raw_states_follow_raw_states_and_gaps_are_those_of_each_station():
     linear = tc.Method(resolution="linearized", objective="all points")
     with_contact, without = (

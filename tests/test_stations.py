@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests.cases import MODELS, stations as cases
 from tolcontact.declaration.script import load_model
+from tolcontact.errors import ModelError
 
 LINEARIZED = tc.Method(resolution="linearized")
 HALF_NORMAL_MEAN, HALF_NORMAL_VARIANCE = np.sqrt(0.5 / np.pi), (1 - 1 / np.pi) / 2  # of max(0, z), z standard normal
@@ -198,3 +200,50 @@ def test_linearized_steps_are_handed_over_wherever_the_assembly_stands():
     near, far = (measured(cases.three_stations(1.0, x=x), samples=100, method=LINEARIZED) for x in (0.0, 1000.0))
     for name in ("check a to b", "check b to c", "check height"):
         assert np.abs(near[name] - far[name]).max() < 1e-8, name
+
+
+def welded(scheme_of, *, turn=(0.0, 0.0, 0.0)):
+    """Two blocks side by side, welded, and then located as a joint by a scheme."""
+    line = tc.Assembly("welded")
+    at = Rotation.from_rotvec(turn).apply([100, 0, 0])
+    a = line.part("a", tc.Box(100, 50, 20), rotation=turn)
+    b = line.part("b", tc.Box(100, 50, 20), at=at, rotation=turn)
+    weld = line.station("weld")
+    for part in (a, b):
+        weld.locate(part, tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x"), inset=5), tolerance=0.2)
+    ab = weld.join("ab", a, b)
+    check = line.station("check")
+    check.locate(ab, scheme_of(a, b), tolerance=0.3)
+    check.measure("corner", b.point(100, 50, 20), along="z")
+    check.measure("side", a.point(100, 50, 20), along="y")
+    return line
+
+
+def on_faces(a, b):
+    return tc.three_two_one(b.face("-z"), a.face("-y"), b.face("+x"), inset=5)
+
+
+def on_points(a, b):
+    """The same points by hand: A on b beside the secondary face, B on a, C in the middle of the end of b."""
+    points = [(5, 5), (95, 5), (50, 45)]
+    scheme = [tc.Locator(f"A{k}", b.point(x, y, 0), "z") for k, (x, y) in enumerate(points, start=1)]
+    scheme += [tc.Locator(f"B{k}", a.point(x, 0, 10), "y") for k, x in enumerate((5, 95), start=1)]
+    return [*scheme, tc.Locator("C1", b.point(100, 25, 10), "-x")]
+
+
+@pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.3, -0.2, 0.5)])
+def test_a_joint_is_located_by_three_faces_of_its_parts(turn):
+    programs = [tc.build(welded(scheme, turn=turn)) for scheme in (on_faces, on_points)]
+    locators = [program.nominal.locators for program in programs]
+    order = [np.lexsort(np.round(each.points[12:], 6).T) for each in locators]
+    points, directions = ([getattr(each, name)[12:][rows] for each, rows in zip(locators, order, strict=True)]
+                          for name in ("points", "directions"))  # fmt: skip
+    assert points[0] == pytest.approx(points[1], abs=1e-9) and directions[0] == pytest.approx(directions[1], abs=1e-12)
+
+
+def test_faces_of_other_parts_do_not_locate_a_joint():
+    def with_stranger(a, b):
+        return tc.three_two_one(a.face("-z"), b.face("-y"), tc.Assembly("other").part("c", tc.Box(1, 1, 1)).face("-x"))
+
+    with pytest.raises(ModelError, match=r'face c -x is of part "c"; the parts of the joint are: a, b'):
+        tc.build(welded(with_stranger))

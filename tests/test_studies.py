@@ -37,6 +37,7 @@ STUDIES = {
     "site/build.py": ["site", "--samples", "20"],
     "solvers/measure.py": ["--realizations", "2", "--figure", "accuracy.png"],
     "speed/measure.py": ["--quick", "--figure", "cost.png"],
+    "speed/springs.py": ["20"],
     "verification/intervals.py": ["--repeats", "3", "--sizes", "100"],
     "verification/rare.py": ["--seeds", "1", "--samples", "4000", "--only", "two ways", "does not fit"],
 }

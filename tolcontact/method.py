@@ -22,7 +22,8 @@ class Objective:
     reaction_units   of what the rows of contact points carry
     counts_points    it sums up displacements of contact points,
     counts_all       of all of them, not only of those that are active in the raw state
-    presses          forces press the parts: every realization moves, two-sided locators hold, and a force has to be declared
+    presses          forces press the parts: every realization moves, two-sided locators hold unless they have a stiffness, and
+                     a force has to be declared
     """
 
     name: str
@@ -52,9 +53,9 @@ class Method:
         objective       what the corrected pose minimizes. "all points": half the sum of squared displacements, from the raw
                         state, of all contact points; "active points": of those that are active in the raw state (the
                         paper's); "locator stiffness": the energy of the two-sided locators as springs; "seating": the
-                        potential energy of the declared forces, with two-sided locators exact. If it is not given, "all
-                        points" with "exact", and "active points" with "linearized": a single active point holds hardly
-                        any turn of its part
+                        potential energy of the declared forces, and of locators and pairs with a stiffness, with other
+                        two-sided locators exact. If it is not given, "all points" with "exact", and "active points" with
+                        "linearized": a single active point holds hardly any turn of its part
         regularization  what holds the degrees of freedom that the objective leaves open. "points": eta times the squared
                         displacements of all contact points, the same in every frame; "identity": the paper's eta I, which
                         mixes mm and rad and so depends on the origin

@@ -55,7 +55,8 @@ class Question:
         units       units of the only measure, where no dimension lists measures
         attributes  beside the title and the settings
         """
-        arrays = {v.name: v.entry(np.array(values[v.name])) for v in self.record.variables}
+        stated = [*self.record.variables, *(v for v in self.record.of_stations if v.name in values)]
+        arrays = {v.name: v.entry(np.array(values[v.name])) for v in stated}
         dataset = xr.Dataset(
             arrays,
             coords=self._coordinates(labels) | ({} if units is None else {"measure_units": ((), units)}),

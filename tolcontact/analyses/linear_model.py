@@ -164,7 +164,7 @@ def _held(program: Program) -> np.ndarray:
     for compiled in program.groups:
         for number, part in enumerate(compiled.group.free):
             nominal = program.nominal.parts[part]
-            exact = ~nominal.locators.one_sided
+            exact = nominal.locators.exact
             for p, n in zip(nominal.locators.points[exact], nominal.locators.directions[exact], strict=True):
                 rows.append([  # a motion of a part that carries this one carries its locators, too
                     n @ _moves(group, mover, axis, p[None])[0] if group is compiled.group and mover == number else 0.0

@@ -13,7 +13,7 @@ from tolcontact.analyses.analysis import Analysis
 from tolcontact.analyses.engine import Engine, Progress
 from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly, Locator, ThreeTwoOne
-from tolcontact.discretization import NominalPart, discretize
+from tolcontact.discretization import Nominal, NominalPart, discretize
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.limits import Limits
 from tolcontact.statistics import intervals, two_samples
@@ -126,7 +126,7 @@ class RelocatedTrials:
         if locator not in nominal.locators.labels:
             raise OptionError(f'there is no locator "{locator}"; expected one of: {", ".join(nominal.locators.labels)}')
         self._part = next(part for part in nominal.parts if locator in part.locators.labels)
-        self._scheme = declared_locators(self._part)
+        self._scheme = declared_locators(nominal, self._part)
         self._number = self._part.locators.labels.index(locator)
 
     @property
@@ -142,7 +142,8 @@ class RelocatedTrials:
         analysis, scheme = self.analysis, list(self._scheme)
         scheme[self._number] = at_point(scheme[self._number], point)
         solver, method = analysis.program.plugin.name, analysis.program.method
-        program = compile_program(discretize(self._with_locators(tuple(scheme))), solver, method)
+        nominal = discretize(self._with_locators(tuple(scheme)), presses=method.minimizes.presses)
+        program = compile_program(nominal, solver, method)
         engine = Engine(program, analysis.blocks)
         start = VERIFICATION_FACTOR * analysis.samples if fresh else 0
         measured, _ = engine.simulate(start or analysis.samples, start=start, seed=analysis.seed)
@@ -206,19 +207,19 @@ class Places:
         return value
 
 
-def declared_locators(part: NominalPart) -> tuple[Locator, ...]:
-    """Return the locators of a part in its own frame, as a script would declare them one by one."""
+def declared_locators(nominal: Nominal, part: NominalPart) -> tuple[Locator, ...]:
+    """Return the locators of a part in its own frame, or of a joint in those of its parts, as a script would declare them."""
     if not isinstance(part.scheme, ThreeTwoOne):
         return part.scheme or ()
-    R_WP, t_WP = part.placement
-    features = {f"{part.name}.{feature.name}": feature for feature in part.part.features}
-    locators = part.locators
-    return tuple(
-        Locator(label.removeprefix(f"{part.located}."), point, direction, on=features[face.name] if face else None)
-        for label, point, direction, face in zip(
-            locators.labels, (locators.points - t_WP) @ R_WP, locators.directions @ R_WP, locators.faces, strict=True
-        )
-    )
+    locators, scheme = part.locators, list[Locator]()
+    owners = [nominal.parts[owner] for owner in part.owners] or [part] * len(locators)
+    for number, owner in enumerate(owners):
+        (R_WP, t_WP), face = owner.placement, locators.faces[number]
+        on = next((feature for feature in owner.part.features if face and face.name == f"{owner.name}.{feature.name}"), None)
+        point, direction = ((locators.points - t_WP) @ R_WP)[number], (locators.directions @ R_WP)[number]
+        name, point_of = locators.labels[number].removeprefix(f"{part.located}."), owner.part if part.owners else None
+        scheme.append(Locator(name, point, direction, on=on, part=point_of))
+    return tuple(scheme)
 
 
 def at_point(locator: Locator, point: np.ndarray) -> Locator:

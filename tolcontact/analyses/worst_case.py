@@ -39,7 +39,8 @@ def worst_case(
         bound       (measure, state, end)               linear estimate. Raw: the sum of all tolerances times their nominal
                                                         sensitivities. Corrected: in the linear model no pose free of
                                                         penetration lies beyond (see tolcontact.analyses.farthest_pose);
-                                                        infinite if contact alone would have to hold the part
+                                                        infinite if contact or springs alone would have to hold
+                                                        the part
         random      (measure, state, end)               the worst of `samples` random combinations
         agreeing    (measure, state, end)               number of searches that met: they ended at the value of the best one, or
                                                         the measure grows from their end all the straight way to its end
@@ -49,6 +50,7 @@ def worst_case(
         by_status   (status_meaning)                    number of realizations, of all that were simulated
         measured, rotation, translation, gap_min, kkt_residual, status  (case, ...)  corrected worst cases in the form in which
                                                         archives hold realizations; a case is "least" or "largest" of a measure
+        station_rotation, station_translation  (case, state, station_part, ...)  their poses in all stations, one after another
 
     tolcontact.analyses.allowed_space describes the region that combinations lie in. With contact a measure is neither smooth
     nor concave, and the linearized resolution jumps: the searches may miss a worse combination, and `agreeing` says how many
@@ -187,8 +189,11 @@ def _far_ends(region: Region, slopes: np.ndarray) -> np.ndarray:
 def _as_realizations(program: Program, deviations: np.ndarray) -> dict[str, np.ndarray]:
     """Return the variables that archives have of realizations, for deviations (n, contributor)."""
     (block,) = simulate_blocks(program, samples=len(deviations), seed=0, draws=GivenDraws(deviations), block=len(deviations))
-    last_poses = block.poses[:, :, program.nominal.last_indices]
-    return {
+    last_poses, of_stations = block.poses[:, :, program.nominal.last_indices], dict[str, np.ndarray]()
+    if program.stations:  # whose parts follow each other station by station
+        of_stations[terms.STATION_ROTATION.name] = poses.rotation(block.poses)
+        of_stations[terms.STATION_TRANSLATION.name] = poses.translation(block.poses)
+    return of_stations | {
         terms.MEASURED.name: block.measured, terms.ROTATION.name: poses.rotation(last_poses),
         terms.TRANSLATION.name: poses.translation(last_poses),
         terms.GAP_MIN.name: block.gap_min, terms.KKT_RESIDUAL.name: block.kkt_residual, terms.STATUS.name: block.status,

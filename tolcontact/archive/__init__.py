@@ -39,6 +39,9 @@ With stations (format 6) `measure_station`, `pair_station` and `part_station` st
 that in the last station that holds it, and the status is that of the worst station. Groups `station/<name>` hold the poses of
 all its parts (`station_part`), `station_translation` and `station_rotation`, and `station_status`.
 
+With contact that gives way (format 7) `point_stiffness` in the group `contact` states the stiffness of each contact point. The
+reaction of a two-sided locator is negative if it pulls.
+
 `state` is raw or corrected. Groups hold the rest: `contact` the contact points, `sample` the contributors (locators, freedoms
 of features, variables), with source, units, tolerance, rule and mean shift, and their drawn `deviation` (realization,
 contributor), `field/<part>` the displacement fields, `surface` the check between contact points, `model` the declaration as

@@ -43,6 +43,6 @@ def keep(path: str | Path, record: terms.AnalysisRecord, dataset: "xr.Dataset", 
             stored = dataset.copy()
             for array in stored.variables.values():
                 array.encoding = {"dtype": "S1"} if array.dtype.kind in "UO" else {}
-            for variable in record.variables:
-                stored[variable.name].attrs[terms.CHECKSUM] = crc32(variable, stored[variable.name].values)
+            for name, values in stored.data_vars.items():
+                values.attrs[terms.CHECKSUM] = crc32(record.known[str(name)], values.values)
             stored.to_netcdf(part, mode="a", group=f"{terms.ANALYSES_GROUP}/{record.name}", engine="netcdf4")

@@ -216,6 +216,9 @@ def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
         terms.REFERENCE_NORMAL: np.vstack([pair.n_r for pair in pairs]),
         terms.LOCATOR_OF_POINT: np.concatenate(locators),
     }
+    if any(pair.is_springy for pair in pairs):
+        stiffness = [np.full(len(pair.P_m), np.inf) if pair.stiffness is None else pair.stiffness for pair in pairs]
+        values[terms.POINT_STIFFNESS] = np.concatenate(stiffness)
     return values | _bounded_values(program) | _round_values(nominal) | _face_values(nominal) | form_values(program)
 
 

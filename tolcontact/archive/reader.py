@@ -50,8 +50,11 @@ def model_of(results: xr.DataTree) -> Assembly:
         document = json.loads(str(results["model"][terms.DECLARATION.name].values))
     except (KeyError, ValueError, RecursionError) as error:
         raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
-    if int(results.attrs.get("format", 1)) < FIRST_WITH_FORM:
+    number = int(results.attrs.get("format", 1))
+    if number < FIRST_WITH_FORM:
         _state_form_alone(document)
+    if number < terms.SPRINGS_FORMAT:
+        _leave_locators_rigid(document, presses=method_of_run(results).minimizes.presses)
     meshes = {}
     if "mesh" in results["model"].children:
         for name, group in results["model/mesh"].children.items():
@@ -73,6 +76,17 @@ def _state_form_alone(document: Any) -> None:
         for tolerance in tolerances:
             if tolerance["kind"] in FORM_KINDS:
                 tolerance.setdefault("form", None)
+    except (KeyError, TypeError, AttributeError):  # the reading of the document finds what is wrong with it
+        return
+
+
+def _leave_locators_rigid(document: Any, *, presses: bool) -> None:
+    """Leave out stiffnesses in a document that had no effect: formats before springs let no locator give way to forces."""
+    try:
+        schemes = [location["scheme"] for location in document["locations"]]
+        for locator in [locator for scheme in schemes if isinstance(scheme, list) for locator in scheme]:
+            if not locator.get("springy") and (locator["one_sided"] or presses):
+                locator.pop("stiffness", None)
     except (KeyError, TypeError, AttributeError):  # the reading of the document finds what is wrong with it
         return
 

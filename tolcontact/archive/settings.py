@@ -81,6 +81,8 @@ def _method_origin(program: Program) -> str:
 
 def format_of(program: Program) -> int:
     """Return the format number of an archive of a program."""
+    if any(pair.is_springy for pair in program.nominal.pairs):
+        return terms.SPRINGS_FORMAT
     return terms.STATIONS_FORMAT if program.stations else terms.FORMAT
 
 

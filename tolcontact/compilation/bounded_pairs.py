@@ -26,7 +26,7 @@ class Trial(NamedTuple):
     """The trial of a pair: the largest error of its fixed planes in the depth of contact, and the one allowed, both [mm].
 
     `places` is the largest number of places at which its faces could touch. Errors are NaN for a pair that has no choice:
-    one-sided locators, round faces, tolerances without an end, or too many edges.
+    one-sided locators, round faces, springs, tolerances without an end, or too many edges.
     """
 
     error: float
@@ -64,7 +64,8 @@ def bounded_pair(
     nothing = None, Trial(np.nan, np.nan)
     if pair.moving_face is None or pair.reference_face is None or pair.reference is None or pair.round is not None:
         return nothing
-    if not np.isfinite(smallest) or (pair.has_form and not (is_flat(pair.moving_face) and is_flat(pair.reference_face))):
+    is_smooth = not pair.has_form or (is_flat(pair.moving_face) and is_flat(pair.reference_face))
+    if pair.is_springy or not np.isfinite(smallest) or not is_smooth:
         return nothing
     highest = float(np.abs(pair.heights(deviations)).max())
     if pair.has_form:

@@ -55,6 +55,7 @@ class ContactQP:
     energy       the objective at `poses` (realization, 1) [mm^2], or [mm] for seating: of poses, raw, moments, deviations
     relate       X_RM of the pairs at `poses`: of poses, deviations
     slacks       number of slacks: the QP's last variables, which are not negative
+    has_springs  whether rows give way
     equations    number of equations: the QP's last rows, for two-sided locators that the objective makes exact
     standing     for each pair of the group the contact points that always have a row, or the number of its slots
     """
@@ -65,6 +66,7 @@ class ContactQP:
     energy: ca.Function
     relate: ca.Function
     slacks: int
+    has_springs: bool
     equations: int
     standing: Standing
 
@@ -150,6 +152,7 @@ def contact_qp(
             {"relative": ca.vertcat(*(X.vector() for X in setting.relative(current)))},
         ),
         slacks=len(group.pairs) + int(np.count_nonzero(rows.compliance)),
+        has_springs=bool(rows.compliance.any()),
         equations=exact.numel(),
         standing=standing,
     )

@@ -41,7 +41,7 @@ class Rows:
     pairs       (row,): position of the row's pair in the group
     relative    (12 * pair, 1): X_RM of every pair, to first order in z
     bends       (12 * pair, 1): sums of the previous reactions times the gaps' gradients by the entries of X_RM
-    compliance  (row,) [mm/N]: of supports that give way; 0 for rigid rows
+    compliance  (row,) [mm/N]: of points that give way; 0 for rigid rows
     bow, wrap   (z, z): sums of the previous reactions times the second derivatives of gaps that are not linear in X_RM
                 (see round_gaps)
     """
@@ -87,7 +87,7 @@ def contact_rows(
     gaps, filled, relative, bends = ([] for _ in range(4))
     bow, wrap = (ca.SX(setting.z.numel(), setting.z.numel()) for _ in range(2))
     for k, (start, end) in enumerate(zip(setting.relative(start_poses), setting.relative(end_poses), strict=True)):
-        by_z = setting.slope(end.vector())
+        by_z, size = setting.slope(end.vector()), len(pairs)
         relative.append(start.vector() + by_z @ setting.z)
         (points, bend), pair = points_of_pairs[k], setting.nominal.pairs[setting.group.pairs[k]]
         if pair.round is not None:
@@ -99,10 +99,10 @@ def contact_rows(
             gaps.append(point_gaps)
             filled.append(ca.SX.ones(len(pair.round)))
             pairs += [k] * len(pair.round)
-            compliance.append(np.zeros(len(pair.round)))
             bends.append(by_entries.T @ of_pair)
             bow += by_z.T @ second_derivative @ by_z
             wrap += by_z.T @ closing @ by_z
+            compliance.append(_compliance(pair, len(pairs) - size))
             continue
         total = ca.SX.zeros(ENTRIES) if bend is None else bend
         for P_m, P_r, n_r, is_filled in points:
@@ -116,7 +116,7 @@ def contact_rows(
             filled.append(is_filled)
             pairs.append(k)
         bends.append(total)
-        compliance.append(1 / pair.stiffness if pair.stiffness is not None and pair.is_springy else np.zeros(len(points)))
+        compliance.append(_compliance(pair, len(pairs) - size))
     return Rows(
         slopes=ca.vertcat(*slopes),
         gaps=ca.vertcat(*gaps),
@@ -128,6 +128,11 @@ def contact_rows(
         bow=bow,
         wrap=wrap,
     )
+
+
+def _compliance(pair: ContactPoints, rows: int) -> np.ndarray:
+    """Return the compliance (row,) [mm/N] of the rows of a pair."""
+    return np.zeros(rows) if pair.stiffness is None or not pair.is_springy else 1 / pair.stiffness
 
 
 def row_points(setting: Setting, standing: Sequence[np.ndarray | int], inputs: Mapping[str, ca.SX]) -> list[RowPoints]:

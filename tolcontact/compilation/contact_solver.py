@@ -172,7 +172,7 @@ class _PluginSolver:
     def __init__(self, qp: ContactQP | ElementQP, plugin: Plugin) -> None:
         self._remembers = plugin.remembers
         with CONSTRUCTION_LOCK, quiet():
-            conic = solver(plugin, qp.sparsity("h"), qp.sparsity("a"))
+            conic = solver(plugin, qp.sparsity("h"), qp.sparsity("a"), springs=qp.has_springs)
         self._inputs = [name for name in conic.name_in() if name in QP]
         self._results = [conic.name_out().index(name) for name in SOLUTION]
         lower_bounds = np.zeros(conic.numel_in("g"))

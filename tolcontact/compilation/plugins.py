@@ -17,17 +17,20 @@ class Plugin:
 
     is_conic    whether it is a plugin of CasADi; if not, it is a GraphSolver
     options     its options in CasADi
+    springs     options that replace them for QPs with rows that give way
     fallbacks   names of the plugins that answer in its place, one after the other, if its answer misses ACCURACY
     remembers   whether it starts each problem from the answer to the previous one
     """
 
     name: str
     options: dict[str, Any] = field(default_factory=dict)
+    springs: dict[str, Any] = field(default_factory=dict)
     fallbacks: tuple[str, ...] = ("qpoases", "daqp")
     remembers: bool = False
     is_conic: bool = True
 
 
+DAQP = {"primal_tol": 1e-12, "dual_tol": 1e-13}
 PLUGINS = {
     plugin.name: plugin
     for plugin in (
@@ -39,7 +42,8 @@ PLUGINS = {
             remembers=True,
         ),
         # It cycles if rows contradict each other and two-sided locators are exact.
-        Plugin("daqp", {"daqp": {"primal_tol": 1e-12, "dual_tol": 1e-13}}, fallbacks=("qpoases",)),
+        # Parallel rows that stiff springs tell apart are no dependent rows: its usual limit of 1e-11 would drop some.
+        Plugin("daqp", {"daqp": DAQP}, {"daqp": {**DAQP, "zero_tol": 1e-15}}, fallbacks=("qpoases",)),
         Plugin("graph", fallbacks=("daqp", "qpoases"), is_conic=False),
         Plugin("piqp", {"piqp": {"eps_abs": 1e-12, "eps_rel": 1e-12}}),
         Plugin("highs", {"highs": {"output_flag": False}}, remembers=True),
@@ -84,9 +88,13 @@ def usable_plugins() -> list[str]:
     return [name for name in PLUGINS if is_usable(name)]
 
 
-def solver(plugin: Plugin, h: ca.Sparsity, a: ca.Sparsity) -> ca.Function:
-    """Return a QP solver for these sparsities; it reports failure in its outputs, never by an exception."""
-    return ca.conic("qp", plugin.name, {"h": h, "a": a}, {**plugin.options, "error_on_fail": False})
+def solver(plugin: Plugin, h: ca.Sparsity, a: ca.Sparsity, *, springs: bool = False) -> ca.Function:
+    """Return a QP solver for these sparsities, of rows with `springs` or without.
+
+    It reports failure in its outputs, never by an exception.
+    """
+    options = plugin.options | (plugin.springs if springs else {})
+    return ca.conic("qp", plugin.name, {"h": h, "a": a}, {**options, "error_on_fail": False})
 
 
 def is_usable(name: str) -> bool:

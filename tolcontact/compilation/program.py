@@ -23,6 +23,7 @@ from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
 from tolcontact.errors import ModelError
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.limits import Limits
+from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.gap import GapMap, gap_map, gap_matrix
 from tolcontact.mechanics.groups import Group, contact_groups
 from tolcontact.mechanics.measures import measured, record
@@ -239,25 +240,24 @@ def _check_forms(nominal: Nominal, method: Method) -> None:
 
 
 def _check_placing(nominal: Nominal, method: Method) -> None:
-    """Raise ModelError for an objective that holds locators to first order, where contact moves a part placed otherwise."""
-    if method.minimizes.counts_points:
-        return
+    """Raise ModelError for placed parts that forces would press, if springs, or too many locators, hold them."""
     faults = [
-        f'part "{part.name}": its locators are placed by "{part.locators.placing}", and the objective "{method.objective}" '
-        'holds them to first order; leave placing out, or choose the objective "all points"'
+        f'part "{part.name}": its locators are placed by "{part.locators.placing}", and if forces press, they have to be at '
+        "most six, without a stiffness; leave placing out, or declare the part fixed=True"
         for index, part in enumerate(nominal.parts)
-        if index in part.movers and part.locators.placing != FIRST_ORDER
+        if index in part.movers and part.locators.placing != FIRST_ORDER and method.minimizes.presses
+        if len(part.locators) > FREEDOMS or part.locators.springy.any()
     ]
     if faults:
         raise ModelError(nominal.assembly.name, faults)
 
 
 def _check_springs(nominal: Nominal, method: Method) -> None:
-    """Raise ModelError for supports with a stiffness, where no forces weigh them, or steps do not look at true gaps."""
+    """Raise ModelError for contact with a stiffness, where no forces weigh it, or steps do not look at true gaps."""
     if method.minimizes.presses and method.is_exact and not method.is_iterated:
         return
     faults = [
-        f'{pair.name}: a support has a stiffness, which needs the objective "seating", the resolution "exact", and a search '
+        f'{_springy_name(pair)} has a stiffness, which needs the objective "seating", the resolution "exact", and a search '
         f'that is not iterated; here they are "{method.objective}", "{method.resolution}" and "{method.search}"; choose '
         "those, or leave stiffness out"
         for pair in nominal.pairs
@@ -265,6 +265,12 @@ def _check_springs(nominal: Nominal, method: Method) -> None:
     ]
     if faults:
         raise ModelError(nominal.assembly.name, faults)
+
+
+def _springy_name(pair: ContactPoints) -> str:
+    if pair.pulls is not None:
+        return f'locator "{pair.name}": it'
+    return f"{pair.name}: a support" if pair.is_supports else f'contact pair "{pair.name}": it'
 
 
 def _check_forces(nominal: Nominal, groups: list[Group]) -> None:

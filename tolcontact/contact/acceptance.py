@@ -84,6 +84,8 @@ class Limits:
                     overhang = side.face.overhang(pose.apply(motion[realization], carriers.places[points, None])[:, 0])
                     doubtful[rows[realization[overhang > carriers.spacing]]] = True
                 pair, deviations = self._group_pairs[k], task.deviations[rows]
+                if pair.is_springy:  # faces that give way lie in each other
+                    continue
                 form = pair.form(deviations) if pair.has_form else None
                 doubtful[rows] |= faces.depth(X_RM, pair.heights(deviations), form) > self.allowed(k)
         return doubtful

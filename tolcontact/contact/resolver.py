@@ -57,8 +57,8 @@ class ContactResolver:
         self._step = LinearStep(program, group, max_rounds)
         self._method = program.method
         self._candidates = Candidates(program, group)
-        self._pairs = [program.nominal.pairs[index] for index in group.group.pairs]
-        self._springy = [k for k, pair in enumerate(self._pairs) if pair.is_springy]
+        self.contact_points = [program.nominal.pairs[index] for index in group.group.pairs]
+        self._springy = [k for k, pair in enumerate(self.contact_points) if pair.is_springy]
         size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
         self._limits = Limits(program.nominal, group.group, self._method, size)
 
@@ -137,8 +137,9 @@ class ContactResolver:
         if self._method.is_exact:
             depth = undone(task.scans, state.gap_min, state.relative, task.deviations, task.may_carry, state.slack)
             for k in self._springy:
-                pair, reactions = self._pairs[k], state.multipliers[:, self.spans[k]]
-                depth[:, k] = spring_misfit(pair, state.relative[:, k], task.deviations, reactions) - state.slack[:, k]
+                reactions = state.multipliers[:, self.spans[k]]
+                misfit = spring_misfit(self.contact_points[k], task.scans[k], state.relative[:, k], task.deviations, reactions)
+                depth[:, k] = misfit - state.slack[:, k]
             state.kkt_residual[:] = checked_residual(state, depth.max(axis=1))
         state.doubtful[:] = self._limits.is_doubtful(task, state, self._candidates)
         if not projected:

@@ -14,6 +14,7 @@ from tolcontact.compilation import ACCURACY
 from tolcontact.contact.record import Record, initial_numbers
 from tolcontact.contact.scan import Scan
 from tolcontact.contact.slots import Slots
+from tolcontact.discretization import ContactPoints
 
 LOADED_SHARE = 1e-4  # of the largest reaction of a realization: smaller ones only oppose the regularization
 ANSWER = ("poses", "relative", "multipliers", "slack", "astray")
@@ -177,9 +178,16 @@ class Resolved:
     gap_min: Float[Array, "realization state pair"]
     active: Int[Array, "realization pair"]
 
-    def reactions(self, spans: Sequence[slice]) -> Float[Array, "n pair"]:
-        """Return the sum of the reactions of each pair, (n, pair), whose rows of the QP are `spans`."""
-        return np.stack([self.state.multipliers[:, span].sum(axis=1) for span in spans], axis=1)
+    def reactions(self, spans: Sequence[slice], pairs: Sequence[ContactPoints]) -> Float[Array, "n pair"]:
+        """Return the sum of the reactions of each pair, (n, pair), whose rows of the QP are `spans`; pulls are negative."""
+        multipliers = [self.state.multipliers[:, span] for span in spans]
+        return np.stack(
+            [
+                (of_pair if pair.pulls is None else np.where(pair.pulls, -of_pair, of_pair)).sum(axis=1)
+                for of_pair, pair in zip(multipliers, pairs, strict=True)
+            ],
+            axis=1,
+        )
 
     def carrying(self, spans: Sequence[slice]) -> Int[Array, "n pair"]:
         """Return the number of carrying points of each pair, (n, pair)."""

@@ -77,8 +77,14 @@ rejected.
 
 A locator with `one_sided=True` is a support: its part may lift off it, and may not pass through it. A part with supports may
 have more than six locators, of which at most six are two-sided. The objective "locator stiffness" uses
-the `stiffness` (N/mm) of two-sided locators. With "seating", a support with a `stiffness` is a spring that pushes only: its gap
-is negative by its compression, which is its force divided by its stiffness. Without one it is rigid.
+the `stiffness` (N/mm) of two-sided locators. With "seating", a locator with a `stiffness` is a spring, and without one it is
+rigid. The spring of a support pushes only: its gap is negative by its compression, which is its force divided by its stiffness.
+That of a two-sided locator pulls, too. It is a pair of its own in results, "part.locator", whose reaction is negative if it
+pulls; its gap is minus its elongation or compression.
+
+A contact pair with a `stiffness` (N/mm) gives way, too: `contact(..., stiffness=5000)` states the force that presses its faces
+into each other evenly by 1 mm, as the data sheet of a pad or a press test does, whatever the number of contact points. These
+share it by the areas that they stand for, and push only. The faces must be flat, or those of balls and shafts against walls.
 
 A part that contact alone holds in some directions (a shaft in a V, a lid over studs) is `floating=True` and has fewer
 locators, or none. In the directions that its locators leave open, it keeps its nominal position in the raw state. Contact then
@@ -203,10 +209,10 @@ derivatives, so `sensitivities` and `contributions` state none for them by a lin
 ## Stations and joints
 
 Products are located, joined, and located again before anybody measures them. `station(name)` declares the next step of such a
-sequence, and has the methods `locate`, `contact`, `force` and `measure` of an assembly, and `join`. Locators belong to a
-station and vary there ("weld.left.A1"); features belong to parts, and deviate alike in all stations. A joint keeps the poses
-of its parts relative to each other that they had in the station that joined them: raw states follow from raw states, and
-corrected states from corrected states. Later stations locate the joint by points of any of its parts.
+sequence, and has the methods `locate`, `contact`, `fasten`, `force` and `measure` of an assembly, and `join`. Locators belong
+to a station and vary there ("weld.left.A1"); features belong to parts, and deviate alike in all stations. A joint keeps the
+poses of its parts relative to each other that they had in the station that joined them: raw states follow from raw states, and
+corrected states from corrected states. Later stations locate the joint by points, or by three faces, of any of its parts.
 
 >>> line = tc.Assembly("line")
 >>> left, right = line.part("left", tc.Box(100, 50, 10)), line.part("right", tc.Box(100, 50, 10), at=(80, 0, 10))

@@ -18,15 +18,13 @@ from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.joint import Joint
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.part import Face, Feature, Part
+from tolcontact.declaration.part import Feature, Part
 from tolcontact.declaration.sequence import in_order, joined_before, present_parts, sequence_faults, settings_of
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.station import Station
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import friction_faults, key_faults, repetitions, script_line, text_faults, vector as _vector
-from tolcontact.errors import ModelError
-from tolcontact.later import FASTENER, LATER
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
 
@@ -85,6 +83,10 @@ class Assembly(Declarations, Pictured):
         return thing
 
     @property
+    def _owner(self) -> "Assembly":
+        return self
+
+    @property
     def _units(self) -> dict[str, str]:
         return {measure.name: measure.units for measure in self.measures}
 
@@ -112,34 +114,6 @@ class Assembly(Declarations, Pictured):
     def station(self, name: str) -> Station:
         """Declare the next station of an assembly that is built in steps, and return it (see Station)."""
         return self._add("stations", Station(name, script_line()).belonging_to(self))
-
-    def fasten(
-        self,
-        name: str,
-        fastener: Part | Face | Feature | Size | float,
-        *,
-        through: Sequence[Face | Feature],
-        into: Face | Feature | None = None,
-        seat: Face | Feature | None = None,
-        pushed: Any = None,
-        drift: bool = False,
-    ) -> Part:
-        """Declare a fastener in the holes of several parts, and return its part (see `tolcontact.fasteners`).
-
-        fastener   its diameter or its tc.Size, and a part is made; or a part, or the face of its shank
-        through    the holes that it passes through, from its head on
-        into       a threaded or press-fit hole, which holds it; without one it floats in the clearance of its holes
-        seat       the plane under its head
-        pushed     a force (x, y, z) [N], in the assembly frame, on a fastener that floats
-        drift      whether it stands anywhere in the clearance of its tightest hole, where contact allows, all places alike
-
-        Raises ModelError if the fastener does not fit into the nominal assembly.
-        """
-        if self.stations:
-            advice = "declare its part, its location and its contacts in a station"
-            raise ModelError(self.name, [f'fastener "{name}" ({script_line()}): stations take no fasteners yet; {advice}'])
-        part: Part = LATER[FASTENER](self, name, fastener, through=through, into=into, seat=seat, pushed=pushed, drift=drift)
-        return part
 
     def variable(self, name: str, tolerance: Any, *, drives: Mapping[str, float], units: str = "mm") -> Variable:
         """Declare a cause that drives several contributors, each by a factor (see Variable)."""
@@ -280,7 +254,8 @@ class Assembly(Declarations, Pictured):
     def _location_faults(self, part: Part) -> Iterator[str]:
         location = self.location_of(part)
         if location is not None and location.floating:
-            if not any(part in (pair.moving.part, pair.reference.part) for pair in self.pairs):
+            body = self.body_of(part)
+            if not any(side.part in body for pair in self.pairs for side in (pair.moving, pair.reference)):
                 yield "it is floating, and in no contact pair, so nothing decides its place; declare its contacts"
             if part.fixed is True:
                 yield "it is floating, so contact has to move it; leave fixed out"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from tolcontact.declaration.part import Face, Part
-from tolcontact.declaration.values import friction_faults
+from tolcontact.declaration.values import friction_faults, stiffness_faults
 from tolcontact.readable import Readable
 
 VERTICES = "vertices"
@@ -25,6 +25,9 @@ class ContactPair(Readable):
               diagonal of the moving part
     mu        coefficient of friction, of which tc.seating and tc.check make use; contact is resolved without friction. By
               default that of the assembly
+    stiffness [N/mm] the force that presses the faces into each other evenly by 1 mm, under the objective "seating". Each point
+              is a spring with the share of the area that it stands for, and pushes only; round faces share it by their balls
+              and ends of shafts. By default the pair is rigid
     """
 
     name: str
@@ -36,6 +39,7 @@ class ContactPair(Readable):
     declared_at: str = ""
     mu: float | None = None
     station: str = ""
+    stiffness: float | None = None
     noun: ClassVar[str] = "contact pair"
 
     @property
@@ -55,6 +59,7 @@ class ContactPair(Readable):
             if length is not None and not (isinstance(length, int | float) and math.isfinite(length) and length > 0):
                 yield f"{option} is {length!r}; expected a length in mm above 0"
         yield from friction_faults(self.mu)
+        yield from stiffness_faults(self.stiffness)
         if self.points is not None and self.spacing is not None:
             yield "both points and spacing are given; give one of them"
 
@@ -64,4 +69,5 @@ class ContactPair(Readable):
         else:
             count = VERTICES if self.points == VERTICES else f"{self.points} points"
             points = "points by geometry" if self.points is None else count
-        return f"contact {self.name}: {self.moving} (moving) against {self.reference} (reference), {points}"
+        stiffness = "" if self.stiffness is None else f", {self.stiffness:g} N/mm"
+        return f"contact {self.name}: {self.moving} (moving) against {self.reference} (reference), {points}{stiffness}"

@@ -94,9 +94,11 @@ def _ground(entries: Mapping[str, Any], place: Place) -> Part | Feature | None:
 
 
 def _stiffness_entries(locator: Locator, writing: Writing) -> Document:
-    """Return the stiffness; rigid supports are written with the usual one, so that a springy one has a mark."""
-    stiffness = USUAL_STIFFNESS if locator.stiffness is None else float(locator.stiffness)
-    return {"stiffness": stiffness} | ({"springy": True} if locator.is_springy else {})
+    """Return the stiffness, by default the usual one: a support that gives way, and a declared usual one, have a mark."""
+    if locator.stiffness is None:
+        return {"stiffness": USUAL_STIFFNESS}
+    mark = {"springy": True} if locator.one_sided or locator.stiffness == USUAL_STIFFNESS else {}
+    return {"stiffness": float(locator.stiffness), **mark}
 
 
 def _stiffness(entries: Mapping[str, Any], place: Place) -> float | None:
@@ -234,9 +236,10 @@ RECORDS = {
         scheme=SCHEME, on=GROUND, placing=Plain(text_type(PLACINGS)),
     ),
     "pairs": Record(
-        ContactPair, "moving reference name points spacing within declared_at mu? station?",
+        ContactPair, "moving reference name points spacing within declared_at mu? station? stiffness?",
         points=Plain(INDEX | text_type([VERTICES]) | None, read=indices_of),
         spacing=Plain(POSITIVE | None), within=Plain(POSITIVE | None), mu=Plain(NOT_NEGATIVE | None, write=floats),
+        stiffness=Plain(POSITIVE | None, write=floats),
     ),
     "measures": Record(
         Measure, "name of to? along tolerance units declared_at absolute? limits? station?", of=Inline(

@@ -14,6 +14,7 @@ from tolcontact.declaration.values import (
     is_finite,
     is_length,
     repetitions,
+    stiffness_faults,
     text_faults,
     vector as _vector,
 )
@@ -29,10 +30,10 @@ class Locator(Readable):
 
     A positive deviation moves the part along `direction`. `tolerance=None` takes the tolerance of the `locate` call. A
     `one_sided` locator is a support: the part may lift off it along `direction`, but not pass through it. The objective
-    "locator stiffness" uses the `stiffness` [N/mm] of two-sided locators, by default 1. A support with a `stiffness` gives
-    way like a spring that pushes only, under the objective "seating"; without one it is rigid. A locator `on` a feature of
-    its part touches this feature, and also moves the part by the deviation of the feature at the point. A locator of a joint
-    is at a point of any of its parts, which the point itself states: part.point(x, y, z).
+    "locator stiffness" uses the `stiffness` [N/mm] of two-sided locators, by default 1. Under the objective "seating" a locator
+    with a `stiffness` gives way, like a spring that pulls, too, unless it is one-sided; without one it is rigid. A locator
+    `on` a feature of its part touches this feature, and also moves the part by the deviation of the feature at the point. A
+    locator of a joint is at a point of any of its parts, which the point itself states: part.point(x, y, z).
     """
 
     name: str
@@ -76,22 +77,17 @@ class Locator(Readable):
             yield from self.tolerance.faults()
         if not isinstance(self.one_sided, bool):
             yield f"one_sided is {self.one_sided!r}; expected True or False"
-        if self.stiffness is not None and not (is_length(self.stiffness) and self.stiffness > 0):
-            yield f"stiffness is {self.stiffness!r}; expected a number in N/mm above 0"
+        yield from stiffness_faults(self.stiffness)
         if not isinstance(self.on, Feature | None):
             yield f"on is a {type(self.on).__name__}; expected a feature of the part, or None"
         if not isinstance(self.part, Part | None):
             yield f"part is a {type(self.part).__name__}; expected the part of the point, or None"
 
-    @property
-    def is_springy(self) -> bool:
-        """Whether it is a support that gives way."""
-        return self.one_sided and self.stiffness is not None
-
     def __str__(self) -> str:
         point, along = (", ".join(f"{c:g}" for c in v) for v in (self.point, self.direction))
         kind = "one-sided locator" if self.one_sided else "locator"
-        return f"{kind} {self.name}: ({point}) along ({along}), {self.tolerance}"
+        stiffness = "" if self.stiffness is None else f", {self.stiffness:g} N/mm"
+        return f"{kind} {self.name}: ({point}) along ({along}), {self.tolerance}{stiffness}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -174,10 +170,19 @@ class Location(Readable):
         return (self.part, *([] if self.parent is None else [self.parent]), *self.mentioned)
 
     @property
+    def locators(self) -> tuple[Locator, ...]:
+        """The locators of a scheme that states them."""
+        return () if isinstance(self.scheme, ThreeTwoOne) else self.scheme
+
+    @property
+    def faces(self) -> tuple[Face, ...]:
+        """The faces of a 3-2-1 scheme."""
+        return self.scheme.faces if isinstance(self.scheme, ThreeTwoOne) else ()
+
+    @property
     def mentioned(self) -> tuple[Part, ...]:
         """The parts to which the faces of the scheme refer."""
-        faces = self.scheme.faces if isinstance(self.scheme, ThreeTwoOne) else ()
-        return tuple(part for face in faces for part in face.parts)
+        return tuple(part for face in self.faces for part in face.parts)
 
     def faults(self) -> Iterator[str]:
         yield from self._faces_faults() if isinstance(self.scheme, ThreeTwoOne) else self._locator_faults(self.scheme)
@@ -192,11 +197,9 @@ class Location(Readable):
 
     def _faces_faults(self) -> Iterator[str]:
         yield from self.scheme.faults() if isinstance(self.scheme, ThreeTwoOne) else ()
-        for face in self.scheme.faces if isinstance(self.scheme, ThreeTwoOne) else ():
-            if face.part is not self.part:
+        for face in self.faces:
+            if face.part is not self.part and not self.joint:
                 yield f'face {face} belongs to part "{face.part.name}", not to part "{self.part.name}"'
-        if self.joint:
-            yield f'joint "{self.joint}" needs locators at points of its parts: tc.Locator(name, part.point(...), ...)'
         if self.floating:
             yield "a 3-2-1 scheme leaves nothing open; leave floating out, or give it fewer locators"
         if self.tolerance is None:
@@ -232,8 +235,6 @@ class Location(Readable):
                 f"it is over-constrained: {len(two_sided)} of its {count} hold it both ways, and {', '.join(idle)} {verb} "
                 f"redundant with {sufficient}; make the redundant ones one_sided=True, or leave them out"
             )
-        elif self.floating and self.joint:
-            yield f'joint "{self.joint}" cannot be floating; give it six locators'
         elif self.floating and len(two_sided) == 6:
             yield "it is floating, but six locators hold it both ways; leave floating out, or some of them"
 

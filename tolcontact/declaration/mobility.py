@@ -4,35 +4,37 @@ from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.part import Part
 
 
-def is_free(assembly: Assembly, part: Part) -> bool:
+def is_free(assembly: Assembly, part: Part, *, springs: bool) -> bool:
     """Return True if contact may move the part.
 
-    Without a declared choice a part is free if it is a moving side, floats, or has one-sided locators.
+    Without a declared choice a part is free if it is a moving side, floats, or has one-sided locators, or `springs` (see
+    `has_supports`).
     """
     body = assembly.body_of(part)
     if any(member.fixed is not None for member in body):
         return any(member.fixed is False for member in body)
     location = assembly.location_of(part)
     floats = location is not None and location.floating
-    return floats or any(pair.moving.part in body for pair in assembly.pairs) or has_supports(assembly, part)
+    return floats or any(pair.moving.part in body for pair in assembly.pairs) or has_supports(assembly, part, springs=springs)
 
 
-def has_supports(assembly: Assembly, part: Part) -> bool:
-    """Return True if a locator of the part is one-sided."""
+def has_supports(assembly: Assembly, part: Part, *, springs: bool) -> bool:
+    """Return True if a locator of the part is one-sided, or has a stiffness, if `springs` that give way to forces count."""
     location = assembly.location_of(part)
-    return location is not None and isinstance(location.scheme, tuple) and any(pin.one_sided for pin in location.scheme)
+    scheme = location.scheme if location is not None and isinstance(location.scheme, tuple) else ()
+    return any(locator.one_sided or (springs and locator.stiffness is not None) for locator in scheme)
 
 
-def movers(assembly: Assembly, part: Part) -> tuple[Part, ...]:
+def movers(assembly: Assembly, part: Part, *, springs: bool) -> tuple[Part, ...]:
     """Return the free parts whose corrections move `part`: the parts that it is located on, then the part itself.
 
-    A part of a joint is moved by the first part of the joint.
+    A part of a joint is moved by the first part of the joint. Locators that are `springs` count as supports.
     """
     body = assembly.body_of(part)
     part = body[0]
     location = assembly.location_of(part)
-    supports = movers(assembly, location.parent) if location and location.parent else ()
-    touches = has_supports(assembly, part) or any(
+    supports = movers(assembly, location.parent, springs=springs) if location and location.parent else ()
+    touches = has_supports(assembly, part, springs=springs) or any(
         side.part in body for pair in assembly.pairs for side in (pair.moving, pair.reference)
     )
-    return (*supports, part) if touches and is_free(assembly, part) else supports
+    return (*supports, part) if touches and is_free(assembly, part, springs=springs) else supports

@@ -122,11 +122,12 @@ def _location_faults(location: Location, joined: dict[Part, Joint], station: Sta
     elif joint is None and location.joint:
         yield f'station "{station.name}" locates joint "{location.joint}", which no earlier station joins'
     elif joint is not None:
-        for locator in location.scheme if isinstance(location.scheme, tuple) else ():
-            if locator.part is not None and locator.part not in joint.members:
-                names = ", ".join(part.name for part in joint.members)
-                place = f'locator "{locator.name}" is at a point of part "{locator.part.name}"'
-                yield f"{place}; the parts of the joint are: {names}"
+        names = ", ".join(part.name for part in joint.members)
+        places = {f'locator "{locator.name}" is at a point': locator.part for locator in location.locators}
+        places |= {f"face {face} is": face.part for face in location.faces}
+        for place, part in places.items():
+            if part is not None and part not in joint.members:
+                yield f'{place} of part "{part.name}"; the parts of the joint are: {names}'
     if joint is not None and location.parent in joint.members:
         yield f'joint "{joint.name}" is located on its own part "{location.parent.name if location.parent else ""}"'
 

@@ -123,6 +123,12 @@ def friction_faults(mu: Any) -> Iterator[str]:
         yield f"mu is {mu!r}; expected a coefficient of friction from 0 to {MAX_FRICTION}, or None"
 
 
+def stiffness_faults(stiffness: Any) -> Iterator[str]:
+    """Yield the fault of a stiffness; None states none."""
+    if stiffness is not None and not (is_length(stiffness) and stiffness > 0):
+        yield f"stiffness is {stiffness!r}; expected a number in N/mm above 0"
+
+
 def script_line() -> str:
     """Return the innermost line outside this package as `file.py:12`; empty if all lines are inside."""
     frame = sys._getframe(1)

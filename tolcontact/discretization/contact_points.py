@@ -20,6 +20,7 @@ from tolcontact.discretization.form_points import (
 )
 from tolcontact.discretization.nominal import ContactPoints, Offsets
 from tolcontact.discretization.nominal_part import NominalPart
+from tolcontact.discretization.point_weights import spring_shares
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.scenes import Scene
@@ -33,6 +34,7 @@ from tolcontact.geometry.surface import Surface
 
 DEFAULT_REACH = 0.1  # of the moving part's size
 DEFAULT_POINTS = 200
+DEFAULT_SPRINGS = 40  # all of which may carry at once, so that a QP has a row for each
 POINT_TOLERANCE = 1e-9  # of the part's size: points that are no farther apart are one point
 
 
@@ -74,9 +76,25 @@ def contact_points(
         round=RoundPoints.of(balls_and_shafts) if balls_and_shafts else None,
         deviating=deviating,
     )
+    if pair.stiffness is not None:
+        points = replace(points, stiffness=pair.stiffness * _spring_shares(points))
     if balls_and_shafts or not any(deviating):
         return points
     return replace(points, offsets=_height_offsets(points))
+
+
+def _spring_shares(points: ContactPoints) -> np.ndarray:
+    """Return the share (point,) of each contact point in the stiffness of its pair.
+
+    Raises GeometryFault for a curved face, whose region of contact no nominal area states.
+    """
+    assert points.moving_face is not None and points.reference_face is not None
+    if points.round is not None:
+        return np.where(points.round.points["axis"].any(axis=1), 0.5, 1.0)  # a shaft has two ends
+    if not (is_flat(points.moving_face) and is_flat(points.reference_face)):
+        raise GeometryFault("it has a stiffness, which needs flat faces, or a ball or shaft against walls; leave stiffness out")
+    distance = float(np.linalg.norm(points.P_m - points.P_r, axis=1).max())
+    return spring_shares(points.P_m, distance, points.moving_face, points.reference_face)
 
 
 def _is_open(pair: ContactPair) -> bool:
@@ -103,7 +121,8 @@ def _candidates(
         points = distinct_vertices(mesh)
     else:
         spacing = form_spacing(lengths) if lengths and _is_open(pair) else pair.spacing
-        count = DEFAULT_POINTS if _is_open(pair) else pair.points
+        open_count = DEFAULT_POINTS if pair.stiffness is None else DEFAULT_SPRINGS
+        count = open_count if _is_open(pair) else pair.points
         if spacing is not None:
             _check_number(mesh.area / spacing**2, f"a spacing of {spacing:g} mm gives")
         points = spread(mesh, count if spacing is None else None, spacing)

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from tolcontact.declaration import (
     Assembly,
     DatumTargets,
+    Face,
     Feature,
     Location,
     Locator,
@@ -20,22 +21,23 @@ from tolcontact.declaration import (
     Tolerance,
     has_supports,
     is_free,
-    movers,
 )
 from tolcontact.declaration.locator import FIRST_ORDER, USUAL_STIFFNESS
 from tolcontact.discretization.contact_points import contact_points
-from tolcontact.discretization.locators import Locators, scheme_locators
+from tolcontact.discretization.locators import FACES_OF_SCHEME, Locators, scheme_locators
 from tolcontact.discretization.measurements import nominal_measurements
-from tolcontact.discretization.nominal import ContactPoints, Nominal, Offsets
+from tolcontact.discretization.nominal import ContactPoints, Nominal
 from tolcontact.discretization.nominal_part import NominalPart
 from tolcontact.discretization.partial_surfaces import warn_of_partial_surfaces
 from tolcontact.discretization.scenes import Scene, carried, scenes_of
+from tolcontact.discretization.support_pairs import support_pairs, supports_name
 from tolcontact.discretization.unit_check import warn_of_units
 from tolcontact.errors import GeometryFault, ModelError, designation
 from tolcontact.features import Features, Placement, datum_order
 from tolcontact.geometry.faces import Meshes
 from tolcontact.geometry.files.reading import Shape, read_files
 from tolcontact.geometry.shapes import field_surface, shape
+from tolcontact.method import Method
 
 log = logging.getLogger(__name__)
 
@@ -54,10 +56,11 @@ class _Faults(list[str]):
             return None
 
 
-def discretize(assembly: Assembly, *, incomplete: bool = False) -> Nominal:
+def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | None = None) -> Nominal:
     """Return the nominal model of an assembly.
 
-    An `incomplete` model may lack what only a run needs: measures, and locations of parts.
+    An `incomplete` model may lack what only a run needs: measures, and locations of parts. Two-sided locators with a stiffness
+    give way if the objective `presses`, by default that of the assembly's own method.
     Raises ModelError with every fault of the declaration and of its geometry.
     """
     omissions = tuple(assembly.omissions()) if incomplete else ()
@@ -66,7 +69,8 @@ def discretize(assembly: Assembly, *, incomplete: bool = False) -> Nominal:
     assembly = assembly.in_station_order if is_sound else assembly
     shapes = _shapes(assembly, faults)
     meshes = {part: read.mesh for part, read in shapes.items()}
-    scenes = scenes_of(assembly) if is_sound or not assembly.stations else ()
+    presses = (assembly.method or Method()).minimizes.presses if presses is None else presses
+    scenes = scenes_of(assembly, presses=presses) if is_sound or not assembly.stations else ()
     entries = [(scene, part) for scene in scenes for part in scene.assembly.parts]
     parts = [_nominal_part(scene, part, meshes, faults) for scene, part in entries]
     features = Features(sum(len(part.locators) for part in parts if part is not None))
@@ -93,7 +97,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False) -> Nominal:
         if not any(pair.faults()) and all(part in placed for part in (*pair.moving.parts, *pair.reference.parts))
     ]
     if is_sound:
-        faults.extend(fault for scene in scenes for fault in _immovable_pairs(scene.assembly))
+        faults.extend(fault for scene in scenes for fault in _immovable_pairs(scene))
         labels = [label for nominal in nominal_parts for label in nominal.locators.labels]
         labels += [*features.labels, *(variable.name for variable in assembly.variables)]
         faults.extend(_repeated_labels(labels))
@@ -105,7 +109,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False) -> Nominal:
         raise ModelError(assembly.name, list(dict.fromkeys(faults)))
     warn_of_units(assembly, shapes)
     warn_of_partial_surfaces(assembly, meshes)
-    return _nominal(assembly, scenes, nominal_parts, (*pairs, *_support_pairs(nominal_parts, scenes)), features)
+    return _nominal(assembly, scenes, nominal_parts, (*pairs, *support_pairs(nominal_parts, scenes)), features)
 
 
 def _nominal(
@@ -162,12 +166,15 @@ def _add_features(assembly: Assembly, indices: Mapping[Part, int], meshes: Meshe
 def _on_features(part: NominalPart, features: Features, meshes: Meshes, faults: _Faults) -> NominalPart:
     """Return the part with the faces of features that its locators stand against."""
     scheme = part.scheme
-    if scheme is None or not part.part.features:
+    if scheme is None:
+        return part
+    sides: Sequence[Face | Locator] = scheme.faces if isinstance(scheme, ThreeTwoOne) else scheme
+    if not any((side.part or part.part).features for side in sides):
         return part
     if isinstance(scheme, ThreeTwoOne):
         place = designation("part", part.part)
-        deviations = [faults.attempt(place, features.face_at, face, meshes, part.placement) for face in scheme.faces]
-        faces = tuple(deviations[k] for k in (0, 0, 0, 1, 1, 2))
+        deviations = [faults.attempt(place, features.face_at, face, meshes, placement_of(face.part)) for face in scheme.faces]
+        faces = tuple(deviations[k] for k in FACES_OF_SCHEME)
     else:
         faces = tuple(
             locator.on and features.face_of(locator.on, np.array(locator.point), placement_of(locator.part or part.part))
@@ -220,44 +227,11 @@ def _contributor_faults(assembly: Assembly, labels: Sequence[str], shifts: Set[s
 
 def _reserved_names(scene: Scene) -> Iterator[str]:
     assembly = scene.assembly
-    reserved = {_supports_name(scene, part) for part in assembly.parts if has_supports(assembly, part)}
+    reserved = {supports_name(scene, part) for part in assembly.parts if has_supports(assembly, part, springs=False)}
     for pair in assembly.pairs:
         if pair.name in reserved:
             place = designation("contact pair", pair)
             yield f"{place}: its name is reserved for the one-sided locators of a part; rename it"
-
-
-def _supports_name(scene: Scene, part: Part) -> str:
-    return f"supports of {part.name}" + (f" in {scene.station}" if scene.station else "")
-
-
-def _support_pairs(parts: tuple[NominalPart, ...], scenes: Sequence[Scene]) -> Iterator[ContactPoints]:
-    """Yield the one-sided locators of each free part, or of each part of a free joint, as a contact pair."""
-    start = 0
-    for index, part in enumerate(parts):
-        owners = np.array(part.owners or (index,) * len(part.locators), dtype=int)
-        for owner in np.unique(owners[part.locators.one_sided]) if part.free else ():
-            supports = np.flatnonzero(part.locators.one_sided & (owners == owner))
-            P, n = part.locators.points[supports], part.locators.directions[supports]
-            offsets = _support_offsets(part.locators, start, supports)
-            scene = next(scene for scene in scenes if scene.station == part.station)
-            name = _supports_name(scene, parts[owner].part)
-            stiffness = np.where(part.locators.springy, part.locators.stiffness, np.inf)[supports]
-            numbers = start + supports
-            yield ContactPoints(name, int(owner), part.parent, P, P, n, offsets, locators=numbers, stiffness=stiffness)
-        start += len(part.locators)
-
-
-def _support_offsets(locators: Locators, start: int, supports: np.ndarray) -> Offsets:
-    """Return the heights of supports: their own deviations, columns `start` on, and those of the faces they stand against."""
-    offsets = [Offsets(start + supports, np.eye(len(supports)))]
-    for place, number in enumerate(supports):
-        columns, factors = locators.pushes(number)
-        if columns.size:
-            matrix = np.zeros((len(columns), len(supports)))
-            matrix[:, place] = factors
-            offsets.append(Offsets(columns, matrix))
-    return Offsets.joined(offsets, len(supports)) if len(offsets) > 1 else offsets[0]
 
 
 def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> NominalPart | None:
@@ -272,7 +246,9 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> 
     if location is not None and not any(location.faults()):
         if isinstance(location.scheme, ThreeTwoOne):
             if all(mentioned in meshes for mentioned in location.mentioned):
-                locators = faults.attempt(designation("part", part), scheme_locators, location.scheme, meshes) or ()
+                placements = [placement_of(face.part) for face in location.faces] if location.joint else ()
+                place = designation(location.noun, location if location.joint else part)
+                locators = faults.attempt(place, scheme_locators, location.scheme, meshes, placements) or ()
         else:
             locators = location.scheme
     common = location.tolerance if location else None
@@ -292,7 +268,7 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> 
         locators=nominal,
         scheme=location.scheme if len(nominal) and location is not None else None,
         parent=scene.parent(part),
-        free=is_free(scene.assembly, part),
+        free=is_free(scene.assembly, part, springs=scene.presses),
         located=scene.label(location.name if location else part.name),
         movers=scene.movers(part),
         station=scene.station,
@@ -320,6 +296,7 @@ def _locators(
         rows = [other is owner for other in owners]
         R_WP, t_WP = placement_of(owner)
         points[rows], directions[rows] = points[rows] @ R_WP.T + t_WP, directions[rows] @ R_WP.T
+    may_give = np.array([locator.one_sided or scene.presses for locator in declared], dtype=bool)
     return Locators(
         labels=tuple(scene.label(f"{location.name if location else part.name}.{locator.name}") for locator in declared),
         points=points,
@@ -327,18 +304,18 @@ def _locators(
         tolerances=tuple(locator.tolerance or common or Tolerance(0.0) for locator in declared),
         stiffness=np.array([float(locator.stiffness or USUAL_STIFFNESS) for locator in declared]),
         one_sided=np.array([locator.one_sided for locator in declared], dtype=bool),
-        springy=np.array([locator.is_springy for locator in declared], dtype=bool),
+        springy=np.array([locator.stiffness is not None for locator in declared], dtype=bool) & may_give,
         faces=(None,) * len(declared),
         grounds=(None,) * len(declared),
         placing=location.placing if location else FIRST_ORDER,
     )
 
 
-def _immovable_pairs(assembly: Assembly) -> list[str]:
+def _immovable_pairs(scene: Scene) -> list[str]:
     """Return a fault for each pair that no free part can open."""
     return [
         f"{designation('contact pair', pair)}: contact cannot move its sides relative to each other; "
         f'declare part "{pair.moving.part.name}" free (fixed=False)'
-        for pair in assembly.pairs
-        if movers(assembly, pair.moving.part) == movers(assembly, pair.reference.part)
+        for pair in scene.assembly.pairs
+        if scene.movers(pair.moving.part) == scene.movers(pair.reference.part)
     ]

@@ -1,6 +1,6 @@
 """Locators with numbers, the locator matrix by which they place their part, and the locators of a 3-2-1 scheme."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,12 +8,13 @@ import numpy as np
 from tolcontact.declaration import Face, Locator, ThreeTwoOne, Tolerance
 from tolcontact.declaration.locator import BEST_FIT, FIRST_ORDER
 from tolcontact.errors import GeometryFault
-from tolcontact.features import FaceDeviation
+from tolcontact.features import FaceDeviation, Placement
 from tolcontact.geometry.faces import Meshes, patch
 
 MAX_CONDITION = 1e8
 MIN_DETERMINANT = 0.1  # of the normals of three faces that count as independent
 SCHEME_NAMES = ("A1", "A2", "A3", "B1", "B2", "C1")
+FACES_OF_SCHEME = (0, 0, 0, 1, 1, 2)  # primary, secondary, tertiary
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +27,7 @@ class Locators:
     tolerances   one for each locator
     stiffness    (locator,) [N/mm]
     one_sided    (locator,) bool: supports that the part may lift off
-    springy      (locator,) bool: supports that give way by their stiffness
+    springy      (locator,) bool: locators that give way by their stiffness
     faces        for each locator the face of a feature that it stands against; None for a nominal face
     grounds      for each locator the feature of another part that it is on; None if it is on no feature
     floating     middle (3,) and size [mm] of a floating part; None for a part that its locators fix
@@ -63,6 +64,11 @@ class Locators:
             faces=tuple(face for part in parts for face in part.faces),
             grounds=tuple(ground for part in parts for ground in part.grounds),
         )
+
+    @property
+    def exact(self) -> np.ndarray:
+        """Whether locators hold both ways, and do not give way (locator,)."""
+        return ~self.one_sided & ~self.springy
 
     def pushes(self, locator: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the columns (k,) of deviations by which features push the part at a locator, and how far for 1 (k,).
@@ -148,13 +154,17 @@ class Locators:
             )
 
 
-def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes) -> tuple[Locator, ...]:
+def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Placement] = ()) -> tuple[Locator, ...]:
     """Return the six locators of a 3-2-1 scheme, in the part's own frame; directions point into the part.
+
+    Each face of a joint belongs to a part of its own, with these `placements`; so do its locators.
 
     Each face is taken as its bounding rectangle along the edges that it shares with the other two. Raises GeometryFault if the
     three faces are not independent, or the inset leaves no room.
     """
-    corners, normals = zip(*(_vertices_and_normal(face, meshes) for face in scheme.faces), strict=True)
+    local = [_vertices_and_normal(face, meshes) for face in scheme.faces]
+    placed = [(v @ R.T + t, R @ n) for (v, n), (R, t) in zip(local, placements, strict=True)] if placements else local
+    corners, normals = zip(*placed, strict=True)
     outward = np.array(normals)
     if abs(np.linalg.det(outward)) < MIN_DETERMINANT:
         raise GeometryFault(
@@ -176,8 +186,13 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes) -> tuple[Locator, ...]:
         _place(edges, outward, secondary, 1, {0: _middle(secondary, a), 2: side_far}),
         _place(edges, outward, tertiary, 2, {0: _middle(tertiary, a), 1: _middle(tertiary, b)}),
     ]
-    directions = -outward[[0, 0, 0, 1, 1, 2]]
-    return tuple(Locator(name, p, n) for name, p, n in zip(SCHEME_NAMES, points, directions, strict=True))
+    directions = -outward[list(FACES_OF_SCHEME)]
+    if not placements:
+        return tuple(Locator(name, p, n) for name, p, n in zip(SCHEME_NAMES, points, directions, strict=True))
+    return tuple(
+        Locator(name, (p - placements[face][1]) @ placements[face][0], n @ placements[face][0], part=scheme.faces[face].part)
+        for name, p, n, face in zip(SCHEME_NAMES, points, directions, FACES_OF_SCHEME, strict=True)
+    )
 
 
 def _vertices_and_normal(face: Face, meshes: Meshes) -> tuple[np.ndarray, np.ndarray]:

@@ -69,8 +69,8 @@ class Offsets:
 class ContactPoints:
     """Contact points of one pair, fixed for all realizations: P^m, P^r, n^r of the paper, each (point, 3).
 
-    The one-sided locators of a part are a pair of this kind, too. Its reference is the part that it is located on, or None for
-    the ground. It has no faces, and its offsets are the locators' deviations.
+    The one-sided locators of a part are a pair of this kind, too, and so is each two-sided locator that gives way. Their
+    reference is the part that they are on, or None for the ground. They have no faces; their offsets are the deviations.
 
     moving_face, reference_face   in their nominal places
     facets      [mm] largest distance between their triangles and the round faces that these approximate
@@ -78,7 +78,8 @@ class ContactPoints:
     deviating   deviations of the moving and the reference face, if these belong to features; their heights at fixed points are
                 among the offsets
     locators    (point,) numbers of the one-sided locators
-    stiffness   (point,) [N/mm] of one-sided locators, infinite if they are rigid; None for faces
+    stiffness   (point,) [N/mm] of springs, infinite for rigid one-sided locators; None for rigid faces
+    pulls       (point,): whether the spring at a point pulls, of a two-sided locator; None if none does
     """
 
     name: str
@@ -95,6 +96,7 @@ class ContactPoints:
     deviating: tuple[FaceDeviation | None, FaceDeviation | None] = (None, None)
     locators: np.ndarray | None = None
     stiffness: np.ndarray | None = None
+    pulls: np.ndarray | None = None
 
     @cached_property
     def facing(self) -> np.ndarray:
@@ -197,7 +199,7 @@ class ContactPoints:
 
     @property
     def is_supports(self) -> bool:
-        """Whether the points are one-sided locators."""
+        """Whether the points are locators."""
         return self.reference_face is None
 
 

@@ -13,11 +13,13 @@ class Scene:
     assembly   what it declares
     station    its name; empty for an assembly without stations
     first      index of its first part among the parts of all scenes
+    presses    whether forces press the parts, so that two-sided locators with a stiffness give way
     """
 
     assembly: Assembly
     station: str
     first: int
+    presses: bool
 
     def index(self, part: Part) -> int:
         """Return the index of a part of the scene among the parts of all scenes."""
@@ -32,19 +34,19 @@ class Scene:
 
     def movers(self, part: Part) -> tuple[int, ...]:
         """Return the indices of the free parts whose corrections move a part."""
-        return tuple(map(self.index, movers(self.assembly, part)))
+        return tuple(map(self.index, movers(self.assembly, part, springs=self.presses)))
 
     def label(self, name: str) -> str:
         """Return the name of something in this scene that is declared anew in each station."""
         return f"{self.station}.{name}" if self.station else name
 
 
-def scenes_of(assembly: Assembly) -> tuple[Scene, ...]:
+def scenes_of(assembly: Assembly, *, presses: bool) -> tuple[Scene, ...]:
     """Return the scenes of an assembly, in the order of its stations."""
     models = assembly.scenes
     names = [station.name for station in assembly.stations] or [""]
     starts = [sum(len(earlier.parts) for earlier in models[:k]) for k in range(len(models))]
-    return tuple(map(Scene, models, names, starts))
+    return tuple(Scene(*scene, presses) for scene in zip(models, names, starts, strict=True))
 
 
 def carried(scenes: Sequence[Scene], scene: Scene, part: Part) -> tuple[int, int] | None:

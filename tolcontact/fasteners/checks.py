@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from tolcontact.declaration import Assembly, Face, Feature, Part, Size
+from tolcontact.declaration import Assembly, Face, Feature, Part, Size, Station
 from tolcontact.declaration.values import is_finite, is_length, vector
 from tolcontact.fasteners.fit import INTO, SEAT
 
@@ -25,6 +25,12 @@ def check_types(name: str, fastener: Any, through: Any, into: Any, seat: Any, dr
             raise TypeError(f'fasten "{name}": {label} is a {type(value).__name__}; expected {expected}')
     if not isinstance(drift, bool):
         raise TypeError(f'fasten "{name}": drift is a {type(drift).__name__}; expected True or False')
+
+
+def station_faults(assembly: Assembly, scene: Assembly | Station) -> Iterator[str]:
+    """Yield the fault of a fastener that an assembly with stations declares by itself."""
+    if assembly.stations and scene is assembly:
+        yield f"it belongs to no station; declare it in one: {assembly.stations[0].name}.fasten(...)"
 
 
 def reference_faults(

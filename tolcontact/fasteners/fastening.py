@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tolcontact.declaration import Assembly, Cylinder, Face, Feature, Part, Pin, Size
+from tolcontact.declaration import Assembly, Cylinder, Face, Feature, Part, Pin, Size, Station
 from tolcontact.declaration.part import face_of
 from tolcontact.declaration.values import script_line
 from tolcontact.errors import GeometryFault, ModelError
-from tolcontact.fasteners.checks import check_types, reference_faults
+from tolcontact.fasteners.checks import check_types, reference_faults, station_faults
 from tolcontact.fasteners.fit import INTO, SEAT, Fit, made_fit, part_fit
 from tolcontact.fasteners.location import DIGITS, declare_drift, in_part, locate
 from tolcontact.fasteners.placed_faces import PlacedCylinder, placed_cylinder, placed_plane
@@ -42,6 +42,7 @@ class Faults:
 
 def fasten(
     assembly: Assembly,
+    scene: Assembly | Station,
     name: str,
     fastener: Part | Face | Feature | Size | float,
     *,
@@ -51,13 +52,17 @@ def fasten(
     pushed: Any,
     drift: bool,
 ) -> Part:
-    """Declare what a fastener consists of, and return its part (see Assembly.fasten). Raises ModelError with all its faults."""
+    """Declare what a fastener consists of, and return its part (see Assembly.fasten). Raises ModelError with all its faults.
+
+    Its part belongs to the assembly, and its location, contacts and force to the `scene`: the assembly, or one of its stations.
+    """
     check_types(name, fastener, through, into, seat, drift)
     shank = face_of(fastener) if isinstance(fastener, Face | Feature) else None
     subject: Part | Size | float = fastener.part if isinstance(fastener, Face | Feature) else fastener
     faces = {f"through[{k}]": face_of(hole) for k, hole in enumerate(through)} | ({INTO: face_of(into)} if into else {})
     plane_face = face_of(seat) if seat else None
     faults = Faults(assembly, name)
+    faults.add(station_faults(assembly, scene))
     faults.add(reference_faults(assembly, subject, faces, plane_face, pushed, drift=drift))
     faults.refuse()
     holes = {label: faults.attempt(label, _hole, face) for label, face in faces.items()}
@@ -73,14 +78,14 @@ def fasten(
         faults.add([f"drift: the tightest hole is as wide as the fastener, {2 * fit.radius:.6g} mm; leave drift out"])
     faults.refuse()
     part = subject if isinstance(subject, Part) else _made_part(assembly, name, subject, fit)
-    _declare_contacts(assembly, name, fit.shank or _shank_face(part, fit), fit)
+    _declare_contacts(scene, name, fit.shank or _shank_face(part, fit), fit)
     if drift:
-        declare_drift(assembly, name, part, fit)
+        declare_drift(assembly, scene, name, part, fit)
     else:
-        locate(assembly, name, part, fit)
+        locate(scene, name, part, fit)
     if pushed is not None:
         middle = fit.axis.at(sum(fit.reach) / 2)
-        assembly.force(f"{name} push", at=part.point(*in_part(part, middle)), vector=pushed)
+        scene.force(f"{name} push", at=part.point(*in_part(part, middle)), vector=pushed)
     return part
 
 
@@ -107,7 +112,7 @@ def _made_part(assembly: Assembly, name: str, size: Size | float, fit: Fit) -> P
     return part
 
 
-def _declare_contacts(assembly: Assembly, name: str, shank: Face, fit: Fit) -> None:
+def _declare_contacts(scene: Assembly | Station, name: str, shank: Face, fit: Fit) -> None:
     """Declare contact of the shank with each hole that it passes through.
 
     Parts before the last one are moving sides, so that contact may move them. The last one holds the fastener, or is the
@@ -118,6 +123,6 @@ def _declare_contacts(assembly: Assembly, name: str, shank: Face, fit: Fit) -> N
         if label == INTO:
             continue
         if hole is list(fit.holes.values())[-1]:
-            assembly.contact(pair, moving=shank, reference=hole.face)
+            scene.contact(pair, moving=shank, reference=hole.face)
         else:
-            assembly.contact(pair, moving=hole.face, reference=shank)
+            scene.contact(pair, moving=hole.face, reference=shank)

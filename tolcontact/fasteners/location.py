@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tolcontact.declaration import Assembly, Face, Feature, Locator, Part, Tolerance
+from tolcontact.declaration import Assembly, Face, Feature, Locator, Part, Station, Tolerance
 from tolcontact.fasteners.fit import INTO, Fit
 from tolcontact.fasteners.placed_faces import PlacedCylinder, PlacedPlane, meshes_of, placement
 from tolcontact.geometry.faces import face_area
@@ -16,33 +16,33 @@ SAME_FACE = 1 - 1e-6  # share of its area that a face has in common with that of
 PLACES = 1000  # in a clearance
 
 
-def locate(assembly: Assembly, name: str, part: Part, fit: Fit) -> None:
+def locate(scene: Assembly | Station, name: str, part: Part, fit: Fit) -> None:
     """Locate a fastener in the hole that holds it, or let it float: with its head on its seat, or held at an end alone."""
     if INTO in fit.holes:
         ground = _feature_of(fit.holes[INTO].face, f"{name} hole")
-        assembly.locate(part, list(_hole_locators(part, fit, fit.holes[INTO])), on=ground)
+        scene.locate(part, list(_hole_locators(part, fit, fit.holes[INTO])), on=ground)
     elif fit.seat is not None:
         ground = _feature_of(fit.seat.face, f"{name} seat")
-        assembly.locate(part, list(_seat_locators(part, fit, fit.seat)), on=ground, floating=True)
+        scene.locate(part, list(_seat_locators(part, fit, fit.seat)), on=ground, floating=True)
     else:
         first = next(iter(fit.holes.values()))
         end = _locator(part, "end", fit.axis.at(fit.reach[1]), fit.axis.head)
-        assembly.locate(part, [end], on=first.face.part, floating=True)
+        scene.locate(part, [end], on=first.face.part, floating=True)
 
 
-def declare_drift(assembly: Assembly, name: str, part: Part, fit: Fit) -> None:
+def declare_drift(assembly: Assembly, scene: Assembly | Station, name: str, part: Part, fit: Fit) -> None:
     """Locate a fastener at a random place in the clearance of its tightest hole, parallel to the axis of the hole.
 
     The places are rows of a population: they fill the disc evenly, and one is drawn for each realization.
     """
     hole, (x, y) = fit.tightest, fit.axis.across
-    assembly.locate(part, list(_hole_locators(part, fit, hole)), on=_feature_of(hole.face, f"{name} hole"))
+    location = scene.locate(part, list(_hole_locators(part, fit, hole)), on=_feature_of(hole.face, f"{name} hole"))
     offset = fit.axis.at(fit.axis.station(hole.middle)) - hole.middle
-    columns = {}
+    columns, place = {}, f"{location.station}.{part.name}" if location.station else part.name
     drivers = {"x": (x, ("x1", "x2")), "y": (y, ("y1", "y2", "turn"))}
     for (letter, (direction, names)), places in zip(drivers.items(), fit.clearance * even_disc(PLACES).T, strict=True):
         label = f"{name} drift {letter}"
-        drives = {f"{part.name}.{locator}": 1.0 for locator in names}
+        drives = {f"{place}.{locator}": 1.0 for locator in names}
         assembly.variable(label, Tolerance(2 * fit.clearance, "uniform"), drives=drives)
         columns[label] = np.round(places - offset @ direction, DIGITS)
     assembly.population(columns)

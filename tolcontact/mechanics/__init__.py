@@ -68,7 +68,7 @@ measured from the raw state.
 | "all points" (default if exact) | 1/2 sum of squared displacements of all contact points |
 | "active points" (default if linearized) | the same sum over the contact points that penetrated |
 | "locator stiffness" | energy 1/2 sum k e^2 of the two-sided locators as springs |
-| "seating" | potential energy of the declared forces, with two-sided locators exact |
+| "seating" | potential energy of the declared forces and of springs, with other two-sided locators exact |
 
 | objective | choose it if |
 |---|---|
@@ -84,10 +84,26 @@ The objective determines the result, so every archive states it. For "seating" a
 all contact points keeps the problem convex. This term takes over part of the load: about 0.1 % times (travel / size of the
 contact).
 
-A one-sided locator with a `stiffness` k [N/mm] is a spring that pushes only. With the reactions lambda [N] and C = 1/k, the QP
-has 1/2 lambda' C lambda more in its objective, and the row g + A dq + C lambda >= 0. So `gap_min` of these supports is negative
-by the largest compression, and a realization is resolved only if poses and reactions obey lambda = k max(0, -g). The small
-multiple then counts from the pose of the last step, and takes no load.
+A one-sided locator with a `stiffness` k [N/mm] is a spring that pushes only, and so is each point of a contact pair with a
+`stiffness`, by the share of the area that it stands for. A two-sided locator with a `stiffness` is two springs at its point, of
+which one pushes and one pulls. With the reactions lambda [N] and C = 1/k, the QP has 1/2 lambda' C lambda more in its
+objective, and the row g + A dq + C lambda >= 0. So `gap_min` of such a pair is negative by the largest compression, and a
+realization is resolved only if poses and reactions obey lambda = k max(0, -g). The small multiple then counts from the pose of
+the last step, and takes no load. Springs of a pair stay at their points of the moving face, and push against the plane of the
+other face, also beyond its end. A load beside the middle of a pad sinks and tilts a machine:
+
+>>> pads = tc.Assembly("pads", method=tc.Method(objective="seating"))
+>>> floor = pads.part("floor", tc.Box(400, 300, 20), fixed=True)
+>>> machine = pads.part("machine", tc.Box(200, 100, 50), at=(0, 0, 20))
+>>> stops = [tc.Locator("B1", (20, 0, 0), "y"), tc.Locator("B2", (180, 0, 0), "y"), tc.Locator("C", (0, 50, 0), "x")]
+>>> location = pads.locate(machine, stops, tolerance=1, floating=True)
+>>> pad = pads.contact("pad", moving=machine.face("-z"), reference=floor.face("+z"), stiffness=5000)
+>>> weight = pads.force("weight", at=machine.point(120, 50, 0), vector=(0, 0, -1000))
+>>> for name, x in (("left", 0), ("right", 200)):
+...     measure = pads.measure(name, machine.point(x, 50, 0), along="z")
+>>> sunk = tc.run(pads, samples=8, fields="none", surfaces=0).measured.sel(state="corrected").mean("realization")
+>>> [round(float(height), 3) for height in sunk]  # F/k, and F e (b/2) / (k b^2/12)
+[-0.08, -0.32]
 
 `regularization` holds the degrees of freedom that the objective leaves open. "points" (default) adds `eta` = 1e-6 times the
 squared displacements of all contact points, and does not depend on where the assembly lies in space. "identity" is the paper's

@@ -64,7 +64,7 @@ def _springs(setting: Setting, poses: Sequence[Pose]) -> Energy:
     for part in setting.group.free:
         locators = setting.nominal.parts[part].locators
         start_elongation, end_elongation = (elongation(setting, part, poses, linear=True) for poses in (setting.raw, poses))
-        for k, e in zip(locators.stiffness[~locators.one_sided], ca.vertsplit(end_elongation - start_elongation), strict=True):
+        for k, e in zip(locators.stiffness[locators.exact], ca.vertsplit(end_elongation - start_elongation), strict=True):
             value += float(k) * e**2 / 2
             total += float(k)
     total = total or 1.0

@@ -90,7 +90,8 @@ def _locator_pose(part: NominalPart, d: ca.SX) -> Pose:
 def elongation(setting: Setting, part: int, poses: Sequence[Pose], *, linear: bool = False) -> ca.SX:
     """Return the distance (locator, 1) [mm] of each two-sided locator of a part from its nominal place, along its direction.
 
-    It is measured in the frame that the part is located on, and to first order in the increments if `linear`.
+    Locators that give way are left out. The distance is measured in the frame that the part is located on, and to first order
+    in the increments if `linear`.
     """
     group, entry = setting.group, setting.nominal.parts[part]
     owners = entry.owners or (part,) * len(entry.locators)
@@ -101,17 +102,21 @@ def elongation(setting: Setting, part: int, poses: Sequence[Pose], *, linear: bo
         return setting.linear(X_PM) if entry.parent is not None and linear else X_PM
 
     X_PM = {owner: pose(owner) for owner in dict.fromkeys(owners)}
-    exact = np.flatnonzero(~entry.locators.one_sided)
+    exact = np.flatnonzero(entry.locators.exact)
     P, n = entry.locators.points, entry.locators.directions
     return ca.vertcat(*(ca.dot(ca.DM(n[k]), X_PM[owners[k]].apply(ca.DM(P[k])) - ca.DM(P[k])) for k in exact))
 
 
 def misfit(setting: Setting, poses: Sequence[Pose], *, linear: bool = False) -> ca.SX:
-    """Return the elongations of the movers' two-sided locators less their deviations (locator, 1) [mm]."""
+    """Return the elongations of the movers' two-sided locators less their deviations (locator, 1) [mm].
+
+    Locators whose faces slide over them, or that a best fit averages, hold their part where they have placed it.
+    """
     errors = []
     for part in setting.group.free:
-        exact = ~setting.nominal.parts[part].locators.one_sided
-        if exact.any():
-            expected = locator_steps(setting.nominal, part, setting.deviations)[np.flatnonzero(exact).tolist()]
+        locators = setting.nominal.parts[part].locators
+        if locators.exact.any():
+            steps = locator_steps(setting.nominal, part, setting.deviations)[np.flatnonzero(locators.exact).tolist()]
+            expected = steps if locators.placing == FIRST_ORDER else elongation(setting, part, setting.raw)
             errors.append(elongation(setting, part, poses, linear=linear) - expected)
     return ca.vertcat(*errors) if errors else ca.SX(0, 1)

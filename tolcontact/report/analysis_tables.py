@@ -52,9 +52,8 @@ def archived_analysis(results: xr.DataTree, record: terms.AnalysisRecord) -> xr.
         return None
     group = f"{terms.ANALYSES_GROUP}/{record.name}"
     dataset = results[group].to_dataset()
-    variables = {variable.name: variable for variable in record.variables}
     for name, array in dataset.data_vars.items():
-        variable = variables.get(str(name))
+        variable = record.known.get(str(name))
         if variable is None or crc32(variable, array.values) != int(array.attrs.get(terms.CHECKSUM, -1)):
             raise ArchiveError(f"{group}/{name} in the archive is not what was written")
     return dataset

@@ -95,6 +95,7 @@ def _locators(document: Entry, results: xr.DataTree) -> ModelTable:
     dim = sample[terms.TOLERANCE_RANGE.name].dims[0]
     numbers = {str(label): k for k, label in enumerate(sample[dim].values)}
     rows: list[list[Cell]] = []
+    giving = _giving(results["contact"].to_dataset())
     for k, label in enumerate(labels):
         part, _, name = label.rpartition(".")
         at, along = (sample[v.name].values[k] for v in (terms.LOCATOR_POINT, terms.LOCATOR_DIRECTION))
@@ -103,9 +104,19 @@ def _locators(document: Entry, results: xr.DataTree) -> ModelTable:
         distribution = str(sample[terms.DISTRIBUTION.name].values[numbers[label]]) if is_stated else ""
         one_sided = terms.ONE_SIDED.name in sample and bool(sample[terms.ONE_SIDED.name].values[k])
         kind = "one-sided" if one_sided else "two-sided"
+        if k in giving:
+            kind += f", {float(sample[terms.STIFFNESS.name].values[k]):g} N/mm"
         rows.append([part, name, _triple(at), _triple(along), width if math.isfinite(width) else None, distribution, kind])
     columns = ["part", "locator", "point, mm", "direction", f"{terms.ZONE_WIDTH}, mm", "distribution", "held"]
     return ModelTable("Locators", columns, rows)
+
+
+def _giving(contact: xr.Dataset) -> set[int]:
+    """Return the numbers of the locators that give way."""
+    if terms.POINT_STIFFNESS.name not in contact:
+        return set()
+    gives = np.isfinite(contact[terms.POINT_STIFFNESS.name].values)
+    return set(contact[terms.LOCATOR_OF_POINT.name].values[gives].tolist())
 
 
 def _pairs(document: Entry, results: xr.DataTree) -> ModelTable:
@@ -113,11 +124,19 @@ def _pairs(document: Entry, results: xr.DataTree) -> ModelTable:
     counts = np.zeros(0, dtype=int)
     if terms.PAIR_OF_POINT.name in contact:
         counts = np.bincount(contact[terms.PAIR_OF_POINT.name].values, minlength=len(document["pairs"]))
+    gives = any("stiffness" in pair for pair in document["pairs"])
     rows = [
-        [pair["name"], pair["moving"]["part"], pair["reference"]["part"], float(counts[k]) if k < len(counts) else None]
+        [
+            pair["name"],
+            pair["moving"]["part"],
+            pair["reference"]["part"],
+            float(counts[k]) if k < len(counts) else None,
+            *([pair.get("stiffness")] if gives else []),
+        ]
         for k, pair in enumerate(document["pairs"])
     ]
-    return ModelTable("Contact pairs", ["contact pair", "moving part", "reference part", "contact points"], rows)
+    columns = ["contact pair", "moving part", "reference part", "contact points", *(["stiffness, N/mm"] if gives else [])]
+    return ModelTable("Contact pairs", columns, rows)
 
 
 def _measurements(document: Entry, results: xr.DataTree) -> ModelTable:

@@ -152,7 +152,7 @@ def _put(block: Block, resolver: ContactResolver, resolved: Resolved) -> None:
     block.poses[touched[:, None], CORRECTED, resolver.parts] = state.poses
     block.gap_min[:, :, pairs], block.active[:, pairs] = resolved.gap_min, resolved.active
     block.carrying[np.ix_(touched, pairs)] = resolved.carrying(resolver.spans)
-    block.reaction[np.ix_(touched, pairs)] = resolved.reactions(resolver.spans)
+    block.reaction[np.ix_(touched, pairs)] = resolved.reactions(resolver.spans, resolver.contact_points)
     join_groups(block, touched, state)
 
 

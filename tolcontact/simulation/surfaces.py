@@ -18,7 +18,7 @@ FAR = 1.0  # mm: range in its place if nothing is toleranced
 
 
 class Surfaces(NamedTuple):
-    """Results of the check at some poses, each (row, pair); NaN for pairs that are not faces.
+    """Results of the check at some poses, each (row, pair); NaN for pairs that are not faces, or give way.
 
     penetration     largest depth of one face in the other's body, seen at many points of both [mm]
     overhang        how far contact points that touch stand beside the rim of the reference face, which is not there [mm]
@@ -46,7 +46,7 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviation
     raw_relative = program.observe(poses=raw, deviations=deviations)["relative"].reshape(relative.shape)
     for k, pair in enumerate(nominal.pairs):
         faces = nominal.face_pair(k)
-        if faces is None or pair.reference is None:
+        if faces is None or pair.reference is None or pair.is_springy:  # what gives way may be inside
             continue
         X_RM, heights = relative[:, k], pair.heights(deviations)
         form = pair.form(deviations) if pair.has_form else None

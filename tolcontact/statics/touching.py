@@ -19,7 +19,7 @@ GROUND = -1
 class Contact(NamedTuple):
     """A locator, or a contact pair that touches.
 
-    moving, reference   numbers of the parts; GROUND for the ground
+    moving, reference   numbers of the parts; GROUND for the ground. A joint has that of the part that carries it
     points, normals     (point, 3) [mm] and (point, 3): where it holds the moving part, and unit vectors into that part
     is_guide            whether it holds both ways, without friction
     mu                  stated coefficient of friction; None if none is stated
@@ -80,24 +80,33 @@ def contacts_at(nominal: Nominal, poses: np.ndarray, places: Sequence[Places]) -
     declared = nominal.assembly.pairs
     loads = np.zeros((len(nominal.parts), 6))
     for force in nominal.assembly.forces:
-        part = nominal.part_index(force.at.part)
+        part = nominal.part_index(force.at.part, force.station)
         at = pose.apply(poses[part], nominal.position(force.at)[None])
-        loads[part] += wrenches(at, np.array([force.vector]))[0]
+        loads[_body(nominal, part)] += wrenches(at, np.array([force.vector]))[0]
     return Touching(
         (*_locator_contacts(nominal, poses), *_pair_contacts(nominal, places)),
         tuple(pair.name for pair, touched in zip(declared, places, strict=True) if not len(touched.points)),
         loads,
         float(sum(np.linalg.norm(force.vector) for force in nominal.assembly.forces)),
-        np.array([nominal.assembly.location_of(part.part) is not None for part in nominal.parts]),
+        np.array([nominal.assembly.location_of(part.part) is not None and part.carried is None for part in nominal.parts]),
     )
+
+
+def _body(nominal: Nominal, part: int) -> int:
+    """Return the part that carries a part of a joint, or the part itself."""
+    entry = nominal.parts[part]
+    return part if entry.carried is None or entry.parent is None else entry.parent
 
 
 def _locator_contacts(nominal: Nominal, poses: np.ndarray) -> Iterator[Contact]:
     """Yield the locators of all parts."""
     for number, part in enumerate(nominal.parts):
-        locators, parent = part.locators, GROUND if part.parent is None else part.parent
+        locators, ground = part.locators, GROUND if part.parent is None else part.parent
         points = pose.apply(poses[number], locators.points)
-        directions = locators.directions if parent == GROUND else locators.directions @ pose.rotation(poses[parent]).T
+        for locator, owner in enumerate(part.owners):
+            points[locator] = pose.apply(poses[owner], locators.points[locator, None])[0]
+        directions = locators.directions if ground == GROUND else locators.directions @ pose.rotation(poses[ground]).T
+        parent = ground if ground == GROUND else _body(nominal, ground)
         for label, point, direction, one_sided in zip(locators.labels, points, directions, locators.one_sided, strict=True):
             yield Contact(label, number, parent, point[None], direction[None], not one_sided, nominal.assembly.mu)
 
@@ -105,7 +114,8 @@ def _locator_contacts(nominal: Nominal, poses: np.ndarray) -> Iterator[Contact]:
 def _pair_contacts(nominal: Nominal, places: Sequence[Places]) -> Iterator[Contact]:
     """Yield the pairs that touch; points that cannot carry more than others do are left out."""
     for declared, (points, normals) in zip(nominal.assembly.pairs, places, strict=True):
-        moving, reference = (nominal.part_index(face.part) for face in (declared.moving, declared.reference))
+        sides = (nominal.part_index(face.part, declared.station) for face in (declared.moving, declared.reference))
+        moving, reference = (_body(nominal, side) for side in sides)
         corners, mu = carrying(points, normals), nominal.assembly.mu if declared.mu is None else declared.mu
         if len(corners):
             yield Contact(declared.name, moving, reference, points[corners], normals[corners], False, mu)

@@ -31,7 +31,7 @@ def summary_table(results: Results) -> Table:
         **_status_values(rows),
         **_contact_values(rows, combinations),
         terms.STEPS: _steps(rows),
-        terms.PENETRATION: _penetration(rows),
+        terms.PENETRATION: _penetration(rows, _is_rigid(results)),
         **surface_values(results, terms.NOTICED_SHARE * smallest),
         **_field_values(results),
     }
@@ -127,12 +127,21 @@ def _field_values(results: Results) -> dict[ArchiveVariable, Any]:
     }
 
 
-def _penetration(rows: Rows) -> np.ndarray:
-    """Return the largest penetration of any contact point in each state [mm]."""
-    if not rows[terms.GAP_MIN.name].size:
+def _is_rigid(results: Results) -> np.ndarray:
+    """Return whether no point of a pair gives way (pair,)."""
+    rigid = np.ones(results.to_dataset().sizes[terms.PAIR], dtype=bool)
+    if terms.POINT_STIFFNESS.name in (contact := results["contact"].to_dataset()):
+        gives = np.isfinite(contact[terms.POINT_STIFFNESS.name].values)
+        rigid[contact[terms.PAIR_OF_POINT.name].values[gives]] = False
+    return rigid
+
+
+def _penetration(rows: Rows, rigid: np.ndarray) -> np.ndarray:
+    """Return the largest penetration of any contact point of the `rigid` pairs (pair,) in each state [mm]."""
+    if not (rows[terms.GAP_MIN.name].size and rigid.any()):
         return np.zeros(len(terms.STATES))
-    gaps = (piece[terms.GAP_MIN.name].transpose(terms.STATE, ...).values for piece in pieces(rows))
-    return np.maximum(-np.min([np.fmin.reduce(gap, axis=(1, 2)) for gap in gaps], axis=0), 0)
+    gaps = (piece[terms.GAP_MIN.name].transpose(terms.STATE, ..., terms.PAIR).values for piece in pieces(rows))
+    return np.maximum(-np.min([np.fmin.reduce(gap[..., rigid], axis=(1, 2)) for gap in gaps], axis=0), 0)
 
 
 def _steps(rows: Rows) -> list[float]:

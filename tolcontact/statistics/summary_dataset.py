@@ -25,7 +25,7 @@ def summarize(results: Results) -> Summary:
     by_status       (status_meaning)                     number of realizations
     not_assemblable (interval)                           share of realizations without a pose free of penetration
     conflicts       (pair)                               in how many of these a pair is among those in conflict
-    penetration     (state)                              largest true penetration of any contact point [mm]
+    penetration     (state)                              largest true penetration in a pair that does not give way [mm]
     surface_penetration, beside   largest of the realizations that were checked against the surfaces [mm]: how deep a face lies
                                   in the other body, and how far contact points that touch stand beside the face
     surfaces_checked              number of these realizations

@@ -169,6 +169,10 @@ class ArchivedFaces:
         moved = tau + centre - turned @ centre
         return R @ turned[:, None], np.einsum("...ij,...j->...i", R, moved[:, None]) + t
 
+    def directions(self, locators: np.ndarray) -> np.ndarray:
+        """Return the directions (locator, 3) of locators."""
+        return np.asarray(self._sample[terms.LOCATOR_DIRECTION.name][locators])
+
     def pushes(self, locators: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         """Return how far locators move their parts (realization, locator) [mm]."""
         pushes = deviations[:, locators].copy()
@@ -248,7 +252,9 @@ class ArchivedPair:
             gaps -= self.faces.form(self.reference_face, deviations, self.reference_point)[:, None]
         supports = self.locators >= 0
         if supports.any():
-            gaps[..., supports] -= self.faces.pushes(self.locators[supports], deviations)[:, None]
+            locators = self.locators[supports]
+            along = np.sign((self.normal[supports] * self.faces.directions(locators)).sum(axis=1))  # -1 of springs that pull
+            gaps[..., supports] -= (along * self.faces.pushes(locators, deviations))[:, None]
         return gaps
 
     def _form(self, deviations: np.ndarray, P_m: np.ndarray, P_r: np.ndarray) -> np.ndarray:

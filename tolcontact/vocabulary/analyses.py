@@ -15,6 +15,7 @@ from tolcontact.vocabulary.labels import (
     STATUS_MEANINGS,
     ArchiveVariable,
 )
+from tolcontact.vocabulary.stations import STATION_POSES
 from tolcontact.vocabulary.summary import ESTIMATE, INTERVAL, OUTSIDE
 
 ANALYSES_GROUP = "statistics"  # the group of an archive that holds a group for each analysis
@@ -34,11 +35,20 @@ FIXED_LABELS = {
 
 @dataclass(frozen=True, eq=False)
 class AnalysisRecord:
-    """The form in which an analysis is returned and archived; `title` is a format of the assembly's name and of attributes."""
+    """The form in which an analysis is returned and archived; `title` is a format of the assembly's name and of attributes.
+
+    Variables `of_stations` are only those of an assembly that is built in stations.
+    """
 
     name: str
     title: str
     variables: tuple[ArchiveVariable, ...]
+    of_stations: tuple[ArchiveVariable, ...] = ()
+
+    @property
+    def known(self) -> dict[str, ArchiveVariable]:
+        """All variables by name."""
+        return {variable.name: variable for variable in (*self.variables, *self.of_stations)}
 
     @property
     def dims(self) -> tuple[str, ...]:
@@ -122,6 +132,7 @@ WORST_CASE = AnalysisRecord(
             for variable in (MEASURED, TRANSLATION, ROTATION, GAP_MIN, KKT_RESIDUAL, STATUS)
         ),
     ),
+    of_stations=tuple(replace(variable, dims=(CASE, *variable.dims[1:])) for variable in STATION_POSES),
 )
 TAILS = AnalysisRecord(
     "tails",

@@ -245,6 +245,9 @@ REFERENCE_NORMAL = ArchiveVariable(
     "reference_normal", (POINT, AXIS), "f8", "n^r: outward unit normal of the reference part there, nominal", "1"
 )
 
+POINT_STIFFNESS = ArchiveVariable(
+    "point_stiffness", (POINT,), "f8", "stiffness of a contact point that gives way; infinite: it is rigid", "N mm-1"
+)
 LOCATOR_OF_POINT = ArchiveVariable(
     "locator_of_point",
     (POINT,),

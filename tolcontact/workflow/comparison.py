@@ -14,7 +14,8 @@ import xarray as xr
 from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.archive import check_rows, open_archive
 from tolcontact.compilation import Program, compile_program
-from tolcontact.discretization import Nominal, discretize
+from tolcontact.declaration import Assembly
+from tolcontact.discretization import discretize
 from tolcontact.errors import OptionError
 from tolcontact.method import USUAL_SEARCH, Method
 from tolcontact.plausibility import warn_of_nominal
@@ -64,9 +65,9 @@ def compare(
     for option, names in {"solvers": solvers, "methods": resolved_by}.items():
         if not names or len(set(names)) < len(names):
             raise OptionError(f"{option}: {', '.join(map(str, names)) or 'none'}; name at least one, and each once")
-    nominal, blocks = discretize(assembly), mapping(client)
     contestants = [(solver, method) for method in resolved_by for solver in solvers]
-    programs = _programs(nominal, contestants)
+    programs, blocks = _programs(assembly, contestants), mapping(client)
+    nominal = programs[0].nominal
     kept = 2 + 12 * len(nominal.parts) + len(nominal.measures) + len(nominal.pairs)
     for program in programs:
         check_affordable(program, samples=samples, seed=seed, threads=threads_of(client), kept=kept)
@@ -93,9 +94,11 @@ def compare(
     )
 
 
-def _programs(nominal: Nominal, contestants: Sequence[tuple[str, Method]]) -> list[Program]:
+def _programs(assembly: Assembly, contestants: Sequence[tuple[str, Method]]) -> list[Program]:
     """Return the program of each solver and method, and warn of what is probably a mistake in the nominal assembly."""
-    programs = [compile_program(nominal, solver, method) for solver, method in contestants]
+    presses = dict.fromkeys(method.minimizes.presses for _, method in contestants)
+    nominals = {choice: discretize(assembly, presses=choice) for choice in presses}
+    programs = [compile_program(nominals[method.minimizes.presses], solver, method) for solver, method in contestants]
     warn_of_nominal(programs[0])
     return programs
 
@@ -117,7 +120,9 @@ def _timed_results(program: Program, blocks: MapBlocks, samples: int, seed: int)
     results = list(blocks(_compared, program, samples=samples, seed=seed))
     seconds = time.perf_counter() - start
     names = ("status", "kkt_residual", "poses", "measured", "gap_min")
-    return {"seconds": seconds, **dict(zip(names, map(np.concatenate, zip(*results, strict=True)), strict=True))}
+    arrays = dict(zip(names, map(np.concatenate, zip(*results, strict=True)), strict=True))
+    rigid = [not pair.is_springy for pair in program.nominal.pairs]  # what gives way does not penetrate
+    return {"seconds": seconds, **arrays, "gap_min": arrays["gap_min"][:, rigid]}
 
 
 def _compared(block: Block) -> tuple[np.ndarray, ...]:

@@ -30,7 +30,8 @@ def build(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None =
     Raises ModelError with all faults of the model, and OptionError for a solver or a method that cannot be used.
     """
     assembly, method_of_run = _loaded(model) if isinstance(model, str | Path) else (assembly_of(model), None)
-    program = compile_program(discretize(assembly), solver, method_of(assembly, method, method_of_run))
+    choice = method_of(assembly, method, method_of_run)
+    program = compile_program(discretize(assembly, presses=choice.minimizes.presses), solver, choice)
     warn_of_nominal(program)
     return program
 

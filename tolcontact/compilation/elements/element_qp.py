@@ -38,12 +38,12 @@ def has_elements(group: Group, method: Method) -> bool:
 
 
 class ElementQP:
-    """The QP of a group as ContactQP has it, by functions of its elements; it has no equations.
+    """The QP of a group as ContactQP has it, by functions of its elements; it has no equations and no springs.
 
     slacks, equations, standing, plugin, spans   as in ContactQP
     """
 
-    equations = 0
+    equations, has_springs = 0, False
 
     def __init__(
         self, nominal: Nominal, group: Group, gaps: Sequence[GapMap | None], method: Method, plugin: Plugin, standing: Standing

@@ -17,7 +17,7 @@ from tolcontact.report.html.decimation import coarser, triangle_budgets
 from tolcontact.report.html.feature_list import feature_lists
 from tolcontact.report.html.form_scene import MAX_GAPS, SingleStates
 from tolcontact.report.html.single_realizations import SingleRealization, single_realizations
-from tolcontact.report.html.station_scenes import station_poses, stations_of, stations_of_nominal
+from tolcontact.report.html.station_scenes import station_poses, stations_of, stations_of_nominal, worst_poses
 from tolcontact.statistics import touching
 
 Packed = dict[str, Any]
@@ -132,17 +132,15 @@ def _realizations(results: xr.DataTree, singles: list[SingleRealization]) -> Sce
 
 
 def _stations(results: xr.DataTree, singles: list[SingleRealization]) -> list[Scene]:
-    """Return the scenes of stations; archived worst cases, which have no poses there, are not drawn."""
+    """Return the scenes of stations, with the motions of archived worst cases, then of single realizations."""
     worst = archived_analysis(results, terms.WORST_CASE)
-    cases, order = (
-        0 if worst is None else worst.sizes[terms.CASE],
-        np.argsort([single.row for single in singles], kind="stable"),
-    )
+    order = np.argsort([single.row for single in singles], kind="stable")
     rows, rank = np.array([single.row for single in singles], dtype=int)[order], np.argsort(order, kind="stable")
     stations = stations_of(results)
     for station in stations:
         if (poses := station_poses(results, station["name"], rows)) is not None:
-            R, t = (np.pad(a[rank], [(cases, 0), *[(0, 0)] * (a.ndim - 1)], constant_values=np.nan) for a in poses)
+            cases = worst_poses(results, station["name"], worst)
+            R, t = (np.concatenate([of_cases, of_rows[rank]]) for of_cases, of_rows in zip(cases, poses, strict=True))
             station["motions"] = _motions(R - np.eye(3), t)
     return stations
 

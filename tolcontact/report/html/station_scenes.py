@@ -57,11 +57,39 @@ def station_poses(results: xr.DataTree, station: str, rows: np.ndarray) -> tuple
     group = results[terms.station_group(station)].to_dataset()
     if terms.STATION_ROTATION.name not in group:
         return None
-    parts = results.to_dataset()[terms.PART].values
-    positions = [parts.tolist().index(part) for part in group[terms.STATION_PART].values]
-    R = np.tile(np.eye(3), (len(rows), len(terms.STATES), len(parts), 1, 1))
-    t = np.zeros((len(rows), len(terms.STATES), len(parts), 3))
     t_held, R_held = (group[variable.name].isel({terms.REALIZATION: rows}).values for variable in terms.STATION_POSES)
+    return _of_all_parts(results, station, R_held, t_held)
+
+
+def worst_poses(results: xr.DataTree, station: str, worst: xr.Dataset | None) -> tuple[np.ndarray, np.ndarray]:
+    """Return R (case, state, part, 3, 3) and t (case, state, part, 3) [mm] of worst cases in a station; none without them.
+
+    They are NaN for worst cases of earlier versions, which state no poses of stations.
+    """
+    sizes = {
+        str(group.attrs["station"]): group.sizes[terms.STATION_PART]
+        for group in results[terms.STATIONS_GROUP].children.values()
+    }
+    names, count = list(sizes), 0 if worst is None else worst.sizes[terms.CASE]
+    if worst is None or terms.STATION_ROTATION.name not in worst:
+        parts = results.sizes[terms.PART]
+        unknown = np.full((count, len(terms.STATES), parts, 3, 3), np.nan)
+        return unknown, unknown[..., 0]
+    start = sum(sizes[name] for name in names[: names.index(station)])
+    own = slice(start, start + sizes[station])
+    t_held, R_held = (worst[variable.name].values[:, :, own] for variable in terms.STATION_POSES)
+    return _of_all_parts(results, station, R_held, t_held)
+
+
+def _of_all_parts(results: xr.DataTree, station: str, R_held: np.ndarray, t_held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return R and t of all parts, nominal for those that the station does not hold."""
+    parts, held = (
+        results.to_dataset()[terms.PART].values,
+        results[terms.station_group(station)].to_dataset()[terms.STATION_PART].values,
+    )
+    positions = [parts.tolist().index(part) for part in held]
+    R = np.tile(np.eye(3), (len(R_held), len(terms.STATES), len(parts), 1, 1))
+    t = np.zeros((len(R_held), len(terms.STATES), len(parts), 3))
     R[:, :, positions], t[:, :, positions] = R_held, t_held
     return R, t
 
