@@ -98,7 +98,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False) -> Nominal:
         labels += [*features.labels, *(variable.name for variable in assembly.variables)]
         faults.extend(_repeated_labels(labels))
         if not faults:
-            shifts = {labels[column] for pattern in features.patterns for column in pattern.leans}
+            shifts = {labels[column] for pattern in features.patterns for column in pattern.shift_columns}
             faults.extend(_contributor_faults(assembly, labels, shifts))
     faults.extend(fault for scene in scenes for fault in _reserved_names(scene))
     if faults:

@@ -68,6 +68,11 @@ class FormField:
         members = self.associated.members(self.places)
         return tuple(ZoneMember(numbers, self.associated.rows(self.places[numbers])) for numbers in members)
 
+    @cached_property
+    def place_heights(self) -> np.ndarray:
+        """The heights (mode, place) of each mode at the places."""
+        return np.ascontiguousarray(self.heights(self.places).T)
+
     def heights(self, points: np.ndarray) -> np.ndarray:
         """Return the heights (..., mode) of each mode at points (..., 3) [mm] of the face."""
         flat = points.reshape(-1, 3)
