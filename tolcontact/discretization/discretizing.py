@@ -72,6 +72,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False) -> Nominal:
     features = Features(sum(len(part.locators) for part in parts if part is not None))
     if is_sound and None not in parts:
         _add_features(assembly, {part: number for number, (_, part) in enumerate(entries)}, meshes, features, faults)
+        features.use_touched([part.placement for part in parts if part is not None])
         placements = {part.part: part.placement for part in parts if part is not None}
         parts = [
             replace(

@@ -8,7 +8,7 @@ import numpy as np
 
 from tolcontact.declaration import DatumTargets, Face, Feature, GeometricTolerance, Pattern
 from tolcontact.errors import GeometryFault
-from tolcontact.features.datum_planes import Lean
+from tolcontact.features.datum_planes import Lean, TangentPlane
 from tolcontact.features.face_deviation import FaceDeviation
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize, TargetPoint
 from tolcontact.features.feature_recognition import feature_geometry
@@ -265,6 +265,12 @@ class Features:
         """Return how the middle of a feature deviates, which no size moves; None if the feature could not be added."""
         nominal = next((nominal for nominal in self.features if nominal.feature is feature), None)
         return None if nominal is None else self._used(nominal, None, placement)
+
+    def use_touched(self, placements: Sequence[Placement]) -> None:
+        """Use the faces with form that datums touch, so that archives hold them."""
+        touched = [lean.form for pattern in self.patterns for lean in pattern.leans.values() if isinstance(lean, TangentPlane)]
+        for nominal in (nominal for nominal in self.features if nominal.form in touched):
+            self._used(nominal, 0, placements[nominal.part])
 
     def _used(self, nominal: NominalFeature, number: int | None, placement: Placement) -> FaceDeviation:
         """Return the deviation of a face: the same object for all that uses it."""
