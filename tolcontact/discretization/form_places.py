@@ -11,6 +11,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.discretization.nominal import ContactPoints
+from tolcontact.geometry import region_kernel
 from tolcontact.geometry.meeting import NEARNESS, Meeting, Places
 
 FIRST_POINT = 1 << 40  # number of the first contact point among the labels of places
@@ -79,19 +80,6 @@ def face_points(pair: ContactPoints, X_RM: Float[Array, "n 12"]) -> FacePoints:
     )
 
 
-def are_over(pair: ContactPoints, X_RM: Float[Array, "n 12"], points: FacePoints, numbers: Int[Array, "n k"]) -> np.ndarray:
-    """Return whether points with numbers (n, k), -1 for none, stand over the other face at X_RM (n, 12)."""
-    over, count = numbers >= 0, len(pair.P_m)
-    for face, selected in ((pair.reference_face, over & (numbers < count)), (pair.moving_face, numbers >= count)):
-        row, place = np.nonzero(selected)
-        if row.size and face is not None:
-            places = points.P_m[row, numbers[row, place]]
-            if face is pair.reference_face:
-                places = np.einsum("kij,kj->ki", pose.rotation(X_RM)[row], places) + pose.translation(X_RM)[row]
-            over[row, place] = face.project(places)[2]
-    return over
-
-
 def _points(
     pair: ContactPoints, X_RM: np.ndarray, deviations: np.ndarray, retained: np.ndarray | None
 ) -> tuple[Places, np.ndarray]:
@@ -100,14 +88,20 @@ def _points(
     These are the `retained` ones, and the lowest of each group.
     """
     points, form, count = face_points(pair, X_RM), pair.form(deviations), len(pair.P_m)
-    rim = points.P_m[:, count:]
+    rim = np.ascontiguousarray(points.P_m[:, count:])
     row = np.repeat(np.arange(len(X_RM)), rim.shape[1])
     at_rim = form.at(row, rim.reshape(-1, 3), points.P_r[:, count:].reshape(-1, 3)).reshape(rim.shape[:2])
     heights = np.concatenate([pair.form_heights(deviations), at_rim], axis=1)
-    numbers = _lowest_over(pair, X_RM, points, points.gaps - heights)
+    assert pair.reference_face is not None and pair.moving_face is not None
+    regions = pair.reference_face.region, pair.moving_face.region
+    poses, gaps = np.ascontiguousarray(X_RM), points.gaps - heights
+    groups = np.cumsum([0, *map(len, np.array_split(np.arange(gaps.shape[1]), min(POINT_GROUPS, gaps.shape[1])))])
+    numbers = np.empty((len(poses), len(groups) - 1), dtype=np.int64)
+    region_kernel.lowest_over(poses, pair.P_m, rim, gaps, groups, *regions, numbers)
     if retained is not None:
         kept = np.where(retained >= FIRST_POINT, retained - FIRST_POINT, -1)
-        numbers = np.concatenate([np.where(are_over(pair, X_RM, points, kept), kept, -1), numbers], axis=1)
+        region_kernel.keep_over(poses, pair.P_m, rim, *regions, kept)
+        numbers = np.concatenate([kept, numbers], axis=1)
     for column in range(1, numbers.shape[1]):
         numbers[(numbers[:, :column] == numbers[:, column, None]).any(axis=1), column] = -1
     rows, is_point = np.arange(len(X_RM))[:, None], numbers >= 0
@@ -115,21 +109,3 @@ def _points(
     n_r = np.broadcast_to(pair.n_r[0], (*numbers.shape, 3))
     places = Places(labels, gaps, points.P_m[rows, numbers], points.P_r[rows, numbers], n_r)
     return places, heights[rows, numbers] * is_point
-
-
-def _lowest_over(pair: ContactPoints, X_RM: np.ndarray, points: FacePoints, gaps: np.ndarray) -> np.ndarray:
-    """Return the point of each group (n, group) with the least of the gaps (n, point) over the other face; -1 for none."""
-    groups = np.array_split(np.arange(gaps.shape[1]), min(POINT_GROUPS, gaps.shape[1]))
-    numbers = np.full((len(X_RM), len(groups)), -1)
-    for place, group in enumerate(groups):
-        remaining, left = np.arange(len(X_RM)), gaps[:, group].copy()
-        while remaining.size:
-            lowest = left[remaining].argmin(axis=1)
-            remaining = remaining[left[remaining, lowest] < np.inf]
-            lowest = left[remaining].argmin(axis=1)
-            of_remaining = FacePoints(*(values[remaining] for values in points))
-            over = are_over(pair, X_RM[remaining], of_remaining, group[lowest][:, None])[:, 0]
-            numbers[remaining[over], place] = group[lowest[over]]
-            left[remaining[~over], lowest[~over]] = np.inf
-            remaining = remaining[~over]
-    return numbers

@@ -13,7 +13,7 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from tolcontact import vocabulary as terms
-from tolcontact.discretization import ContactPoints, are_over, face_points
+from tolcontact.discretization import ContactPoints, face_points
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.testing.archived_form import ArchivedForm
 
@@ -285,8 +285,20 @@ class ArchivedPair:
         rim = slice(len(self.moving_point), None)
         at_rim = self._form(deviations, points.P_m[:, rim], points.P_r[0, rim])
         forms = np.concatenate([self._form(deviations, self.moving_point, self.reference_point), at_rim], axis=1)
-        numbers = np.broadcast_to(np.arange(points.gaps.shape[1]), points.gaps.shape)
-        return np.where(are_over(self.nominal, X_RM, points, numbers), points.gaps - forms, np.inf)
+        return np.where(_are_over(self.nominal, X_RM, points.P_m), points.gaps - forms, np.inf)
+
+
+def _are_over(pair: ContactPoints, X_RM: np.ndarray, P_m: np.ndarray) -> np.ndarray:
+    """Return whether points P_m (n, point, 3), those of the pair and then of the reference rim, are over the other face."""
+    over, count = np.empty(P_m.shape[:2], dtype=bool), len(pair.P_m)
+    assert pair.moving_face is not None and pair.reference_face is not None
+    R, t = X_RM[:, :9].reshape(-1, 3, 3), X_RM[:, None, 9:]
+    for face, part, places in (
+        (pair.reference_face, slice(count), P_m[:, :count] @ R.swapaxes(1, 2) + t),
+        (pair.moving_face, slice(count, None), P_m[:, count:]),
+    ):
+        over[:, part] = face.project(places.reshape(-1, 3))[2].reshape(places.shape[:2])
+    return over
 
 
 def _products(matrix: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
