@@ -54,30 +54,25 @@ def raised_places(
     return RaisedPlaces(Places(*joined), grown + np.concatenate([heights, of_points], axis=1))
 
 
-class FacePoints(NamedTuple):
-    """Points between the ends of two planes: contact points, and then points of the rim of the reference face.
+class RimPoints(NamedTuple):
+    """Points of the rim of the reference face, and the points of the moving plane across from them at n poses.
 
-    P_m, P_r   (n, point, 3) [mm] on both nominal faces
-    gaps       (n, point) [mm] of nominal faces, along the normal of the reference face
+    P_m    (n, point, 3) [mm] of the nominal moving plane
+    P_r    (point, 3) [mm]
+    gaps   (n, point) [mm] of nominal faces, along the normal of the reference face
     """
 
     P_m: Float[Array, "n point 3"]
-    P_r: Float[Array, "n point 3"]
+    P_r: Float[Array, "point 3"]
     gaps: Float[Array, "n point"]
 
 
-def face_points(pair: ContactPoints, X_RM: Float[Array, "n 12"]) -> FacePoints:
-    """Return contact points, which move with the moving face, and rim points of the reference face, at X_RM (n, 12)."""
-    gaps = ((pose.apply(X_RM, pair.P_m) - pair.P_r) * pair.n_r).sum(axis=2)
-    P_m, P_r = (np.broadcast_to(points, (*gaps.shape, 3)) for points in (pair.P_m, pair.P_r))
+def rim_points(pair: ContactPoints, X_RM: Float[Array, "n 12"]) -> RimPoints:
+    """Return the rim points of the reference plane of a pair at X_RM (n, 12)."""
     rim, n, (m, corner) = pair.reference_rim, pair.n_r[0], pair.moving_plane
     back, along = pose.apply(pose.inverse(X_RM), rim), n @ pose.rotation(X_RM)  # (n, rim point, 3), (n, 3)
     heights = ((corner - back) @ m) / (along @ m)[:, None]
-    return FacePoints(
-        np.concatenate([P_m, back + heights[..., None] * along[:, None]], axis=1),
-        np.concatenate([P_r, np.broadcast_to(rim, back.shape)], axis=1),
-        np.concatenate([gaps, heights], axis=1),
-    )
+    return RimPoints(back + heights[..., None] * along[:, None], rim, heights)
 
 
 def _points(
@@ -85,27 +80,37 @@ def _points(
 ) -> tuple[Places, np.ndarray]:
     """Return points between the ends of the faces as places, and the heights (n, place) [mm] of the forms there.
 
-    These are the `retained` ones, and the lowest of each group.
+    These are the `retained` ones, and the lowest of each group: contact points, and after these points of the rim.
     """
-    points, form, count = face_points(pair, X_RM), pair.form(deviations), len(pair.P_m)
-    rim = np.ascontiguousarray(points.P_m[:, count:])
-    row = np.repeat(np.arange(len(X_RM)), rim.shape[1])
-    at_rim = form.at(row, rim.reshape(-1, 3), points.P_r[:, count:].reshape(-1, 3)).reshape(rim.shape[:2])
-    heights = np.concatenate([pair.form_heights(deviations), at_rim], axis=1)
     assert pair.reference_face is not None and pair.moving_face is not None
     regions = pair.reference_face.region, pair.moving_face.region
-    poses, gaps = np.ascontiguousarray(X_RM), points.gaps - heights
-    groups = np.cumsum([0, *map(len, np.array_split(np.arange(gaps.shape[1]), min(POINT_GROUPS, gaps.shape[1])))])
-    numbers = np.empty((len(poses), len(groups) - 1), dtype=np.int64)
-    region_kernel.lowest_over(poses, pair.P_m, rim, gaps, groups, *regions, numbers)
+    poses, rim, count = np.ascontiguousarray(X_RM), rim_points(pair, X_RM), len(pair.P_m)
+    total = count + len(rim.P_r)
+    groups = np.cumsum([0, *map(len, np.array_split(np.arange(total), min(POINT_GROUPS, total)))])
+    gaps, heights = np.empty((len(poses), total)), np.zeros((len(poses), total))
+    region_kernel.plane_gaps(poses, *(np.ascontiguousarray(values) for values in (pair.P_m, pair.P_r, pair.n_r)), gaps)
+    gaps[:, count:], heights[:, :count] = rim.gaps, pair.form_heights(deviations)
+    P_m, feet = np.ascontiguousarray(pair.P_m), np.ascontiguousarray(rim.P_m)
+    kept = np.zeros((len(poses), 0), dtype=np.int64)
     if retained is not None:
         kept = np.where(retained >= FIRST_POINT, retained - FIRST_POINT, -1)
-        region_kernel.keep_over(poses, pair.P_m, rim, *regions, kept)
-        numbers = np.concatenate([kept, numbers], axis=1)
+        region_kernel.keep_over(poses, P_m, feet, *regions, kept)
+    form = pair.form(deviations)
+    may_be_lowest = np.zeros(gaps.shape, dtype=bool)
+    region_kernel.write_promising(feet, gaps, form.bounds(), groups, count, regions[1], kept, may_be_lowest)
+    row, point = np.nonzero(may_be_lowest)
+    heights[row, point] = form.at(row, feet[row, point - count], rim.P_r[point - count])
+    raised = gaps - heights
+    raised[:, count:][~may_be_lowest[:, count:]] = np.inf
+    lowest = np.empty((len(poses), len(groups) - 1), dtype=np.int64)
+    region_kernel.lowest_over(poses, P_m, feet, raised, groups, *regions, lowest)
+    numbers = np.concatenate([kept, lowest], axis=1)
     for column in range(1, numbers.shape[1]):
         numbers[(numbers[:, :column] == numbers[:, column, None]).any(axis=1), column] = -1
-    rows, is_point = np.arange(len(X_RM))[:, None], numbers >= 0
-    labels, gaps = np.where(is_point, numbers + FIRST_POINT, -1), np.where(is_point, points.gaps[rows, numbers], np.inf)
+    rows, is_point, on_rim = np.arange(len(poses))[:, None], numbers >= 0, np.nonzero(numbers >= count)
+    labels, gaps = np.where(is_point, numbers + FIRST_POINT, -1), np.where(is_point, gaps[rows, numbers], np.inf)
+    of_pair, of_rim = np.where(numbers < count, numbers, 0), numbers[on_rim] - count
+    P_m, P_r = pair.P_m[of_pair], pair.P_r[of_pair]
+    P_m[on_rim], P_r[on_rim] = feet[on_rim[0], of_rim], rim.P_r[of_rim]
     n_r = np.broadcast_to(pair.n_r[0], (*numbers.shape, 3))
-    places = Places(labels, gaps, points.P_m[rows, numbers], points.P_r[rows, numbers], n_r)
-    return places, heights[rows, numbers] * is_point
+    return Places(labels, gaps, P_m, P_r, n_r), heights[rows, numbers] * is_point

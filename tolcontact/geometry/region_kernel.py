@@ -21,6 +21,43 @@ class Region(NamedTuple):
 
 
 @compiled
+def plane_gaps(X_RM, P_m, P_r, n_r, gaps):  # type: ignore[no-untyped-def]
+    """Write gaps n_r (R P_m + t - P_r) of points (point, 3) at X_RM (n, 12) to the first columns of `gaps`."""
+    for k in range(X_RM.shape[0]):
+        X = X_RM[k]
+        for j in range(P_m.shape[0]):
+            gap = 0.0
+            for i in range(3):
+                x = X[3 * i] * P_m[j, 0] + X[3 * i + 1] * P_m[j, 1] + X[3 * i + 2] * P_m[j, 2] + X[9 + i] - P_r[j, i]
+                gap += x * n_r[j, i]
+            gaps[k, j] = gap
+
+
+@compiled
+def write_promising(rim, gaps, bounds, groups, count, moving, kept, promising):  # type: ignore[no-untyped-def]
+    """Write which points of the rim may be the lowest of their group over the moving face, or are kept.
+
+    gaps        (n, point) [mm] of nominal faces, from number `count` on of the rim (n, rim point, 3)
+    bounds      (n,) [mm] by which forms may change them
+    groups      (group + 1,) the first point of each, and the end
+    kept        (n, k) numbers of points, -1 for none
+    """
+    for k in range(gaps.shape[0]):
+        for group in range(groups.size - 1):
+            first, end = max(groups[group], count), groups[group + 1]
+            least = np.inf
+            for j in range(first, end):
+                p = rim[k, j - count]
+                if gaps[k, j] < least and contains(moving, p[0], p[1], p[2]):
+                    least = gaps[k, j]
+            for j in range(first, end):
+                promising[k, j] = gaps[k, j] - bounds[k] <= least + bounds[k] < np.inf
+        for c in range(kept.shape[1]):
+            if kept[k, c] >= count:
+                promising[k, kept[k, c]] = True
+
+
+@compiled
 def lowest_over(X_RM, P_m, rim, gaps, groups, reference, moving, numbers):  # type: ignore[no-untyped-def]
     """Write the point of each group with the least gap over the other face to numbers (n, group); -1 for none.
 

@@ -13,8 +13,9 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from tolcontact import vocabulary as terms
-from tolcontact.discretization import ContactPoints, face_points
+from tolcontact.discretization import ContactPoints, rim_points
 from tolcontact.geometry.meeting import Meeting
+from tolcontact.geometry.surface import Surface
 from tolcontact.testing.archived_form import ArchivedForm
 
 DIRECTIONS = 72  # that are tried at first
@@ -281,24 +282,21 @@ class ArchivedPair:
     def _gaps_over_face(self, X_RM: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         """Return gaps (n, point) [mm] of points between the ends of the faces; infinite ones of points beside them."""
         assert self.nominal is not None
-        points = face_points(self.nominal, X_RM)
-        rim = slice(len(self.moving_point), None)
-        at_rim = self._form(deviations, points.P_m[:, rim], points.P_r[0, rim])
-        forms = np.concatenate([self._form(deviations, self.moving_point, self.reference_point), at_rim], axis=1)
-        return np.where(_are_over(self.nominal, X_RM, points.P_m), points.gaps - forms, np.inf)
+        rim, R, t = rim_points(self.nominal, X_RM), X_RM[:, :9].reshape(-1, 3, 3), X_RM[:, None, 9:]
+        moved = self.moving_point @ R.swapaxes(1, 2) + t
+        gaps = ((moved - self.reference_point) * self.normal).sum(axis=2) - self._form(
+            deviations, self.moving_point, self.reference_point
+        )
+        at_rim = rim.gaps - self._form(deviations, rim.P_m, rim.P_r)
+        gaps[~_are_over(self.nominal.reference_face, moved)] = np.inf
+        at_rim[~_are_over(self.nominal.moving_face, rim.P_m)] = np.inf
+        return np.concatenate([gaps, at_rim], axis=1)
 
 
-def _are_over(pair: ContactPoints, X_RM: np.ndarray, P_m: np.ndarray) -> np.ndarray:
-    """Return whether points P_m (n, point, 3), those of the pair and then of the reference rim, are over the other face."""
-    over, count = np.empty(P_m.shape[:2], dtype=bool), len(pair.P_m)
-    assert pair.moving_face is not None and pair.reference_face is not None
-    R, t = X_RM[:, :9].reshape(-1, 3, 3), X_RM[:, None, 9:]
-    for face, part, places in (
-        (pair.reference_face, slice(count), P_m[:, :count] @ R.swapaxes(1, 2) + t),
-        (pair.moving_face, slice(count, None), P_m[:, count:]),
-    ):
-        over[:, part] = face.project(places.reshape(-1, 3))[2].reshape(places.shape[:2])
-    return over
+def _are_over(face: Surface | None, places: np.ndarray) -> np.ndarray:
+    """Return whether places (n, place, 3) stand over a face, by their nearest points on its triangles."""
+    assert face is not None
+    return np.asarray(face.project(places.reshape(-1, 3))[2].reshape(places.shape[:2]))
 
 
 def _products(matrix: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
