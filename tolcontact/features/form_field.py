@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from tolcontact.declaration.form import Form
+from tolcontact.errors import GeometryFault
 from tolcontact.features.associated_features import TERMS, AssociatedFeature, displacement_terms
 from tolcontact.features.covariances import Lengths, covariance
 from tolcontact.features.least_zone import ZoneMember
@@ -61,6 +62,18 @@ class FormField:
     def normals(self) -> np.ndarray:
         """Unit normals (place, 3) of the surface at the places, away from its axis or centre."""
         return self.associated.surface.distance(self.places)[1]
+
+    @cached_property
+    def scales(self) -> Lengths:
+        """The lengths over which heights change: the correlation lengths, or half of the extents of the face if that is less.
+
+        A length far beyond the face leaves heights that bend once over the face.
+        """
+        surface = self.associated.surface
+        if not isinstance(surface, Cylinder | Cone):
+            return Lengths(*np.minimum(self.lengths, longest_extent(self.places) / 2))
+        across, along = axial_extents(surface.origin, surface.axis, self.places)
+        return Lengths(min(self.lengths.across, across / 2), min(self.lengths.along, along / 2))
 
     @cached_property
     def zone(self) -> tuple[ZoneMember, ...]:
@@ -116,6 +129,11 @@ def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> Form
     functions = associated_covariance(form, lengths, associated, places, stations) @ inverse
     remainder, removed = beside_displacements(functions, associated, places, shares)
     variances, directions = np.linalg.eigh(remainder.T @ remainder)
+    if variances.sum() < REST:
+        raise GeometryFault(
+            f"the correlation length of its form, {max(lengths):.3g} mm, is so large that little more than displacements of the "
+            f"face is left; expected at most three times its extent, {longest_extent(places):.3g} mm"
+        )
     count = min(form.modes, int((variances > MIN_VARIANCE * variances[-1]).sum()))
     modes = directions[:, : -count - 1 : -1]  # of the functions
     modes = modes * np.sign(np.diagonal(modes[np.abs(modes).argmax(axis=0)]))
@@ -153,11 +171,17 @@ def _lengths(form: Form, face: Surface, associated: AssociatedFeature) -> Length
     if not isinstance(surface, Cylinder | Cone):
         length = form.length or LENGTH_SHARE * longest_extent(vertices)
         return Lengths(length, length)
-    arms = vertices - surface.origin
-    along = arms @ surface.axis
-    radius = float(np.linalg.norm(arms - along[:, None] * surface.axis, axis=1).max())
-    across = radius / form.lobes if form.lobes else form.length or LENGTH_SHARE * 2 * radius
-    return Lengths(across, form.length or LENGTH_SHARE * float(np.ptp(along)))
+    diameter, extent = axial_extents(surface.origin, surface.axis, vertices)
+    across = diameter / 2 / form.lobes if form.lobes else form.length or LENGTH_SHARE * diameter
+    return Lengths(across, form.length or LENGTH_SHARE * extent)
+
+
+def axial_extents(origin: np.ndarray, axis: np.ndarray, points: np.ndarray) -> tuple[float, float]:
+    """Return the largest diameter [mm] of points (point, 3) around an axis, and their extent along it [mm]."""
+    arms = points - origin
+    along = arms @ axis
+    radius = float(np.linalg.norm(arms - along[:, None] * axis, axis=1).max())
+    return 2 * radius, float(np.ptp(along))
 
 
 def longest_extent(points: np.ndarray) -> float:
