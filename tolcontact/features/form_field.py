@@ -131,8 +131,8 @@ def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> Form
     variances, directions = np.linalg.eigh(remainder.T @ remainder)
     if variances.sum() < REST:
         raise GeometryFault(
-            f"the correlation length of its form, {max(lengths):.3g} mm, is so large that little more than displacements of the "
-            f"face is left; expected at most three times its extent, {longest_extent(places):.3g} mm"
+            f"the correlation length of its form, {max(lengths):.3g} mm, is so large that little more than displacements of "
+            f"the face is left; expected at most three times its extent, {longest_extent(places):.3g} mm"
         )
     count = min(form.modes, int((variances > MIN_VARIANCE * variances[-1]).sum()))
     modes = directions[:, : -count - 1 : -1]  # of the functions

@@ -146,7 +146,7 @@ def _form_probes(feature: NominalFeature | Datum) -> Probes:
 def _form_heights(feature: NominalFeature | Datum, deviations: np.ndarray) -> np.ndarray:
     """Return the heights (n, place) [mm] of the form of drawn features at these places."""
     assert feature.form is not None
-    return np.asarray(deviations[:, feature.form_columns] @ feature.form.heights(feature.form.places).T)
+    return np.asarray(deviations[:, feature.form_columns] @ feature.form.place_heights)
 
 
 def _stated_share(pattern: NominalPattern, layer: Layer) -> float:
