@@ -210,7 +210,7 @@ def _contributor_faults(assembly: Assembly, labels: Sequence[str], shifts: Set[s
                 similar = difflib.get_close_matches(label, labels, 3, 0.3) or list(labels[:3])
                 yield f'{place}: unknown contributor "{label}"; contributors are, for example: {", ".join(similar)}'
             elif label in shifts:
-                yield f'{place}: "{label}" follows from the tilts of its datum; leave it out, and state those tilts'
+                yield f'{place}: "{label}" follows from the tilts of its datum, or from its form; leave it out, and state those'
             elif kind == "variable" and label in variables:
                 yield f'{place}: it drives the variable "{label}"; a variable drives locators and features alone'
             elif kind != "variable" and label in sources:

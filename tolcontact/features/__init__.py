@@ -103,7 +103,8 @@ count them together with the form; sensitivities are those to the datum itself, 
 >>> [label for label in tc.build(rough).nominal.contributors if "datum" in label]
 ['part.lid.datum A of A: tilt x']
 
-The form of other datums, of cylinders for example, and of the planes of a common datum counts by least squares.
+The form of other datums, and of the planes of a common datum, counts by least squares. Of cylinders this is also because the
+smallest one around a shaft is often held in one section only, and is then free to tilt.
 
 `part.datum_targets("A", foot.point(5, 5, 0), ...)` is a datum that touches features at points, along their normals there, like
 the locators of a fixture. The features may be of any kind, also free-form, and several may have targets of one datum. Three
