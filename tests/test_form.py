@@ -1,7 +1,7 @@
 """Faces that are not flat: seats against a linear programme on the same heights, archives, and one field for all uses."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pytest
@@ -84,7 +84,8 @@ def seat_of_one_mode(shape):
     nominal = discretize(seat(tc.Form(modes=1)))
     pair, *supports = nominal.pairs
     face = pair.deviating[0]
-    by_hand = OneMode(**vars(face.form), shape=shape)
+    values = {field.name: getattr(face.form, field.name) for field in fields(FormField)}
+    by_hand = OneMode(**values, shape=shape)
     offsets = Offsets(face.form_columns, by_hand.heights(pair.P_m).T)
     pair = replace(pair, offsets=offsets, deviating=(replace(face, form=by_hand), None))
     program = compile_program(replace(nominal, pairs=(pair, *supports)), "daqp", SEATED)
