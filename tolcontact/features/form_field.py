@@ -91,7 +91,7 @@ class FormField:
         flat = points.reshape(-1, 3)
         heights = np.zeros((len(flat), self.modes))
         # A product of matrices would depend, in its last bits, on the number of points.
-        for factor, row in zip(self._functions(flat).T, (*self.weights, *-self.removed), strict=True):
+        for factor, row in zip(np.hstack(self._functions(flat)).T, (*self.weights, *-self.removed), strict=True):
             heights += factor[:, None] * row
         return heights.reshape(*points.shape[:-1], self.modes)
 
@@ -103,14 +103,17 @@ class FormField:
         heights = np.zeros(len(points))
         for start in range(0, len(points), POINTS_AT_ONCE):
             piece = slice(start, start + POINTS_AT_ONCE)
-            heights[piece] = (self._functions(points[piece]) * factors[row[piece]]).sum(axis=1)
+            values, terms = self._functions(points[piece])
+            of_points, count = factors[row[piece]], len(self.stations)
+            heights[piece] = (values * of_points[:, :count]).sum(axis=1)
+            heights[piece] += (terms * of_points[:, count:]).sum(axis=1)
         return heights
 
-    def _functions(self, points: np.ndarray) -> np.ndarray:
-        """Return covariances with the stations, and displacements of the face (point, station + 7) at points (point, 3)."""
+    def _functions(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return covariances with stations (point, station) and displacements of the face (point, 7) at points (point, 3)."""
         _, normals = self.associated.surface.distance(points)
         values = associated_covariance(self.form, self.lengths, self.associated, points, self.stations)
-        return np.hstack([values, displacement_terms(normals, points)])
+        return values, displacement_terms(normals, points)
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "FormField":
         """Return the field of a face that stands at R (3, 3), t (3,) [mm]."""
