@@ -1,11 +1,13 @@
 """Faces that are not flat: seats against a linear programme on the same heights, archives, and one field for all uses."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.optimize import linprog
+from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 import tolcontact as tc
@@ -19,6 +21,7 @@ from tolcontact.contact.scan import PairScan, pair_scan
 from tolcontact.discretization import Offsets, discretize
 from tolcontact.errors import ModelError
 from tolcontact.features import FormField
+from tolcontact.geometry.region_kernel import keep_over
 from tolcontact.simulation import simulate_blocks
 from tolcontact.simulation.surfaces import check_surfaces, warn_of
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
@@ -81,7 +84,8 @@ def seat_of_one_mode(shape):
     nominal = discretize(seat(tc.Form(modes=1)))
     pair, *supports = nominal.pairs
     face = pair.deviating[0]
-    by_hand = OneMode(**vars(face.form), shape=shape)
+    values = {field.name: getattr(face.form, field.name) for field in fields(FormField)}
+    by_hand = OneMode(**values, shape=shape)
     offsets = Offsets(face.form_columns, by_hand.heights(pair.P_m).T)
     pair = replace(pair, offsets=offsets, deviating=(replace(face, form=by_hand), None))
     program = compile_program(replace(nominal, pairs=(pair, *supports)), "daqp", SEATED)
@@ -213,6 +217,32 @@ def test_what_cannot_be_drawn_is_refused_in_one_message():
     assert "form of straightness of a plane cannot be drawn" in fault and "form=None" in fault
     fault = refused(lambda a, block, base: block.feature("f", block.face("-z"), tc.Flatness(0.1, form=tc.Form("white"))))
     assert "covariance is 'white'; expected one of" in fault
+
+
+def test_a_correlation_length_far_beyond_the_face_has_points_by_the_size_of_the_face_and_one_with_nothing_left_is_refused():
+    pair, *_ = discretize(seat(tc.Form(length=250))).pairs
+    assert pair.form_spacing == pytest.approx(0.71 * 50 / 5)  # a fifth of half of the face
+    fault = refused(lambda a, block, base: block.feature("f", block.face("-z"), tc.Flatness(0.1, form=tc.Form(length=1e4))))
+    assert (
+        'feature "f"' in fault
+        and "correlation length of its form, 1e+04 mm" in fault
+        and "three times its extent, 100 mm" in fault
+    )
+
+
+@pytest.mark.parametrize("turn", [(0, 0, 0), (0.3, -0.7, 0.2)])
+def test_points_over_a_flat_face_with_a_hole_are_those_that_project_onto_it(turn):
+    a = tc.Assembly("ring")
+    part = a.part("ring", tc.Mesh(trimesh.creation.annulus(15, 40, 20, sections=48)), fixed=True)
+    part.feature("top", part.face("+z"), tc.Flatness(0.05))
+    a.measure("corner", part.point(20, 0, 10), along="z")
+    R, t = Rotation.from_euler("xyz", turn).as_matrix(), np.array([3.0, -2.0, 7.0])
+    face = discretize(a).features[0].surfaces[0].placed(R, t)
+    places = np.random.default_rng(0).uniform((-42, -42, 9), (42, 42, 11), (4000, 3)) @ R.T + t
+    numbers, at_rest = np.arange(4000)[None].copy(), np.array([[1.0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]])
+    keep_over(at_rest, places, np.zeros((1, 0, 3)), face.region, face.region, numbers)
+    np.testing.assert_array_equal(numbers[0] >= 0, face.project(places)[2])
+    assert 0.5 < (numbers >= 0).mean() < 0.8
 
 
 def test_contact_points_too_far_apart_for_a_form_are_refused():

@@ -97,6 +97,11 @@ and its mean around the axis; from "lines", without its line of least squares be
 heights of both sides from gaps, at their nominal points, that of the moving side times `facing`; add that of the face of a
 locator to its deviation. `tolcontact.testing.assert_gaps_recompute` does all of this from the file alone.
 
+The deviations of a datum of a face with form, `tangent_face`, are the offset and the tilts (`tangent_contributor`) of the plane
+that touches heights of this face at the places `tangent_place_at`: `tangent_height` @ `tangent_leaning` @ `deviation`, and the
+form. It is none of these below any height, and the largest distance is least, of all planes with coordinates in the span of
+`tangent_free`. `tolcontact.testing.assert_datums_recompute` finds these planes again.
+
 `tc.open_archive(path)` checks everything but the rows and opens the file; `tc.model_of` rebuilds its model.
 
 >>> with tc.open_archive(path) as results:

@@ -7,6 +7,7 @@ import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as terms
+from tolcontact.archive.datum_values import datum_sizes, datum_values
 from tolcontact.archive.form_values import form_sizes, form_values
 from tolcontact.archive.rows import Row, kept_rows
 from tolcontact.archive.settings import Run, declaration, format_of, now, run_settings, versions
@@ -192,6 +193,7 @@ def _write_contact(contents: Contents, group: netCDF4.Group, program: Program) -
             terms.FREEDOM: len(terms.FREEDOMS),
             terms.CONTRIBUTOR: len(nominal.contributors),
             **form_sizes(program),
+            **datum_sizes(program),
         }
         for name, size in sizes.items():
             group.createDimension(name, size)
@@ -207,7 +209,7 @@ def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
         terms.REFERENCE_PART: [-1 if pair.reference is None else nominal.number(pair.reference) for pair in pairs],
     }
     if not pairs:
-        return parts | _face_values(nominal) | form_values(program)
+        return parts | _face_values(nominal) | form_values(program) | datum_values(program)
     locators = [np.full(len(pair.P_m), -1) if pair.locators is None else pair.locators for pair in pairs]
     values = parts | {
         terms.PAIR_OF_POINT: np.repeat(np.arange(len(pairs)), [len(pair.P_m) for pair in pairs]),
@@ -219,7 +221,8 @@ def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
     if any(pair.is_springy for pair in pairs):
         stiffness = [np.full(len(pair.P_m), np.inf) if pair.stiffness is None else pair.stiffness for pair in pairs]
         values[terms.POINT_STIFFNESS] = np.concatenate(stiffness)
-    return values | _bounded_values(program) | _round_values(nominal) | _face_values(nominal) | form_values(program)
+    values |= _bounded_values(program) | _round_values(nominal) | _face_values(nominal)
+    return values | form_values(program) | datum_values(program)
 
 
 def _bounded_values(program: Program) -> dict[ArchiveVariable, Any]:

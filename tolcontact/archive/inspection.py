@@ -226,6 +226,8 @@ def _check_needed(file: netCDF4.Dataset) -> None:
         _need(file["contact"], terms.FEATURE_FACES)
     if any(variable.name in file["contact"].variables for variable in terms.FORMS):
         _need(file["contact"], terms.FORMS)
+    if any(variable.name in file["contact"].variables for variable in terms.TANGENTS):
+        _need(file["contact"], (*terms.FORMS, *terms.TANGENTS))
     for group, needed in (("contact", OF_CONTACT), ("sample", OF_SAMPLE), ("model", (terms.DECLARATION,))):
         _need(file[group], needed)
     _need(file, (terms.MEASURE_NOMINAL, terms.MEASURE_TOLERANCE, terms.MEASURE_UNITS))

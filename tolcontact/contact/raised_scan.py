@@ -9,7 +9,7 @@ import numpy as np
 
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.contact import kernel, raised_kernel
-from tolcontact.contact.scan import CompiledScan, PairScan
+from tolcontact.contact.scan import CompiledScan, Deepest, PairScan
 
 MIN_HEIGHTS = 4  # that vary independently: fewer are as quick in every pass
 
@@ -23,7 +23,12 @@ class RaisedScan(CompiledScan):
     raised           (realization of the block, point) [mm]: added to the gaps of nominal faces, below 0 where faces stand out
     lowest           (realization of the block, leaf) [mm]: the least of these
     numbers          (realization,): numbers of the realizations in the block
+
+    The lowest points of clusters take the slots that are left, too: faces with form end up on few points anywhere, and fewer
+    QPs find these if all sides of the faces have rows from the first one on.
     """
+
+    fills = True
 
     nominal: tuple[np.ndarray, np.ndarray, np.ndarray]
     compiled_points: kernel.Points
@@ -38,6 +43,10 @@ class RaisedScan(CompiledScan):
         P_m, P_r, n_r = (np.empty((*points.shape, 3)) for _ in range(3))
         raised_kernel.gather(*self.nominal, self.raised, self.numbers, np.ascontiguousarray(points), P_m, P_r, n_r)
         return P_m, P_r, n_r
+
+    def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
+        points, gaps = self._deepest(self.clusters, relative, deviations, may_carry, np.inf)
+        return Deepest(points, -gaps)
 
     def _deepest(
         self, clusters: np.ndarray, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None, limit: float

@@ -55,7 +55,8 @@ class Part(Readable):
     ) -> "Feature":
         """Name a face, or two that are opposed, with its tolerances: `part.feature("H1", face, tc.Size(...), datum="B")`.
 
-        `association` is how a plane that leans becomes a datum: "outside" or "least squares" (see `tolcontact.features`).
+        `association` is how a plane that leans, or has form, becomes a datum: "outside" or "least squares" (see
+        `tolcontact.features`).
         """
         for constituent in constituents:
             if not isinstance(constituent, Face | Control):
@@ -196,7 +197,7 @@ class Feature(Toleranced, Readable):
 
     A feature may be used in place of a face. Contact, locators and measures on a feature share its deviation, which is positive
     outward from the material. `datum` is the letter by which tolerances refer to it, and `association` is how a plane becomes
-    that datum if it leans: one of ASSOCIATIONS.
+    that datum if it leans or has form: one of ASSOCIATIONS.
     """
 
     name: str

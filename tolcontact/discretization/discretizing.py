@@ -76,6 +76,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
     features = Features(sum(len(part.locators) for part in parts if part is not None))
     if is_sound and None not in parts:
         _add_features(assembly, {part: number for number, (_, part) in enumerate(entries)}, meshes, features, faults)
+        features.use_touched([part.placement for part in parts if part is not None])
         placements = {part.part: part.placement for part in parts if part is not None}
         parts = [
             replace(
@@ -102,7 +103,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
         labels += [*features.labels, *(variable.name for variable in assembly.variables)]
         faults.extend(_repeated_labels(labels))
         if not faults:
-            shifts = {labels[column] for pattern in features.patterns for column in pattern.leans}
+            shifts = {labels[column] for pattern in features.patterns for column in pattern.shift_columns}
             faults.extend(_contributor_faults(assembly, labels, shifts))
     faults.extend(fault for scene in scenes for fault in _reserved_names(scene))
     if faults:
@@ -216,7 +217,7 @@ def _contributor_faults(assembly: Assembly, labels: Sequence[str], shifts: Set[s
                 similar = difflib.get_close_matches(label, labels, 3, 0.3) or list(labels[:3])
                 yield f'{place}: unknown contributor "{label}"; contributors are, for example: {", ".join(similar)}'
             elif label in shifts:
-                yield f'{place}: "{label}" follows from the tilts of its datum; leave it out, and state those tilts'
+                yield f'{place}: "{label}" follows from the tilts of its datum, or from its form; leave it out, and state those'
             elif kind == "variable" and label in variables:
                 yield f'{place}: it drives the variable "{label}"; a variable drives locators and features alone'
             elif kind != "variable" and label in sources:

@@ -11,6 +11,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.discretization.nominal import ContactPoints
+from tolcontact.geometry import region_kernel
 from tolcontact.geometry.meeting import NEARNESS, Meeting, Places
 
 FIRST_POINT = 1 << 40  # number of the first contact point among the labels of places
@@ -53,43 +54,25 @@ def raised_places(
     return RaisedPlaces(Places(*joined), grown + np.concatenate([heights, of_points], axis=1))
 
 
-class FacePoints(NamedTuple):
-    """Points between the ends of two planes: contact points, and then points of the rim of the reference face.
+class RimPoints(NamedTuple):
+    """Points of the rim of the reference face, and the points of the moving plane across from them at n poses.
 
-    P_m, P_r   (n, point, 3) [mm] on both nominal faces
-    gaps       (n, point) [mm] of nominal faces, along the normal of the reference face
+    P_m    (n, point, 3) [mm] of the nominal moving plane
+    P_r    (point, 3) [mm]
+    gaps   (n, point) [mm] of nominal faces, along the normal of the reference face
     """
 
     P_m: Float[Array, "n point 3"]
-    P_r: Float[Array, "n point 3"]
+    P_r: Float[Array, "point 3"]
     gaps: Float[Array, "n point"]
 
 
-def face_points(pair: ContactPoints, X_RM: Float[Array, "n 12"]) -> FacePoints:
-    """Return contact points, which move with the moving face, and rim points of the reference face, at X_RM (n, 12)."""
-    gaps = ((pose.apply(X_RM, pair.P_m) - pair.P_r) * pair.n_r).sum(axis=2)
-    P_m, P_r = (np.broadcast_to(points, (*gaps.shape, 3)) for points in (pair.P_m, pair.P_r))
+def rim_points(pair: ContactPoints, X_RM: Float[Array, "n 12"]) -> RimPoints:
+    """Return the rim points of the reference plane of a pair at X_RM (n, 12)."""
     rim, n, (m, corner) = pair.reference_rim, pair.n_r[0], pair.moving_plane
     back, along = pose.apply(pose.inverse(X_RM), rim), n @ pose.rotation(X_RM)  # (n, rim point, 3), (n, 3)
     heights = ((corner - back) @ m) / (along @ m)[:, None]
-    return FacePoints(
-        np.concatenate([P_m, back + heights[..., None] * along[:, None]], axis=1),
-        np.concatenate([P_r, np.broadcast_to(rim, back.shape)], axis=1),
-        np.concatenate([gaps, heights], axis=1),
-    )
-
-
-def are_over(pair: ContactPoints, X_RM: Float[Array, "n 12"], points: FacePoints, numbers: Int[Array, "n k"]) -> np.ndarray:
-    """Return whether points with numbers (n, k), -1 for none, stand over the other face at X_RM (n, 12)."""
-    over, count = numbers >= 0, len(pair.P_m)
-    for face, selected in ((pair.reference_face, over & (numbers < count)), (pair.moving_face, numbers >= count)):
-        row, place = np.nonzero(selected)
-        if row.size and face is not None:
-            places = points.P_m[row, numbers[row, place]]
-            if face is pair.reference_face:
-                places = np.einsum("kij,kj->ki", pose.rotation(X_RM)[row], places) + pose.translation(X_RM)[row]
-            over[row, place] = face.project(places)[2]
-    return over
+    return RimPoints(back + heights[..., None] * along[:, None], rim, heights)
 
 
 def _points(
@@ -97,39 +80,37 @@ def _points(
 ) -> tuple[Places, np.ndarray]:
     """Return points between the ends of the faces as places, and the heights (n, place) [mm] of the forms there.
 
-    These are the `retained` ones, and the lowest of each group.
+    These are the `retained` ones, and the lowest of each group: contact points, and after these points of the rim.
     """
-    points, form, count = face_points(pair, X_RM), pair.form(deviations), len(pair.P_m)
-    rim = points.P_m[:, count:]
-    row = np.repeat(np.arange(len(X_RM)), rim.shape[1])
-    at_rim = form.at(row, rim.reshape(-1, 3), points.P_r[:, count:].reshape(-1, 3)).reshape(rim.shape[:2])
-    heights = np.concatenate([pair.form_heights(deviations), at_rim], axis=1)
-    numbers = _lowest_over(pair, X_RM, points, points.gaps - heights)
+    assert pair.reference_face is not None and pair.moving_face is not None
+    regions = pair.reference_face.region, pair.moving_face.region
+    poses, rim, count = np.ascontiguousarray(X_RM), rim_points(pair, X_RM), len(pair.P_m)
+    total = count + len(rim.P_r)
+    groups = np.cumsum([0, *map(len, np.array_split(np.arange(total), min(POINT_GROUPS, total)))])
+    gaps, heights = np.empty((len(poses), total)), np.zeros((len(poses), total))
+    region_kernel.plane_gaps(poses, *(np.ascontiguousarray(values) for values in (pair.P_m, pair.P_r, pair.n_r)), gaps)
+    gaps[:, count:], heights[:, :count] = rim.gaps, pair.form_heights(deviations)
+    P_m, feet = np.ascontiguousarray(pair.P_m), np.ascontiguousarray(rim.P_m)
+    kept = np.zeros((len(poses), 0), dtype=np.int64)
     if retained is not None:
         kept = np.where(retained >= FIRST_POINT, retained - FIRST_POINT, -1)
-        numbers = np.concatenate([np.where(are_over(pair, X_RM, points, kept), kept, -1), numbers], axis=1)
+        region_kernel.keep_over(poses, P_m, feet, *regions, kept)
+    form = pair.form(deviations)
+    may_be_lowest = np.zeros(gaps.shape, dtype=bool)
+    region_kernel.write_promising(feet, gaps, form.bounds(), groups, count, regions[1], kept, may_be_lowest)
+    row, point = np.nonzero(may_be_lowest)
+    heights[row, point] = form.at(row, feet[row, point - count], rim.P_r[point - count])
+    raised = gaps - heights
+    raised[:, count:][~may_be_lowest[:, count:]] = np.inf
+    lowest = np.empty((len(poses), len(groups) - 1), dtype=np.int64)
+    region_kernel.lowest_over(poses, P_m, feet, raised, groups, *regions, lowest)
+    numbers = np.concatenate([kept, lowest], axis=1)
     for column in range(1, numbers.shape[1]):
         numbers[(numbers[:, :column] == numbers[:, column, None]).any(axis=1), column] = -1
-    rows, is_point = np.arange(len(X_RM))[:, None], numbers >= 0
-    labels, gaps = np.where(is_point, numbers + FIRST_POINT, -1), np.where(is_point, points.gaps[rows, numbers], np.inf)
+    rows, is_point, on_rim = np.arange(len(poses))[:, None], numbers >= 0, np.nonzero(numbers >= count)
+    labels, gaps = np.where(is_point, numbers + FIRST_POINT, -1), np.where(is_point, gaps[rows, numbers], np.inf)
+    of_pair, of_rim = np.where(numbers < count, numbers, 0), numbers[on_rim] - count
+    P_m, P_r = pair.P_m[of_pair], pair.P_r[of_pair]
+    P_m[on_rim], P_r[on_rim] = feet[on_rim[0], of_rim], rim.P_r[of_rim]
     n_r = np.broadcast_to(pair.n_r[0], (*numbers.shape, 3))
-    places = Places(labels, gaps, points.P_m[rows, numbers], points.P_r[rows, numbers], n_r)
-    return places, heights[rows, numbers] * is_point
-
-
-def _lowest_over(pair: ContactPoints, X_RM: np.ndarray, points: FacePoints, gaps: np.ndarray) -> np.ndarray:
-    """Return the point of each group (n, group) with the least of the gaps (n, point) over the other face; -1 for none."""
-    groups = np.array_split(np.arange(gaps.shape[1]), min(POINT_GROUPS, gaps.shape[1]))
-    numbers = np.full((len(X_RM), len(groups)), -1)
-    for place, group in enumerate(groups):
-        remaining, left = np.arange(len(X_RM)), gaps[:, group].copy()
-        while remaining.size:
-            lowest = left[remaining].argmin(axis=1)
-            remaining = remaining[left[remaining, lowest] < np.inf]
-            lowest = left[remaining].argmin(axis=1)
-            of_remaining = FacePoints(*(values[remaining] for values in points))
-            over = are_over(pair, X_RM[remaining], of_remaining, group[lowest][:, None])[:, 0]
-            numbers[remaining[over], place] = group[lowest[over]]
-            left[remaining[~over], lowest[~over]] = np.inf
-            remaining = remaining[~over]
-    return numbers
+    return Places(labels, gaps, P_m, P_r, n_r), heights[rows, numbers] * is_point

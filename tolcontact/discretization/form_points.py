@@ -26,8 +26,8 @@ EDGES = 8  # of the triangles whose corners are compared with contact points, in
 
 
 def form_lengths(deviating: Sequence[FaceDeviation | None]) -> list[float]:
-    """Return the correlation lengths [mm] of the faces that have form."""
-    return [min(face.form.lengths) for face in deviating if face is not None and face.form is not None]
+    """Return the lengths [mm] over which the heights of the faces that have form change."""
+    return [min(face.form.scales) for face in deviating if face is not None and face.form is not None]
 
 
 def form_spacing(lengths: Sequence[float]) -> float:
@@ -60,7 +60,7 @@ def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[Face
     start, end = max(extent.min() for extent in extents), min(extent.max() for extent in extents)
     if end <= start:
         return None
-    lengths = [face.form.lengths for face in deviating if face is not None and face.form is not None]
+    lengths = [face.form.scales for face in deviating if face is not None and face.form is not None]
     across, along = (min(values) for values in zip(*lengths, strict=True))
     inset = END_SHARE * (end - start)
     heights = np.linspace(start + inset, end - inset, int(np.ceil((end - start) / (ALONG_SHARE * along))) + 1)

@@ -17,6 +17,7 @@ from tolcontact.discretization.pair_form import PairForm
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.features import Datum, FaceDeviation, Features, NominalFeature, NominalPattern
+from tolcontact.features.zone_kernel import sum_modes
 from tolcontact.geometry.curvature import chord_height
 from tolcontact.geometry.face_pair import FacePair, body_face
 from tolcontact.geometry.faces import Meshes, triangles
@@ -146,16 +147,15 @@ class ContactPoints:
         """Return the sums of both forms (row, point) [mm] at contact points, for deviations (row, contributor)."""
         heights = np.zeros((len(deviations), len(self.P_m[points])))
         for columns, modes in self._modes:
-            for column, mode in zip(columns, modes[points].T, strict=True):
-                heights += deviations[:, column, None] * mode
+            sum_modes(np.ascontiguousarray(deviations[:, columns]), np.ascontiguousarray(modes[:, points]), heights)
         return heights
 
     @cached_property
     def _modes(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The columns (mode,) of the forms of both faces, and their heights (point, mode) at the points for deviations of 1."""
+        """The columns (mode,) of the forms of both faces, and their heights (mode, point) at the points for deviations of 1."""
         sides = zip(self.deviating, (self.P_m, self.P_r), (self.facing, np.ones(len(self.P_m))), strict=True)
         return [
-            (face.form_columns, face.form.heights(P) * share[:, None])
+            (face.form_columns, np.ascontiguousarray((face.form.heights(P) * share[:, None]).T))
             for face, P, share in sides
             if face is not None and face.form is not None
         ]

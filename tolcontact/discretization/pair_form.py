@@ -30,11 +30,20 @@ class PairForm:
                 heights += face.form.sums(places, row, self.deviations[:, face.form_columns])
         return heights
 
+    def bounds(self) -> Float[Array, " row"]:
+        """Return bounds (row,) [mm] of the sums of both heights, up or down: those of all modes at their highest places."""
+        bound = np.zeros(len(self.deviations))
+        for face in self.deviating:
+            if face is not None and face.form is not None:
+                for column, mode in zip(face.form_columns, face.form.place_heights, strict=True):
+                    bound += (1 + MARGIN_SHARE) * np.abs(mode).max() * np.abs(self.deviations[:, column])
+        return bound
+
     def highest(self) -> Float[Array, " row"]:
         """Return a bound (row,) [mm] of the sums of both heights, from the heights at many places of each face."""
         bound = np.zeros(len(self.deviations))
         for face in self.deviating:
             if face is not None and face.form is not None:
-                heights = self.deviations[:, face.form_columns] @ face.form.heights(face.form.places).T
+                heights = self.deviations[:, face.form_columns] @ face.form.place_heights
                 bound += heights.max(axis=1) + MARGIN_SHARE * np.ptp(heights, axis=1)
         return bound

@@ -73,9 +73,9 @@ the diameter across it. `tc.Form(lobes=3)` has this number of lobes in all secti
 measured faces do, whose points are in files, one for each part: about their mean by their principal components. It is not
 scaled to the tolerance, and of its mean the zones around it count nothing. Of several tolerances of form the narrowest is
 drawn. Archives state which share of the variance the modes leave out, and the
-mean width of the zones. The field is orthogonal to displacements of the face as a whole: it moves no datum that is fitted by
-least squares, and datums do not touch high spots. The tolerances around a form limit form and displacement together, so that
-displacements have what the form leaves of their zones; a form that leaves nothing is refused.
+mean width of the zones. The field is orthogonal to displacements of the face as a whole, so that it moves no datum that is
+fitted by least squares. The tolerances around a form limit form and displacement together: displacements have what the form
+leaves of their zones, and a form that leaves nothing is refused.
 
 The form of general surfaces, of lines of a plane, of sections of a sphere or of part of a circle, of part of a surface, and of
 pairs of planes cannot be drawn. Such a tolerance needs `form=None`: it is stated, and the feature keeps its shape.
@@ -89,6 +89,22 @@ before it is taken where it touches its datum outside of the material (ISO 5459)
 association="least squares")`. That shift is a contributor, "far.datum B of A|B", which is not drawn: it follows from the tilts
 of the plane. Planes of a common datum count by least squares. The frame of a part is the frame of its
 shape, in which datums are nominal. A datum shift is not drawn: it follows from the contact of the datum feature with its mate.
+
+The datum of a plane with form is the plane that touches its high spots from outside of the material, again unless its
+association is "least squares". Of all such planes it is the one whose largest distance from the face is least (the minimax
+rule of ISO 5459), tilted as far as the datums before it leave free; several contacts need not carry, and a saddle does not
+rock. If places in line leave a choice, it is the plane with the least sum of squared distances. The datum is found again in
+each realization, at the places of the face where its zone is evaluated. Its offset and tilts against the datum by least squares
+are contributors, "top.datum A of A|B: tilt x", which are not drawn: they follow from the form, and not linearly. Contributions
+count them together with the form; sensitivities are those to the datum itself, and to the form at the same datum:
+
+>>> rest = rough.parts[0].feature("rest", part.face("-z"), tc.Flatness(0.02), datum="A")
+>>> lid = part.feature("lid", part.face("+x"), tc.Perpendicularity(0.05, "A"))
+>>> [label for label in tc.build(rough).nominal.contributors if "datum" in label]
+['part.lid.datum A of A: tilt x']
+
+The form of other datums, and of the planes of a common datum, counts by least squares. Of cylinders this is also because the
+smallest one around a shaft is often held in one section only, and is then free to tilt.
 
 `part.datum_targets("A", foot.point(5, 5, 0), ...)` is a datum that touches features at points, along their normals there, like
 the locators of a fixture. The features may be of any kind, also free-form, and several may have targets of one datum. Three
@@ -128,6 +144,7 @@ member has by itself, without a common zone, are those of features: declare one 
 """
 
 from tolcontact.features.datum_order import datum_order
+from tolcontact.features.datum_planes import TangentPlane
 from tolcontact.features.face_deviation import FaceDeviation
 from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, PlaneFeature
 from tolcontact.features.feature_recognition import feature_geometry
@@ -138,5 +155,6 @@ from tolcontact.features.tolerance_layers import Datum, Layer
 
 __all__ = [
     "AxisFeature", "Datum", "FaceDeviation", "FeatureGeometry", "FeatureOfSize", "Features", "FormField", "Layer",
-    "NominalFeature", "NominalPattern", "Placement", "PlaneFeature", "datum_order", "feature_geometry", "zone_of",
+    "NominalFeature", "NominalPattern", "Placement", "PlaneFeature", "TangentPlane", "datum_order", "feature_geometry",
+    "zone_of",
 ]  # fmt: skip

@@ -33,7 +33,8 @@ def displacement_terms(normals: np.ndarray, arms: np.ndarray) -> np.ndarray:
 
     Turns are about the point from which `arms` (place, 3) [mm] are counted.
     """
-    return np.column_stack([np.ones(len(arms)), normals, np.cross(arms, normals)])
+    (x, y, z), (u, v, w) = arms.T, normals.T
+    return np.column_stack([np.ones(len(arms)), normals, y * w - z * v, z * u - x * w, x * v - y * u])
 
 
 @dataclass(frozen=True, eq=False)

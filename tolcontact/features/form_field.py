@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from tolcontact.declaration.form import Form
+from tolcontact.errors import GeometryFault
 from tolcontact.features.associated_features import TERMS, AssociatedFeature, displacement_terms
 from tolcontact.features.covariances import Lengths, covariance
 from tolcontact.features.least_zone import ZoneMember
@@ -63,17 +64,34 @@ class FormField:
         return self.associated.surface.distance(self.places)[1]
 
     @cached_property
+    def scales(self) -> Lengths:
+        """The lengths over which heights change: the correlation lengths, or half of the extents of the face if that is less.
+
+        A length far beyond the face leaves heights that bend once over the face.
+        """
+        surface = self.associated.surface
+        if not isinstance(surface, Cylinder | Cone):
+            return Lengths(*np.minimum(self.lengths, longest_extent(self.places) / 2))
+        across, along = axial_extents(surface.origin, surface.axis, self.places)
+        return Lengths(min(self.lengths.across, across / 2), min(self.lengths.along, along / 2))
+
+    @cached_property
     def zone(self) -> tuple[ZoneMember, ...]:
         """The members of the zone of the form, at the places."""
         members = self.associated.members(self.places)
         return tuple(ZoneMember(numbers, self.associated.rows(self.places[numbers])) for numbers in members)
+
+    @cached_property
+    def place_heights(self) -> np.ndarray:
+        """The heights (mode, place) of each mode at the places."""
+        return np.ascontiguousarray(self.heights(self.places).T)
 
     def heights(self, points: np.ndarray) -> np.ndarray:
         """Return the heights (..., mode) of each mode at points (..., 3) [mm] of the face."""
         flat = points.reshape(-1, 3)
         heights = np.zeros((len(flat), self.modes))
         # A product of matrices would depend, in its last bits, on the number of points.
-        for factor, row in zip(self._functions(flat).T, (*self.weights, *-self.removed), strict=True):
+        for factor, row in zip(np.hstack(self._functions(flat)).T, (*self.weights, *-self.removed), strict=True):
             heights += factor[:, None] * row
         return heights.reshape(*points.shape[:-1], self.modes)
 
@@ -85,14 +103,17 @@ class FormField:
         heights = np.zeros(len(points))
         for start in range(0, len(points), POINTS_AT_ONCE):
             piece = slice(start, start + POINTS_AT_ONCE)
-            heights[piece] = (self._functions(points[piece]) * factors[row[piece]]).sum(axis=1)
+            values, terms = self._functions(points[piece])
+            of_points, count = factors[row[piece]], len(self.stations)
+            heights[piece] = (values * of_points[:, :count]).sum(axis=1)
+            heights[piece] += (terms * of_points[:, count:]).sum(axis=1)
         return heights
 
-    def _functions(self, points: np.ndarray) -> np.ndarray:
-        """Return covariances with the stations, and displacements of the face (point, station + 7) at points (point, 3)."""
+    def _functions(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return covariances with stations (point, station) and displacements of the face (point, 7) at points (point, 3)."""
         _, normals = self.associated.surface.distance(points)
         values = associated_covariance(self.form, self.lengths, self.associated, points, self.stations)
-        return np.hstack([values, displacement_terms(normals, points)])
+        return values, displacement_terms(normals, points)
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "FormField":
         """Return the field of a face that stands at R (3, 3), t (3,) [mm]."""
@@ -111,6 +132,11 @@ def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> Form
     functions = associated_covariance(form, lengths, associated, places, stations) @ inverse
     remainder, removed = beside_displacements(functions, associated, places, shares)
     variances, directions = np.linalg.eigh(remainder.T @ remainder)
+    if variances.sum() < REST:
+        raise GeometryFault(
+            f"the correlation length of its form, {max(lengths):.3g} mm, is so large that little more than displacements of "
+            f"the face is left; expected at most three times its extent, {longest_extent(places):.3g} mm"
+        )
     count = min(form.modes, int((variances > MIN_VARIANCE * variances[-1]).sum()))
     modes = directions[:, : -count - 1 : -1]  # of the functions
     modes = modes * np.sign(np.diagonal(modes[np.abs(modes).argmax(axis=0)]))
@@ -148,11 +174,17 @@ def _lengths(form: Form, face: Surface, associated: AssociatedFeature) -> Length
     if not isinstance(surface, Cylinder | Cone):
         length = form.length or LENGTH_SHARE * longest_extent(vertices)
         return Lengths(length, length)
-    arms = vertices - surface.origin
-    along = arms @ surface.axis
-    radius = float(np.linalg.norm(arms - along[:, None] * surface.axis, axis=1).max())
-    across = radius / form.lobes if form.lobes else form.length or LENGTH_SHARE * 2 * radius
-    return Lengths(across, form.length or LENGTH_SHARE * float(np.ptp(along)))
+    diameter, extent = axial_extents(surface.origin, surface.axis, vertices)
+    across = diameter / 2 / form.lobes if form.lobes else form.length or LENGTH_SHARE * diameter
+    return Lengths(across, form.length or LENGTH_SHARE * extent)
+
+
+def axial_extents(origin: np.ndarray, axis: np.ndarray, points: np.ndarray) -> tuple[float, float]:
+    """Return the largest diameter [mm] of points (point, 3) around an axis, and their extent along it [mm]."""
+    arms = points - origin
+    along = arms @ axis
+    radius = float(np.linalg.norm(arms - along[:, None] * axis, axis=1).max())
+    return 2 * radius, float(np.ptp(along))
 
 
 def longest_extent(points: np.ndarray) -> float:

@@ -3,7 +3,7 @@
 A new form is a row of DRAWN, and its associated feature.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from tolcontact.declaration import (
     Cylindricity,
@@ -11,6 +11,7 @@ from tolcontact.declaration import (
     Flatness,
     GeometricTolerance,
     LineProfile,
+    Pattern,
     Profile,
     Roundness,
     Straightness,
@@ -58,7 +59,20 @@ def is_drawn(kind: type[GeometricTolerance], per: object) -> bool:
     return kind in DRAWN_ALWAYS and per is None
 
 
-def drawn_form(declared: Toleranced, geometry: FeatureGeometry) -> GeometricTolerance | None:
+def form_fields(
+    declared: Feature | Pattern, members: Mapping[Feature, tuple[FeatureGeometry, Sequence[Surface]]]
+) -> tuple[GeometricTolerance | None, dict[Feature, FormField]]:
+    """Return the tolerance by which the form of members is drawn, and the form field of each; None, and none, without it."""
+    form, fields = None, dict[Feature, FormField]()
+    for member, (geometry, (surface, *_)) in members.items():
+        form = _drawn_form(declared, geometry)
+        field = None if form is None else _drawn_field(form, geometry, surface)
+        if field is not None:
+            fields[member] = field
+    return form, fields
+
+
+def _drawn_form(declared: Toleranced, geometry: FeatureGeometry) -> GeometricTolerance | None:
     """Return the tolerance by which the form of a feature is drawn, the narrowest one; None if it keeps its shape.
 
     Raises GeometryFault for a tolerance of form that cannot be drawn.
@@ -83,7 +97,7 @@ def drawn_form(declared: Toleranced, geometry: FeatureGeometry) -> GeometricTole
     return min(tolerances, key=lambda tolerance: tolerance.width, default=None)
 
 
-def drawn_field(tolerance: GeometricTolerance, geometry: FeatureGeometry, face: Surface) -> FormField | None:
+def _drawn_field(tolerance: GeometricTolerance, geometry: FeatureGeometry, face: Surface) -> FormField | None:
     """Return the form field of a face by a tolerance; None for a tolerance without form. Raises GeometryFault."""
     surface = analytic_surface(face)
     if tolerance.form is None or surface is None:

@@ -8,13 +8,14 @@ import numpy as np
 
 from tolcontact.declaration import DatumTargets, Face, Feature, GeometricTolerance, Pattern
 from tolcontact.errors import GeometryFault
+from tolcontact.features.datum_planes import Lean, TangentPlane
 from tolcontact.features.face_deviation import FaceDeviation
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize, TargetPoint
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.form_field import FormField
-from tolcontact.features.forms import drawn_field, drawn_form
+from tolcontact.features.forms import form_fields
 from tolcontact.features.pattern_geometry import MIXED, RELATIVE, SIZE_TOLERANCE, PatternGeometry, check_alike
-from tolcontact.features.tolerance_layers import Datum, Layer, Lean, padded, tolerance_layers
+from tolcontact.features.tolerance_layers import Datum, Layer, padded, tolerance_layers
 from tolcontact.geometry.faces import FaceArea, Meshes, face_area, patch
 from tolcontact.geometry.surface import Surface
 
@@ -125,7 +126,15 @@ class NominalPattern:
     @property
     def datums(self) -> tuple[Datum, ...]:
         """The members as datums, all of which are one common datum."""
-        return tuple(Datum(member.feature, member.geometry, member.coordinates) for member in self.members)
+        return tuple(
+            Datum(member.feature, member.geometry, member.coordinates, member.form, member.form_columns)
+            for member in self.members
+        )
+
+    @property
+    def shift_columns(self) -> list[int]:
+        """The columns of the shifts of datums."""
+        return [first + k for first, lean in self.leans.items() for k in range(len(lean.coordinates))]
 
 
 @dataclass(eq=False)
@@ -173,14 +182,14 @@ class Features:
         layers = tolerance_layers(declared, geometry, self.datums(part), start)
         names = _freedom_names(declared, geometry, layers)
         leans, coordinates = _coordinates(geometry, layers, start)
-        names += [f"{declared.name}.datum {lean.datum} of {system}" for lean, system in leans.values()]
+        names += [f"{declared.name}.{lean.name(k, system)}" for lean, system in leans.values() for k in lean.coordinates]
         sizes = dict[Feature, int]()
         if declared.size is not None:
             for member in new:
                 _check_size(member, geometries[member])
                 sizes[member] = start + len(names)
                 names.append(f"{member.name}.size")
-        form, fields = _form_fields(declared, {member: (geometries[member], surfaces[member]) for member in new})
+        form, fields = form_fields(declared, {member: (geometries[member], surfaces[member]) for member in new})
         forms = dict[Feature, range]()
         for member, shape in fields.items():
             forms[member] = range(start + len(names), start + len(names) + shape.modes)
@@ -257,6 +266,12 @@ class Features:
         nominal = next((nominal for nominal in self.features if nominal.feature is feature), None)
         return None if nominal is None else self._used(nominal, None, placement)
 
+    def use_touched(self, placements: Sequence[Placement]) -> None:
+        """Use the faces with form that datums touch, so that archives hold them."""
+        touched = [lean.form for pattern in self.patterns for lean in pattern.leans.values() if isinstance(lean, TangentPlane)]
+        for nominal in (nominal for nominal in self.features if nominal.form in touched):
+            self._used(nominal, 0, placements[nominal.part])
+
     def _used(self, nominal: NominalFeature, number: int | None, placement: Placement) -> FaceDeviation:
         """Return the deviation of a face: the same object for all that uses it."""
         key = (nominal.feature, number)
@@ -296,19 +311,6 @@ def _check_size(feature: Feature, geometry: FeatureGeometry) -> None:
         raise GeometryFault(f'its tolerance class is {size.tolerance_class}, and it is {own}; write "{other}"')
 
 
-def _form_fields(
-    declared: Feature | Pattern, members: Mapping[Feature, tuple[FeatureGeometry, Sequence[Surface]]]
-) -> tuple[GeometricTolerance | None, dict[Feature, FormField]]:
-    """Return the tolerance by which the form of members is drawn, and the form field of each; None, and none, without it."""
-    form, fields = None, dict[Feature, FormField]()
-    for member, (geometry, (surface, *_)) in members.items():
-        form = drawn_form(declared, geometry)
-        field = None if form is None else drawn_field(form, geometry, surface)
-        if field is not None:
-            fields[member] = field
-    return form, fields
-
-
 def _freedom_names(declared: Feature | Pattern, geometry: PatternGeometry, layers: Sequence[Layer]) -> list[str]:
     """Return the names "feature.freedom" of the directions that layers add, of the feature or pattern that they move."""
     names, counts = list[str](), Counter[str]()
@@ -329,14 +331,17 @@ def _coordinates(
     The columns from `start` on are the directions that layers add, then the leans.
     """
     shift = start + sum(layer.added.shape[1] for layer in layers)
-    coordinates = np.zeros((geometry.count, shift + sum(len(layer.frame.leans) for layer in layers)))
+    columns = sum(len(lean.coordinates) for layer in layers for lean in layer.frame.leans)
+    coordinates = np.zeros((geometry.count, shift + columns))
     column, leans = start, dict[int, tuple[Lean, str]]()
     for layer in layers:
         followed = layer.followed(geometry)
-        count, shifts = layer.added.shape[1], len(layer.frame.leans)
-        leans |= {shift + k: (lean.at_column(start, shift), layer.tolerance.datums) for k, lean in enumerate(layer.frame.leans)}
+        count, first = layer.added.shape[1], shift
+        for lean in layer.frame.leans:
+            leans[shift] = lean.at_column(start, first), layer.tolerance.datums
+            shift += len(lean.coordinates)
         coordinates[:, column : column + count] = layer.added
         coordinates[:, :start] += followed[:, :start]
-        coordinates[:, shift : shift + shifts] = followed[:, start:]
-        column, shift = column + count, shift + shifts
+        coordinates[:, first:shift] = followed[:, start:]
+        column += count
     return leans, coordinates

@@ -11,7 +11,9 @@ from tolcontact.declaration import OUTSIDE, Feature, GeometricTolerance
 from tolcontact.declaration.feature_tolerance import TRANSLATIONS
 from tolcontact.declaration.toleranced import Toleranced
 from tolcontact.errors import GeometryFault
+from tolcontact.features.datum_planes import Lean, TangentPlane, free_directions
 from tolcontact.features.feature_geometry import FeatureGeometry, PlaneFeature
+from tolcontact.features.form_field import FormField
 from tolcontact.features.pattern_geometry import MIN_LENGTH, PatternGeometry
 from tolcontact.features.tolerance_kinds import zone_of
 
@@ -22,42 +24,13 @@ RANK_TOLERANCE = 1e-4  # smallest singular value of an independent direction: sh
 
 
 class Datum(NamedTuple):
-    """A datum feature, and its coordinates (coordinate, column) for deviations of 1."""
+    """A datum feature, its coordinates (coordinate, column) for deviations of 1, and its form with the columns of that."""
 
     feature: Feature
     geometry: FeatureGeometry
     coordinates: np.ndarray
-
-
-class Lean(NamedTuple):
-    """A plane that leans against the datums before it, so that its datum touches it at an extreme, outside of the material.
-
-    datum     its letter
-    extremes  (extreme, column) [mm]: how far the extremes of the plane stand out of its datum by least squares, for deviations
-              of 1. The datum is shifted by the largest one
-    """
-
-    datum: str | None
-    extremes: np.ndarray
-
-    def at_column(self, own: int, place: int) -> "Lean":
-        """Return this lean with its columns from number `own` on, which are those of the leans before it, at `place`."""
-        extremes = padded(self.extremes[:, :own], place)
-        return self._replace(extremes=np.hstack([extremes, self.extremes[:, own:]]))
-
-    def shifts(self, deviations: np.ndarray) -> np.ndarray:
-        """Return the shift (row,) [mm] of the datum for deviations (row, column), summed up in a fixed order."""
-        out = np.zeros((len(deviations), len(self.extremes)))
-        for column, factors in enumerate(self.extremes.T):
-            if factors.any():
-                out += deviations[:, column, None] * factors
-        return out.max(axis=1)
-
-    def bounds(self, lower: np.ndarray, upper: np.ndarray) -> tuple[float, float]:
-        """Return bounds [mm] of the shift for deviations between `lower` and `upper` (contributor,)."""
-        rows = np.vstack([self.extremes, self.extremes.mean(axis=0)])
-        ends = np.stack([rows * bound[: rows.shape[1]] for bound in (lower, upper)])
-        return float(ends.min(axis=0).sum(axis=1).max()), float(ends.max(axis=0).sum(axis=1).max())
+    form: FormField | None = None
+    form_columns: range = range(0)
 
 
 class DatumFrame(NamedTuple):
@@ -65,7 +38,7 @@ class DatumFrame(NamedTuple):
 
     motion   (6, column) of the frame for deviations of 1; the last columns are for shifts of 1 mm by its leans
     free     (6, freedom): displacements that none of the datums notices
-    leans    of its planes, in the order of their columns
+    leans    of its planes, in the order of their columns; each has one for each of its coordinates
     """
 
     motion: np.ndarray
@@ -74,17 +47,18 @@ class DatumFrame(NamedTuple):
 
     def felt(self, effect: np.ndarray) -> "DatumFrame":
         """Return this frame without the leans that change nothing of `effect` (coordinate, 6) of its motion."""
-        columns = self.motion.shape[1] - len(self.leans)
-        felt = np.abs(effect @ self.motion[:, columns:]).max(axis=0, initial=0.0) > MIN_LEAN
-        for k in reversed(range(len(self.leans))):
-            felt[k] |= any(felt[j] and self.leans[j].extremes[:, columns + k].any() for j in range(k + 1, len(self.leans)))
-        kept = [*range(columns), *(columns + np.flatnonzero(felt))]
-        leans = [
-            lean._replace(extremes=lean.extremes[:, [column for column in kept if column < lean.extremes.shape[1]]])
-            for lean, is_felt in zip(self.leans, felt, strict=True)
-            if is_felt
-        ]
-        return DatumFrame(self.motion[:, kept], self.free, tuple(leans))
+        starts = self.motion.shape[1] - np.cumsum([len(lean.coordinates) for lean in reversed(self.leans)])[::-1]
+        columns = int(min(starts, default=self.motion.shape[1]))
+        felt = np.abs(effect @ self.motion).max(axis=0, initial=0.0) > MIN_LEAN
+        felt[:columns] = True
+        for lean, start in reversed([*zip(self.leans, starts, strict=True)]):
+            if felt[start : start + len(lean.coordinates)].any():
+                felt[lean.sources] = True
+        leans = list[Lean]()
+        for lean, start in zip(self.leans, starts, strict=True):
+            if len(own := np.flatnonzero(felt[start : start + len(lean.coordinates)])):
+                leans.append(lean.taken(np.flatnonzero(felt[:start]), own))
+        return DatumFrame(self.motion[:, felt], self.free, tuple(leans))
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,45 +88,56 @@ def datum_frame(
     """Return the frame of datums in their precedence: each takes what it notices of the freedoms left by those before it.
 
     Compartments that are `orientation_only` notice no translations (ISO 5459, "><"). The datums of one compartment count
-    together, by least squares of their coordinates. A plane by itself is then shifted to its extreme outside of the material
-    (ISO 5459), unless its association is by least squares. Angles are weighed by `reach` [mm].
+    together, by least squares of their coordinates. A plane by itself is then moved to where it touches its feature outside of
+    the material (ISO 5459), unless its association is by least squares. Angles are weighed by `reach` [mm].
     """
     to_twist = np.diag([1.0] * 3 + [1 / reach] * 3)
     motion, free, leans = np.zeros((6, columns)), np.eye(6), list[Lean]()
     for compartment, is_turned in zip(system, orientation_only, strict=True):
         values = np.vstack([datum.geometry.about(centre) for datum in compartment]) @ to_twist
         coordinates = np.vstack([padded(datum.coordinates, motion.shape[1]) for datum in compartment])
+        features = values, coordinates
+        selection = np.eye(len(values))
         if is_turned:
-            turns = scipy.linalg.null_space(values[:, :3].T, rcond=RANK_TOLERANCE)
-            values, coordinates = turns.T @ values, turns.T @ coordinates
+            selection = scipy.linalg.null_space(values[:, :3].T, rcond=RANK_TOLERANCE)
+            values, coordinates = selection.T @ values, selection.T @ coordinates
         U, S, Vt = np.linalg.svd(values @ free)
         largest = S.max(initial=0.0)
         rank = int((S > MIN_NOTICED * max(largest, 1e-300)).sum()) if largest > MIN_NOTICED else 0
         if rank:
             inverse = Vt[:rank].T @ (U[:, :rank] / S[:rank]).T
             motion = motion + free @ inverse @ (coordinates - values @ motion)
-            lean = None if is_turned else _lean(compartment, coordinates - values @ motion)
+            lean = _lean(compartment, features[1] - features[0] @ motion, features[0] @ free, is_turned=is_turned)
             if lean is not None:
                 leans.append(lean)
-                shift = free @ inverse @ compartment[0].geometry.values @ _translation(compartment[0].geometry)
-                motion = np.column_stack([motion, shift])
+                plane = compartment[0].geometry
+                assert isinstance(plane, PlaneFeature)
+                motion = np.hstack([motion, lean.motions(free @ inverse @ selection.T, plane)])
         free = free @ Vt[rank:].T
     return DatumFrame(to_twist @ motion, to_twist @ free, tuple(leans))
 
 
-def _lean(compartment: Sequence[Datum], residuals: np.ndarray) -> Lean | None:
-    """Return how a plane leans, from what its datum leaves of its coordinates (coordinate, column); None if it does not."""
+def _lean(compartment: Sequence[Datum], residuals: np.ndarray, turns: np.ndarray, *, is_turned: bool) -> Lean | None:
+    """Return where the plane of a compartment lies beside that by least squares; None if it does not lie elsewhere.
+
+    residuals   (coordinate, column): what the datum leaves of the coordinates of its feature
+    turns       (coordinate, n): how the motions that the datums before leave free change these
+    """
     (datum, *others) = compartment
-    if others or not isinstance(datum.geometry, PlaneFeature) or datum.feature.association != OUTSIDE:
+    geometry = datum.geometry
+    if others or not isinstance(geometry, PlaneFeature) or datum.feature.association != OUTSIDE:
         return None
-    extremes = datum.geometry.rows(datum.geometry.extremes)[:, 0] @ residuals
-    return Lean(datum.feature.datum, extremes) if np.abs(extremes).max(initial=0.0) > MIN_LEAN else None
-
-
-def _translation(geometry: FeatureGeometry) -> np.ndarray:
-    """Return the displacement (6,) of a plane by 1 mm along its normal."""
-    assert isinstance(geometry, PlaneFeature)
-    return np.concatenate([geometry.normal, np.zeros(3)])
+    if datum.form is not None:
+        heights = geometry.rows((datum.form.places, datum.form.normals[:, None]))[:, 0]
+        leaning, free = np.where(np.abs(residuals) < MIN_PART, 0.0, residuals), free_directions(turns[1:])
+        return TangentPlane(
+            datum.feature.datum, geometry.rows(geometry.extremes)[:, 0] @ leaning, (0, 1, 2),
+            datum.form, datum.form_columns, heights, leaning, free, geometry.names,
+        )  # fmt: skip
+    extremes = geometry.rows(geometry.extremes)[:, 0] @ residuals
+    if is_turned or np.abs(extremes).max(initial=0.0) <= MIN_LEAN:
+        return None
+    return Lean(datum.feature.datum, extremes, (0,))
 
 
 def padded(coordinates: np.ndarray, columns: int) -> np.ndarray:

@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.edges import CREASE, on_rim, rim
+from tolcontact.geometry.region_kernel import Region
 from tolcontact.geometry.triangle_tree import triangle_tree
 
 RIM_TOLERANCE = 1e-6  # of a face's size: a point over a face stands no farther beside its rim
@@ -125,6 +126,13 @@ class Surface:
     def _rim_corners(self) -> np.ndarray:
         """Mask (face, corner) of the corners on the rim."""
         return np.isin(self._faces, rim(self._faces))
+
+    @cached_property
+    def region(self) -> Region:
+        """A flat face, seen along its normal."""
+        axes = np.linalg.svd(self.corner_normals[0, 0][None])[2][1:]
+        edges = np.asarray(self.mesh.vertices)[rim(self._faces)] @ axes.T
+        return Region(np.ascontiguousarray(axes), np.ascontiguousarray(edges), RIM_TOLERANCE * float(self.mesh.scale))
 
     def nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the triangle (point,) and the place on it (point, 3) [mm] nearest to each of `points` (point, 3) [mm]."""

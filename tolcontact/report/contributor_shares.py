@@ -76,10 +76,7 @@ def _groups(results: xr.DataTree, sample: xr.Dataset, columns: np.ndarray) -> di
     labels = [str(label) for label in sample[sample[terms.DEVIATION.name].dims[-1]].values]
     is_stated = terms.CONTRIBUTOR_SOURCE.name in sample  # archives before format 4 have locators alone
     sources = sample[terms.CONTRIBUTOR_SOURCE.name].values if is_stated else np.full(len(labels), "locator")
-    ends = {"feature": ".", "datum": ".", "form": " "}  # before the freedom of a feature, and the number of a mode of its form
-    owners = [
-        label.rpartition(ends[source])[0] if source in ends else label for label, source in zip(labels, sources, strict=True)
-    ]
+    owners = [_owner(label, source) for label, source in zip(labels, sources, strict=True)]
     leader = {owner: owner for owner in owners}
 
     def find(owner: str) -> str:
@@ -97,6 +94,14 @@ def _groups(results: xr.DataTree, sample: xr.Dataset, columns: np.ndarray) -> di
         members.setdefault(find(owners[column]), []).append(position)
     names = {key: " + ".join(dict.fromkeys(owners[columns[k]] for k in positions)) for key, positions in members.items()}
     return {names[key]: np.array(positions) for key, positions in members.items()}
+
+
+def _owner(label: str, source: str) -> str:
+    """Return what a contributor belongs to: a feature, its form, a datum that touches form, or the contributor itself."""
+    if source == "datum" and ": " in label:  # its form is that of another feature
+        return label.rpartition(": ")[0]
+    ends = {"feature": ".", "datum": ".", "form": " "}  # before the freedom of a feature, and the number of a mode of its form
+    return label.rpartition(ends[source])[0] if source in ends else label
 
 
 def _drawn_together(results: xr.DataTree) -> Iterator[list[str]]:

@@ -26,6 +26,7 @@ from tolcontact.discretization import ContactPoints
 from tolcontact.errors import OptionError
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.method import Method
+from tolcontact.testing.archived_datums import tangents
 from tolcontact.testing.referee import ArchivedPair, NotKeptError, Rows
 from tolcontact.workflow import build
 
@@ -89,6 +90,24 @@ def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) ->
             f'"{terms.GAP_MIN.name}" is not the smallest gap of the archived contact points: it differs by {largest:.3g} mm in '
             f"{place}; {within:.3g} mm are allowed"
         )
+
+
+def assert_datums_recompute(results: Results) -> None:
+    """Assert that the archived planes which touch datum features with form lie where they do, outside of the material.
+
+    A linear programme finds the plane with the least distance from the archived heights of each face, from the archive alone.
+    Raises AssertionError with the first realization whose plane is another one, and if the archive has no deviations.
+    """
+    with _opened(results) as tree:
+        rows, planes = _rows(tree), tangents(tree)
+        if planes and terms.DEVIATION.name not in rows:
+            raise AssertionError(f'datums cannot be computed again without "{terms.DEVIATION.name}", which was not kept')
+        finished = np.flatnonzero(rows[terms.STATUS.name].values != terms.UNFINISHED)
+        for plane in planes:
+            deviations = rows[terms.DEVIATION.name].values[finished]
+            label = rows[terms.DEVIATION.name][terms.CONTRIBUTOR].values[plane.columns.max()]
+            for row, fault in plane.faults(deviations):
+                raise AssertionError(f'the plane of "{label}" in realization {_numbers(tree)[finished[row]]} {fault}')
 
 
 def assert_same_run(a: Results, b: Results, *, variables: Sequence[str] | None = None) -> None:

@@ -13,8 +13,9 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from tolcontact import vocabulary as terms
-from tolcontact.discretization import ContactPoints, are_over, face_points
+from tolcontact.discretization import ContactPoints, rim_points
 from tolcontact.geometry.meeting import Meeting
+from tolcontact.geometry.surface import Surface
 from tolcontact.testing.archived_form import ArchivedForm
 
 DIRECTIONS = 72  # that are tried at first
@@ -287,12 +288,21 @@ class ArchivedPair:
     def _gaps_over_face(self, X_RM: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         """Return gaps (n, point) [mm] of points between the ends of the faces; infinite ones of points beside them."""
         assert self.nominal is not None
-        points = face_points(self.nominal, X_RM)
-        rim = slice(len(self.moving_point), None)
-        at_rim = self._form(deviations, points.P_m[:, rim], points.P_r[0, rim])
-        forms = np.concatenate([self._form(deviations, self.moving_point, self.reference_point), at_rim], axis=1)
-        numbers = np.broadcast_to(np.arange(points.gaps.shape[1]), points.gaps.shape)
-        return np.where(are_over(self.nominal, X_RM, points, numbers), points.gaps - forms, np.inf)
+        rim, R, t = rim_points(self.nominal, X_RM), X_RM[:, :9].reshape(-1, 3, 3), X_RM[:, None, 9:]
+        moved = self.moving_point @ R.swapaxes(1, 2) + t
+        gaps = ((moved - self.reference_point) * self.normal).sum(axis=2) - self._form(
+            deviations, self.moving_point, self.reference_point
+        )
+        at_rim = rim.gaps - self._form(deviations, rim.P_m, rim.P_r)
+        gaps[~_are_over(self.nominal.reference_face, moved)] = np.inf
+        at_rim[~_are_over(self.nominal.moving_face, rim.P_m)] = np.inf
+        return np.concatenate([gaps, at_rim], axis=1)
+
+
+def _are_over(face: Surface | None, places: np.ndarray) -> np.ndarray:
+    """Return whether places (n, place, 3) stand over a face, by their nearest points on its triangles."""
+    assert face is not None
+    return np.asarray(face.project(places.reshape(-1, 3))[2].reshape(places.shape[:2]))
 
 
 def _products(matrix: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -93,7 +93,7 @@ def _formed_zone(
     field, geometry = member.form, member.geometry
     assert field is not None
     offsets = geometry.rows((field.places, field.normals[:, None]))[:, 0]
-    heights = spreads * field.heights(field.places)
+    heights = spreads * field.place_heights.T
     return FormedZone(rows, coordinates, heights, offsets, floats(tolerance, geometry, rows))
 
 

@@ -50,6 +50,7 @@ class Contributor(NamedTuple):
     layer      of a freedom or a form of a feature: the tolerance that controls it
     spread     [mm] standard deviation of a freedom of a feature, or of a coefficient of its form
     mean       [mm] of a freedom of a feature
+    rule       of a datum: what its shift follows from
     """
 
     label: str
@@ -59,6 +60,7 @@ class Contributor(NamedTuple):
     layer: Layer | None = None
     spread: float = 0.0
     mean: float = 0.0
+    rule: str = ""
 
     @property
     def range(self) -> float:
@@ -81,7 +83,7 @@ class Contributor(NamedTuple):
         if self.layer is not None:
             return f"{self.layer.tolerance.archived_text}; {self.layer.tolerance.rule}"
         if self.source == DATUM:
-            return "follows from the tilts of the datum feature"
+            return self.rule
         if self.tolerance is None:
             return ""
         name = self.tolerance.distribution
@@ -193,8 +195,9 @@ class Contributors:
             for k in range(count):
                 yield Contributor(next(labels), FEATURE, "mm", None, layer, spread / tolerance.cp, float(mean[k]))
             column += count
-        for _ in pattern.leans:
-            yield Contributor(next(labels), DATUM, "mm")
+        for lean in pattern.leans.values():
+            for _ in lean.coordinates:
+                yield Contributor(next(labels), DATUM, "mm", rule=lean.rule)
         if pattern.declared.size is not None:
             for _ in pattern.members:
                 yield Contributor(next(labels), FEATURE, "mm", pattern.declared.size.tolerance)

@@ -13,6 +13,7 @@ from scipy.special import ndtr, ndtri
 from tolcontact.declaration.feature_tolerance import INSIDE
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
+from tolcontact.features.datum_planes import Shifts
 from tolcontact.variation.contributors import Contributors
 from tolcontact.variation.plans import STREAM, Numbers, Plan
 from tolcontact.vocabulary import MONTE_CARLO
@@ -113,9 +114,10 @@ class Draws:
         return deviations
 
     def add_shifts(self, deviations: np.ndarray) -> None:
-        """Put into deviations (n, contributor) the shifts of datums whose planes lean, which follow from the other ones."""
+        """Put into deviations (n, contributor) the shifts of datums, which follow from the other ones."""
+        known: Shifts = {}
         for column, lean in self.leans.items():
-            deviations[:, column] = lean.shifts(deviations)
+            deviations[:, column : column + len(lean.coordinates)] = lean.shifts(deviations, known)
 
     def _single_draws(self, numbers: Numbers, count: int) -> np.ndarray:
         """Return deviations (count, contributor) of each contributor by itself, or in its correlation."""
@@ -148,7 +150,9 @@ class Draws:
         sets = [[self._column[label] for label in labels] for labels, _ in self.correlated if correlated]
         sets += [[self._column[label] for label in population.columns] for population in assembly.populations]
         sets += [[int(column) for column in joint.columns] for joint in self.contributors.joint_draws]
-        together = [[column, *map(int, np.flatnonzero(lean.extremes.any(axis=0)))] for column, lean in self.leans.items()]
+        together = [
+            [*range(column, column + len(lean.coordinates)), *map(int, lean.sources)] for column, lean in self.leans.items()
+        ]
         together += [list(map(int, [*bonus.sizes, *bonus.columns])) for bonus in self.contributors.bonuses]
         # What follows from others by more than a sum also follows from the causes that drive them.
         followed = {column for columns in together for column in columns}

@@ -41,11 +41,11 @@ class FormSpread:
 
     field: FormField
 
-    @property
+    @functools.cached_property
     def widths(self) -> np.ndarray:
         """The widths (direction,) of the zones for unit vectors of coefficients in all directions evenly."""
         zone = tuple((member.numbers.tobytes(), member.rows.tobytes()) for member in self.field.zone)
-        return _unit_widths(zone, self.field.heights(self.field.places).tobytes(), self.field.modes)
+        return _unit_widths(zone, self.field.place_heights.T.tobytes(), self.field.modes)
 
     def share_inside(self, spread: float, width: float) -> float:
         """Return the share of faces, with coefficients of a standard deviation [mm], inside a zone of a width [mm]."""
@@ -71,7 +71,7 @@ class FormSpread:
             mean_length = np.sqrt(2) * scipy.special.poch(self.field.modes / 2, 0.5)  # of the chi distribution
             return float(spreads[0] * mean_length * self.widths.mean())
         faces = self.field.means + spreads * np.random.default_rng(0).normal(size=(FACES, len(spreads)))
-        return float(least_widths(self.field.zone, faces @ self.field.heights(self.field.places).T).mean())
+        return float(least_widths(self.field.zone, faces @ self.field.place_heights).mean())
 
 
 @dataclass(frozen=True, eq=False)

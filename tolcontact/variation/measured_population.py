@@ -15,7 +15,7 @@ from tolcontact.declaration.feature_tolerance import INSIDE
 from tolcontact.discretization import Nominal
 from tolcontact.features import Datum, Layer, NominalFeature, NominalPattern, PlaneFeature, zone_of
 from tolcontact.features.feature_geometry import Probes
-from tolcontact.features.least_zone import least_widths
+from tolcontact.features.least_zone import least_widths, middles
 from tolcontact.variation.component_zones import bonus, floats, includes_form
 from tolcontact.variation.draws import Draws
 
@@ -137,16 +137,16 @@ def _measured_form(pattern: NominalPattern, layer: Layer, deviations: np.ndarray
     return _measured_zone(pattern, f"{tolerance}; {tolerance.rule}", stated, _in_turn(widths), tolerance.width)
 
 
-def _form_probes(feature: NominalFeature) -> Probes:
+def _form_probes(feature: NominalFeature | Datum) -> Probes:
     """Return places all over a face with form, and its normal at each."""
     assert feature.form is not None
     return feature.form.places, feature.form.normals[:, None]
 
 
-def _form_heights(feature: NominalFeature, deviations: np.ndarray) -> np.ndarray:
+def _form_heights(feature: NominalFeature | Datum, deviations: np.ndarray) -> np.ndarray:
     """Return the heights (n, place) [mm] of the form of drawn features at these places."""
     assert feature.form is not None
-    return np.asarray(deviations[:, feature.form_columns] @ feature.form.heights(feature.form.places).T)
+    return np.asarray(deviations[:, feature.form_columns] @ feature.form.place_heights)
 
 
 def _stated_share(pattern: NominalPattern, layer: Layer) -> float:
@@ -175,6 +175,19 @@ def _touches_outside(datum: Datum) -> bool:
     return isinstance(datum.geometry, PlaneFeature) and datum.feature.association == OUTSIDE
 
 
+def _tangents(motions: np.ndarray, heights: np.ndarray) -> np.ndarray:
+    """Return the heights (n, place) of the planes that touch those of a face outside of the material, with the least distance.
+
+    Planes may shift along their normals, and tilt as the face does in `motions` (place, freedom).
+    """
+    tilts, lengths, _ = np.linalg.svd(motions - motions.mean(axis=0), full_matrices=False)
+    tilts = tilts[:, lengths > MIN_NOTICED * max(lengths.max(initial=0.0), 1.0)]
+    rows = np.column_stack([np.ones(len(motions)), tilts / np.abs(tilts).max(axis=0, initial=MIN_NOTICED)])
+    middle, _ = middles(rows, heights)
+    planes = middle @ rows.T
+    return np.asarray(planes + (heights - planes).max(axis=1)[:, None])
+
+
 def _fitted_frame(
     pattern: NominalPattern,
     system: Sequence[Sequence[Datum]],
@@ -184,15 +197,24 @@ def _fitted_frame(
     """Return the motions (n, 6) of the datum frame about the pattern's centre, and a basis (6, freedom) of its free motions.
 
     The datum features of each compartment are fitted by least squares, with the motions that the compartments before it leave
-    free. A plane by itself is then moved out of the material until no probe of it stands outside of its datum.
+    free. A plane by itself is then moved out of the material until no probe of it stands outside of its datum. One with form is
+    measured all over, and what is fitted to it first is the plane that touches it.
     """
     centre = pattern.geometry.centre
     free = np.diag([1.0] * 3 + [1 / pattern.geometry.reach] * 3)
     motion = np.zeros((len(deviations), 6))
     for compartment, is_turned in zip(system, orientation_only, strict=True):
-        measurements = [_measurement(datum, *datum.geometry.extremes, deviations, centre) for datum in compartment]
+        is_outside = len(compartment) == 1 and _touches_outside(compartment[0])
+        has_form = is_outside and compartment[0].form is not None
+        probes = [_form_probes(datum) if has_form else datum.geometry.extremes for datum in compartment]
+        measurements = [
+            _measurement(datum, *places, deviations, centre) for datum, places in zip(compartment, probes, strict=True)
+        ]
         rows = np.vstack([measurement.rows for measurement in measurements])
         values = np.hstack([measurement.values for measurement in measurements])
+        if has_form:
+            residuals = values - motion @ rows.T + _form_heights(compartment[0], deviations)
+            values = motion @ rows.T + _tangents(rows @ free, residuals)
         if is_turned:  # what any translation changes is not measured
             seen = scipy.linalg.orth(rows[:, :3])
             rows, values = rows - seen @ (seen.T @ rows), values - values @ seen @ seen.T
@@ -202,7 +224,7 @@ def _fitted_frame(
         residuals = values - motion @ rows.T
         locked_motion, *_ = np.linalg.lstsq(rows @ locked, residuals.T, rcond=None)
         motion = motion + (locked @ locked_motion).T
-        if not is_turned and len(compartment) == 1 and _touches_outside(compartment[0]):
+        if not is_turned and is_outside and not has_form:
             outermost = (values - motion @ rows.T).max(axis=1)
             shift, *_ = np.linalg.lstsq(rows @ locked, np.ones(len(rows)), rcond=None)
             motion = motion + outermost[:, None] * (locked @ shift)

@@ -1,0 +1,56 @@
+"""The values of an archive that describe planes which touch datum features with form."""
+
+from typing import Any
+
+import numpy as np
+
+from tolcontact import vocabulary as terms
+from tolcontact.compilation import Program
+from tolcontact.features import TangentPlane
+from tolcontact.vocabulary import ArchiveVariable
+
+COORDINATES = 3  # of a plane
+
+
+def tangents(program: Program) -> dict[int, TangentPlane]:
+    """Return the planes that touch datum features, by the first of their columns of deviations."""
+    leans = {column: lean for pattern in program.nominal.patterns for column, lean in pattern.leans.items()}
+    return {column: lean for column, lean in leans.items() if isinstance(lean, TangentPlane)}
+
+
+def datum_sizes(program: Program) -> dict[str, int]:
+    """Return the dimensions of these planes; none if there are none."""
+    planes = list(tangents(program).values())
+    if not planes:
+        return {}
+    places = {plane.form_columns.start: len(plane.heights) for plane in planes}
+    return {
+        terms.TANGENT: len(planes), terms.TANGENT_PLACE: sum(places.values()),
+        terms.COORDINATE: COORDINATES, terms.TANGENT_FREEDOM: COORDINATES,
+    }  # fmt: skip
+
+
+def datum_values(program: Program) -> dict[ArchiveVariable, Any]:
+    """Return these planes and the places that they may touch; none if there are none."""
+    planes, sizes = tangents(program), datum_sizes(program)
+    if not sizes:
+        return {}
+    faces = {int(face.form_columns[0]): k for k, face in enumerate(program.nominal.faces) if face.form is not None}
+    count = len(program.nominal.contributors)
+    columns, leaning = np.full((len(planes), COORDINATES), -1), np.zeros((len(planes), COORDINATES, count))
+    free = np.zeros((len(planes), COORDINATES, COORDINATES))
+    for number, (column, plane) in enumerate(planes.items()):
+        columns[number, list(plane.coordinates)] = column + np.arange(len(plane.coordinates))
+        leaning[number, :, : plane.leaning.shape[1]] = plane.leaning
+        free[number, :, : plane.free.shape[1]] = plane.free
+    touched = {faces[plane.form_columns.start]: plane for plane in planes.values()}
+    places = [program.nominal.faces[face].form for face in touched]
+    return {
+        terms.TANGENT_FACE: [faces[plane.form_columns.start] for plane in planes.values()],
+        terms.TANGENT_CONTRIBUTOR: columns,
+        terms.TANGENT_LEANING: leaning,
+        terms.TANGENT_FREE: free,
+        terms.FACE_OF_TANGENT_PLACE: np.concatenate([np.full(len(plane.heights), k) for k, plane in touched.items()]),
+        terms.TANGENT_PLACE_AT: np.vstack([form.places for form in places if form is not None]),
+        terms.TANGENT_HEIGHT: np.vstack([plane.heights for plane in touched.values()]),
+    }

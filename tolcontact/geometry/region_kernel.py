@@ -1,0 +1,126 @@
+"""Compiled search of the lowest points of flat faces that stand over each other."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tolcontact.compiled import compiled, inner
+
+
+class Region(NamedTuple):
+    """A flat face, seen along its normal.
+
+    axes        (2, 3) unit vectors in its plane
+    edges       (edge, 2, 2) [mm]: ends of the edges of its rim along these
+    tolerance   [mm] by which points may stand beside the rim
+    """
+
+    axes: np.ndarray
+    edges: np.ndarray
+    tolerance: float
+
+
+@compiled
+def plane_gaps(X_RM, P_m, P_r, n_r, gaps):  # type: ignore[no-untyped-def]
+    """Write gaps n_r (R P_m + t - P_r) of points (point, 3) at X_RM (n, 12) to the first columns of `gaps`."""
+    for k in range(X_RM.shape[0]):
+        X = X_RM[k]
+        for j in range(P_m.shape[0]):
+            gap = 0.0
+            for i in range(3):
+                x = X[3 * i] * P_m[j, 0] + X[3 * i + 1] * P_m[j, 1] + X[3 * i + 2] * P_m[j, 2] + X[9 + i] - P_r[j, i]
+                gap += x * n_r[j, i]
+            gaps[k, j] = gap
+
+
+@compiled
+def write_promising(rim, gaps, bounds, groups, count, moving, kept, promising):  # type: ignore[no-untyped-def]
+    """Write which points of the rim may be the lowest of their group over the moving face, or are kept.
+
+    gaps        (n, point) [mm] of nominal faces, from number `count` on of the rim (n, rim point, 3)
+    bounds      (n,) [mm] by which forms may change them
+    groups      (group + 1,) the first point of each, and the end
+    kept        (n, k) numbers of points, -1 for none
+    """
+    for k in range(gaps.shape[0]):
+        for group in range(groups.size - 1):
+            first, end = max(groups[group], count), groups[group + 1]
+            least = np.inf
+            for j in range(first, end):
+                p = rim[k, j - count]
+                if gaps[k, j] < least and contains(moving, p[0], p[1], p[2]):
+                    least = gaps[k, j]
+            for j in range(first, end):
+                promising[k, j] = gaps[k, j] - bounds[k] <= least + bounds[k] < np.inf
+        for c in range(kept.shape[1]):
+            if kept[k, c] >= count:
+                promising[k, kept[k, c]] = True
+
+
+@compiled
+def lowest_over(X_RM, P_m, rim, gaps, groups, reference, moving, numbers):  # type: ignore[no-untyped-def]
+    """Write the point of each group with the least gap over the other face to numbers (n, group); -1 for none.
+
+    P_m         (point, 3) of the moving face, which must be over the reference region at X_RM (n, 12)
+    rim         (n, rim point, 3) of the plane of the moving face, which must be over the moving region
+    gaps        (n, point) [mm] of both
+    groups      (group + 1,) the first point of each, and the end
+    """
+    for k in range(X_RM.shape[0]):
+        for group in range(groups.size - 1):
+            least, number = np.inf, -1
+            for j in range(groups[group], groups[group + 1]):
+                if gaps[k, j] < least and stands_over(X_RM[k], P_m, rim[k], j, reference, moving):
+                    least, number = gaps[k, j], j
+            numbers[k, group] = number
+
+
+@compiled
+def keep_over(X_RM, P_m, rim, reference, moving, numbers):  # type: ignore[no-untyped-def]
+    """Replace those numbers of points (n, k) by -1 that do not stand over the other face; see lowest_over."""
+    for k in range(X_RM.shape[0]):
+        for c in range(numbers.shape[1]):
+            if numbers[k, c] >= 0 and not stands_over(X_RM[k], P_m, rim[k], numbers[k, c], reference, moving):
+                numbers[k, c] = -1
+
+
+@inner
+def stands_over(X, P_m, rim, number, reference, moving):  # type: ignore[no-untyped-def]
+    """Return whether a point stands over the other face at a pose X (12,)."""
+    count = P_m.shape[0]
+    if number >= count:
+        p = rim[number - count]
+        return contains(moving, p[0], p[1], p[2])
+    x, y, z = P_m[number, 0], P_m[number, 1], P_m[number, 2]
+    return contains(
+        reference,
+        X[0] * x + X[1] * y + X[2] * z + X[9],
+        X[3] * x + X[4] * y + X[5] * z + X[10],
+        X[6] * x + X[7] * y + X[8] * z + X[11],
+    )
+
+
+@inner
+def contains(region, x, y, z):  # type: ignore[no-untyped-def]
+    """Return whether a place is over a region, or beside its rim by no more than its tolerance."""
+    axes, edges = region.axes, region.edges
+    u, v = axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z, axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z
+    is_inside = False
+    for e in range(edges.shape[0]):
+        below, above = edges[e, 0, 1] - v, edges[e, 1, 1] - v
+        if (below > 0) != (above > 0):  # the edge crosses the line from the place along the first axis, on one of its sides
+            crossing = edges[e, 0, 0] + (edges[e, 1, 0] - edges[e, 0, 0]) * below / (below - above)
+            is_inside = is_inside != (crossing > u)
+    return is_inside or is_near(edges, u, v, region.tolerance)
+
+
+@inner
+def is_near(edges, u, v, distance):  # type: ignore[no-untyped-def]
+    """Return whether a place is within a distance of one of the edges (edge, 2, 2)."""
+    for e in range(edges.shape[0]):
+        a, b = u - edges[e, 0, 0], v - edges[e, 0, 1]
+        along, across = edges[e, 1, 0] - edges[e, 0, 0], edges[e, 1, 1] - edges[e, 0, 1]
+        share = min(max((a * along + b * across) / max(along * along + across * across, 1e-300), 0.0), 1.0)
+        if (a - share * along) ** 2 + (b - share * across) ** 2 <= distance * distance:
+            return True
+    return False

@@ -1,0 +1,63 @@
+"""Planes that touch datum features, computed from an archive alone, by linear programmes, as the simulation does not."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import scipy
+import xarray as xr
+
+from tolcontact import vocabulary as terms
+from tolcontact.testing.archived_form import ArchivedForm
+
+WITHIN = 1e-9  # mm
+SOLVED = 1e-7  # of the largest height: tolerances of the solver
+
+
+class ArchivedTangent:
+    """A plane that touches a datum feature, with a number, from an archive."""
+
+    def __init__(self, tree: xr.DataTree, number: int) -> None:
+        contact = {str(name): values.values for name, values in tree.children["contact"].to_dataset().data_vars.items()}
+        face = int(contact[terms.TANGENT_FACE.name][number])
+        self.columns = contact[terms.TANGENT_CONTRIBUTOR.name][number]
+        self._leaning, self._free = (contact[v.name][number] for v in (terms.TANGENT_LEANING, terms.TANGENT_FREE))
+        is_own = contact[terms.FACE_OF_TANGENT_PLACE.name] == face
+        self._heights, form = contact[terms.TANGENT_HEIGHT.name][is_own], contact[terms.FORM_CONTRIBUTOR.name][face]
+        modes = ArchivedForm(contact, face).heights(contact[terms.TANGENT_PLACE_AT.name][is_own])
+        self._form_columns, self._modes = form[form >= 0], modes[:, form >= 0]
+
+    def faults(self, deviations: np.ndarray) -> Iterator[tuple[int, str]]:
+        """Yield realizations whose plane of deviations (realization, contributor) is not the one that touches, and why."""
+        for row, deviation in enumerate(deviations):
+            heights = self._heights @ (self._leaning @ deviation) + self._modes @ deviation[self._form_columns]
+            least, archived = self._distance(heights, None), self._distance(heights, deviation)
+            if not archived <= least + WITHIN + SOLVED * float(np.abs(heights).max()):
+                yield row, f"is {archived:.9g} mm from its face, and one {least:.9g} mm from it touches it, too"
+
+    def _distance(self, heights: np.ndarray, deviation: np.ndarray | None) -> float:
+        """Return the least distance [mm] from heights (place,) of planes that have none of them outside.
+
+        With a deviation (contributor,), planes have its coordinates as far as these are archived.
+        """
+        scale = max(float(np.abs(heights).max()), 1e-300)
+        planes, ones = self._heights @ self._free, np.ones((len(heights), 1))
+        known = np.zeros(0, dtype=int) if deviation is None else np.flatnonzero(self.columns >= 0)
+        values = np.zeros(0) if deviation is None else deviation[self.columns[known]]
+        # A plane with known coordinates may be lower by what rounding leaves.
+        slack = scale * 1e-12 if known.size else 0.0
+        solution = scipy.optimize.linprog(
+            np.append(np.zeros(planes.shape[1]), 1.0),
+            A_ub=np.block([[-planes, 0 * ones], [planes, -ones]]),
+            b_ub=np.concatenate([slack - heights, heights]) / scale,
+            A_eq=np.column_stack([self._free[known], np.zeros(len(known))]),
+            b_eq=values / scale,
+            bounds=[(None, None)] * planes.shape[1] + [(0, None)],
+            method="highs-ds",
+        )
+        return float(scale * solution.fun) if solution.success else np.inf
+
+
+def tangents(tree: xr.DataTree) -> list[ArchivedTangent]:
+    """Return the planes that touch datum features of an archive."""
+    sizes = tree.children["contact"].to_dataset().sizes
+    return [ArchivedTangent(tree, number) for number in range(sizes.get(terms.TANGENT, 0))]
