@@ -19,6 +19,7 @@ from tolcontact.geometry.quadrature import quadrature
 from tolcontact.geometry.surface import Surface
 
 MIN_PLACES, MAX_PLACES = 600, 20_000  # of a face, over which areas are summed
+MAX_EXCESS = 8  # times the intended number of places
 ROTATIONS = 32  # by which a section's place and diameter are known, exactly for fewer lobes
 NODES = 16  # of a line
 MIN_LENGTH = 1e-9  # of a displacement, relative to the largest
@@ -67,7 +68,11 @@ class AssociatedFeature(ABC):
             grid = AxialGrid.of(self.surface, self.ends, face, lengths)
             return grid.places[grid.is_on], grid.areas[grid.is_on]
         count = min(max(MIN_PLACES, face.mesh.area / (PLACE_SPACING * min(lengths)) ** 2), MAX_PLACES)
-        places, areas = quadrature(face.mesh, float(np.sqrt(face.mesh.area / count)))
+        step = float(np.sqrt(face.mesh.area / count))
+        places, areas = quadrature(face.mesh, step)
+        while len(places) > MAX_EXCESS * count:  # of a strip, whose triangles are divided along and across
+            step *= 2
+            places, areas = quadrature(face.mesh, step)
         return (self.surface.project(places) if face.curvature else places), areas
 
     def copies(self, points: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
