@@ -128,3 +128,9 @@ def test_what_cannot_give_way_is_refused():
         tc.build(padded_block(), method={"objective": "all points"})
     with pytest.raises(tc.ModelError, match=r"stiffness is 0\.0; expected a number in N/mm above 0"):
         tc.build(padded_block(stiffness=0.0))
+
+
+def test_poses_do_not_depend_on_blocks():
+    _, whole = simulate(padded_block(), samples=40, solver="graph")
+    _, single = simulate(padded_block(), samples=40, solver="graph", block=1)
+    assert np.array_equal(whole["poses"], single["poses"])

@@ -83,7 +83,7 @@ class ContactSolver:
     def __call__(self, **arrays: Float[Array, "realization ..."]) -> Arrays:
         """Return the outputs of contact_qp by name, (realization, entry), for its inputs by name, (realization, ...).
 
-        Further inputs are `guess` (realization, row) and `guessed_slack` (realization, slack): reactions and slacks that are
+        Further inputs are `guess` (realization, row) and `guessed_slack` (realization, pair): reactions and slacks that are
         probable, from which a solver may start.
         A further output is `second` (realization, 1): whether another plugin had to answer. Problems that this plugin misses
         are solved without curvature, which may leave no minimum: by this plugin, and then by others. If all fail, `residual` is
@@ -132,7 +132,9 @@ class ContactSolver:
 
     def _solved_batch(self, solver: "_Solver", inputs: Arrays) -> Arrays:
         problem = self._assemble(**inputs)
-        solution, failed = solver(problem, inputs["guess"], inputs["guessed_slack"])
+        slacks = np.ones((len(inputs["guess"]), self._qp.slacks))  # what gives way opens whenever it carries
+        slacks[:, : inputs["guessed_slack"].shape[1]] = inputs["guessed_slack"]
+        solution, failed = solver(problem, inputs["guess"], slacks)
         outputs = self._finished(inputs | problem | solution)
         outputs["residual"][failed] = np.inf
         residual = outputs["residual"][:, 0]

@@ -39,6 +39,7 @@ class GraphSolver:
         In the first guess rows with `reactions` carry, and `slacks` above zero are open.
         """
         count = len(reactions)
+        assert slacks.shape == (count, self._slacks)  # machine code would read beyond them
         answer = {name: np.zeros((count, size)) for name, size in self._sizes().items()}
         failed = np.zeros(count, dtype=np.bool_)
         arrays = (problem["h"], problem["a"], self._full("g", problem["g"]), self._full("lba", problem["lba"]))
