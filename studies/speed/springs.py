@@ -9,7 +9,7 @@ import time
 import tolcontact as tc
 
 SOLVERS = ("daqp", "qpoases", "graph")
-REALIZATIONS = 400
+REALIZATIONS = 4000
 
 
 def table(stiffness: float | None) -> tc.Assembly:
