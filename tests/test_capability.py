@@ -99,6 +99,12 @@ def test_a_small_sample_bounds_no_tail():
     assert pp.lower == ppk.lower == 0 and ppk.value > 1
 
 
+def test_two_values_equally_often_have_an_index_without_spread():
+    """Their variance does not depend on which of them a realization has, so an interval is as wide as rounding."""
+    index, _ = capability.as_normal(Sample.of(np.tile([0.1, 0.3], 5000)), Limits(-0.1, 0.9))
+    assert index.value == pytest.approx(1.0 / 0.6, rel=1e-3) and index.upper - index.lower < 1e-6
+
+
 def test_a_limit_at_which_values_stop_has_no_capability_of_its_own():
     """Contact keeps max(0, z); a mass of more than 0.135 % at the limit would be an index of exactly 1 whatever else varies."""
     z = 0.1 * np.random.default_rng(3).standard_normal(20_000)

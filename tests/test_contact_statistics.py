@@ -1,13 +1,17 @@
 """Where and how often contact is, against closed forms and the rows themselves."""
 
+from collections import Counter
+
 import numpy as np
 import pytest
 
 import tolcontact as tc
 from tests import cases
 from tests.test_report import browser, data_of, needs_browser, open_page  # noqa: F401 (fixtures)
+from tolcontact.labelled import Table
 from tolcontact.report import write_page
 from tolcontact.statistics import touching
+from tolcontact.statistics.contact import combinations
 from tolcontact.workflow.run_sums import MAX_REALIZATIONS, TOUCHING_GAP
 
 
@@ -38,6 +42,16 @@ def test_figures_are_those_of_the_rows():
     assert float(together.sel(combination="lower joint + upper joint")) == pytest.approx(carries.all(axis=1).mean())
     if "none" in together["combination"]:
         assert float(together.sel(combination="none")) == pytest.approx((~carries.any(axis=1)).mean())
+
+
+@pytest.mark.parametrize("pairs", [1, 9, 64, 65])
+def test_combinations_of_pairs_are_counted(pairs):
+    names = [f"pair {k}" for k in range(pairs)]
+    masks = np.random.default_rng(pairs).random((6, pairs)) < 0.3
+    carrying = np.repeat(masks, [1, 2, 3, 4, 5, 6], axis=0).astype(np.int16)
+    found = combinations(Table({"carrying": (("realization", "pair"), carrying)}, {"pair": names}))
+    expected = Counter(tuple(np.array(names)[row].tolist()) for row in carrying > 0)
+    assert Counter(dict(found)) == expected
 
 
 @pytest.mark.slow

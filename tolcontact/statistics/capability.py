@@ -97,11 +97,11 @@ def as_normal(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
         return UNDEFINED, UNDEFINED
     lower, upper, _ = without_stops(x, limits)
     deviation = float(np.sqrt(x.moments[0] * x.count / (x.count - 1)))
-    _, kurt = x.standardized_moments
+    kurt = float(x.standardized_moments[4])
     pp, sides = UNDEFINED, []
     if np.isfinite(lower) and np.isfinite(upper) and kurt > 0:
         width = (upper - lower) / (6 * deviation)
-        pp = from_standardized_influence(x, width, lambda z: -width / 2 * (z**2 - 1))
+        pp = from_standardized_influence(x, width, [width / 2, 0, -width / 2])
     if np.isfinite(upper):
         sides.append(_side(x, (upper - x.mean) / (3 * deviation), 1.0))
     if np.isfinite(lower):
@@ -111,7 +111,7 @@ def as_normal(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
 
 def _side(x: Sample, index: float, sign: float) -> Estimate:
     """Return the index of one side as of a normal distribution; `sign` is 1 for the upper limit, -1 for the lower."""
-    return from_standardized_influence(x, index, lambda z: -sign * z / 3 - index / 2 * (z**2 - 1))
+    return from_standardized_influence(x, index, [index / 2, -sign / 3, -index / 2])
 
 
 def _pp(low: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> np.ndarray:

@@ -5,7 +5,7 @@ normal distribution: contact cuts distributions off.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -61,24 +61,27 @@ def from_influence(estimate: float, squares: float, count: int, fourths: float |
     return Estimate(float(estimate), float(estimate - half), float(estimate + half))
 
 
-def from_standardized_influence(x: Sample, estimate: float, influence: Callable[[np.ndarray], np.ndarray]) -> Estimate:
-    """Return an estimate whose influence function is given as a function of the standardized values.
+def from_standardized_influence(x: Sample, estimate: float, influence: Sequence[float]) -> Estimate:
+    """Return an estimate whose influence function is a polynomial of the standardized values, of degree 4 at most.
 
-    It has no interval if the sample is too small.
+    The polynomial is given by its coefficients, from the constant on. The estimate has no interval if the sample is too small.
     """
     if x.count < MIN_VARIANCE:
         return Estimate(float(estimate), math.nan, math.nan)
-    scale = np.sqrt(x.moments[0])
-    influences = x.map(lambda piece: influence((piece - x.mean) / scale))
-    squares = sum(float((piece**2).sum()) for piece in influences.pieces())
-    fourths = sum(float((piece**4).sum()) for piece in influences.pieces())
-    widening = influences.widening
+    scale, square = np.sqrt(x.moments[0]), np.convolve(influence, influence)
+    squares, fourths = (_sum_over(x, polynomial) for polynomial in (square, np.convolve(square, square)))
+    widening = x.map(lambda piece: np.polyval(influence[::-1], (piece - x.mean) / scale)).widening
     return from_influence(estimate, squares * widening**2, x.count, fourths * widening**4)
+
+
+def _sum_over(x: Sample, polynomial: np.ndarray) -> float:
+    """Return the sum of a polynomial without negative values, given by its coefficients, over standardized values."""
+    return max(float(polynomial @ x.standardized_moments[: len(polynomial)] * x.count), 0.0)  # no rounding below 0
 
 
 def is_shape_known(x: Sample) -> bool:
     """Return whether skewness and kurtosis have an interval: their spread depends on moments that few samples tell."""
-    return x.count >= MIN_SHAPE and x.standardized_moments[1] < MAX_KURTOSIS
+    return x.count >= MIN_SHAPE and x.standardized_moments[4] < MAX_KURTOSIS
 
 
 def skewness(x: np.ndarray | Sample) -> Estimate:
@@ -86,10 +89,10 @@ def skewness(x: np.ndarray | Sample) -> Estimate:
     x = Sample.of(x)
     if is_constant(x):
         return UNDEFINED
-    skew, _ = x.standardized_moments
+    skew = float(x.standardized_moments[3])
     if not is_shape_known(x):
         return Estimate(skew, math.nan, math.nan)
-    return from_standardized_influence(x, skew, lambda z: z**3 - 3 * z - skew - 1.5 * skew * (z**2 - 1))
+    return from_standardized_influence(x, skew, [0.5 * skew, -3, -1.5 * skew, 1])
 
 
 def kurtosis(x: np.ndarray | Sample) -> Estimate:
@@ -97,10 +100,10 @@ def kurtosis(x: np.ndarray | Sample) -> Estimate:
     x = Sample.of(x)
     if is_constant(x):
         return UNDEFINED
-    skew, kurt = x.standardized_moments
+    skew, kurt = x.standardized_moments[3:5].tolist()
     if not is_shape_known(x):
         return Estimate(kurt, math.nan, math.nan)
-    return from_standardized_influence(x, kurt, lambda z: z**4 - kurt - 4 * skew * z - 2 * kurt * (z**2 - 1))
+    return from_standardized_influence(x, kurt, [kurt, -4 * skew, -2 * kurt, 0, 1])
 
 
 def variance(x: np.ndarray | Sample) -> Estimate:
@@ -114,9 +117,9 @@ def variance(x: np.ndarray | Sample) -> Estimate:
         return Estimate(estimate, math.nan, math.nan)
     if not estimate > 0:
         return Estimate(estimate, *bonett)
-    _, kurt = x.standardized_moments
+    kurt, sixth = x.standardized_moments[[4, 6]].tolist()
     deviation = math.sqrt(max(kurt - 1, 0.0))  # of squares, relative to their mean
-    skew = (x.sixth_moment - 3 * kurt + 2) / deviation**3 if deviation > 0 else 0.0
+    skew = (sixth - 3 * kurt + 2) / deviation**3 if deviation > 0 else 0.0
     widening = x.map(lambda piece: (piece - x.mean) ** 2).widening
     lower, upper = (1 - deviation * _back(sign * _Z * widening, skew, x.count) for sign in (1, -1))
     lower, upper = estimate * max(lower, 0.0), estimate * upper

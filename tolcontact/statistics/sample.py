@@ -16,6 +16,7 @@ DIGIT = 16  # bits
 COUNTED_DIGITS = 2
 MAX_PREFIXES = 16  # that are counted in one pass, in 25 MB
 MIN_REPLICATES = 16
+STANDARDIZED_MOMENTS = 17  # the fourth powers of influences on the fourth moment, and the zeroth
 
 
 class Sample:
@@ -83,19 +84,16 @@ class Sample:
         return float(sums[0] / self.count), float(sums[1] / self.count)
 
     @cached_property
-    def sixth_moment(self) -> float:
-        """The sixth moment of the standardized values."""
-        scale = np.sqrt(self.moments[0])
-        return float(sum((((piece - self.mean) / scale) ** 6).sum() for piece in self.pieces()) / self.count)
-
-    @cached_property
-    def standardized_moments(self) -> tuple[float, float]:
-        """The third and the fourth moment of the standardized values."""
-        scale, sums = np.sqrt(self.moments[0]), np.zeros(2)
+    def standardized_moments(self) -> np.ndarray:
+        """The moments of the standardized values, from the zeroth to the sixteenth."""
+        scale, sums = np.sqrt(self.moments[0]), np.zeros(STANDARDIZED_MOMENTS)
         for piece in self.pieces():
             z = (piece - self.mean) / scale
-            sums += (z**3).sum(), (z**4).sum()
-        return float(sums[0] / self.count), float(sums[1] / self.count)
+            power = np.ones_like(z)
+            for k in range(STANDARDIZED_MOMENTS):
+                sums[k] += power.sum()
+                power *= z  # a power by `**` takes twenty times as long
+        return sums / self.count
 
     def ordered(self, ranks: Sequence[int]) -> np.ndarray:
         """Return the order statistics of some ranks, from 0 (least) to count - 1; NaN if a value is not finite.
