@@ -14,7 +14,6 @@ import numpy as np
 from tolcontact.compiled import compiled, inlined
 
 LEAF, BRANCH = 32, 32  # points of a leaf, leaves of a branch
-SUMS = 8  # side by side
 ROUNDING = 1e-14  # of the gap in the origin of the coordinates: sums of a dozen terms are rounded by less
 
 
@@ -74,38 +73,16 @@ def gaps_of(coordinates, start, count, factors, gaps):  # type: ignore[no-untype
 
 
 @compiled
-def _add_moments(table, start, count, counts, lanes, moments):  # type: ignore[no-untyped-def]
-    """Add to moments (m,) the columns of `table` (m, point) that count: counts (LEAF,), 1 or 0.
-
-    SUMS side by side, in a fixed order: a compiler that may choose the order chooses another one another day.
-    """
-    full = count - count % SUMS
-    for moment in range(table.shape[0]):
-        row = table[moment, start : start + count]
-        for lane in range(SUMS):
-            lanes[lane] = 0.0
-        for j in range(0, full, SUMS):
-            for lane in range(SUMS):
-                lanes[lane] += counts[j + lane] * row[j + lane]
-        total = 0.0
-        for lane in range(SUMS):
-            total += lanes[lane]
-        for j in range(full, count):
-            total += counts[j] * row[j]
-        moments[moment] += total
-
-
-@compiled
-def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activity, active, moments):  # type: ignore[no-untyped-def]
+def survey(points, table, leaf_sums, branch_sums, relative, deviations, activity, active, moments):  # type: ignore[no-untyped-def]
     """Write for each realization the number of points below `activity` (n,), and their moments (n, side * 10).
 
     points        Points
-    tables        (side * moment, point)
+    table         (point, side * moment): what each point adds to the moments
     leaf_sums     (leaf, side * moment), and
     branch_sums   (branch, side * moment): of all points there
     """
     leaves, branches = points.leaves, points.branches
-    factors, gaps, counts, lanes = np.empty(points.coordinates.shape[0]), np.empty(LEAF), np.empty(LEAF), np.empty(SUMS)
+    factors, gaps, found = np.empty(points.coordinates.shape[0]), np.empty(LEAF), np.empty(LEAF, dtype=np.int64)
     middle, spread = np.empty(branches.size - 1), np.empty(branches.size - 1)
     leaf_middle, leaf_spread = np.empty(BRANCH), np.empty(BRANCH)
     for k in range(relative.shape[0]):
@@ -134,13 +111,14 @@ def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activit
                     continue
                 gaps_of(points.coordinates, start, count, factors, gaps)
                 active_here = 0
-                for j in range(count):
-                    is_active = gaps[j] < activity
-                    active_here += is_active
-                    counts[j] = 1.0 if is_active else 0.0
+                for j in range(count):  # without a branch, which could not be predicted
+                    found[active_here] = start + j
+                    active_here += gaps[j] < activity
                 number += active_here
-                if active_here:
-                    _add_moments(tables, start, count, counts, lanes, moments[k])
+                for j in range(active_here):
+                    of_point = table[found[j]]
+                    for moment in range(moments.shape[1]):
+                        moments[k, moment] += of_point[moment]
         active[k] = number
 
 

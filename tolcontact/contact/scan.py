@@ -189,8 +189,8 @@ class CompiledScan(PairScan):
         count = len(relative)
         active, moments = np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS))
         poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
-        flat = moments.reshape(count, len(self._tables))
-        kernel.survey(self.compiled, self._tables, *self._sums, poses, heights, activity, active, flat)
+        flat = moments.reshape(count, self._table.shape[1])
+        kernel.survey(self.compiled, self._table, *self._sums, poses, heights, activity, active, flat)
         return Survey(active, moments)
 
     def min_gap(
@@ -229,14 +229,14 @@ class CompiledScan(PairScan):
         return kernel.Points(self.basis, self.columns, self.coordinates, self.leaves, self.branches, *boxes)
 
     @cached_property
-    def _tables(self) -> np.ndarray:
-        """(side * moment, point)."""
-        return np.array(self.tables).reshape(len(self.tables) * MOMENTS, len(self.P_m))
+    def _table(self) -> np.ndarray:
+        """What each point adds to the moments (point, side * moment)."""
+        return np.ascontiguousarray(np.array(self.tables).reshape(len(self.tables) * MOMENTS, len(self.P_m)).T)
 
     @cached_property
     def _sums(self) -> tuple[np.ndarray, np.ndarray]:
         """Summed moments of the leaves and of the branches, (leaf, side * moment) and (branch, side * moment)."""
-        of_leaves = np.ascontiguousarray(np.add.reduceat(self._tables, self.leaves[:-1], axis=1).T)
+        of_leaves = np.add.reduceat(self._table, self.leaves[:-1], axis=0)
         return of_leaves, np.add.reduceat(of_leaves, self.branches[:-1], axis=0)
 
 
