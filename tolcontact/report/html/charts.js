@@ -22,7 +22,11 @@ function chart(title, into = byId("charts")) {
   return box;
 }
 
-const SETTINGS = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
+// Where nothing can hover, the bar of buttons would always lie over the title.
+const HAS_BUTTONS = window.matchMedia("(hover: hover)").matches ? "hover" : false;
+const SETTINGS = {
+  responsive: true, displaylogo: false, displayModeBar: HAS_BUTTONS, modeBarButtonsToRemove: ["lasso2d", "select2d"],
+};
 const STATES = data.states;
 const escaped = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
 
