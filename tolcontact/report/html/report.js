@@ -118,7 +118,7 @@ function contributors(measure, into) {
   const shown = layout("Contributors, with contact", "% of variance", "");
   Object.assign(shown, { showlegend: false, bargap: 0.3 });
   Object.assign(shown.margin, { l: 12, t: 36 });
-  Object.assign(shown.yaxis, { automargin: true, type: "category" });
+  Object.assign(shown.yaxis, { automargin: true, type: "category", dtick: 1 }); // each is named, on paper as well
   shown.xaxis.rangemode = "nonnegative";
   Plotly.newPlot(chart(`Contributors to the variance of ${measure.name}`, into), traces, shown, SETTINGS);
 }
