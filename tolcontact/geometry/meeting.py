@@ -57,12 +57,14 @@ class Reach(NamedTuple):
     """How far a moving body may be from its nominal place relative to a reference body.
 
     travel, tilt   [mm], [rad]: how far it may move and turn
+    spread         [mm]: how far deviations alone, without contact, may move it
     overlap        [mm]: how deep the bodies lie in each other nominally, at most
     clearance      [mm]: their nominal gap, at least
     """
 
     travel: float
     tilt: float
+    spread: float
     overlap: float
     clearance: float
 
