@@ -40,7 +40,7 @@ def relocate(
 
         point        (stage, axis)      its place "before" and "after" [mm]
         reached      (stage, interval)  the statistic `least` in a fresh run of 4 samples realizations, with its 95 % interval
-        change       (interval)         6 sigma after over before, or the share outside after less before, of the same draws
+        change       (interval)         6 sigma after / before, or the share outside after minus before, of the same draws
         unresolved   (stage)            number of realizations of the fresh run that were not resolved
         tried        (trial, axis)      all places that were tried [mm], and
         tried_value  (trial)            the statistic there; infinite where the model cannot be built

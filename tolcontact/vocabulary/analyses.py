@@ -150,7 +150,7 @@ ALLOCATION = AnalysisRecord(
     "allocation of tolerances of {assembly}",
     (
         ArchiveVariable("range", (GROUP, STAGE), "f8", "full width of the zones of a group; not a number if they differ"),
-        ArchiveVariable("factor", (GROUP,), "f8", "full width after over that before", "1"),
+        ArchiveVariable("factor", (GROUP,), "f8", "full width after / before", "1"),
         ArchiveVariable("cost", (GROUP, STAGE), "f8", "cost of the ranges", "1"),
         ArchiveVariable(
             "kept", (REQUIREMENT, STAGE, INTERVAL), "f8", "share outside of the limits, or Ppk, in a fresh run", "1"
@@ -167,7 +167,7 @@ RELOCATION = AnalysisRecord(
     (
         ArchiveVariable("point", (STAGE, AXIS), "f8", "place of the locator, in its part's own frame", "mm"),
         ArchiveVariable("reached", (STAGE, INTERVAL), "f8", "what is to be least, in a fresh run"),
-        ArchiveVariable("change", (INTERVAL,), "f8", "6 sigma after over before; or share outside, after less before", "1"),
+        ArchiveVariable("change", (INTERVAL,), "f8", "6 sigma after / before; or share outside, after minus before", "1"),
         ArchiveVariable("unresolved", (STAGE,), "i8", "number of realizations of the fresh run that were not resolved", "1"),
         ArchiveVariable("tried", (TRIAL, AXIS), "f8", "places tried, in the part's own frame", "mm"),
         ArchiveVariable("tried_value", (TRIAL,), "f8", "what is to be least, at the places tried"),
