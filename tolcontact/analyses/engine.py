@@ -82,7 +82,7 @@ class Engine:
         By default these are measures (n, state, measure) and statuses (n,). `draws` replaces the draws of the program.
         """
         observed = []
-        block = min(self._rows, max(self._rows, samples) // MIN_BLOCKS)  # whatever the number of threads or workers
+        block = min(self._rows, max(self._rows, samples) // MIN_BLOCKS)  # for any number of threads or workers
         for arrays in self._blocks(
             observe, self.program, samples=start + samples, start=start, seed=seed, draws=draws, block=block
         ):

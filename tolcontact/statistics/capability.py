@@ -52,7 +52,7 @@ def share_outside(x: Sample, limits: Limits) -> Estimate:
 def without_stops(x: Sample, limits: Limits) -> Limits:
     """Return the limits without those at which values stop: none lies beyond, and the outer percentile is the limit itself.
 
-    Otherwise such a limit would have an index of exactly 1, whatever the values between are.
+    Otherwise such a limit would have an index of exactly 1 for any values in between.
     """
     low, _, high = (percentile.value for percentile in percentiles(x.map(limits.settled), PERCENTS))
     if low == limits.lower and not _is_any(x.map(limits.below)):

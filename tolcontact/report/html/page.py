@@ -178,7 +178,7 @@ def _page(kind: str, values: dict[str, Any], data: dict[str, Any]) -> str:
         style=_as_is("page.css"),
         generator=markupsafe.Markup(GENERATOR),
         scripts=scripts,
-        allowed=" ".join(map(_hash, scripts)),  # no other script runs, whatever the data are
+        allowed=" ".join(map(_hash, scripts)),  # no other script runs, even if data contain one
         **values,
     )
 
