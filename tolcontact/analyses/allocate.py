@@ -12,10 +12,10 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis
-from tolcontact.analyses.engine import Progress
+from tolcontact.analyses.engine import VERIFICATION_FACTOR, Progress
 from tolcontact.analyses.grouping import check_grouping, owners
 from tolcontact.analyses.requirement import MIN_DECISIVE, Requirement
-from tolcontact.analyses.scaled_trials import VERIFICATION_FACTOR, ScaledTrials
+from tolcontact.analyses.scaled_trials import ScaledTrials
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.statistics.intervals import Estimate, mean

@@ -26,8 +26,8 @@ from tolcontact.pmi.declared import Annotation
 from tolcontact.pmi.declared_file import DeclaredFile, declared_file
 from tolcontact.pmi.script import script
 from tolcontact.pmi.second_reading import SecondReading, second_reading
+from tolcontact.report.text.table import FILE_WIDTH
 
-WIDTH = 80  # of files and pipes
 MAX_ROWS = 2000  # of a table, which takes a second; a drawing has a hundred
 _CSV = (
     "type", "number", "record", "kind", "name", "value", "lower", "upper", "unit", "zone", "details", "datums", "refines",
@@ -111,7 +111,7 @@ def _reason(information: Pmi, name: str) -> str:
 
 def _print_tables(declared: DeclaredFile, reading: SecondReading | None) -> None:
     output = console()
-    width = output.width if sys.stdout.isatty() else WIDTH
+    width = output.width if sys.stdout.isatty() else FILE_WIDTH
     output.print(Text(str(declared.pmi), style="bold"))
     parts = *_sections(declared), *_undeclared_lines(declared), *([] if reading is None else _reading_lines(reading))
     for part in parts:

@@ -30,7 +30,7 @@ from tolcontact.statistics.intervals import (
 from tolcontact.statistics.sample import Sample
 from tolcontact.variation.sobol_points import scrambled_points
 
-LOW, MEDIAN, HIGH = PERCENTS = 0.135, 50.0, 99.865
+PERCENTS = 0.135, 50.0, 99.865
 TRIALS = 1 << 11  # simulated triples of percentiles, of which an interval covers 95 %
 
 
