@@ -13,6 +13,7 @@ import pytest
 import typer
 from rich.cells import cell_len
 from rich.console import Console
+from typer.testing import CliRunner
 
 import tolcontact as tc
 from tests.cases import MODELS
@@ -45,6 +46,12 @@ def test_a_wrong_option_is_refused_before_the_run(mistake, tmp_path):
     assert "Traceback" not in done.stderr
     for words in expected:
         assert words in done.stderr, done.stderr
+
+
+def test_help_states_values_only_of_options_that_take_one():
+    printed = CliRunner().invoke(app, ["run", "--help"], terminal_width=100).stdout
+    assert re.search("--samples +<int>", printed)
+    assert all(re.search(f"--{name}  +[A-Z]", printed) for name in ("overwrite", "resume", "quiet")), printed
 
 
 @pytest.mark.slow

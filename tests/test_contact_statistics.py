@@ -12,7 +12,8 @@ from tolcontact.labelled import Table
 from tolcontact.report import write_page
 from tolcontact.statistics import touching
 from tolcontact.statistics.contact import combinations
-from tolcontact.workflow.run_sums import MAX_REALIZATIONS, TOUCHING_GAP
+from tolcontact.vocabulary import TOUCHING_GAP
+from tolcontact.workflow.run_sums import MAX_REALIZATIONS
 
 
 def test_a_block_touches_in_half_of_the_realizations_at_all_its_points():

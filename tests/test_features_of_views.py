@@ -151,7 +151,7 @@ class Scene:
     def click(self, *point):
         x, y = self.place(*point)
         self.page.mouse.click(self.box["x"] + x * self.box["width"], self.box["y"] + y * self.box["height"])
-        return self.page.locator("#said").inner_text()
+        return self.page.locator("#message").inner_text()
 
     def colours(self, *points):
         """Red, green, blue and opacity where points of the part are drawn."""
@@ -189,7 +189,7 @@ def test_a_feature_is_found_on_its_faces(width, scheme, tmp_path, open_page):  #
     page.locator("#toleranced button", has_text="feature half").click()
     assert scene.blueness(*points) == pytest.approx(before) and not scene.pressed()
     page.locator("#toleranced button", has_text="feature bottom").click()
-    assert page.locator("#said").inner_text() == "part block\nfeature bottom\nparallelism 0.2 A"
+    assert page.locator("#message").inner_text() == "part block\nfeature bottom\nparallelism 0.2 A"
     assert (scene.blueness(BOTTOM) > 1.1 * before[2:].max()).all()  # through what is before it
     page.locator("#toleranced button", has_text="pattern A").click()
     page.select_option("#across", "z")
@@ -229,4 +229,4 @@ def test_odd_names_of_features_are_texts(tmp_path, open_page):  # noqa: F811
     for k, name in enumerate(names):
         assert buttons.nth(k).inner_text() == f"feature {name}\nflatness 0.1" and headings.nth(k).inner_text() == f"part {name}"
         buttons.nth(k).click()
-        assert page.locator("#said").inner_text() == f"part {name}\nfeature {name}\nflatness 0.1"
+        assert page.locator("#message").inner_text() == f"part {name}\nfeature {name}\nflatness 0.1"

@@ -51,7 +51,7 @@ def test_docstrings_of_functions_open_with_a_verb():
 def test_files_and_functions_can_be_seen_whole(limit, size):
     for file, tree in TREES.items():
         functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
-        spans = {function.name: (function.end_lineno or 0) - function.lineno + 1 for function in functions}
-        sizes = spans if limit == "function" else {"the file": len(file.read_text(encoding="utf-8").splitlines())}
-        for name, lines in sizes.items():
+        spans = [(function.name, (function.end_lineno or 0) - function.lineno + 1) for function in functions]
+        sizes = spans if limit == "function" else [("the file", len(file.read_text(encoding="utf-8").splitlines()))]
+        for name, lines in sizes:
             assert lines <= size, f"{file.relative_to(PACKAGE)}: {name} has {lines} lines"

@@ -66,7 +66,7 @@ MISTAKES = {
     ),
     "point of the assembly": (
         {"at": (70, 25, 10), "changes": off("A2", (118, 27, 10), "z")},
-        r'\[point\] part "block" .* locator "A2".*: \(48, 2, 0\) is this one of the assembly',
+        r'\[point\] part "block" .* locator "A2".*; for this point of the assembly write \(48, 2, 0\)',
     ),
     "support out of the part": (
         {"changes": off("A3", (25, 23, 0), "-z", one_sided=True)},
@@ -165,7 +165,7 @@ def test_directions_of_the_assembly_on_a_turned_part(directions, is_doubtful):
     assert len(texts) == is_doubtful
     for text in texts:
         assert re.match(r'\[direction\] part "block" .*\(0, 1, 0\) of locator "B1"', text)
-        assert "(1, 0, 0) is this one of the assembly" in text
+        assert "for this direction of the assembly write (1, 0, 0)" in text
 
 
 def test_bodies_that_are_no_pair():

@@ -199,7 +199,7 @@ def test_the_page_is_used(archive, page, width, open_page):
     opened.select_option("#field", "")
     assert not opened.locator("#bar").is_visible()
     opened.locator("#which").fill("7")
-    said = opened.locator("#said").inner_text()
+    said = opened.locator("#message").inner_text()
     row = int(re.match(r"realization (\d+) ", said)[1])
     raw, corrected = re.search(r"without contact (\S+), with contact (\S+) mm", said).groups()
     assert [float(raw), float(corrected)] == pytest.approx(measured[row], rel=1e-3)

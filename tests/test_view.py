@@ -67,7 +67,7 @@ def test_the_command_shows_models_step_files_and_archives(tmp_path):
         done = call(tmp_path, "view", what, "--out", tmp_path / "page.html")
         assert (done.returncode, done.stdout) == (0, f"page: {tmp_path / 'page.html'}\n"), done.stderr
         parts = data_of((tmp_path / "page.html").read_text())["scene"]["parts"]
-        assert all(words["words"].startswith("face(tc.Brep((") for words in parts[-1]["described"]) or what.suffix == ".py"
+        assert all(face["snippet"].startswith("face(tc.Brep((") for face in parts[-1]["described"]) or what.suffix == ".py"
     tc.run(cases.stack(), samples=10, solver="daqp", out=tmp_path / "stack.nc").close()
     done = call(tmp_path, "view", tmp_path / "stack.nc", "--out", tmp_path / "run.html")
     assert done.returncode == 0 and "Contact and certificates" in (tmp_path / "run.html").read_text()
@@ -103,10 +103,10 @@ def test_faces_are_picked(tmp_path, open_page):  # noqa: F811
     opened = open_page(tmp_path / "box.html")
     box = opened.locator("#scene").bounding_box()
     opened.mouse.click(box["x"] + 5, box["y"] + 5)
-    assert "Click on a face" in opened.locator("#said").inner_text()
+    assert "Click on a face" in opened.locator("#message").inner_text()
     place = opened.evaluate("new THREE.Vector3(50, 25, 20).project(viewer.camera).toArray()")
     opened.mouse.click(box["x"] + (1 + place[0]) / 2 * box["width"], box["y"] + (1 - place[1]) / 2 * box["height"])
-    said = opened.locator("#said").inner_text()
+    said = opened.locator("#message").inner_text()
     assert said.startswith("part box\n") and 'face("+z")\npoint(' in said and said.endswith("on it")
 
 
@@ -122,7 +122,7 @@ def test_points_are_picked_in_the_parts_own_frame(tmp_path, open_page):  # noqa:
         at = [30 - own[1], -20 + own[0], 5 + own[2]]  # turned to the left
         place = opened.evaluate(f"new THREE.Vector3(...{at}).project(viewer.camera).toArray()")
         opened.mouse.click(box["x"] + (1 + place[0]) / 2 * box["width"], box["y"] + (1 - place[1]) / 2 * box["height"])
-        words = opened.locator("#said").inner_text().splitlines()[-1]
+        words = opened.locator("#message").inner_text().splitlines()[-1]
         found = [float(x) for x in re.search(r"point\((.*)\)", words)[1].split(", ")]
         assert found == pytest.approx([100, 0, 20] if own[1] < 1 else own, abs=0.3) and ("on it" in words) == (own[1] > 1)
 

@@ -9,7 +9,7 @@ from tolcontact.vocabulary import ArchiveVariable
 
 
 def crc32(variable: ArchiveVariable, values: Any, start: int = 0) -> int:
-    """Return the CRC-32 of the values of a variable; `after` is that of the values before them.
+    """Return the CRC-32 of the values of a variable; `start` is the checksum of the values before them.
 
     Numbers are taken as little-endian bytes of the variable's kind, texts as UTF-8 with a zero byte behind each.
     """

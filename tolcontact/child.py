@@ -13,7 +13,9 @@ except ImportError:  # not on Windows, where nothing is limited
     resource = None  # type: ignore[assignment]
 
 
-STALL_FACTOR = 10  # times the processor time that a child may take: longer it does not wait for a processor, but for ever
+STALL_FACTOR = (
+    10  # times the processor time that a child may take: one that lives longer does not wait for a processor, it hangs
+)
 
 
 class Refusal(Exception):

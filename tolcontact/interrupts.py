@@ -1,9 +1,9 @@
 """Ctrl-C and SIGTERM, which end a command wherever it is.
 
-Python raises KeyboardInterrupt at whatever the main thread does. Some libraries catch it (trimesh takes any exception for a
+Python raises KeyboardInterrupt wherever the main thread is. Some libraries catch it (trimesh takes any exception for a
 package that is not installed), in callbacks and in the clean-up of objects it is ignored, and in the initialization of some
 native modules it ends the process with a memory fault. So it is not raised in these; it is raised again and again until it is
-being handled; and whatever ends a command afterwards is a stop.
+being handled; a command that ends afterwards, for any reason, was stopped.
 """
 
 import _thread

@@ -1,7 +1,7 @@
 """Tables of arrays with labelled dimensions, on NumPy alone: what summaries read and return.
 
 Importing xarray takes longer than a small run with its summary. So a command that needs no more reads an archive as a `Group`
-of `Table`s. These have the names and the meaning of xarray's: whatever takes a table takes an `xarray.Dataset`, too.
+of `Table`s. These have the names and the meaning of xarray's: a function that takes a table takes an `xarray.Dataset`, too.
 """
 
 import math

@@ -10,7 +10,7 @@ RESOLUTIONS = ("linearized", "exact")
 REGULARIZATIONS = ("points", "identity")
 ACTIVE_SETS = ("closed", "initial")
 SEARCHES = ("fixed", "iterated", "bounded")
-# By resolution: of one linear step the paper's.
+# By resolution. That of one linear step is the paper's.
 USUAL_SEARCH = {"linearized": "fixed", "exact": "bounded"}
 USUAL_OBJECTIVE = {"linearized": "active points", "exact": "all points"}
 
@@ -145,5 +145,8 @@ class Method:
 
     @property
     def corners_suffice(self) -> bool:
-        """Whether of points that lie in one plane only the corners of their hull can carry: all may, and they stay."""
+        """Whether, of points in one plane, the corners of their convex hull suffice.
+
+        They do if every point may carry, and if points do not move.
+        """
         return self.is_closed and not self.is_iterated

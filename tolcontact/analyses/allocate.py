@@ -12,10 +12,10 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis
-from tolcontact.analyses.engine import Progress
+from tolcontact.analyses.engine import VERIFICATION_FACTOR, Progress
 from tolcontact.analyses.grouping import check_grouping, owners
 from tolcontact.analyses.requirement import MIN_DECISIVE, Requirement
-from tolcontact.analyses.scaled_trials import VERIFICATION_FACTOR, ScaledTrials
+from tolcontact.analyses.scaled_trials import ScaledTrials
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.statistics.intervals import Estimate, mean
@@ -28,7 +28,7 @@ MAX_STEPS, USUAL_STEPS = 24, 8  # of one search: at most, and for the forecast
 FIRST_RADIUS, LAST_RADIUS = 0.5, 0.004  # of the region that a step stays in, in logarithms of the factors
 IDLE = 1e-6  # of a measure's spread: a group that changes no decisive realization by more has no influence
 MIN_EFFECT_SAMPLES, EFFECT_SHARE = 512, 4  # realizations for effects: at least, and one in so many; of all groups so many times
-COMMON_FACTORS = np.geomspace(0.1, 3.0, 13)  # of all ranges, where requirements cannot be met
+COMMON_FACTORS = np.geomspace(MIN_FACTOR, MAX_FACTOR, 13)  # of all ranges, where requirements cannot be met
 PENALTY = 10.0  # for missed margins, in the costs that the same margins save to first order
 MIN_GAIN = 1e-4  # of the cost
 VERIFICATIONS = 4

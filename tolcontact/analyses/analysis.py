@@ -116,7 +116,7 @@ class Analysis(Question):
     def engine(self, total: int | None = None) -> Engine:
         """Return an engine that reports its progress if there is a `total` of realizations.
 
-        Raises OptionError if so many realizations cannot end.
+        Raises OptionError if that many realizations would take too much time or memory.
         """
         self.check_affordable(self.samples if total is None else total)
         return Engine(self.program, self.blocks, progress=None if total is None else self.progress, total=total or 0)
@@ -125,7 +125,7 @@ class Analysis(Question):
     def engines(self, count: int, total: int) -> Iterator[list[Engine]]:
         """Open engines for different threads, which report progress together, and stop when this ends.
 
-        Raises OptionError if `total` realizations cannot end.
+        Raises OptionError if `total` realizations would take too much time or memory.
         """
         self.check_affordable(total)
         progress = SharedProgress(self.progress, total)
@@ -140,7 +140,7 @@ class Analysis(Question):
         return processors() if self._client is None else 1
 
     def check_affordable(self, realizations: int) -> None:
-        """Raise OptionError if so many realizations cannot end."""
+        """Raise OptionError if that many realizations would take too much time or memory."""
         check_affordable(self.program, samples=realizations, seed=self.seed, threads=threads_of(self._client))
 
     def sampled_deviations(self) -> np.ndarray:

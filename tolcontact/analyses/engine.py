@@ -17,6 +17,7 @@ from tolcontact.variation import GivenDraws
 
 MAX_ROWS_OF_BODIES = 8192  # realizations of a block, times the bodies that contact couples: a block ends within some seconds
 MIN_BLOCKS = 8  # of few realizations, so that these occupy all processors
+VERIFICATION_FACTOR = 4  # realizations of a fresh run, times samples
 
 Progress = Callable[[int, int], None]  # is called with the number of finished steps, and of all
 Observer = Callable[[Block], tuple[Any, ...]]  # gives arrays of a block; the last one is the statuses (n,)
@@ -82,7 +83,7 @@ class Engine:
         By default these are measures (n, state, measure) and statuses (n,). `draws` replaces the draws of the program.
         """
         observed = []
-        block = min(self._rows, max(self._rows, samples) // MIN_BLOCKS)  # whatever the number of threads or workers
+        block = min(self._rows, max(self._rows, samples) // MIN_BLOCKS)  # for any number of threads or workers
         for arrays in self._blocks(
             observe, self.program, samples=start + samples, start=start, seed=seed, draws=draws, block=block
         ):

@@ -10,7 +10,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis
-from tolcontact.analyses.engine import Engine, Progress
+from tolcontact.analyses.engine import VERIFICATION_FACTOR, Engine, Progress
 from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly, Locator, ThreeTwoOne
 from tolcontact.discretization import Nominal, NominalPart, discretize
@@ -26,7 +26,6 @@ from tolcontact.workflow.models import DEFAULT_SOLVER, Choice, Model
 GRID_POINTS = {1: 9, 2: 5, 3: 4}  # places tried along each side, by the number of sides
 MAX_TRIALS = 40  # after the grid, from its best place on
 PLACE_TOLERANCE = 1e-3  # of the sides: the search ends there
-VERIFICATION_FACTOR = 4  # realizations of the fresh run, times samples
 SIX_SIGMA = "6 sigma"
 EXAMPLES = (f"corner height: {SIX_SIGMA}", f"gap: {terms.PPM}")
 
@@ -40,7 +39,7 @@ def relocate(
 
         point        (stage, axis)      its place "before" and "after" [mm]
         reached      (stage, interval)  the statistic `least` in a fresh run of 4 samples realizations, with its 95 % interval
-        change       (interval)         6 sigma after over before, or the share outside after less before, of the same draws
+        change       (interval)         6 sigma after / before, or the share outside after minus before, of the same draws
         unresolved   (stage)            number of realizations of the fresh run that were not resolved
         tried        (trial, axis)      all places that were tried [mm], and
         tried_value  (trial)            the statistic there; infinite where the model cannot be built

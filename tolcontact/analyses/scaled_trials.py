@@ -6,10 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.engine import Engine
+from tolcontact.analyses.engine import VERIFICATION_FACTOR, Engine
 from tolcontact.variation import Draws
-
-VERIFICATION_FACTOR = 4  # realizations of a verification, times samples
 
 
 @dataclass(frozen=True, eq=False)

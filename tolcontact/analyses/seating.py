@@ -28,8 +28,8 @@ def seating(model: Model | Program, *, into: str | Path | None = None) -> xr.Dat
         share     (seat, holder)  the share that each contact then has in the sum of all normal forces: what holds the part; one
                                   distribution of several where it is not unique
 
-    Parts stand where the forces seat them without deviations and without friction, in the exact resolution, whatever the method
-    of the model; if they find no such pose, parts stand as drawn (attribute `place`). What touches there may carry: one-sided
+    Parts stand where the forces seat them without deviations and without friction, in the exact resolution, for any method
+    of the model. If they find no such pose, parts stand as drawn (attribute `place`). What touches there may carry: one-sided
     locators and contact pairs with friction, two-sided locators without. A contact that states mu=0 has no friction. Opposed
     contacts may press against each other as hard as the balance of forces allows, as in a drawer that jams. Whether a part does
     stop short depends on how it was put down, which nobody knows; the coefficient states whether it can. It is exact to 1e-6;

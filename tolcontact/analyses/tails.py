@@ -68,17 +68,17 @@ def tails(
         for side in range(len(event.sides))  # each has its own way, and may hide that of the other
     ]
     answers = _answered(analysis, searches, len(events) * samples)
-    found, statuses, stops = [], [], []
+    event_tails, statuses, stops = [], [], []
     for number in range(len(events)):
         sides = [answer for search, answer in zip(searches, answers, strict=True) if search.number == number]
         # Beside another side, one at which values stop would only add how seldom a run of this size can see it.
         kept = [side.tail for side in sides if not side.is_stop]
-        found.append(either(kept or [side.tail for side in sides]))
+        event_tails.append(either(kept or [side.tail for side in sides]))
         stops.append(any(side.is_stop for side in sides))
         statuses.append(np.sum([side.statuses for side in sides], axis=0))
     values = {
-        "probability": [tail.probability for tail in found],
-        "disagreement": [tail.disagreement for tail in found],
+        "probability": [tail.probability for tail in event_tails],
+        "disagreement": [tail.disagreement for tail in event_tails],
         "stop": np.array(stops, dtype=np.int8),
         "simulated": np.sum(statuses, axis=1),
         "by_status": statuses,
@@ -112,7 +112,7 @@ class _Event(NamedTuple):
 
 
 class _Search(NamedTuple):
-    """A search for one side of an event, which has a number, with about so many realizations."""
+    """The search for one side of event `number`, with about `samples` realizations."""
 
     event: _Event
     number: int

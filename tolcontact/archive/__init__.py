@@ -45,11 +45,11 @@ reaction of a two-sided locator is negative if it pulls.
 `state` is raw or corrected. Groups hold the rest: `contact` the contact points, `sample` the contributors (locators, freedoms
 of features, variables), with source, units, tolerance, rule and mean shift, and their drawn `deviation` (realization,
 contributor), `field/<part>` the displacement fields, `surface` the check between contact points, `model` the declaration as
-JSON, `statistics/<name>` what `tc.contributions`, `tc.sensitivities`, `tc.worst_case`, `tc.tails`, `tc.allocate` and
-`tc.relocate` return, if asked to keep it there (`into=`). A group has the name of its part, followed by an underscore if that
-is the name of a dimension (the attribute `part` is the name in any case). Attributes state the format
-number, the versions, the seed, the solver with its options, and the method with all its choices, and the sampling plan
-(`sampler`); `method_from` states whether the method was the model's, the defaults, or set by options.
+JSON, `statistics/<name>` what `tc.contributions`, `tc.sensitivities`, `tc.worst_case`, `tc.tails`, `tc.allocate`,
+`tc.relocate` and `tc.seating` return with `into=`. A group has the name of its part, followed by an underscore if that is the
+name of a dimension (the attribute `part` is the name in any case). Attributes state the format number, the versions, the seed,
+the solver with its options, the method with all its choices, and the sampling plan (`sampler`); `method_from` states whether
+the method was the model's, the defaults, or set by options.
 
 ## Reading it
 

@@ -56,6 +56,9 @@ def _acquire(holding: FileLock, lock: Path, path: str | Path) -> None:
 
 def _check_replaceable(path: str | Path, real: Path, *, is_allowed: bool) -> None:
     if not is_allowed:
-        raise ArchiveError(f'archive "{path}" exists; choose another name, or ask to overwrite or to resume it')
+        raise ArchiveError(
+            f'archive "{path}" exists; choose another name, replace it (--overwrite, overwrite=True) or continue it '
+            "(--resume, resume=True)"
+        )
     if not os.access(real, os.W_OK):
         raise ArchiveError(f'archive "{path}" cannot be written: it is read-only')

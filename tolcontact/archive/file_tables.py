@@ -21,7 +21,7 @@ def opening(path: Path) -> Iterator[None]:
     try:
         with small_caches():
             yield
-    except Exception as error:  # whatever a library finds that the inspection did not
+    except Exception as error:  # libraries may find a fault that the inspection did not
         raise ArchiveError(f'"{path}" cannot be read: {type(error).__name__}: {error}') from error
 
 

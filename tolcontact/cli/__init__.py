@@ -1,29 +1,28 @@
 """The command line: `tolcontact`, or `python -m tolcontact`. A chapter of the guide.
 
-    tolcontact new NAME                                  write a small model with comments as a starting point
-    tolcontact check MODEL.py                            list every fault of a model, without a run
-    tolcontact check MODEL.py --view                     also open the page of `view`, with marked faults
-    tolcontact check MODEL.py --population 1000          draw features, and print the share inside their zones
-    tolcontact run MODEL.py --samples 1000 --seed 1      simulate, and print the summary
-    tolcontact run MODEL.py --out FILE.nc                simulate into an archive
-    tolcontact summary FILE.nc [--json | --csv]          print the summary of an archive
-    tolcontact summary FILE.nc --limits                  only shares out of specification, and capability
-    tolcontact report FILE.nc [--out FILE.html]          write a page with the assembly in 3D, and charts
-    tolcontact compare MODEL.py --solvers daqp,qpoases   compare solvers on the same draws
-
-    tolcontact compare MODEL.py --resolution linearized,exact
-    tolcontact contributions MODEL.py [--by part]        sources of the variance of each measure
-    tolcontact sensitivities MODEL.py                    slope of each measure by each contributor
-    tolcontact worst MODEL.py                            extreme values of each measure, and the deviations
-    tolcontact tails MODEL.py                            probabilities of rare violations of limits
-    tolcontact allocate MODEL.py --require "gap: ppm 1000"   tolerance ranges at the lowest cost
-    tolcontact relocate MODEL.py --locator top.A3 ...   best position of a locator
-    tolcontact seating MODEL.py                          friction that can hold parts short of their seats
-    tolcontact compare A.nc B.nc [--report FILE.html]    compare runs, from the same draws or not
-    tolcontact view MODEL.py | FILE.stp                  show an assembly or a file before a run
-    tolcontact bodies FILE.stp                           the product tree of a STEP file, with numbers and sizes
-    tolcontact faces FILE.stp --body NAME                the faces of a body: numbers, kinds, directions, radii, areas
-    tolcontact pmi FILE.stp [--json | --csv | --script]  the tolerances, dimensions and datums that a STEP file states
+    tolcontact new NAME                                        write a small model with comments as a starting point
+    tolcontact check MODEL.py                                  list every fault of a model, without a run
+    tolcontact check MODEL.py --view                           also open the page of `view`, with marked faults
+    tolcontact check MODEL.py --population 1000                draw features, and print the share inside their zones
+    tolcontact run MODEL.py --samples 1000 --seed 1            simulate, and print the summary
+    tolcontact run MODEL.py --out FILE.nc                      simulate into an archive
+    tolcontact summary FILE.nc [--json | --csv]                print the summary of an archive
+    tolcontact summary FILE.nc --limits                        only shares out of specification, and capability
+    tolcontact report FILE.nc [--out FILE.html]                write a page with the assembly in 3D, and charts
+    tolcontact compare MODEL.py --solvers daqp,qpoases         compare solvers on the same draws
+    tolcontact compare MODEL.py --resolution linearized,exact  compare resolutions; --objective compares objectives
+    tolcontact compare A.nc B.nc [--report FILE.html]          compare runs, from the same draws or not
+    tolcontact contributions MODEL.py [--by part]              sources of the variance of each measure
+    tolcontact sensitivities MODEL.py                          slope of each measure by each contributor
+    tolcontact worst MODEL.py                                  extreme values of each measure, and the deviations
+    tolcontact tails MODEL.py                                  probabilities of rare violations of limits
+    tolcontact allocate MODEL.py --require "gap: ppm 1000"     tolerance ranges at the lowest cost
+    tolcontact relocate MODEL.py --locator top.A3 ...          best position of a locator
+    tolcontact seating MODEL.py                                friction that can hold parts short of their seats
+    tolcontact view MODEL.py | FILE.stp                        show an assembly or a file before a run
+    tolcontact bodies FILE.stp                                 the product tree of a STEP file, with numbers and sizes
+    tolcontact faces FILE.stp --body NAME                      the faces of a body: numbers, kinds, directions, radii, areas
+    tolcontact pmi FILE.stp [--json | --csv | --script]        the tolerances, dimensions and datums that a STEP file states
     tolcontact --version
 
 `tolcontact COMMAND --help` lists the options, with examples; `tolcontact --install-completion` enables completion in the
@@ -45,6 +44,8 @@ prints JSON with `--json`, and writes netCDF with `--out`.
 | `--quiet` | no progress, no notices |
 | `--report FILE.html` | also write the page of `report` |
 | `--surfaces` | number of realizations checked between contact points, 64 by default |
+| `--workers N`, `--scheduler ADDRESS` | simulate in worker processes, or on a dask scheduler, see `tolcontact.simulation` |
+| `--title`, `--part-number`, `--author`, `--revision`, `--date`, `--company` | replace entries of the title block |
 
 | exit code | meaning |
 |---|---|

@@ -208,7 +208,8 @@ COMMANDS = (
         "Print rare-event (ppm) estimates: how often measures are outside their limits, or parts cannot be assembled.",
         tails,
         terms.TAILS,
-        "Largest number of realizations for each event, about; by default all events share 60 000. A quarter may suffice.",
+        "Approximate largest number of realizations for each event; by default all events share 60 000. "
+        "The analysis stops at a quarter of them if these suffice.",
         ("tails model.py", "tails model.py --samples 400000 --json > rare.json"),
         _intervals("probability"),
     ),
@@ -217,7 +218,7 @@ COMMANDS = (
         "Print the worst-case minimum and maximum of each measure, and the deviations that give them.",
         worst_case,
         terms.WORST_CASE,
-        "Number of random combinations; a search for each extreme begins at one in 85 of them.",
+        "Number of random combinations; three searches for each extreme start for every 256 of them.",
         ("worst model.py", "worst model.py --samples 20000 --json > worst.json"),
         lambda dataset: dataset[["worst", "bound", "random", "agreeing", "ends", "unseen"]].to_dataframe(),
     ),

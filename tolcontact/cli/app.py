@@ -31,6 +31,11 @@ app = typer.Typer(
 )
 
 
+def flag(name: str, purpose: str, **settings: Any) -> Any:
+    """Return an option without a value; an empty `metavar` keeps a type out of its help."""
+    return typer.Option(name, metavar="", help=purpose, **settings)
+
+
 def _show_version(is_set: bool) -> None:
     if is_set:
         typer.echo(f"tolcontact {__version__}")
@@ -39,9 +44,7 @@ def _show_version(is_set: bool) -> None:
 
 @app.callback()
 def _options(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
-    ] = False,
+    version: Annotated[bool, flag("--version", "Show the version and exit.", callback=_show_version, is_eager=True)] = False,
 ) -> None:
     pass
 
@@ -69,18 +72,16 @@ Objective = Annotated[
     str | None,
     typer.Option(help=f"Quantity that the pose with contact minimizes: {or_(OBJECTIVES)}. Default: the model's."),
 ]
-
-
-AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
-AsCsv = Annotated[bool, typer.Option("--csv", help="Print the estimates as CSV.")]
+AsJson = Annotated[bool, flag("--json", "Print the result as JSON.")]
+AsCsv = Annotated[bool, flag("--csv", "Print the estimates as CSV.")]
 Into = Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also store the result in an archive of the same model.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the files to write if they exist, whatever they are.")]
+Overwrite = Annotated[bool, flag("--overwrite", "Replace existing output files, also those that tolcontact did not write.")]
 Workers = Annotated[int | None, typer.Option(metavar="N", help="Number of worker processes (with dask).")]
 Scheduler = Annotated[
     str | None,
     typer.Option(metavar="ADDRESS", help="Simulate on the workers of a dask scheduler, such as tcp://host:8786."),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Print results only: no progress, no notices.")]
+Quiet = Annotated[bool, flag("--quiet", "Print results only: no progress, no notices.")]
 
 
 def set_options(context: typer.Context) -> set[str]:

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from tolcontact import archive as archives, report as reports, statistics, workflow
-from tolcontact.cli.app import Archive, AsCsv, AsJson, Overwrite, app, examples, only_one
+from tolcontact.cli.app import Archive, AsCsv, AsJson, Overwrite, app, examples, flag, only_one
 from tolcontact.cli.json_output import print_data
 from tolcontact.cli.output import check_page, check_spreadsheet, console, print_summary
 from tolcontact.cli.progress import waiting
@@ -22,7 +22,7 @@ def summary(
     archive: Archive,
     as_json: AsJson = False,
     as_csv: AsCsv = False,
-    limits: Annotated[bool, typer.Option("--limits", help="Print only shares out of specification, and capability.")] = False,
+    limits: Annotated[bool, flag("--limits", "Print only shares out of specification, and capability.")] = False,
 ) -> None:
     """Print the statistics of an archive."""
     only_one(json=as_json, csv=as_csv, limits=limits)

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from tolcontact.archive import open_archive
-from tolcontact.cli.app import Model, Objective, Overwrite, Resolution, Seed, Solver, app, chosen, examples, show_warnings
+from tolcontact.cli.app import Model, Objective, Overwrite, Resolution, Seed, Solver, app, chosen, examples, flag, show_warnings
 from tolcontact.cli.output import check_page, console
 from tolcontact.cli.progress import waiting
 from tolcontact.declaration import Assembly
@@ -21,7 +21,7 @@ from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError, OptionError, shown
 from tolcontact.geometry import parts_from
 from tolcontact.report import nominal_and_faults, population_text, write_page, write_view
-from tolcontact.workflow.models import DEFAULT_SOLVER, build
+from tolcontact.workflow.models import DEFAULT_SOLVER, build, check_counts
 from tolcontact.workflow.population import check_population
 from tolcontact.workflow.summaries import summarize
 
@@ -62,9 +62,11 @@ def check(
         int | None, typer.Option(metavar="N", help="Also draw every feature N times, and print the share inside its zones.")
     ] = None,
     seed: Seed = 1,
-    view: Annotated[bool, typer.Option("--view", help="Also open the page of `tolcontact view`, with marked faults.")] = False,
+    view: Annotated[bool, flag("--view", "Also open the page of `tolcontact view`, with marked faults.")] = False,
 ) -> None:
     """Check a model and its options without a run, and list all faults, and what is probably a mistake."""
+    if population is not None:
+        check_counts(population=population)
     assembly, doubts = None, list[warnings.WarningMessage]()
     try:
         with waiting(f"checking {model}"), warnings.catch_warnings(record=True) as doubts:

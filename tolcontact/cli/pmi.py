@@ -16,7 +16,7 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from tolcontact.cli.app import AsJson, StepFile, app, examples, only_one
+from tolcontact.cli.app import AsJson, StepFile, app, examples, flag, only_one
 from tolcontact.cli.output import console
 from tolcontact.cli.progress import waiting
 from tolcontact.errors import OptionError, clipped, shown
@@ -26,8 +26,8 @@ from tolcontact.pmi.declared import Annotation
 from tolcontact.pmi.declared_file import DeclaredFile, declared_file
 from tolcontact.pmi.script import script
 from tolcontact.pmi.second_reading import SecondReading, second_reading
+from tolcontact.report.text.table import FILE_WIDTH
 
-WIDTH = 80  # of files and pipes
 MAX_ROWS = 2000  # of a table, which takes a second; a drawing has a hundred
 _CSV = (
     "type", "number", "record", "kind", "name", "value", "lower", "upper", "unit", "zone", "details", "datums", "refines",
@@ -40,15 +40,15 @@ MIN_WIDTHS = {"dimension": 9, "declared as": 12, "faces": 11}  # of columns, so 
 MAX_FACES = 12  # in a cell
 MAX_FEATURES = 6  # in a cell
 
-AsCsv = Annotated[bool, typer.Option("--csv", help="Print the tolerances and dimensions as CSV.")]
-AsScript = Annotated[bool, typer.Option("--script", help="Print a model script that declares the parts with these tolerances.")]
+AsCsv = Annotated[bool, flag("--csv", "Print the tolerances and dimensions as CSV.")]
+AsScript = Annotated[bool, flag("--script", "Print a model script that declares the parts with these tolerances.")]
 
 
 @app.command(epilog=examples("pmi part.stp", "pmi part.stp --csv > part.csv", "pmi part.stp --script > part.py"))
 def pmi(file: StepFile, as_json: AsJson = False, as_csv: AsCsv = False, as_script: AsScript = False) -> None:
     """List the tolerances, dimensions and datums of a STEP file of AP242, and how features declare them. In mm and rad.
 
-    The CAD kernel's own reading is compared with the list, and differences are told.
+    The CAD kernel's own reading is compared with the list, and differences are listed.
     """
     only_one(json=as_json, csv=as_csv, script=as_script)
     with waiting(f"reading {file}"):
@@ -111,7 +111,7 @@ def _reason(information: Pmi, name: str) -> str:
 
 def _print_tables(declared: DeclaredFile, reading: SecondReading | None) -> None:
     output = console()
-    width = output.width if sys.stdout.isatty() else WIDTH
+    width = output.width if sys.stdout.isatty() else FILE_WIDTH
     output.print(Text(str(declared.pmi), style="bold"))
     parts = *_sections(declared), *_undeclared_lines(declared), *([] if reading is None else _reading_lines(reading))
     for part in parts:

@@ -23,6 +23,7 @@ from tolcontact.cli.app import (
     app,
     chosen,
     examples,
+    flag,
     or_,
 )
 from tolcontact.cli.output import check_page, print_summary
@@ -71,7 +72,7 @@ def run(
     objective: Objective = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Archive to write.")] = None,
     overwrite: Overwrite = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue the archive if it exists.")] = False,
+    resume: Annotated[bool, flag("--resume", "Continue the archive if it exists.")] = False,
     keep: Annotated[str, typer.Option(help=f"Variables to archive for each realization: {or_(KEPT)}.")] = "all",
     fields: Annotated[
         str,

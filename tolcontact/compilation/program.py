@@ -109,7 +109,7 @@ class Program(Pictured):
         if trial is None or math.isnan(trial.error):
             return words
         if k in self.meetings:
-            return f"{words}; found anew at every pose, since fixed points would err by {trial.error:.2g} mm"
+            return f"{words}; contact is searched at every pose, since fixed points would err by up to {trial.error:.2g} mm"
         return f"{words}; they are fixed, and err by {trial.error:.2g} mm at most"
 
 

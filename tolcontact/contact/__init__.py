@@ -32,11 +32,11 @@ summary recommends `exact`. The single step fails for a U in a U without clearan
 True
 
 The exact resolution first takes steps like the paper's. Realizations that have not converged after eight steps continue with
-Newton steps, which take the curvature of the gaps and the objective into account. They end where twenty became no smaller, or
-where parts contradict each other and ten left no less penetration. If there is a conflict, no solution, or a
-solution far from the raw pose, other starts are tried: from the nominal pose, with small steps, or with contact points that
-are projected again; the same conflict from two starts is not looked for from a third. The best solution is kept; `starts`
-counts the starts.
+Newton steps, which take the curvature of the gaps and the objective into account. They stop when none of
+twenty steps in a row is smaller than all before, or, if parts contradict each other, when ten steps do not reduce the
+penetration. If there is a conflict, no solution, or a solution far from the raw pose, other starts are tried: from the nominal
+pose, with small steps, or with contact points that are projected again. If two starts end in the same conflict, there is no
+third. The best solution is kept; `starts` counts the starts.
 
 ## Contact search
 

@@ -83,7 +83,7 @@ That of a two-sided locator pulls, too. It is a pair of its own in results, "par
 pulls; its gap is minus its elongation or compression.
 
 A contact pair with a `stiffness` (N/mm) gives way, too: `contact(..., stiffness=5000)` states the force that presses its faces
-into each other evenly by 1 mm, as the data sheet of a pad or a press test does, whatever the number of contact points. These
+into each other evenly by 1 mm, as the data sheet of a pad or a press test does, for any number of contact points. These
 share it by the areas that they stand for, and push only. The faces must be flat, or those of balls and shafts against walls.
 
 A part that contact alone holds in some directions (a shaft in a V, a lid over studs) is `floating=True` and has fewer

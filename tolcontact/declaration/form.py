@@ -23,7 +23,7 @@ class Form(Readable):
     lobes        of a cylinder or cone: all sections have this number of lobes, as waviness has; covariances then count the
                  distance along the axis alone
     measured     path of the points of measured faces, one CSV or PLY file for each part, as in "scans/*.csv": lines x, y, z
-                 [mm] in the frame of the part. Faces then vary as these do, whatever the width of the tolerance
+                 [mm] in the frame of the part. Faces then vary as these do, regardless of the tolerance
     """
 
     covariance: str = "squared exponential"

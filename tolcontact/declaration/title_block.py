@@ -15,7 +15,7 @@ MAX_LENGTH = 200  # characters of an entry
 class TitleBlock:
     """The title block of reports of an assembly; empty entries are left out.
 
-    `date` is a text, in whatever form the company writes dates. Without a `title`, reports have the name of the assembly.
+    `date` is a text, in any form in which a company writes dates. Without a `title`, reports have the name of the assembly.
     """
 
     title: str = ""

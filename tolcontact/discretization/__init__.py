@@ -67,7 +67,7 @@ m) or compared with a part that it touches. It also names a mesh if all declared
 If a ball or a shaft of one part lies beside walls of the other, no points are sampled at all. A ball (a sphere) is its centre
 beside a plane, cylinder, cone or sphere, or a convex torus. A shaft (an outer cylinder) is the two ends of its axis in a
 parallel hole (an inner cylinder), or along a plane. The points of contact are computed at every pose, including tilted ones: a
-pin jams in its hole at the correct angle whatever the tessellation. Where an edge of the wall, a gap in it or another curve
+pin jams in its hole at the correct angle for any tessellation. Where an edge of the wall, a gap in it or another curve
 may touch first, the pair has sampled points. `tolcontact check` names the pairs that are handled in this way; `points=` or
 `spacing=` overrides it.
 

@@ -67,14 +67,16 @@ def unfit_directions(draws: TrialDraws) -> Iterator[str]:
             if np.abs(inward @ direction).max() < ALONG and all(fits):
                 yield (
                     f'{place}: the direction ({_row(direction)}) of locator "{locator.name}" lies along the surface of the '
-                    f"part; directions are in the part's own frame: ({_row(R_WP.T @ direction)}) is this one of the assembly"
+                    f"part; directions are stated in the part's own frame; for this direction of the assembly write "
+                    f"({_row(R_WP.T @ direction)})"
                 )
                 break
         for locator, inward in on_surface:
             if locator.one_sided and (inward @ np.array(locator.direction)).max() < -OUTWARD:
                 yield (
                     f'{place}: the direction ({_row(np.array(locator.direction))}) of the one-sided locator "{locator.name}" '
-                    "points out of the part; it holds the part up along its direction, so state the one into the part"
+                    "points out of the part; a one-sided locator pushes its part along its direction: state the direction "
+                    "into the part"
                 )
 
 
@@ -114,7 +116,7 @@ def _cause(nominal: NominalPart, point: np.ndarray) -> str:
     R_WP, t_WP = nominal.placement
     meant = (point - t_WP) @ R_WP
     if _outside(meant[None], nominal.mesh.bounds)[0] <= ON_SURFACE * nominal.mesh.scale:
-        return f"points are in the part's own frame: ({_row(meant)}) is this one of the assembly"
+        return f"points are stated in the part's own frame; for this point of the assembly write ({_row(meant)})"
     return "check the coordinates, which are in the part's own frame [mm]"
 
 

@@ -1,4 +1,4 @@
-"""Motions of faces beside the triangles that their clearance looks at."""
+"""Motions of faces beyond the triangles that their clearance compares."""
 
 from collections.abc import Iterator
 
@@ -12,7 +12,7 @@ from tolcontact.plausibility.trial_draws import TrialDraws
 
 
 def measured_reach(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence for each clearance by triangles that may be too small in some draws, since others may be nearer."""
+    """Yield a sentence for each clearance by triangles that is only a lower bound in some draws."""
     nominal = draws.program.nominal
     for measure, measurement in zip(nominal.measures, nominal.measurements, strict=True):
         for clearance in _clearances(measurement):
@@ -26,8 +26,8 @@ def _doubts(measure: Measure, clearance: MeshClearance, X: np.ndarray) -> Iterat
     if count := int((motion > spare).sum()):
         yield (
             f"{designation('measure', measure)}: its faces move by more than {spare:.3g} mm in {count} of {len(motion)} draws "
-            "without contact, beyond which triangles that are not looked at may be nearer, and it may be too small; choose "
-            "smaller faces, or read the parts with a larger chord"
+            "without contact; triangles that are not compared may then be nearer, so the clearance is only a lower bound; "
+            "choose smaller faces, or read the parts with a larger chord"
         )
 
 

@@ -2,7 +2,7 @@
 
 A STEP file of AP242 can state the product and manufacturing information (PMI) of a drawing as data: geometric tolerances,
 dimensions and datums, with the faces to which they apply. `tc.read_pmi` reads them, and `tolcontact pmi FILE.stp` lists them
-as tables, JSON or CSV. Lengths are in mm and angles in rad, whatever the units of the file.
+as tables, JSON or CSV. Lengths are in mm and angles in rad, regardless of the units of the file.
 
 >>> import tolcontact as tc
 >>> from pathlib import Path

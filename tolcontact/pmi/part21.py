@@ -1,6 +1,6 @@
 """The records of a STEP file (ISO 10303-21), by number and entity. Parameters are parsed when they are asked for.
 
-Time and memory are linear in the size of the text, whatever it holds: the patterns are possessive and never backtrack.
+Time and memory are linear in the size of any text: the patterns are possessive and never backtrack.
 """
 
 import re

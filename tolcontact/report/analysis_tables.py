@@ -131,9 +131,9 @@ def _by_size(shares: xr.DataArray) -> np.ndarray:
 
 def _sensitivities(dataset: xr.Dataset) -> AnalysisReport:
     notes = [
-        "Mean derivatives, 95 % intervals: where parts stay apart, and where they touch,",
-        "both where they are smooth; and of all, with kinks and jumps, whose share is",
-        "stated.",
+        "Mean derivatives with 95 % intervals: over realizations in which parts stay",
+        "apart, and over those in which they touch, both without kinks and jumps;",
+        '"all" includes kinks and jumps, and "kinks" is their share.',
         *_lost(_unresolved(dataset)),
     ]
     tables = [_slopes(dataset.sel(measure=measure)) for measure in dataset["measure"].values]
@@ -253,13 +253,12 @@ def _allocation(dataset: xr.Dataset) -> AnalysisReport:
     ]
     notes = [f"Requirements in fresh runs of {grouped(dataset.attrs['fresh'])} realizations; 95 % intervals."]
     if "floor" in dataset.attrs:
-        notes.append("Tolerances may be a tenth (smallest allowed) to three times (largest allowed) of before.\n")
+        least, most = (f"{dataset.attrs[name]:g} times" for name in ("floor", "ceiling"))
+        notes.append(f"Tolerances may be {least} (smallest allowed) to {most} (largest allowed) those before.\n")
     met = dataset["met"].values if "met" in dataset else np.ones(len(requirements))  # older archives do not state it
     for name, values in zip(dataset["requirement"].values[met == 0], dataset["kept"].values[met == 0], strict=True):
         text = share if f": {terms.PPM}" in str(name) else number
-        notes.append(
-            f'"{name}" is not met by tolerances from a tenth to three times those before; the best found: {text(values[1])}.\n'
-        )
+        notes.append(f'"{name}" is not met by any tolerances allowed; the best found: {text(values[1])}.\n')
     return AnalysisReport("Allocation", f"{grouped(dataset.attrs['samples'])} realizations", notes, tables)
 
 
@@ -292,10 +291,13 @@ def _relocation(dataset: xr.Dataset) -> AnalysisReport:
     for stage, point, reached in zip(terms.STAGES, dataset["point"].values, dataset["reached"].values, strict=True):
         rows.append([f"{stage}: ({', '.join(f'{c:.4g}' for c in point)})", text(reached)])
     change = dataset["change"].values
-    rows.append(["after less before", _ppm(change, "+")] if is_share else ["after over before", number(change)])
+    rows.append(["after minus before", _ppm(change, "+")] if is_share else ["after / before", number(change)])
     columns = [dataset.attrs["locator"], statistic if is_share else f"{statistic} [{dataset['measure_units'].values}]"]
     samples, fresh = (grouped(dataset.attrs[word]) for word in ("samples", "fresh"))
-    notes = [f"{samples} realizations each, {fresh} other ones below; 95 % intervals.\n"]
+    notes = [
+        f"{samples} realizations for each place tried;",
+        f"{fresh} fresh ones for the figures below, with 95 % intervals.\n",
+    ]
     table = AnalysisTable("", columns, rows, _lost(int(dataset["unresolved"].max())))
     return AnalysisReport("Place of a locator", f"{grouped(dataset.sizes['trial'])} places tried", notes, [table])
 
@@ -310,7 +312,7 @@ def _seating(dataset: xr.Dataset) -> AnalysisReport:
     if dataset.attrs["open_pairs"]:
         notes.append(f"They do not touch there, so they hold nothing: {dataset.attrs['open_pairs']}.")
     rows = [_seat(dataset.isel(seat=k)) for k in range(dataset.sizes["seat"])]
-    columns = ["", "critical", "over stated", "held by"]
+    columns = ["", "critical", "reserve", "held by"]
     return AnalysisReport("Seating", f"{len(rows)} seats", notes, [AnalysisTable("", columns, rows)])
 
 
@@ -321,8 +323,8 @@ def _seat(dataset: xr.Dataset) -> list[str]:
     names = [f"{dataset['holder'].values[k]} {100 * shares[k]:.0f} %" for k in holders[:MAX_HOLDERS]]
     names += [f"and {len(holders) - MAX_HOLDERS} more"] if len(holders) > MAX_HOLDERS else []
     warning = ", may stop short" if 0 < critical and reserve <= 1 else ""
-    over = "-" if np.isnan(reserve) else f"{float(reserve):.3g}{warning}"
-    return [str(dataset["seat"].values), f"{float(critical):.4g}", over, ",\n".join(names)]
+    factor = "-" if np.isnan(reserve) else f"{float(reserve):.3g}{warning}"
+    return [str(dataset["seat"].values), f"{float(critical):.4g}", factor, ",\n".join(names)]
 
 
 _REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {

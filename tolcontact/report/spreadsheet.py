@@ -17,10 +17,10 @@ from tolcontact.replacing import replacing
 from tolcontact.report.contributor_shares import contributor_shares
 from tolcontact.report.model_tables import model_tables
 from tolcontact.report.results_table import STATISTICS, result_rows
+from tolcontact.report.run_settings import run_settings
 from tolcontact.statistics.verdict import VERDICT_RULE
 from tolcontact.vocabulary import units_of
 
-RUN = ("solver", "resolution", "objective", "seed", "sampler", "versions")  # attributes of an archive
 MAX_WIDTH = 48  # characters of a column
 FORMULA_SIGNS = ("=", "+", "-", "@")  # a text that begins with one of them might be run as a formula
 INTERVAL = ("", ", lower end of its 95 % interval", ", upper end of its 95 % interval")
@@ -85,7 +85,7 @@ def _document(results: xr.DataTree, summary: xr.Dataset, titles: TitleBlock) -> 
         ["simulation", summary.attrs["title"]],
         ["realizations", summary.attrs["realizations"]],
         ["verdict", VERDICT_RULE],
-        *([name, results.attrs[name]] for name in RUN if name in results.attrs),
+        *map(list, run_settings(results).items()),
     ]
     return Sheet("Document", ["entry", "value"], rows)
 

@@ -114,7 +114,7 @@ def _event_loop() -> Iterator[Any]:
 
 def _say_where(client: Any) -> None:
     if find_spec("bokeh"):
-        log.warning("the workers at work: %s", client.dashboard_link)
+        log.warning("dask dashboard: %s", client.dashboard_link)
 
 
 @contextmanager
@@ -171,7 +171,7 @@ class Workers:
     """`map_blocks` on the workers of a client. They get a program once, however often it is simulated.
 
     Raises ClusterError if there are no workers, if one has other versions than this process, or if none comes through a shard;
-    and whatever a shard raises.
+    and any error of a shard.
 
     timeout   how long [s] a lost connection, and the first worker, are waited for
     """
@@ -290,7 +290,7 @@ class _Shards:
                 raise ClusterError(
                     f"realizations {start} to {stop - 1} ended the workers that simulated them: {error}"
                 ) from error
-            except (distributed.client.FutureCancelledError, OSError):  # a lost connection is an OSError, whatever its cause
+            except (distributed.client.FutureCancelledError, OSError):  # a lost connection is an OSError for any cause
                 if future.status == "error":  # of the shard itself
                     raise
                 self._begin_again()

@@ -12,7 +12,7 @@ from tolcontact.errors import ContactWarning, shown
 from tolcontact.simulation.block import simulate_block
 from tolcontact.vocabulary import CORRECTED
 
-TOUCHING_GAP = 1e-6  # mm: a contact point with a smaller gap stands on its plane
+ON_PLANE_GAP = 1e-6  # mm: a contact point with a smaller gap stands on its plane
 ENDED_SHARE = 1 / 2000  # of the smallest tolerance range: a face that is farther from a point on its plane has ended there
 FAR = 1.0  # mm: range in its place if nothing is toleranced
 
@@ -39,7 +39,7 @@ class Surfaces(NamedTuple):
 def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviations: Float[Array, "n contributor"]) -> Surfaces:
     """Return the check of every pair's faces at corrected poses (row, part, 12), for deviations (row, contributor)."""
     nominal, fixed = program.nominal, not program.method.is_iterated
-    ended = max(ENDED_SHARE * min(nominal.assembly.smallest_zone(), FAR), TOUCHING_GAP)
+    ended = max(ENDED_SHARE * min(nominal.assembly.smallest_zone(), FAR), ON_PLANE_GAP)
     surfaces = Surfaces(*(np.full((len(poses), len(nominal.pairs)), np.nan) for _ in Surfaces._fields))
     relative = program.observe(poses=poses, deviations=deviations)["relative"].reshape(len(poses), len(nominal.pairs), 12)
     raw = program.place(deviations=deviations)["poses"]
@@ -55,7 +55,7 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviation
             places = pose.apply(X_RM, pair.P_m)
             gaps = ((places - pair.P_r) * pair.n_r).sum(axis=2)
             raised = heights[:, None] if form is None else heights[:, None] + pair.form_heights(deviations)
-            row, point = np.nonzero(gaps < TOUCHING_GAP + raised)
+            row, point = np.nonzero(gaps < ON_PLANE_GAP + raised)
             depth = np.maximum(-pair.least_gap(raw_relative[:, k], deviations), 0)
             inside = np.flatnonzero(depth)
             of_inside = None if form is None else form.take(inside)

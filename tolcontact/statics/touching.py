@@ -132,7 +132,7 @@ def _drawn_places(pair: ContactPoints) -> Places:
 
 
 def carrying(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Return the numbers of the points (point, 3) that suffice to carry whatever all of them carry, also by friction.
+    """Return the numbers of the points (point, 3) that can carry every load that all of them can, also by friction.
 
     Where all normals (point, 3) are equal and the points lie in one plane, these are the corners of their hull: a force within
     the friction cone of any point is the sum of forces within those of the corners, with the same moment.

@@ -56,7 +56,7 @@ Below 92.5 % are only these. A measure is at its stop in 93 % of realizations: t
 (91 % at 300). A skewed measure (lognormal): Ppk as normal (91 % at 100) and the ratio of variance (92 %).
 
 A measure that evaluates to NaN does not stop the run; its statistics are NaN, and the table shows "-". Statistics always cover
-all finished realizations, whatever their status.
+all finished realizations, of any status.
 
 >>> change = summary.change.sel(measure="height", change_of="ratio of 6 sigma")
 >>> bool(change.sel(interval="upper") < 1)  # contact reduces the spread, at 95 % confidence

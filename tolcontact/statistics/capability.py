@@ -30,7 +30,7 @@ from tolcontact.statistics.intervals import (
 from tolcontact.statistics.sample import Sample
 from tolcontact.variation.sobol_points import scrambled_points
 
-LOW, MEDIAN, HIGH = PERCENTS = 0.135, 50.0, 99.865
+PERCENTS = 0.135, 50.0, 99.865
 TRIALS = 1 << 11  # simulated triples of percentiles, of which an interval covers 95 %
 
 
@@ -52,7 +52,7 @@ def share_outside(x: Sample, limits: Limits) -> Estimate:
 def without_stops(x: Sample, limits: Limits) -> Limits:
     """Return the limits without those at which values stop: none lies beyond, and the outer percentile is the limit itself.
 
-    Otherwise such a limit would have an index of exactly 1, whatever the values between are.
+    Otherwise such a limit would have an index of exactly 1 for any values in between.
     """
     low, _, high = (percentile.value for percentile in percentiles(x.map(limits.settled), PERCENTS))
     if low == limits.lower and not _is_any(x.map(limits.below)):

@@ -1,7 +1,7 @@
 """Names and units of all variables in archives, summaries and comparisons, each defined once."""
 
 from tolcontact.vocabulary.analyses import *  # noqa: F403
-from tolcontact.vocabulary.archive import *  # noqa: F403 (one namespace, of which each file holds a part)  # noqa: F403
+from tolcontact.vocabulary.archive import *  # noqa: F403 (one namespace, of which each file holds a part)
 from tolcontact.vocabulary.datum import *  # noqa: F403
 from tolcontact.vocabulary.form import *  # noqa: F403
 from tolcontact.vocabulary.labels import *  # noqa: F403

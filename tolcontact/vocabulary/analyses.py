@@ -70,7 +70,7 @@ CONTRIBUTIONS = AnalysisRecord(
     "contributions to the measures of {assembly}",
     (
         ArchiveVariable("first", _INDEX, "f8", "first-order Sobol' index: share of variance by a group alone", "1"),
-        ArchiveVariable("total", _INDEX, "f8", "total Sobol' index: with all that it does with others", "1"),
+        ArchiveVariable("total", _INDEX, "f8", "total Sobol' index: share of variance by a group and its interactions", "1"),
         ArchiveVariable("minor", (GROUP,), "i1", "1: estimated together with all other minor groups; 0: by itself", "1"),
         ArchiveVariable(
             "minor_total", (MEASURE, STATE, INTERVAL), "f8", "total Sobol' index of all minor groups together", "1"
@@ -83,7 +83,7 @@ CONTRIBUTIONS = AnalysisRecord(
             "1",
         ),
         ArchiveVariable(
-            "linear", (MEASURE, GROUP), "f8", "share of variance that linear sensitivities at the nominal assembly say", "1"
+            "linear", (MEASURE, GROUP), "f8", "share of variance by the linear sensitivities at the nominal assembly", "1"
         ),
         ArchiveVariable("missed", (MEASURE, STATE, INTERVAL), "f8", "share of variance that the linear prediction misses", "1"),
         _by_status(),
@@ -105,7 +105,7 @@ SENSITIVITIES = AnalysisRecord(
             "by_contact",
             (MEASURE, CONTACT, CONTRIBUTOR, INTERVAL),
             "f8",
-            "mean derivative, corrected, where contact is or is not",
+            "mean derivative with contact: where parts stay apart, and where they touch",
         ),
         ArchiveVariable(
             "changing", (CONTRIBUTOR, INTERVAL), "f8", "share of realizations with a kink or a jump within the step", "1"
@@ -150,7 +150,7 @@ ALLOCATION = AnalysisRecord(
     "allocation of tolerances of {assembly}",
     (
         ArchiveVariable("range", (GROUP, STAGE), "f8", "full width of the zones of a group; not a number if they differ"),
-        ArchiveVariable("factor", (GROUP,), "f8", "full width after over that before", "1"),
+        ArchiveVariable("factor", (GROUP,), "f8", "full width after / before", "1"),
         ArchiveVariable("cost", (GROUP, STAGE), "f8", "cost of the ranges", "1"),
         ArchiveVariable(
             "kept", (REQUIREMENT, STAGE, INTERVAL), "f8", "share outside of the limits, or Ppk, in a fresh run", "1"
@@ -167,7 +167,7 @@ RELOCATION = AnalysisRecord(
     (
         ArchiveVariable("point", (STAGE, AXIS), "f8", "place of the locator, in its part's own frame", "mm"),
         ArchiveVariable("reached", (STAGE, INTERVAL), "f8", "what is to be least, in a fresh run"),
-        ArchiveVariable("change", (INTERVAL,), "f8", "6 sigma after over before; or share outside, after less before", "1"),
+        ArchiveVariable("change", (INTERVAL,), "f8", "6 sigma after / before; or share outside, after minus before", "1"),
         ArchiveVariable("unresolved", (STAGE,), "i8", "number of realizations of the fresh run that were not resolved", "1"),
         ArchiveVariable("tried", (TRIAL, AXIS), "f8", "places tried, in the part's own frame", "mm"),
         ArchiveVariable("tried_value", (TRIAL,), "f8", "what is to be least, at the places tried"),
@@ -180,7 +180,13 @@ SEATING = AnalysisRecord(
         ArchiveVariable(
             "critical", (SEAT,), "f8", "least coefficient of friction that can hold the part short of the seat", "1"
         ),
-        ArchiveVariable("reserve", (SEAT,), "f8", "least factor of the stated coefficients that can", "1"),
+        ArchiveVariable(
+            "reserve",
+            (SEAT,),
+            "f8",
+            "least factor of the stated coefficients at which the part can be held short of the seat",
+            "1",
+        ),
         ArchiveVariable("share", (SEAT, HOLDER), "f8", "share of the normal forces that then hold the part", "1"),
     ),
 )

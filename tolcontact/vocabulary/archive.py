@@ -29,6 +29,7 @@ from tolcontact.vocabulary.variation import DEVIATION
 
 BREP_FACE, ROUND_POINT = "brep_face", "round_point"
 SURFACE_KINDS = ("plane", "cylinder", "cone", "sphere", "torus")  # in the order of their numbers
+TOUCHING_GAP = 1e-4  # mm: a contact point with a smaller gap touches
 KINDS_MEAN = {"flag_values": list(range(len(SURFACE_KINDS))), "flag_meanings": " ".join(SURFACE_KINDS)}
 
 
@@ -298,7 +299,7 @@ TOUCHING_SHARE = ArchiveVariable(
     "touching",
     (POINT,),
     "f8",
-    "share of realizations in which a contact point touches in the corrected state, gap below 1e-4 mm; NaN: not known",
+    f"share of realizations in which a contact point touches, corrected: gap below {TOUCHING_GAP} mm; NaN: not known",
     "1",
 )
 TOUCHING_INTERVAL = ArchiveVariable("touching_interval", (POINT, BOUND), "f8", "its 95 % confidence interval", "1")

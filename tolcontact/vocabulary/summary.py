@@ -152,4 +152,3 @@ SHARE_INSIDE = ArchiveVariable(
     "share_inside", (ZONE, INTERVAL), "f8", "share of drawn features that were measured to be inside", "1"
 )
 NEEDED_WIDTH = ArchiveVariable("needed_width", (ZONE,), "f8", "width of the zone that 99.73 % of the drawn features need", "mm")
-OF_ZONES = (ZONE_FEATURE, ZONE_TOLERANCE, STATED_SHARE, SHARE_INSIDE, NEEDED_WIDTH)

@@ -71,8 +71,9 @@ True
 Every change has a 95 % interval. Runs with the same seed are compared realization by realization, which makes the intervals
 narrow; other runs are compared as independent samples.
 
->>> found = tc.compare_runs({"exact": results, "linearized": linear})
->>> str(found.draws.sel(run="linearized").values), found.change.sel(run="linearized", change_of="shift of the mean").dims
+>>> comparison = tc.compare_runs({"exact": results, "linearized": linear})
+>>> change = comparison.change.sel(run="linearized", change_of="shift of the mean")
+>>> str(comparison.draws.sel(run="linearized").values), change.dims
 ('same', ('state', 'measure', 'interval'))
 
 `tc.check_population` draws the features of a model and measures them as a coordinate measuring machine would: it returns the

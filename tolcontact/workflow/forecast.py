@@ -43,9 +43,9 @@ def announce(program: Program, *, samples: int, seed: int, keep: str, threads: i
 
 
 def check_affordable(program: Program, *, samples: int, seed: int, threads: int, kept: int | None = None) -> None:
-    """Raise OptionError if what keeps `kept` numbers of each of `samples` realizations cannot end.
+    """Raise OptionError if `samples` realizations, with `kept` numbers kept of each, would take too much time or memory.
 
-    By default these are deviations, and measures in both states.
+    By default the numbers are deviations, and measures in both states.
     """
     check_memory(samples, kept or len(program.nominal.contributors) + 2 * len(program.nominal.measures))
     if samples >= MIN_ANNOUNCED_ROWS:

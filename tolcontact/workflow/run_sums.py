@@ -19,7 +19,6 @@ from tolcontact.simulation import Block
 from tolcontact.statistics import BlockSums, DisplacementFields, TouchingShares
 from tolcontact.vocabulary import CORRECTED
 
-TOUCHING_GAP = 1e-4  # mm: a point with a smaller gap touches
 MAX_REALIZATIONS = 2048
 MAX_GAPS = 20_000_000  # of all points in all realizations
 
@@ -38,7 +37,7 @@ def counted_realizations(nominal: Nominal) -> int:
 
 
 def gaps_need_deviations(nominal: Nominal) -> bool:
-    """Return whether gaps follow from poses together with deviations only: of supports, and of faces that deviate."""
+    """Return whether gaps depend on deviations as well as on poses, as those of supports and of deviating faces do."""
     return any(pair.is_supports or any(face is not None for face in pair.deviating) for pair in nominal.pairs)
 
 
@@ -64,9 +63,9 @@ def count_touching(
                 points[:] = _nearest_counts(program, k, relative[:, k], deviations)
             elif gaps is None:
                 distances = program.round_gaps[k](X_RM=X_RM, deviations=deviations)["distances"]
-                points[:] = (distances < TOUCHING_GAP).sum(axis=0)
+                points[:] = (distances < terms.TOUCHING_GAP).sum(axis=0)
             else:
-                kernel.count_below(gaps.basis, gaps.columns, gaps.coordinates, X_RM, deviations, TOUCHING_GAP, points)
+                kernel.count_below(gaps.basis, gaps.columns, gaps.coordinates, X_RM, deviations, terms.TOUCHING_GAP, points)
     return TouchingCounts(np.concatenate([np.zeros(0, dtype=np.int64), *counts]), len(poses))
 
 
@@ -76,7 +75,7 @@ def _nearest_counts(
     """Return in how many realizations pair k, whose places are found at every pose, touches nearest to each contact point."""
     pair = program.nominal.pairs[k]
     raised = raised_places(pair, program.meetings[k], X_RM, deviations)
-    row, place = np.nonzero(raised.gaps < TOUCHING_GAP)
+    row, place = np.nonzero(raised.gaps < terms.TOUCHING_GAP)
     _, nearest = KDTree(pair.P_m).query(raised.places.P_m[row, place])
     realization_and_point = np.unique(np.column_stack([row, nearest]), axis=0)
     return np.bincount(realization_and_point[:, 1], minlength=len(pair.P_m))

@@ -141,7 +141,7 @@ class FeatureList {
     this.choose(isChosen ? [] : [entry]);
     this.viewer.draw();
     const lost = entry.faces.length ? [] : ["Its faces were not found."];
-    say(isChosen ? null : [`part ${entry.partName}`, ...linesOf(entry.feature), ...lost]);
+    show(isChosen ? null : [`part ${entry.partName}`, ...linesOf(entry.feature), ...lost]);
   }
 
   /** Choose entries; none without any. */
@@ -159,10 +159,10 @@ class FeatureList {
   }
 }
 
-/** Say a text in the place for what is chosen; without one, what can be. */
-const INVITATION = byId("said").textContent;
-function say(lines) {
-  byId("said").textContent = lines ? lines.join("\n") : INVITATION;
+/** Show a text about what is chosen; without one, a hint at what can be chosen. */
+const HINT = byId("message").textContent;
+function show(lines) {
+  byId("message").textContent = lines ? lines.join("\n") : HINT;
 }
 
 /** Scroll a list so that an entry of it is seen, without scrolling the page. */

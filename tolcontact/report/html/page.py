@@ -23,6 +23,7 @@ from tolcontact.report.html.charts import bars_of, charts_of, compared_charts, r
 from tolcontact.report.html.scene import gap_rows, scene_of, view_of
 from tolcontact.report.model_tables import model_tables
 from tolcontact.report.results_table import COLUMNS, SIDES, result_rows, share_heading
+from tolcontact.report.run_settings import run_settings
 from tolcontact.report.text.runs import CHANGES, VALUES, change_rows, runs_lines, value_rows
 from tolcontact.report.text.summary import contact_lines, measure_rows, notes, pair_columns, pair_rows
 from tolcontact.statistics.verdict import VERDICT_RULE
@@ -51,8 +52,6 @@ SCRIPTS = {
     "view": ("vendor/three.min.js", "data.js", "labels.js", "viewer.js", "stations.js", "features.js", "view.js"),
     "compare": ("vendor/plotly-basic.min.js", "data.js", "charts.js", "compare.js"),
 }
-RUN = ("solver", "resolution", "objective", "regularization", "eta", "active_set", "search", "method_from", "sampler", "seed",
-       "samples", "kept", "fields", "versions", "history", "format")  # fmt: skip
 TITLE_ENTRIES = {"part_number": "part number", "revision": "revision", "author": "author", "date": "date"}
 MAX_ROWS = 15  # of the table of an analysis, above a fold
 WORDS = {
@@ -102,7 +101,7 @@ def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock |
         "tables": list(tables_of(results)),
         "contributions": (indices := contributions_of(results)),
         "max_rows": MAX_ROWS,
-        "run": {name: str(results.attrs[name]) for name in RUN if name in results.attrs},
+        "run": {name: str(value) for name, value in run_settings(results).items()},
         "missing": _missing(scene),
         "stations": scene["stations"],
     }
@@ -178,7 +177,7 @@ def _page(kind: str, values: dict[str, Any], data: dict[str, Any]) -> str:
         style=_as_is("page.css"),
         generator=markupsafe.Markup(GENERATOR),
         scripts=scripts,
-        allowed=" ".join(map(_hash, scripts)),  # no other script runs, whatever the data are
+        allowed=" ".join(map(_hash, scripts)),  # no other script runs, even if data contain one
         **values,
     )
 

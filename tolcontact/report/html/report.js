@@ -28,7 +28,7 @@ function drive(viewer) {
 
   function moved() {
     if (!byId("single").checked) {
-      byId("said").textContent = "";
+      byId("message").textContent = "";
       viewer.bend(-1);
       return viewer.move(null);
     }
@@ -39,7 +39,7 @@ function drive(viewer) {
       return `${chart.name}: ${STATES[RAW]} ${at(RAW)}, ${STATES[CORRECTED]} ${at(CORRECTED)} ${chart.units}`;
     });
     const deepest = pairs ? `smallest gap, ${STATES[seen]}: ${figure(Math.min(...own))} mm` : "no contact pairs";
-    byId("said").textContent = [
+    byId("message").textContent = [
       one.names[k], `status: ${one.status[k]}, residual ${figure(residual[k])} mm`, deepest, ...values,
     ].join("\n");
     viewer.bend(k - one.worstCases, Number(byId("factor").value));

@@ -189,7 +189,7 @@ def _drawn_part(part: Part, image: PartPreview, faulty: set[str]) -> Scene:
         "faces": packed(image.faces, "i4"),
         "faceOfTriangle": packed(image.face_of, "i4"),
         "described": [
-            {"said": str(face), "words": words, "groups": groups, "whole": face.whole or [face.number]}
-            for face, words, groups in zip(image.descriptions, image.snippets, image.groups, strict=True)
+            {"description": str(face), "snippet": snippet, "groups": groups, "whole": face.whole or [face.number]}
+            for face, snippet, groups in zip(image.descriptions, image.snippets, image.groups, strict=True)
         ],
     }

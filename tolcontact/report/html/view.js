@@ -25,7 +25,7 @@ function choose(viewer, features, part, hit) {
   features.choose(owners.map(({ entry }) => entry));
   if (!part) {
     viewer.draw();
-    say(null);
+    show(null);
     return;
   }
   const known = data.scene.parts[viewer.parts.indexOf(part)], faces = unpacked(known.faceOfTriangle).values;
@@ -33,7 +33,7 @@ function choose(viewer, features, part, hit) {
   for (const number of face.whole) features.highlights.add(part, runsOf(faces, number - 1), [], OF_FACE, 2);
   viewer.draw();
   const ofFeatures = owners.flatMap(({ entry, member }) => ["", ...linesOf(entry.feature, member)]);
-  say([`part ${part.name}`, face.said, face.words, ...face.groups, pointAt(known, part, hit), ...ofFeatures]);
+  show([`part ${part.name}`, face.description, face.snippet, ...face.groups, pointAt(known, part, hit), ...ofFeatures]);
 }
 
 /** Return the selector of the nearest corner of the triangle, or of the hit if no corner is near, in the frame of the part. */

@@ -41,7 +41,10 @@ SHORT_LABELS = {"standard deviation": "std. dev.", BELOW: "below the lower limit
                 OUTSIDE: OUT_OF_SPECIFICATION}  # fmt: skip
 PERCENTILE_COUNTERPART = {PP_NORMAL: PP, PPK_NORMAL: PPK}
 APART = "* differs from the index by percentiles: the measurement is not normally distributed"
-WITHOUT = f"{NO_INTERVAL} no interval: spreads need 10 realizations; shapes need 1000, and light tails"
+WITHOUT = (
+    f"{NO_INTERVAL} no interval: std. dev., 6 sigma and variance need 10 realizations; skewness\n"
+    "and kurtosis need 1000, and a kurtosis below 3.5"
+)
 
 
 def summary_text(summary: Rows) -> Group:
@@ -208,7 +211,7 @@ def _between(summary: Rows, count: int) -> Iterator[str]:
             yield f"touching contact points lie up to {overhang:.3g} mm beside their reference face"
     contacts, ended = (float(summary[name]) for name in ("contacts", "contacts_ended"))
     if ended > 0:
-        yield f"contact with faces that have ended there: {ended:.0f} of {contacts:.0f} touching contact points of these"
+        yield f"contact beyond the end of a face: {ended:.0f} of {contacts:.0f} touching contact points, where checked"
     for pair, depth in zip(summary["pair"].values, summary["false_contact"].values, strict=True):
         if depth > limit:
             share = percent(summary["false_contact_share"].values)

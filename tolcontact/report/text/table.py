@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 NAME_WIDTH = 12  # longer names and labels may be wrapped
-WIDTH = 80  # of files and pipes
+FILE_WIDTH = 80  # of tables in files and pipes
 BETWEEN = "  "  # columns
 
 
@@ -23,7 +23,7 @@ class FigureTable:
     rows: Sequence[Sequence[str]]
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        width = options.max_width if console.is_terminal else WIDTH
+        width = options.max_width if console.is_terminal else FILE_WIDTH
         rows = [[cell.split("\n") for cell in row] for row in self.rows]
         if self._full_width(rows) > width:
             rows = [[cell.replace(" [", "\n[").split("\n") for cell in row] for row in self.rows]

@@ -16,8 +16,8 @@ Each search is made by eight strands that share levels or inflations. How they d
 Each search moves along where the other may be led astray: levels follow the way that moves in the largest units, and inflation
 prefers what is far away. Realizations within the event walk by u' = sqrt(1 - b^2) u + b v, v standard normal, taken if u' is in
 the event (Papaioannou and others, 2015). What both have found are the centres of a mixture of standard normals, from which the
-probability is estimated by importance sampling, which is unbiased whatever was found. A way that neither search found is
-missing from it. So the estimate counts only if many realizations carry it, none of them much of it, and if neither search says
+probability is estimated by importance sampling, which is unbiased for any centres. A way that neither search found is missing
+from it. So the estimate counts only if many realizations carry it, none of them much of it, and if neither search says
 significantly more; and where single strands alone came to a way, there may be others, for which the interval is widened (Good,
 1953). Otherwise the searches answer; where they disagree, the interval covers both, and `disagreement` says so.
 

@@ -1,0 +1,15 @@
+"""The settings of a run, as pages and spreadsheets list them."""
+
+from typing import Any
+
+import xarray as xr
+
+SETTINGS = (
+    "solver", "resolution", "objective", "regularization", "eta", "active_set", "search", "method_from", "sampler", "seed",
+    "samples", "kept", "fields", "versions", "history", "format",
+)  # fmt: skip
+
+
+def run_settings(results: xr.DataTree) -> dict[str, Any]:
+    """Return the settings that an archive states, by the names of its attributes."""
+    return {name: results.attrs[name] for name in SETTINGS if name in results.attrs}
