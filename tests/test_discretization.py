@@ -87,3 +87,39 @@ def test_every_declared_thing_prints_as_one_row_and_remembers_its_line():
     assert a.measures[0].declared_at == "ra1.py:16"
     with pytest.raises(AttributeError):
         a.parts[0].name = "other"
+
+
+def lying(mesh, inset):
+    """The points of a 3-2-1 scheme on the faces -z, -y and -x of a mesh."""
+    a = tc.Assembly("plate")
+    plate = a.part("plate", tc.Mesh(mesh))
+    a.locate(plate, tc.three_two_one(plate.face("-z"), plate.face("-y"), plate.face("-x"), inset=inset), tolerance=0.1)
+    a.measure("m", plate.point(0, 0, 0), along="z")
+    return discretize(a).locators.points
+
+
+def box(lower, upper):
+    return trimesh.creation.box(bounds=[lower, upper])
+
+
+def test_points_of_a_scheme_beside_the_material_move_to_the_widest_support_on_it():
+    angled = trimesh.boolean.union([box((0, 0, 0), (100, 20, 5)), box((0, 0, 0), (20, 80, 5))])
+    points = lying(angled, 5)
+    assert points == pytest.approx(
+        np.array([(5, 5, 0), (95, 5, 0), (15, 75, 0), (5, 0, 2.5), (95, 0, 2.5), (0, 40, 2.5)]), abs=1e-9
+    )
+    notched = trimesh.boolean.difference([box((0, 0, 0), (100, 60, 5)), box((40, 50, -1), (60, 61, 6))])
+    A1, A2, A3 = lying(notched, 5)[:3]
+    assert A1 == pytest.approx([5, 5, 0], abs=1e-9) and A2 == pytest.approx([95, 5, 0], abs=1e-9)
+    assert A3[1:] == pytest.approx([55, 0], abs=1e-9) and 2.6 > min(35 - A3[0], abs(A3[0] - 65)) >= -1e-6
+
+
+def test_points_of_a_scheme_stand_at_the_level_of_the_material():
+    stepped = trimesh.boolean.union([box((0, 0, 0), (100, 60, 5)), box((0, 0, -3), (10, 60, 5))])
+    assert lying(stepped, 5)[:3] == pytest.approx(np.array([(5, 5, -3), (95, 5, 0), (50, 55, 0)]), abs=1e-9)
+
+
+def test_a_face_without_a_place_inside_its_edges_is_refused():
+    frame = trimesh.boolean.difference([box((0, 0, 0), (100, 60, 5)), box((4, 4, -1), (96, 56, 6))])
+    with pytest.raises(tc.ModelError, match=r'part "plate".*beside the material of face .*-z.* 10 mm from its edges'):
+        lying(frame, 10)
