@@ -100,7 +100,7 @@ class Goal:
         number = question.number_of([measure.name for measure in measures])
         limits = program.limits(number)
         if not is_spread and limits.are_open:
-            raise OptionError(f"least is {text!r}, and the measure has no limits; give it tolerance=... or limits=...")
+            raise OptionError(f"least is {text!r}, and the measurement has no limits; give it tolerance=... or limits=...")
         return cls(number, is_spread, limits, measures[number].units if is_spread else "1")
 
     def estimate(self, x: np.ndarray) -> Estimate:

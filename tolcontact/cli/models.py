@@ -64,7 +64,7 @@ def check(
     seed: Seed = 1,
     view: Annotated[bool, flag("--view", "Also open the page of `tolcontact view`, with marked faults.")] = False,
 ) -> None:
-    """Check a model and its options without a run, and list all faults, and what is probably a mistake."""
+    """Check a model and its options without a run; list all faults and probable mistakes."""
     if population is not None:
         check_counts(population=population)
     assembly, doubts = None, list[warnings.WarningMessage]()
@@ -110,7 +110,7 @@ def view(
 ) -> None:
     """Show an assembly before a run: faces, features with their tolerances, locators, contact points and nominal gaps.
 
-    The page lists the faults of a model, which may be incomplete: it needs no measures. For an archive it is the report.
+    The page lists the faults of a model, which may be incomplete: it needs no measurements. For an archive it is the report.
     """
     if out is not None:
         check_page(out, overwrite=overwrite)

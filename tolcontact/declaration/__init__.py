@@ -256,7 +256,7 @@ model's own, the defaults, or set by options.
 ...     print(error)
 model "nothing" has 2 faults:
   - it has no parts; declare at least one with assembly.part(name, geometry)
-  - it measures nothing; declare at least one measure with assembly.measure(...)
+  - it measures nothing; declare at least one measurement with assembly.measure(...)
 
 ## Scripts, and models as data
 

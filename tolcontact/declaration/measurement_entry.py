@@ -32,7 +32,7 @@ def _record(cls: Any) -> Record:
 
 CODECS[Point] = Record(Point, "part on? end? position?", mark="part")
 KIND = f"a measurement whose kind is one of {', '.join(MEASUREMENTS)}"
-OPERAND = Choice("Operand", f"the name of a measure, or {KIND}")
+OPERAND = Choice("Operand", f"the name of a measurement, or {KIND}")
 KINDS = tuple(map(_record, MEASUREMENTS.values()))
 OPERAND.codecs = (*KINDS, Plain(str))
 MEASURED = Choice("Measured", f"a point, or {KIND}", *KINDS, CODECS[Point])

@@ -91,7 +91,7 @@ def nominal_measurements(nominal: Nominal) -> tuple[NominalMeasurement | None, .
             if isinstance(measure.of, Measurement):
                 measurements[measure.name] = _with_numbers(measure.of, faces, measurements)
         except GeometryFault as fault:
-            faults.append(f"{designation('measure', measure)}: {fault}")
+            faults.append(f"{designation(measure.noun, measure)}: {fault}")
     if faults:
         raise ModelError(nominal.assembly.name, faults)
     return tuple(measurements.values())

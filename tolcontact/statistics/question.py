@@ -42,5 +42,5 @@ class Question:
     def number_of(self, measures: Sequence[str]) -> int:
         """Return the position of the measure among the names of a model's measures. Raises OptionError if it has none."""
         if self.measure not in measures:
-            raise OptionError(f'{self.option} has the measure "{self.measure}"; expected one of: {", ".join(measures)}')
+            raise OptionError(f'{self.option} has the measurement "{self.measure}"; expected one of: {", ".join(measures)}')
         return list(measures).index(self.measure)
