@@ -106,7 +106,7 @@ class AnalysisCommand:
             options |= {name: value for name, value in _settings_of_run(model, context).items() if name in self._parameters}
         arguments = self.arguments(options)
         with shown_progress(model.stem, 1, quiet=quiet) as show, client_of(workers, scheduler) as client:
-            method = common.chosen(resolution=resolution, objective=objective)
+            method = common.method_choices(resolution=resolution, objective=objective)
             shared = {"method": method, "client": client, "progress": show}
             arguments |= {name: value for name, value in shared.items() if name in self._parameters}
             dataset = self.analysis(model, **arguments)

@@ -101,7 +101,7 @@ def examples(*commands: str) -> str:
     return "Examples:\n\n" + "\n\n".join(f"tolcontact {command}" for command in commands)
 
 
-def chosen(**options: str | None) -> dict[str, str]:
+def method_choices(**options: str | None) -> dict[str, str]:
     """Return the choices of a method that options replace."""
     return {name: value for name, value in options.items() if value is not None}
 

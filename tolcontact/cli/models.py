@@ -10,7 +10,19 @@ from typing import Annotated
 import typer
 
 from tolcontact.archive import open_archive
-from tolcontact.cli.app import Model, Objective, Overwrite, Resolution, Seed, Solver, app, chosen, examples, flag, show_warnings
+from tolcontact.cli.app import (
+    Model,
+    Objective,
+    Overwrite,
+    Resolution,
+    Seed,
+    Solver,
+    app,
+    examples,
+    flag,
+    method_choices,
+    show_warnings,
+)
 from tolcontact.cli.output import check_page, console
 from tolcontact.cli.progress import waiting
 from tolcontact.declaration import Assembly
@@ -71,7 +83,7 @@ def check(
     try:
         with waiting(f"checking {model}"), warnings.catch_warnings(record=True) as doubts:
             assembly = load_model(model)
-            program = build(assembly, solver=solver, method=chosen(resolution=resolution, objective=objective))
+            program = build(assembly, solver=solver, method=method_choices(resolution=resolution, objective=objective))
     except ModelError as error:
         show_warnings(doubts)
         if view and assembly is not None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tolcontact.archive import ArchiveWriter, Run, opened_tables, taken
+from tolcontact.archive import ArchiveWriter, Run, locked_archive, open_tables_unchecked
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
@@ -41,14 +41,14 @@ def write_run(
     _check_choices(settings)
     check_program(model, solver, method)
     target = None if until is None else Target.of(until)
-    with taken(out, overwrite=overwrite, resume=resume) as path:
+    with locked_archive(out, overwrite=overwrite, resume=resume) as path:
         program = program_of(model, solver, method)
         program = replace(program, draws=program.draws.planned(settings.plan))
         if target:
             target.check(program)
         write_archive(path, program, settings, target, client, progress, is_resumed=resume and path.exists())
     if target:
-        with opened_tables(path) as results:
+        with open_tables_unchecked(path) as results:
             if sentence := target.shortfall(results):
                 log.warning(sentence)
     return path
@@ -117,7 +117,7 @@ def _simulate(
         if is_summed:
             sums.write_to(writer)
         raise
-    rows_to_check, at_random = writer.chosen(seed)
+    rows_to_check, at_random = writer.rows_to_check(seed)
     if rows_to_check.size:
         stored_poses = writer.poses(rows_to_check)
         deviations = program.draws.rows(rows_to_check, seed=seed)

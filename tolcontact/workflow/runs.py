@@ -6,7 +6,7 @@ from typing import Any
 
 import xarray as xr
 
-from tolcontact.archive import Run, open_archive, opened
+from tolcontact.archive import Run, open_archive, open_unchecked
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.vocabulary import MONTE_CARLO
@@ -64,7 +64,7 @@ def run(
     options = {"solver": solver, "method": method, "until": until, "client": client, "progress": progress}
     if out is None:
         return _results_in_memory(model, settings, options, overwrite=overwrite, resume=resume)
-    return opened(write_run(model, settings, Path(out), overwrite=overwrite, resume=resume, **options))
+    return open_unchecked(write_run(model, settings, Path(out), overwrite=overwrite, resume=resume, **options))
 
 
 def _results_in_memory(model: Model | Program, settings: Run, options: dict[str, Any], **archive_options: bool) -> xr.DataTree:
@@ -74,6 +74,6 @@ def _results_in_memory(model: Model | Program, settings: Run, options: dict[str,
             raise OptionError(f"{option} needs an archive, and none is named; name one: out=...")
     with (
         tempfile.TemporaryDirectory() as folder,
-        opened(write_run(model, settings, Path(folder) / "results.nc", **options)) as tree,
+        open_unchecked(write_run(model, settings, Path(folder) / "results.nc", **options)) as tree,
     ):
         return tree.load()

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from tolcontact.archive import opened_tables
+from tolcontact.archive import open_tables_unchecked
 from tolcontact.compilation import Program
 from tolcontact.labelled import Results
 from tolcontact.simulation import block_rows
@@ -49,7 +49,7 @@ class Target:
 
         None means that the interval is narrow enough, or cannot become narrow enough.
         """
-        with opened_tables(path) as results:
+        with open_tables_unchecked(path) as results:
             samples = int(results.attrs["samples"])
             estimate, half, target_half = self._widths(results)
         is_hopeless = math.isnan(half) and samples >= MAX_WITHOUT_INTERVAL

@@ -14,8 +14,8 @@ from tolcontact.statistics.rare.searches import (
     MAX_WEIGHTED,
     MIN_LEVEL,
     STRANDS,
-    Found,
     Score,
+    SearchResult,
     Walk,
     by_inflation,
     by_levels,
@@ -119,7 +119,7 @@ def _counted(score: Score, dimensions: int, count: int, rng: np.random.Generator
     return intervals.proportion(score(rng.standard_normal((count, dimensions))) > 0)
 
 
-def _searched(score: Score, dimensions: int, budget: int, rng: np.random.Generator, *, inflates: bool) -> Found:
+def _searched(score: Score, dimensions: int, budget: int, rng: np.random.Generator, *, inflates: bool) -> SearchResult:
     """Return what a search found with about `budget` realizations."""
     used, inflation = 0, 1.0
 
@@ -128,7 +128,7 @@ def _searched(score: Score, dimensions: int, budget: int, rng: np.random.Generat
         used += len(u)
         return score(u)
 
-    def search(count: int) -> Found:
+    def search(count: int) -> SearchResult:
         walk = Walk(counting, dimensions, count, rng)
         return by_inflation(walk, inflation, budget - used) if inflates else by_levels(walk)
 
