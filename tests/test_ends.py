@@ -108,9 +108,8 @@ def test_bodies_touch_exactly_if_a_place_has_a_gap_below_0(seed):
     rng = np.random.default_rng(seed)
     reference, moving = piece(rng, True), piece(rng, False)
     bodies = [trimesh.convex.convex_hull(points) for points in (moving, reference)]
-    places = meeting(
-        tuple(Surface(body) for body in bodies), tuple(bodies), Reach(travel=1.0, tilt=0.1, overlap=0.0, clearance=0.5)
-    )
+    reach = Reach(travel=1.0, tilt=0.1, spread=0.5, overlap=0.0, clearance=0.5)
+    places = meeting(tuple(Surface(body) for body in bodies), tuple(bodies), reach)
     convex = Convex(moving), Convex(reference)
     poses, distances = [], []
     for _ in range(200):

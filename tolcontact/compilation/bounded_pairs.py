@@ -77,6 +77,7 @@ def bounded_pair(
     reach = Reach(
         travel=TRAVEL_FACTOR * travel + pushed + MIN_TRAVEL_SHARE * size,
         tilt=tilt + pushed / size,
+        spread=travel,
         overlap=max(-float(pair.least_gap(pose.AT_REST[None])[0]), 0.0),
         clearance=clearance(pair),
     )
@@ -89,6 +90,18 @@ def bounded_pair(
             stacklevel=2,
         )
         return nothing
+    error, most = _error_of_planes(pair, places, X_RM, deviations, room)
+    bulge = max(pair.moving_face.bulge, pair.reference_face.bulge)
+    stands_for_curves = FACET_FACTOR * bulge <= COARSE_SHARE * smallest
+    allowed = max(ALLOWED_SHARE * smallest, FACET_FACTOR * bulge if stands_for_curves else 0.0)
+    trial = Trial(error, allowed, most)
+    return (places if trial.error > trial.allowed else None), trial
+
+
+def _error_of_planes(
+    pair: ContactPoints, places: Meeting, X_RM: np.ndarray, deviations: np.ndarray, room: float
+) -> tuple[float, int]:
+    """Return the largest error [mm] of the fixed planes of a pair in the depth of contact, and the largest number of places."""
     fixed = pair.least_gap(X_RM, deviations)
     room = max(room, float(np.ptp(fixed)))  # rarer poses than those of the trial may be as much deeper
     error, most = 0.0, 0
@@ -99,11 +112,7 @@ def bounded_pair(
         bounded = gaps.min(axis=1, initial=np.inf)
         differences = np.minimum(bounded, room) - np.minimum(fixed[rows], room)
         error = max(error, float(np.abs(differences).max(initial=0)))
-    bulge = max(pair.moving_face.bulge, pair.reference_face.bulge)
-    stands_for_curves = FACET_FACTOR * bulge <= COARSE_SHARE * smallest
-    allowed = max(ALLOWED_SHARE * smallest, FACET_FACTOR * bulge if stands_for_curves else 0.0)
-    trial = Trial(error, allowed, most)
-    return (places if trial.error > trial.allowed else None), trial
+    return error, most
 
 
 def _travel(pair: ContactPoints, X_RM: np.ndarray) -> float:

@@ -6,12 +6,13 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from tolcontact.compilation.contact_rows import Rows
+from tolcontact.arrays import Array, Bool, Int
+from tolcontact.compilation.contact_rows import Rows, springs_of
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.pose import Number
 from tolcontact.mechanics.setting import Setting
 
-SLACK = 1e-3  # mm of gap that a slack of 1 mm opens
+SLACK = 1e-3  # mm of gap that a slack of 1 mm opens, unless its row gives way
 IDLE_DISTANCE = 1e3  # lengths of the group: bound of an empty row, which never binds
 
 
@@ -35,23 +36,15 @@ def conditioned(setting: Setting, Q: ca.SX, pull: ca.SX, rows: Rows, misfit: ca.
     H, to_z = unit_blocks(Q)
     A = rows.slopes @ to_z
     idle = [idle_row(k, A[k, :].nnz()) for k in range(len(rows))]
-    gap_rows = conditioned_rows(A, rows.gaps, rows.filled, idle, setting.group.length)
+    gap_rows = conditioned_rows(A, rows.gaps, rows.filled, idle, setting.group.length, openings(rows.compliance, scale))
     B = setting.slope(misfit) @ to_z
-    gives = np.flatnonzero(rows.compliance)
-    owners = np.where(rows.compliance > 0, -1, rows.pairs)
-    owners[gives] = pairs + np.arange(len(gives))
-    slacks = pairs + len(gives)
-    opens = ca.sparsify(ca.DM(np.equal.outer(owners, range(slacks)).astype(float)))
-    opening = gap_rows.opening
-    if gives.size:
-        compliance = ca.DM(np.where(rows.compliance > 0, rows.compliance, 0.0))
-        opening = ca.if_else(compliance > 0, ca.sqrt(compliance * scale) / gap_rows.length, opening)
-    prices = np.where(np.isin(range(slacks), owners[rows.compliance == 0]), 1.0, 0.0) * setting.group.length
+    owners, priced = slack_owners(rows.pairs, rows.springs, pairs)
+    opens = ca.sparsify(ca.DM(np.equal.outer(owners, range(len(priced))).astype(float)))
     targets = -setting.at_rest(misfit)
     return {
-        "h": ca.diagcat(H, ca.SX.eye(slacks)),
-        "g": ca.vertcat(to_z.T @ pull, ca.DM(prices)),
-        "a": ca.blockcat([[gap_rows.A, ca.diag(opening) @ opens], [B, ca.SX(equations, slacks)]]),
+        "h": ca.diagcat(H, ca.SX.eye(len(priced))),
+        "g": ca.vertcat(to_z.T @ pull, ca.DM(priced.astype(float)) * setting.group.length),
+        "a": ca.blockcat([[gap_rows.A, ca.diag(gap_rows.opening) @ opens], [B, ca.SX(equations, len(priced))]]),
         "lba": ca.vertcat(gap_rows.lower, targets),
         "uba": ca.vertcat(ca.DM(np.full(len(rows), np.inf)), targets),
         "to_z": to_z,
@@ -59,12 +52,34 @@ def conditioned(setting: Setting, Q: ca.SX, pull: ca.SX, rows: Rows, misfit: ca.
     }
 
 
+def slack_owners(
+    pairs: Int[Array, " row"], springs: Sequence[int], pair_count: int
+) -> tuple[Int[Array, " row"], Bool[Array, " slack"]]:
+    """Return the slack of each row, for the `pairs` and the `springs` among the rows; and which slacks have a price.
+
+    Slacks of springs follow those of the pairs. The slack of a pair without rigid rows opens nothing, and has no price.
+    """
+    owners, is_rigid = pairs.copy(), np.ones(len(pairs), dtype=bool)
+    owners[springs] = pair_count + np.arange(len(springs))
+    is_rigid[springs] = False
+    return owners, np.isin(np.arange(pair_count + len(springs)), owners[is_rigid])
+
+
+def openings(compliance: ca.SX, scale: ca.SX) -> ca.SX:
+    """Return the gap (row, 1) [mm] that a slack of 1 mm opens, for the compliance (row, 1) [mm/N] of the rows."""
+    opening = ca.SX.ones(compliance.numel()) * SLACK
+    for k in springs_of(compliance):
+        opening[k] = ca.sqrt(compliance[k] * scale)
+    return opening
+
+
 def conditioned_rows(
-    A: ca.SX, gaps: ca.SX, filled: ca.SX, idle: Sequence[ca.DM | ca.SX], group_length: Number
+    A: ca.SX, gaps: ca.SX, filled: ca.SX, idle: Sequence[ca.DM | ca.SX], group_length: Number, opening: ca.SX
 ) -> ConditionedRows:
     """Return rows of length 1 from the derivatives A (row, y) of gaps (row, 1) [mm]; rows whose slot is empty are `idle`.
 
-    Multipliers are then in the norm of the objective, however weakly that holds a freedom.
+    Multipliers are then in the norm of the objective, however weakly that holds a freedom. A slack of 1 mm opens a gap by
+    `opening` (row, 1) [mm].
     """
     length = ca.sqrt(ca.sum2(A**2))
     length = ca.if_else(length > 0, length, 1)
@@ -75,7 +90,7 @@ def conditioned_rows(
             for k, replacement in enumerate(idle)
         )
     )
-    return ConditionedRows(A, SLACK / length, ca.if_else(filled, -gaps / length, -IDLE_DISTANCE * group_length), length)
+    return ConditionedRows(A, opening / length, ca.if_else(filled, -gaps / length, -IDLE_DISTANCE * group_length), length)
 
 
 def unit_blocks(Q: ca.SX) -> tuple[ca.SX, ca.SX]:

@@ -29,7 +29,7 @@ from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.gap import GapMap
 from tolcontact.mechanics.groups import Group, curved_pairs
 from tolcontact.mechanics.objective import energy
-from tolcontact.mechanics.placement import misfit
+from tolcontact.mechanics.placement import hold_steps, misfit
 from tolcontact.mechanics.pose import ENTRIES, poses_of
 from tolcontact.mechanics.setting import Setting, face_heights, face_poses
 from tolcontact.method import Method
@@ -128,6 +128,7 @@ def contact_qp(
         **{name: inputs[name] for name in ("moments", "deviations", "firmness")},
         faces=[face_poses(pair, inputs["deviations"]) for pair in pairs],
         heights=[face_heights(pair, inputs["deviations"]) for pair in pairs],
+        steps=[hold_steps(nominal, group.parts[hold.part], inputs["deviations"]) for hold in group.holds],
     )  # fmt: skip
     motion = setting.motion(poses_of(inputs["poses"]))
     current, moved, reactions = motion.poses, motion.by(linear), inputs["reactions"]
@@ -138,9 +139,7 @@ def contact_qp(
     problem = conditioned(setting, *terms.summed(inputs["newton"], inputs["caution"]), rows, exact, terms.scale)
     poses = motion.by(rigid if method.is_exact else published)
     solution_symbols, results = outcome(setting, terms.scale, rows, poses, problem, inputs["stride"])
-    pure_energy = ca.substitute(energy(setting, current).value, setting.firmness, 1)
-    for row in np.flatnonzero(rows.compliance).tolist():
-        pure_energy += ca.fmin(rows.gaps[row], 0) ** 2 / (2 * rows.compliance[row] * terms.scale)
+    pure_energy = ca.substitute(energy(setting, current).value, setting.firmness, 1) + rows.spring_energy() / terms.scale
     return ContactQP(
         assemble=_function("assemble", inputs, problem),
         plugin=plugin,
@@ -151,8 +150,8 @@ def contact_qp(
             {name: inputs[name] for name in ("poses", "deviations")},
             {"relative": ca.vertcat(*(X.vector() for X in setting.relative(current)))},
         ),
-        slacks=len(group.pairs) + int(np.count_nonzero(rows.compliance)),
-        has_springs=bool(rows.compliance.any()),
+        slacks=len(group.pairs) + len(rows.springs),
+        has_springs=group.has_springs,
         equations=exact.numel(),
         standing=standing,
     )

@@ -21,13 +21,16 @@ Point = tuple[ca.SX, ca.SX, ca.SX, ca.SX]  # P^m, P^r, n^r, and 1 if it has a ro
 
 
 class RowPoints(NamedTuple):
-    """The points of a pair that have rows, unless it is round.
+    """The points of a pair that have rows.
 
-    `bend` (12, 1) is that of the points in the slots of the previous step; None for points that always have a row, whose
-    previous reactions are known.
+    points       none of a round pair
+    compliance   (row, 1) [mm/N]: of points that give way; 0 for rigid ones
+    bend         (12, 1): of the points in the slots of the previous step; None for points that always have a row, whose
+                 previous reactions are known
     """
 
     points: Sequence[Point]
+    compliance: ca.SX
     bend: ca.SX | None = None
 
 
@@ -41,7 +44,7 @@ class Rows:
     pairs       (row,): position of the row's pair in the group
     relative    (12 * pair, 1): X_RM of every pair, to first order in z
     bends       (12 * pair, 1): sums of the previous reactions times the gaps' gradients by the entries of X_RM
-    compliance  (row,) [mm/N]: of points that give way; 0 for rigid rows
+    compliance  (row, 1) [mm/N]: of points that give way; 0 for rigid rows
     bow, wrap   (z, z): sums of the previous reactions times the second derivatives of gaps that are not linear in X_RM
                 (see round_gaps)
     """
@@ -50,7 +53,7 @@ class Rows:
     gaps: ca.SX
     filled: ca.SX
     pairs: np.ndarray
-    compliance: np.ndarray
+    compliance: ca.SX
     relative: ca.SX
     bends: ca.SX
     bow: ca.SX
@@ -58,6 +61,20 @@ class Rows:
 
     def __len__(self) -> int:
         return len(self.pairs)
+
+    @property
+    def springs(self) -> list[int]:
+        """The rows that give way."""
+        return springs_of(self.compliance)
+
+    def spring_energy(self) -> ca.SX:
+        """Return the energy [N mm] of the compressed springs at z = 0."""
+        return sum((ca.fmin(self.gaps[k], 0) ** 2 / (2 * self.compliance[k]) for k in self.springs), ca.SX(0))
+
+
+def springs_of(compliance: ca.SX) -> list[int]:
+    """Return the rows with a compliance (row, 1) other than 0."""
+    return [k for k in range(compliance.numel()) if not compliance[k].is_zero()]
 
 
 def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) -> np.ndarray | int:
@@ -83,13 +100,13 @@ def contact_rows(
     """
     slopes: list[ca.SX] = []
     pairs: list[int] = []
-    compliance: list[np.ndarray] = []
-    gaps, filled, relative, bends = ([] for _ in range(4))
+    gaps, filled, compliance, relative, bends = ([] for _ in range(5))
     bow, wrap = (ca.SX(setting.z.numel(), setting.z.numel()) for _ in range(2))
     for k, (start, end) in enumerate(zip(setting.relative(start_poses), setting.relative(end_poses), strict=True)):
-        by_z, size = setting.slope(end.vector()), len(pairs)
+        by_z = setting.slope(end.vector())
         relative.append(start.vector() + by_z @ setting.z)
-        (points, bend), pair = points_of_pairs[k], setting.nominal.pairs[setting.group.pairs[k]]
+        (points, gives, bend), pair = points_of_pairs[k], setting.nominal.pairs[setting.group.pairs[k]]
+        compliance.append(gives)
         if pair.round is not None:
             of_pair = reactions[len(pairs) : len(pairs) + len(pair.round)]
             point_gaps, by_entries, second_derivative, closing, _ = round_gaps(pair.round)(
@@ -102,7 +119,6 @@ def contact_rows(
             bends.append(by_entries.T @ of_pair)
             bow += by_z.T @ second_derivative @ by_z
             wrap += by_z.T @ closing @ by_z
-            compliance.append(_compliance(pair, len(pairs) - size))
             continue
         total = ca.SX.zeros(ENTRIES) if bend is None else bend
         for P_m, P_r, n_r, is_filled in points:
@@ -116,23 +132,22 @@ def contact_rows(
             filled.append(is_filled)
             pairs.append(k)
         bends.append(total)
-        compliance.append(_compliance(pair, len(pairs) - size))
     return Rows(
-        slopes=ca.vertcat(*slopes),
-        gaps=ca.vertcat(*gaps),
-        filled=ca.vertcat(*filled),
+        slopes=ca.vertcat(ca.SX(0, setting.z.numel()), *slopes),
+        gaps=ca.vertcat(ca.SX(0, 1), *gaps),
+        filled=ca.vertcat(ca.SX(0, 1), *filled),
         pairs=np.array(pairs),
-        compliance=np.concatenate(compliance),
-        relative=ca.vertcat(*relative),
-        bends=ca.vertcat(*bends),
+        compliance=ca.vertcat(ca.SX(0, 1), *compliance),
+        relative=ca.vertcat(ca.SX(0, 1), *relative),
+        bends=ca.vertcat(ca.SX(0, 1), *bends),
         bow=bow,
         wrap=wrap,
     )
 
 
-def _compliance(pair: ContactPoints, rows: int) -> np.ndarray:
-    """Return the compliance (row,) [mm/N] of the rows of a pair."""
-    return np.zeros(rows) if pair.stiffness is None or not pair.is_springy else 1 / pair.stiffness
+def compliance_of(pair: ContactPoints) -> np.ndarray:
+    """Return the compliance (point,) [mm/N] of the points of a pair."""
+    return np.zeros(len(pair.P_m)) if pair.stiffness is None else 1 / pair.stiffness
 
 
 def row_points(setting: Setting, standing: Sequence[np.ndarray | int], inputs: Mapping[str, ca.SX]) -> list[RowPoints]:
@@ -142,10 +157,10 @@ def row_points(setting: Setting, standing: Sequence[np.ndarray | int], inputs: M
     for index, points in zip(setting.group.pairs, standing, strict=True):
         pair = setting.nominal.pairs[index]
         if isinstance(points, int):
-            points_of_pairs.append(RowPoints(list(itertools.islice(slots, points)), next(bends)))
+            points_of_pairs.append(RowPoints(list(itertools.islice(slots, points)), ca.SX.zeros(points), next(bends)))
         else:
             rows = [] if pair.round is not None else _standing_rows(pair, points, setting.deviations)
-            points_of_pairs.append(RowPoints(rows))
+            points_of_pairs.append(RowPoints(rows, ca.SX(ca.DM(compliance_of(pair)[points]))))
     return points_of_pairs
 
 

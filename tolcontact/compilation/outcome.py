@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 
 import casadi as ca
-import numpy as np
 
 from tolcontact.compilation.conditioning import SLACK
 from tolcontact.compilation.contact_rows import Rows
@@ -30,7 +29,7 @@ def outcome(
     the QP that was solved.
     """
     group, z, count = setting.group, setting.z, len(rows)
-    slacks = len(group.pairs) + int(np.count_nonzero(rows.compliance))
+    slacks = len(group.pairs) + len(rows.springs)
     size, equations = z.numel() + slacks, problem["a"].size1() - count
     symbols = {name: ca.SX.sym(name, problem[name].sparsity()) for name in QP_ENTRIES}
     symbols |= {"x": ca.SX.sym("x", size), "lam_a": ca.SX.sym("lam_a", count + equations), "lam_x": ca.SX.sym("lam_x", size)}

@@ -49,7 +49,7 @@ def quadratic_terms(
     projects    whether points may be projected in each step
     """
     size = setting.z.numel()
-    if rows.compliance.any():  # what holds weakly must not share the load with springs: it counts from the present poses
+    if setting.group.has_springs:  # what holds weakly must not share the load with springs: it counts from the present poses
         setting = replace(setting, raw=motion.poses)
     moved, nothing = motion.by(linear), ca.SX(size, size)
     goal = energy(setting, moved)
@@ -62,7 +62,7 @@ def quadratic_terms(
     # A penalty holds the rows that carry. It does not change the answer, and restores convexity in most cases.
     hold = (1 + 2 * load / goal.scale / setting.group.length) * ca.if_else(reactions > 0, rows.filled, 0)
     curvature += rows.slopes.T @ ca.diag(hold) @ rows.slopes
-    give = rows.gaps + ca.DM(rows.compliance) * reactions if rows.compliance.any() else rows.gaps
+    give = rows.gaps + rows.compliance * reactions
     nearness = setting.curvature(proximity(setting, motion.poses, moved)) / setting.group.length if projects else nothing
     return QuadraticTerms(Q, pull, curvature, rows.slopes.T @ (hold * give), nearness, goal.scale)
 

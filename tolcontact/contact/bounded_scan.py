@@ -52,7 +52,7 @@ class BoundedScan(SlotScan):
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
         shape = len(relative), min(MAX_DEEPEST, self.labels.shape[1])
         deepest = Deepest(np.empty(shape, dtype=np.int64), np.empty(shape))
-        gaps, distance = self.gaps(relative, deviations), self.meeting.reach.travel
+        gaps, distance = self.gaps(relative, deviations), self.meeting.reach.spread
         bounded_kernel.deepest(self.labels, self.feet, gaps, distance, *deepest)
         return deepest
 

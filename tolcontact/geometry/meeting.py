@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.geometry import kernel, places_kernel
 from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER
@@ -57,12 +56,14 @@ class Reach(NamedTuple):
     """How far a moving body may be from its nominal place relative to a reference body.
 
     travel, tilt   [mm], [rad]: how far it may move and turn
+    spread         [mm]: how far deviations alone, without contact, may move it
     overlap        [mm]: how deep the bodies lie in each other nominally, at most
     clearance      [mm]: their nominal gap, at least
     """
 
     travel: float
     tilt: float
+    spread: float
     overlap: float
     clearance: float
 
@@ -123,11 +124,10 @@ class Meeting:
 
     def covers(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
         """Return whether the bodies stay so near to their nominal places that no candidate is missed (n,)."""
-        corners = self.moving.vertices[self._extremes]
-        moved = np.linalg.norm(pose.apply(X_RM - pose.AT_REST, corners), axis=2).max(axis=1)
-        turned = pose.turn(X_RM, pose.AT_REST[None]).reshape(-1)
-        is_turned = turned > self.reach.tilt + SPARE_LEANING if self.reach.leaning < 1 else np.zeros(len(X_RM), dtype=bool)
-        return ~(moved > self.reach.travel) & ~is_turned
+        covered = np.empty(len(X_RM), dtype=bool)
+        turn = self.reach.tilt + SPARE_LEANING if self.reach.leaning < 1 else np.inf
+        places_kernel.cover(np.ascontiguousarray(X_RM), self._extremes, self.reach.travel, turn, covered)
+        return covered
 
     def reaches(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
         """Return whether no candidate is missed at poses X_RM (n, 12), also of those farther away (n,)."""
@@ -137,9 +137,10 @@ class Meeting:
         return reached
 
     @cached_property
-    def _extremes(self) -> np.ndarray:
-        """Numbers of the vertices of the moving body that are outermost in some directions."""
-        return np.unique((self.moving.vertices @ np.vstack([DIRECTIONS, CORNERS]).T).argmax(axis=0))
+    def _extremes(self) -> Float[Array, "v 3"]:
+        """The vertices of the moving body that are outermost in some directions."""
+        numbers = np.unique((self.moving.vertices @ np.vstack([DIRECTIONS, CORNERS]).T).argmax(axis=0))
+        return np.ascontiguousarray(self.moving.vertices[numbers])
 
     def at(
         self,

@@ -50,6 +50,22 @@ class Candidates(NamedTuple):
     tallest: np.ndarray
 
 
+@compiled
+def cover(poses, corners, travel, turn, covered):  # type: ignore[no-untyped-def]
+    """Write whether corners (v, 3) travel by at most `travel` [mm], and turn by at most `turn` [rad], at X_RM (n, 12)."""
+    largest = 8 * math.sin(turn / 2) ** 2 if turn < math.pi else np.inf  # |R - I|^2
+    for k in range(poses.shape[0]):
+        X, square = poses[k], 0.0
+        for i in range(9):
+            square += (X[i] - (1.0 if i % 4 == 0 else 0.0)) ** 2
+        covered[k] = not square > largest
+        for j in range(corners.shape[0]):
+            corner = row(corners, j)
+            motion = minus(move(X, corner), corner)
+            if dot(motion, motion) > travel * travel:
+                covered[k] = False
+
+
 @uncounted
 def _keep_shallowest(candidates, touching, gaps):  # type: ignore[no-untyped-def]
     """Drop all but the nearest of the facets that a corner is behind: by that one it leaves. Facing planes hold all corners."""

@@ -1,10 +1,11 @@
 """Contact groups: parts that contact couples to each other. Each group has a QP of its own."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from tolcontact.declaration.locator import FIRST_ORDER
 from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import Mobility
 from tolcontact.mechanics.displacement import moment_table
@@ -35,6 +36,42 @@ class Side:
 
 
 @dataclass(frozen=True, eq=False)
+class Load:
+    """A force on a part that contact moves.
+
+    part     its position in the group
+    point    (3,) [mm], nominal
+    vector   (3,) [N]
+    """
+
+    part: int
+    point: Vector
+    vector: Vector
+
+
+@dataclass(frozen=True, eq=False)
+class Hold:
+    """The two-sided locators of a mover that do not give way. Parts are given by their positions in the group.
+
+    part         the mover
+    owners       of each locator the part that it is on: the mover, or parts of its joint
+    parent       the part that the mover is located on, or None for the ground
+    points       of each locator, (3,) [mm], nominal
+    directions   of each locator, (3,)
+    stiffness    of each locator [N/mm]
+    is_placed    whether the mover is held where it was placed, and not by the deviations of its locators
+    """
+
+    part: int
+    owners: tuple[int, ...]
+    parent: int | None
+    points: Sequence[Vector]
+    directions: Sequence[Vector]
+    stiffness: Sequence[Number]
+    is_placed: bool
+
+
+@dataclass(frozen=True, eq=False)
 class Group:
     """Parts that contact couples to each other, and the fixed parts that they touch.
 
@@ -42,6 +79,8 @@ class Group:
     free             indices of the movers among all parts
     mobilities       one per part of `parts`
     sides            sides of pairs that enter the objective, in the order of the Function's moments
+    loads, holds     forces, and two-sided locators of movers
+    has_springs      whether contact points give way
     length           root mean square distance of the contact points from their centroid [mm]
     count            number of points on all sides
     """
@@ -51,6 +90,9 @@ class Group:
     free: tuple[int, ...]
     mobilities: tuple[Mobility, ...]
     sides: tuple[Side, ...]
+    loads: tuple[Load, ...]
+    holds: tuple[Hold, ...]
+    has_springs: bool
     length: Number
     count: Number
 
@@ -117,6 +159,7 @@ def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int,
         for part, P in ((pair.moving, pair.P_m), (pair.reference, pair.P_r))
         if part is not None and chains[part]
     ]
+    holds = [_hold(nominal, part, parts) for part in free if nominal.parts[part].locators.exact.any()]
     return Group(
         parts=parts,
         pairs=tuple(index for index, _ in members),
@@ -125,8 +168,34 @@ def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int,
             Mobility(tuple(free.index(mover) for mover in chains[part]), centre[part], part in references) for part in parts
         ),
         sides=tuple(sides),
+        loads=tuple(_loads(nominal, parts, [part for part in parts if chains[part]])),
+        holds=tuple(holds),
+        has_springs=any(pair.is_springy for _, pair in members),
         length=length,
         count=sum(len(side.points) for side in sides),
+    )
+
+
+def _loads(nominal: Nominal, parts: tuple[int, ...], moved: Sequence[int]) -> Iterator[Load]:
+    """Yield the declared forces that act on parts which contact can move."""
+    for force in nominal.assembly.forces:
+        part = nominal.part_index(force.at.part, force.station)
+        if part in moved:
+            yield Load(parts.index(part), nominal.position(force.at), np.array(force.vector))
+
+
+def _hold(nominal: Nominal, part: int, parts: tuple[int, ...]) -> Hold:
+    entry = nominal.parts[part]
+    locators, exact = entry.locators, np.flatnonzero(entry.locators.exact)
+    owners = entry.owners or (part,) * len(locators)
+    return Hold(
+        part=parts.index(part),
+        owners=tuple(parts.index(owners[k]) for k in exact),
+        parent=None if entry.parent is None else parts.index(entry.parent),
+        points=[*locators.points[exact]],
+        directions=[*locators.directions[exact]],
+        stiffness=locators.stiffness[exact].tolist(),
+        is_placed=locators.placing != FIRST_ORDER,
     )
 
 

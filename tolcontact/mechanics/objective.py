@@ -11,10 +11,11 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.mechanics.displacement import displacement_energy
-from tolcontact.mechanics.groups import Side
+from tolcontact.mechanics.groups import Group, Side
 from tolcontact.mechanics.placement import elongation
-from tolcontact.mechanics.pose import Pose, relative
+from tolcontact.mechanics.pose import Pose, constant, relative
 from tolcontact.mechanics.setting import Setting
+from tolcontact.method import Method
 
 # Seating: the share of the forces that the quadratic term carries when all points have moved by the group's length. It is small
 # enough for the contacts to carry nearly the whole load, and large enough for the solvers.
@@ -34,7 +35,20 @@ class Energy(NamedTuple):
 
 def energy(setting: Setting, poses: Sequence[Pose]) -> Energy:
     """Return the objective at `poses`, which are affine in the increments."""
-    return _ENERGIES[setting.method.objective](setting, poses)
+    scale = objective_scale(setting.group, setting.method, setting.moments) if setting.scale is None else setting.scale
+    return Energy(_VALUES[setting.method.objective](setting, poses, scale), scale)
+
+
+def objective_scale(group: Group, method: Method, moments: ca.SX) -> ca.SX:
+    """Return the scale of the objective: of points their number, by the moments (10, side) of those that count, at least 1.
+
+    Of springs it is the sum of their stiffness [N/mm], of forces that of their sizes [N]; 1 without any.
+    """
+    if method.minimizes.counts_points:
+        return ca.fmax(ca.sum2(moments[0, :]), 1)
+    if method.minimizes.presses:
+        return ca.SX(sum(float(np.linalg.norm(load.vector)) for load in group.loads) or 1.0)
+    return ca.SX(sum(float(k) for hold in group.holds for k in hold.stiffness) or 1.0)
 
 
 def proximity(setting: Setting, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
@@ -43,50 +57,36 @@ def proximity(setting: Setting, start: Sequence[Pose], end: Sequence[Pose]) -> c
     return sum((_side_energy(setting, side, start, end) for side in sides), ca.SX(0)) / setting.group.count
 
 
-def points_scale(moments: ca.SX) -> ca.SX:
-    """Return the number of the points that count, of their moments (10, side): at least 1."""
-    return ca.fmax(ca.sum2(moments[0, :]), 1)
-
-
-def _points(setting: Setting, poses: Sequence[Pose]) -> Energy:
+def _points(setting: Setting, poses: Sequence[Pose], scale: ca.SX) -> ca.SX:
     """Return the mean displacement energy of the points that count."""
     value = setting.firmness * _regularization(setting, poses)
     for k, side in enumerate(setting.group.sides):
         value += displacement_energy(setting.moments[:, k], side.centre, setting.raw[side.part], poses[side.part])
-    scale = points_scale(setting.moments) if setting.scale is None else setting.scale
-    return Energy(value / scale, scale)
+    return value / scale
 
 
-def _springs(setting: Setting, poses: Sequence[Pose]) -> Energy:
+def _springs(setting: Setting, poses: Sequence[Pose], scale: ca.SX) -> ca.SX:
     """Return the energy 1/2 sum k e^2 [N mm] of the movers' two-sided locators, divided by the sum of the k [N/mm]."""
     regularization = setting.firmness * _regularization(setting, poses)
-    value, total = ca.SX(0), 0.0
-    for part in setting.group.free:
-        locators = setting.nominal.parts[part].locators
-        start_elongation, end_elongation = (elongation(setting, part, poses, linear=True) for poses in (setting.raw, poses))
-        for k, e in zip(locators.stiffness[locators.exact], ca.vertsplit(end_elongation - start_elongation), strict=True):
-            value += float(k) * e**2 / 2
-            total += float(k)
-    total = total or 1.0
-    return Energy(value / total + regularization / setting.group.count, ca.SX(total))
+    value = ca.SX(0)
+    for hold in setting.group.holds:
+        start_elongation, end_elongation = (elongation(setting, hold, poses, linear=True) for poses in (setting.raw, poses))
+        for k, e in zip(hold.stiffness, ca.vertsplit(end_elongation - start_elongation), strict=True):
+            value += k * e**2 / 2
+    return value / scale + regularization / setting.group.count
 
 
-def _forces(setting: Setting, poses: Sequence[Pose]) -> Energy:
-    """Return the negative work of the declared forces [N mm], divided by the sum of their sizes [N] (1 without forces)."""
-    nominal, group = setting.nominal, setting.group
-    work, total = ca.SX(0), 0.0
-    for force in nominal.assembly.forces:
-        part = nominal.part_index(force.at.part, force.station)
-        if part in group.parts and group.mobilities[group.position(part)].movers:
-            p, k = ca.DM(nominal.position(force.at)), group.position(part)
-            work += ca.dot(ca.DM(np.array(force.vector)), poses[k].apply(p) - setting.raw[k].apply(p))
-            total += float(np.linalg.norm(force.vector))
-    total = total or 1.0
-    quadratic = setting.firmness * SEATING_SHARE * proximity(setting, setting.raw, poses) / group.length
-    return Energy(quadratic - work / total, ca.SX(total))
+def _forces(setting: Setting, poses: Sequence[Pose], scale: ca.SX) -> ca.SX:
+    """Return the negative work of the declared forces [N mm], divided by the sum of their sizes [N]."""
+    work = ca.SX(0)
+    for load in setting.group.loads:
+        p = constant(load.point)
+        work += ca.dot(constant(load.vector), poses[load.part].apply(p) - setting.raw[load.part].apply(p))
+    quadratic = setting.firmness * SEATING_SHARE * proximity(setting, setting.raw, poses) / setting.group.length
+    return quadratic - work / scale
 
 
-_ENERGIES: dict[str, Callable[[Setting, Sequence[Pose]], Energy]] = {
+_VALUES: dict[str, Callable[[Setting, Sequence[Pose], ca.SX], ca.SX]] = {
     "active points": _points,
     "all points": _points,
     "locator stiffness": _springs,

@@ -11,7 +11,8 @@ import numpy as np
 from tolcontact.declaration.locator import FIRST_ORDER
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.mechanics.exact_placing import exact_pose
-from tolcontact.mechanics.pose import Pose, relative, rotation
+from tolcontact.mechanics.groups import Hold
+from tolcontact.mechanics.pose import Pose, constant, relative, rotation
 from tolcontact.mechanics.setting import Setting
 
 
@@ -87,24 +88,26 @@ def _locator_pose(part: NominalPart, d: ca.SX) -> Pose:
     return Pose(R, q[:3] + c - R @ ca.DM(c))
 
 
-def elongation(setting: Setting, part: int, poses: Sequence[Pose], *, linear: bool = False) -> ca.SX:
-    """Return the distance (locator, 1) [mm] of each two-sided locator of a part from its nominal place, along its direction.
+def hold_steps(nominal: Nominal, part: int, deviations: ca.SX) -> ca.SX:
+    """Return the steps (locator, 1) [mm] of a part at its two-sided locators that do not give way."""
+    return locator_steps(nominal, part, deviations)[np.flatnonzero(nominal.parts[part].locators.exact).tolist()]
 
-    Locators that give way are left out. The distance is measured in the frame that the part is located on, and to first order
-    in the increments if `linear`.
+
+def elongation(setting: Setting, hold: Hold, poses: Sequence[Pose], *, linear: bool = False) -> ca.SX:
+    """Return the distance (locator, 1) [mm] of each two-sided locator from its nominal place, along its direction.
+
+    The distance is measured in the frame that the mover is located on, and to first order in the increments if `linear`.
     """
-    group, entry = setting.group, setting.nominal.parts[part]
-    owners = entry.owners or (part,) * len(entry.locators)
 
     def pose(owner: int) -> Pose:
-        X = poses[group.position(owner)]
-        X_PM = X if entry.parent is None else relative(X, poses[group.position(entry.parent)])
-        return setting.linear(X_PM) if entry.parent is not None and linear else X_PM
+        if hold.parent is None:
+            return poses[owner]
+        X_PM = relative(poses[owner], poses[hold.parent])
+        return setting.linear(X_PM) if linear else X_PM
 
-    X_PM = {owner: pose(owner) for owner in dict.fromkeys(owners)}
-    exact = np.flatnonzero(entry.locators.exact)
-    P, n = entry.locators.points, entry.locators.directions
-    return ca.vertcat(*(ca.dot(ca.DM(n[k]), X_PM[owners[k]].apply(ca.DM(P[k])) - ca.DM(P[k])) for k in exact))
+    X_PM = {owner: pose(owner) for owner in dict.fromkeys(hold.owners)}
+    places = zip(hold.owners, map(constant, hold.points), map(constant, hold.directions), strict=True)
+    return ca.vertcat(*(ca.dot(n, X_PM[owner].apply(p) - p) for owner, p, n in places))
 
 
 def misfit(setting: Setting, poses: Sequence[Pose], *, linear: bool = False) -> ca.SX:
@@ -112,11 +115,8 @@ def misfit(setting: Setting, poses: Sequence[Pose], *, linear: bool = False) -> 
 
     Locators whose faces slide over them, or that a best fit averages, hold their part where they have placed it.
     """
-    errors = []
-    for part in setting.group.free:
-        locators = setting.nominal.parts[part].locators
-        if locators.exact.any():
-            steps = locator_steps(setting.nominal, part, setting.deviations)[np.flatnonzero(locators.exact).tolist()]
-            expected = steps if locators.placing == FIRST_ORDER else elongation(setting, part, setting.raw)
-            errors.append(elongation(setting, part, poses, linear=linear) - expected)
-    return ca.vertcat(*errors) if errors else ca.SX(0, 1)
+    errors = [
+        elongation(setting, hold, poses, linear=linear) - (elongation(setting, hold, setting.raw) if hold.is_placed else steps)
+        for hold, steps in zip(setting.group.holds, setting.steps, strict=True)
+    ]
+    return ca.vertcat(ca.SX(0, 1), *errors)

@@ -70,6 +70,7 @@ class Setting:
     z            (6 * mover, 1) [mm]: the increments, about which everything is linearized
     faces        poses of the moving and the reference face of each pair of the group in their parts
     heights      (2, 1) [mm] by which the moving and the reference face of each pair of the group have grown
+    steps        (locator, 1) [mm] of each of the group's holds, see hold_steps
     scale        of the objective, if the group is a part of the one whose objective it is; see tolcontact.mechanics.objective
     """
 
@@ -83,6 +84,7 @@ class Setting:
     z: ca.SX
     faces: Sequence[tuple[Pose | None, Pose | None]]
     heights: Sequence[ca.SX]
+    steps: Sequence[ca.SX]
     scale: ca.SX | None = None
 
     def at_rest(self, expression: ca.SX) -> ca.SX:

@@ -4,7 +4,7 @@ import numpy as np
 
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation.elements.element_batch import blocks
-from tolcontact.compilation.elements.element_functions import advance_function
+from tolcontact.compilation.elements.mover_functions import advance_function
 from tolcontact.compilation.functions import IndexedFunction, located
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.groups import Group

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.arrays import Array, Int
-from tolcontact.compilation.elements.element_batch import BLOCK, Columns, Elements, blocks
-from tolcontact.compilation.elements.element_functions import mover_functions
+from tolcontact.compilation.elements.element_batch import Columns, Elements, blocks
+from tolcontact.compilation.elements.element_functions import BLOCK
+from tolcontact.compilation.elements.mover_functions import mover_functions
+from tolcontact.compilation.elements.pair_elements import PairElements
 from tolcontact.compilation.elements.sparse_layout import BlockSum, SparseLayout
 from tolcontact.compilation.functions import IndexedFunction
 from tolcontact.mechanics.correction import FREEDOMS
@@ -27,14 +29,16 @@ class Movers:
 class ElementLayout:
     """The places of a QP of movers, with rows and slacks, that is assembled from elements of some kinds.
 
+    elements        number of the elements of all kinds
+
     mover_sum, coupling_sum, force_sum   sums of what elements contribute to movers, to pairs of coupled ones, and to forces
     places          for each kind the columns of its contributions, by name
     matrices        h and a
     slot_rows       (slot,) the rows of the slots
     """
 
-    def __init__(self, kinds: Sequence[Elements], *, movers: int, rows: int) -> None:
-        self._movers, self._slacks = movers, sum(kind.pairs.size for kind in kinds)
+    def __init__(self, kinds: Sequence[Elements], *, movers: int, rows: int, slacks: int) -> None:
+        self._movers, self._slacks, self.elements = movers, slacks, sum(map(len, kinds))
         couplings = np.concatenate([np.zeros((0, 2), dtype=int), *(kind.couplings for kind in kinds)])
         codes, numbers = np.unique(couplings[:, 0] * movers + couplings[:, 1], return_inverse=True)
         self._coupled = np.column_stack(np.divmod(codes, movers))
@@ -43,13 +47,8 @@ class ElementLayout:
         self.coupling_sum = BlockSum(numbers.ravel(), len(codes))
         self.force_sum = BlockSum(np.concatenate([diagonal, *self._coupled.T]), movers)
         self._contributions = len(diagonal)
-        slots = np.zeros(rows, dtype=int)
-        is_slot = np.zeros(rows, dtype=bool)
-        for kind in kinds:
-            if kind.has_slots:
-                is_slot[kind.slots] = True
-                slots[kind.slots] = kind.rows
-        self.slot_rows = slots[is_slot]
+        pairs = [kind for kind in kinds if isinstance(kind, PairElements) and kind.slots.size]
+        self.slot_rows = np.sort(np.concatenate([np.zeros(0, dtype=int), *(kind.rows.ravel() for kind in pairs)]))
         self.matrices = {"h": self._lay_out_h(), "a": self._lay_out_a(kinds, rows)}
         self.places = self._places_of(kinds)
 
@@ -94,12 +93,12 @@ class ElementLayout:
 
     def _lay_out_a(self, kinds: Sequence[Elements], row_count: int) -> SparseLayout:
         freedoms, slack = np.arange(FREEDOMS), FREEDOMS * self._movers
-        rows, columns = [], []
+        entries = []
         for kind in kinds:
-            z = (FREEDOMS * kind.movers[:, :, None] + freedoms).reshape(len(kind.pairs), -1)
-            entries = np.broadcast_arrays(kind.rows[:, None, :], z[:, :, None])
-            rows += [entries[0].ravel(), kind.rows.ravel()]
-            columns += [entries[1].ravel(), np.repeat(slack + kind.pairs, kind.row_count)]
+            z = (FREEDOMS * kind.movers[:, :, None] + freedoms).reshape(len(kind), -1)
+            entries.append(np.broadcast_arrays(kind.rows[:, None, :], z[:, :, None]))
+        entries += [(kind.rows, slack + kind.slacks) for kind in kinds if isinstance(kind, PairElements)]
+        rows, columns = ([part.ravel() for part in parts] for parts in zip(*entries, strict=True))
         a = SparseLayout((row_count, slack + self._slacks), np.concatenate(rows), np.concatenate(columns))
         self._row_places = np.split(a.places, np.cumsum([part.size for part in rows])[:-1])
         return a
@@ -107,6 +106,7 @@ class ElementLayout:
     def _places_of(self, kinds: Sequence[Elements]) -> list[dict[str, Columns]]:
         """Return the columns of what elements of each kind contribute."""
         of_kinds, start, start_between = [], 0, 0
+        openings = iter(self._row_places[len(kinds) :])
         for number, kind in enumerate(kinds):
             count, movers = kind.movers.shape
             couplings = len(kind.couplings)
@@ -114,15 +114,16 @@ class ElementLayout:
             between = slice(start_between, start_between := start_between + couplings)
             diagonal, force = (_by_element(sums.places[own], count) for sums in (self.mover_sum, self.force_sum))
             coupled = _by_element(self.coupling_sum.places[between], count)
-            of_kinds.append({
+            places = {
                 **dict.fromkeys(("Q", "curvature", "nearness"), blocks(diagonal, BLOCK)),
                 **dict.fromkeys(("Q_between", "curvature_between", "nearness_between"), blocks(coupled, BLOCK)),
                 **dict.fromkeys(("pull", "hold"), blocks(diagonal, FREEDOMS)),
                 "force": blocks(force, FREEDOMS),
-                "a": self._row_places[2 * number].reshape(count, -1),
-                "opening": self._row_places[2 * number + 1].reshape(count, -1),
-                "slack": FREEDOMS * self._movers + kind.pairs[:, None],
-            })  # fmt: skip
+                "a": _by_element(self._row_places[number], count),
+            }
+            if isinstance(kind, PairElements):
+                places |= {"opening": _by_element(next(openings), count), "slack": FREEDOMS * self._movers + kind.slacks}
+            of_kinds.append(places)
         return of_kinds
 
 

@@ -1,19 +1,26 @@
 """The contact QP of a group of many bodies, assembled from its elements."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
+from typing import TypeVar
 
 import casadi as ca
 import numpy as np
 
 from tolcontact.arrays import Array, Float
-from tolcontact.compilation.conditioning import SLACK
+from tolcontact.compilation.conditioning import SLACK, slack_owners
 from tolcontact.compilation.contact_qp import Evaluators, Standing, row_spans
 from tolcontact.compilation.contact_rows import standing_points
 from tolcontact.compilation.elements.corrected_poses import CorrectedPoses
-from tolcontact.compilation.elements.element import elements_of
-from tolcontact.compilation.elements.element_batch import Arrays, ElementBatch, Elements, Numbers
-from tolcontact.compilation.elements.element_functions import element_functions, function_of
+from tolcontact.compilation.elements.element import Element
+from tolcontact.compilation.elements.element_batch import Arrays, ElementBatch, Elements
+from tolcontact.compilation.elements.element_functions import function_of
 from tolcontact.compilation.elements.element_layout import ElementLayout
+from tolcontact.compilation.elements.pair_element import PairElement, pair_elements
+from tolcontact.compilation.elements.pair_elements import Numbers, PairElements
+from tolcontact.compilation.elements.pair_functions import pair_functions
+from tolcontact.compilation.elements.part_element import PartElement, part_elements
+from tolcontact.compilation.elements.part_elements import PartElements
+from tolcontact.compilation.elements.part_functions import part_functions
 from tolcontact.compilation.functions import NamedFunction, flat, located
 from tolcontact.compilation.outcome import step_share
 from tolcontact.compilation.plugins import Plugin
@@ -22,7 +29,8 @@ from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.gap import GapMap
 from tolcontact.mechanics.groups import Group, curved_pairs
-from tolcontact.mechanics.objective import points_scale
+from tolcontact.mechanics.objective import objective_scale
+from tolcontact.mechanics.placement import hold_steps
 from tolcontact.mechanics.pose import ENTRIES
 from tolcontact.mechanics.setting import face_heights, face_poses
 from tolcontact.method import Method
@@ -31,34 +39,40 @@ MANY_MOVERS = 6  # from which on a group is assembled from elements
 MAX_ENTRIES = 1_000_000  # of the terms of all elements of a batch of realizations
 
 
+E = TypeVar("E", bound=Element)
+
+
 def has_elements(group: Group, method: Method) -> bool:
-    """Return whether a group has many bodies, and its objective is a sum over its pairs."""
-    is_sum = method.minimizes.counts_points and method.regularization == "points"
+    """Return whether a group has many bodies, and its objective is a sum over its pairs and parts."""
+    is_sum = method.minimizes.presses or method.regularization == "points"
     return is_sum and len(group.free) >= MANY_MOVERS
 
 
 class ElementQP:
-    """The QP of a group as ContactQP has it, by functions of its elements; it has no equations and no springs.
+    """The QP of a group as ContactQP has it, by functions of its elements.
 
-    slacks, equations, standing, plugin, spans   as in ContactQP
+    slacks, has_springs, equations, standing, plugin, spans   as in ContactQP
     """
-
-    equations, has_springs = 0, False
 
     def __init__(
         self, nominal: Nominal, group: Group, gaps: Sequence[GapMap | None], method: Method, plugin: Plugin, standing: Standing
     ) -> None:
         self.plugin, self._method = plugin, method
         self.standing = standing or [standing_points(nominal.pairs[k], gaps[k], method) for k in group.pairs]
-        self.slacks, self.spans = len(group.pairs), row_spans(self.standing)
+        self.spans, self._pairs, self.has_springs = row_spans(self.standing), len(group.pairs), group.has_springs
         self._projects = method.is_iterated or bool(curved_pairs(nominal, group))
         self._size = FREEDOMS * len(group.free)
-        kinds = _kinds(nominal, group, method, self.standing, projects=self._projects)
-        self._layout = ElementLayout(kinds, movers=len(group.free), rows=self.spans[-1].stop)
+        pairs, parts = pair_elements(nominal, group, self.standing), part_elements(nominal, group, method)
+        kinds = _kinds(pairs, parts, method, projects=self._projects)
+        is_priced = _priced_slacks(pairs)
+        self.slacks, self.equations = len(is_priced), sum(part.equations for part in parts)
+        self._prices = np.where(is_priced, float(group.length), 0.0)
+        rows = self.spans[-1].stop + self.equations
+        self._layout = ElementLayout(kinds, movers=len(group.free), rows=rows, slacks=self.slacks)
         self._batches = [ElementBatch.of(elements, places) for elements, places in zip(kinds, self._layout.places, strict=True)]
         self._movers = self._layout.of_movers()
         self._corrected_poses = CorrectedPoses(group, method)
-        self._shared = _shared_function(nominal, group)
+        self._shared = _shared_function(nominal, group, method)
         self._share = _share_function(self._size)
         self._values = {
             name: np.full((1, 1), float(value)) for name, value in (("length", group.length), ("count", group.count))
@@ -74,7 +88,7 @@ class ElementQP:
     def max_batch(self) -> int:
         """The number of realizations whose terms fit into little memory."""
         kinds = [batch.elements for batch in self._batches]
-        entries = sum(kind.pairs.size * kind.size * (2 * kind.size + ENTRIES) for kind in kinds)
+        entries = sum(len(kind) * kind.size * (2 * kind.size + ENTRIES) for kind in kinds)
         return max(16, MAX_ENTRIES // entries)
 
     @property
@@ -86,7 +100,7 @@ class ElementQP:
         """Return the sparsity of h, g, a or lba."""
         if name in ("h", "a"):
             return self._layout.matrices[name].sparsity
-        return ca.Sparsity.dense(self._size + self.slacks if name == "g" else self.spans[-1].stop, 1)
+        return ca.Sparsity.dense(self._size + self.slacks if name == "g" else self.spans[-1].stop + self.equations, 1)
 
     def assemble(self, **inputs: Float[Array, "realization _"]) -> Arrays:
         """Return h, g, a, lba and uba, and what `finish` needs beside them, for the inputs of contact_qp."""
@@ -95,24 +109,26 @@ class ElementQP:
         filled = np.ones((count, rows))
         filled[:, layout.slot_rows] = inputs["filled"]
         arrays = inputs | self._shared_arrays(inputs) | {"filled": filled, "gaps": np.empty((count, rows))}
+        lower, row_length = np.empty((count, rows + self.equations)), np.empty((count, rows))
         terms = {name: np.empty((count, size)) for name, size in layout.sizes_of_terms.items()}
-        shared = located(arrays | terms)
+        shared = located(arrays | terms | {"lower": lower})
         local = [shared | batch.arrays(inputs["deviations"]) for batch in self._batches]
         for batch, own in zip(self._batches, local, strict=True):
-            function = batch.newton if newton and batch.newton is not None else batch.terms
-            function(count, own)
+            batch.evaluate("newton" if newton else "terms", count, own)
         Q, between, pull = self._summed(terms, inputs, newton=newton)
         V, h, a = (np.ones((count, size)) for size in (Q.shape[1], len(layout.matrices["h"]), len(layout.matrices["a"])))
-        g = np.full((count, self._size + self.slacks), self._values["length"][0, 0])  # the prices of slacks
+        g = np.empty((count, self._size + self.slacks))
+        g[:, self._size :] = self._prices
         self._movers.whiten(count, located({"Q": Q, "pull": pull, "V": V, "g": g}))
         self._movers.couple(count, located({"Q": between, "V_i": V, "V_j": V, "H": h, "mirrored": h}))
-        by_row = {name: np.empty((count, rows)) for name in ("lower", "row_length")}
-        of_rows = located(by_row | {"V": V, "a": a, "opening": a})
+        of_rows = located({"row_length": row_length, "V": V, "a": a, "opening": a})
         for batch, own in zip(self._batches, local, strict=True):
-            batch.rows(count, own | of_rows)
+            batch.evaluate("rows", count, own | of_rows)
+        upper = np.full(lower.shape, np.inf)
+        upper[:, rows:] = lower[:, rows:]
         return {
-            "h": h, "g": g, "a": a, "lba": by_row["lower"], "uba": np.full((count, rows), np.inf), "V": V, "filled": filled,
-            "faces": arrays["faces"], "scale": arrays["scale"], "row_length": by_row["row_length"],
+            "h": h, "g": g, "a": a, "lba": lower, "uba": upper, "V": V, "filled": filled, "row_length": row_length,
+            **{name: arrays[name] for name in ("faces", "scale", "steps")},
         }  # fmt: skip
 
     def finish(self, **arrays: Float[Array, "realization _"]) -> Arrays:
@@ -125,19 +141,20 @@ class ElementQP:
         share = self._share(step=steps, y=x[:, : self._size], stride=stride, length=length)
         corrected = self._corrected_poses(arrays["poses"], steps * share["share"])
         sizes = {
-            "residual": self.slacks, "slack_force": self.slacks, "multipliers": self.spans[-1].stop,
-            "linearized": ENTRIES * self.slacks, "relative": ENTRIES * self.slacks,
+            "residual": layout.elements, "astray": layout.elements, "slack_force": self.slacks,
+            "multipliers": self.spans[-1].stop, **dict.fromkeys(("linearized", "relative"), ENTRIES * self._pairs),
         }  # fmt: skip
-        results = {name: np.empty((count, size)) for name, size in sizes.items()}
-        forces = np.empty((count, FREEDOMS * len(layout.force_sum.places)))
+        # Elements without rows contribute nothing.
+        results = {name: np.zeros((count, size)) for name, size in sizes.items()}
+        forces = np.zeros((count, FREEDOMS * len(layout.force_sum.places)))
         checked = results | {"opening": arrays["a"], "y": x, "slack": x, "lam": arrays["lam_a"], "lower": arrays["lba"]}
-        checked |= {name: arrays[name] for name in ("a", "row_length", "filled", "scale", "faces")} | {"force": forces}
-        before = located(checked | self._values | {"poses": arrays["poses"], "step": steps})
+        names = ("a", "row_length", "filled", "scale", "faces", "steps", "poses", "raw")
+        checked |= {name: arrays[name] for name in names} | {"force": forces}
+        before = located(checked | self._values | {"step": steps})
         after = before | located({"poses": corrected})
         for batch in self._batches:
-            batch.check(count, before | batch.own)
-            batch.advance(count, before | batch.own)
-            batch.relate(count, after | batch.own)
+            for name, values in (("check", before), ("advance", before), ("relate", after), ("astray", after)):
+                batch.evaluate(name, count, values | batch.own)
         pulls = {"H": arrays["h"], "y_i": x, "y_j": x, "force_i": forces, "force_j": forces}
         self._movers.pull(count, located(pulls))
         force = np.concatenate([layout.force_sum(forces), results["slack_force"]], axis=1)
@@ -149,18 +166,18 @@ class ElementQP:
             "relative": results["relative"],
             "multipliers": results["multipliers"],
             "residual": np.concatenate(residuals, axis=1).max(axis=1, keepdims=True),
-            "slack": SLACK * slack,
+            "slack": SLACK * slack[:, : self._pairs],
             "step": share["size"],
-            "astray": np.zeros((count, 1)),
+            "astray": results["astray"].max(axis=1, keepdims=True),
         }
 
     def energy(self, **inputs: Float[Array, "realization ..."]) -> Arrays:
         """Return the objective of contact_qp."""
         inputs = {name: flat(values) for name, values in inputs.items()}
-        arrays = inputs | self._shared_arrays(inputs) | {"energy": np.empty((len(inputs["poses"]), self.slacks))}
+        arrays = inputs | self._shared_arrays(inputs) | {"energy": np.empty((len(inputs["poses"]), self._layout.elements))}
         shared = located(arrays)
         for batch in self._batches:
-            batch.energy(len(inputs["poses"]), shared | batch.own)
+            batch.evaluate("energy", len(inputs["poses"]), shared | batch.arrays(inputs["deviations"]))
         return {"energy": arrays["energy"].sum(axis=1, keepdims=True)}
 
     def relate(self, **inputs: Float[Array, "realization ..."]) -> Arrays:
@@ -169,10 +186,10 @@ class ElementQP:
         count = len(poses)
         moments = np.repeat(self._no_moments, count, axis=0)
         arrays = {"poses": poses, "faces": self._shared(deviations=deviations, moments=moments)["faces"]}
-        arrays["relative"] = np.empty((count, ENTRIES * self.slacks))
+        arrays["relative"] = np.empty((count, ENTRIES * self._pairs))
         shared = located(arrays)
         for batch in self._batches:
-            batch.relate(count, shared)
+            batch.evaluate("relate", count, shared)
         return {"relative": arrays["relative"]}
 
     def _shared_arrays(self, inputs: Arrays) -> Arrays:
@@ -203,18 +220,32 @@ class ElementQP:
         return self._layout.mover_sum(terms[name]), self._layout.coupling_sum(terms[f"{name}_between"])
 
 
-def _kinds(nominal: Nominal, group: Group, method: Method, standing: Standing, *, projects: bool) -> list[Elements]:
+def _kinds(pairs: Sequence[PairElement], parts: Sequence[PartElement], method: Method, *, projects: bool) -> list[Elements]:
     """Return the elements by their kinds."""
-    elements = elements_of(nominal, group, standing)
-    kinds: dict[object, list] = {}
+    numbers, rows = Numbers.of(pairs), sum(pair.rows for pair in pairs)
+    return [
+        *(PairElements(kind, pair_functions(kind[0], method, projects=projects), numbers) for kind in _by_kind(pairs)),
+        *(PartElements(kind, part_functions(kind[0], method, projects=projects), rows) for kind in _by_kind(parts)),
+    ]
+
+
+def _by_kind(elements: Sequence[E]) -> list[list[E]]:
+    """Return the elements of each kind."""
+    kinds: dict[Hashable, list[E]] = {}
     for element in elements:
         kinds.setdefault(element.kind, []).append(element)
-    numbers = Numbers.of(elements)
-    return [Elements(members, element_functions(members[0], method, projects=projects), numbers) for members in kinds.values()]
+    return [*kinds.values()]
 
 
-def _shared_function(nominal: Nominal, group: Group) -> NamedFunction:
-    """Return the function (deviations, moments) -> faces, heights, scale of what elements take as inputs."""
+def _priced_slacks(pairs: Sequence[PairElement]) -> np.ndarray:
+    """Return which slacks (slack,) have a price."""
+    first_rows = Numbers.of(pairs).row.tolist()
+    springs = [first + row for first, pair in zip(first_rows, pairs, strict=True) for row in pair.springs]
+    return slack_owners(np.repeat(np.arange(len(pairs)), [pair.rows for pair in pairs]), springs, len(pairs))[1]
+
+
+def _shared_function(nominal: Nominal, group: Group, method: Method) -> NamedFunction:
+    """Return the function (deviations, moments) -> faces, heights, steps, scale of what elements take as inputs."""
     inputs = {
         "deviations": ca.SX.sym("deviations", len(nominal.contributors)),
         "moments": ca.SX.sym("moments", MOMENTS, len(group.sides)),
@@ -222,12 +253,14 @@ def _shared_function(nominal: Nominal, group: Group) -> NamedFunction:
     pairs = [nominal.pairs[index] for index in group.pairs]
     poses = [pose.vector() for pair in pairs for pose in face_poses(pair, inputs["deviations"]) if pose is not None]
     heights = [face_heights(pair, inputs["deviations"]) for pair in pairs]
+    steps = [hold_steps(nominal, group.parts[hold.part], inputs["deviations"]) for hold in group.holds]
     outputs = {
         "faces": ca.vertcat(ca.SX(0, 1), *poses),
         "heights": ca.vertcat(*heights),
-        "scale": points_scale(inputs["moments"]),
+        "steps": ca.vertcat(ca.SX(0, 1), *steps),
+        "scale": objective_scale(group, method, inputs["moments"]),
     }
-    return function_of("shared", inputs, outputs)
+    return NamedFunction.dense(ca.Function("shared", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs]))
 
 
 def _share_function(size: int) -> NamedFunction:

@@ -27,7 +27,7 @@ from tolcontact.compilation.graph.factor_kernel import (
     solve,
     squared_length,
 )
-from tolcontact.compilation.graph.layout import JOINT, NEAR, POSITION, ROW, SLACK
+from tolcontact.compilation.graph.layout import JOINT, POSITION, ROW, SLACK
 from tolcontact.compiled import inlined_inner
 
 FEASIBLE = 1e-12  # mm: rows of length 1 are violated by more
@@ -240,15 +240,10 @@ def _advance(layout, work, length):  # type: ignore[no-untyped-def]
 
 
 @inlined_inner
-def enter_joints(layout, work, depths, deepest, eager):  # type: ignore[no-untyped-def]
-    """Let the most violated row of each joint carry; without `eager`, only if its neighbours are violated less."""
+def enter_joints(layout, work, deepest):  # type: ignore[no-untyped-def]
+    """Let the most violated row of each joint carry, unless a row of the joint has just left."""
     for j in range(deepest.size):
-        enters = deepest[j] >= 0 and not work.joints[j, CHANGED]
-        if not eager:
-            for q in range(layout.joints[j, NEAR], layout.joints[j + 1, NEAR]):
-                k = layout.near[q]
-                enters = enters and (depths[k] > depths[j] or (depths[k] == depths[j] and k > j))
-        if enters:
+        if deepest[j] >= 0 and not work.joints[j, CHANGED]:
             append(layout, work, deepest[j])
 
 

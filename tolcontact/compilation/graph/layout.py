@@ -13,7 +13,7 @@ from tolcontact.compilation.graph.elimination import elimination, least_degree, 
 from tolcontact.mechanics.correction import FREEDOMS
 
 JOINT, SOURCE = range(2)  # columns of Layout.rows
-ROW, POSITION, PRIOR, NEAR, SLACK = range(5)  # columns of Layout.joints
+ROW, POSITION, PRIOR, SLACK = range(4)  # columns of Layout.joints
 
 
 class Layout(NamedTuple):
@@ -21,18 +21,16 @@ class Layout(NamedTuple):
 
     blocks   (row, 1 + block) number of bodies that the row touches, and these bodies, in ascending order
     rows     (row, 2) its joint, and its number in the QP; the rows of a joint come one after the other
-    joints   (joint + 1, 5) the first row of the joint, its first position in the Gram matrix of the rows that carry, its first
-             rows of `prior` and `near`, and its slack, or -1 for equations
+    joints   (joint + 1, 4) the first row of the joint, its first position in the Gram matrix of the rows that carry, its first
+             row of `prior`, and its slack, or -1 for equations
     prior    (_, 2) earlier joints with which the joint has entries in the factor of the Gram matrix, and whether the two share
              a body, so that the Gram matrix has entries, too
-    near     (_,) joints that share a body with the joint
     """
 
     blocks: np.ndarray
     rows: np.ndarray
     joints: np.ndarray
     prior: np.ndarray
-    near: np.ndarray
 
 
 class Storage(NamedTuple):
@@ -76,7 +74,6 @@ def layout(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int, equations: int, coupl
     near = [{k for k, nodes in enumerate(joint_bodies) if k != j and nodes & joint_bodies[j]} for j in range(len(joints))]
     # Equations come first, so that no equation is dropped because it depends on rows that may leave.
     order, joined = elimination(near, lambda j, depths, graph: (j >= equation_joints, *least_degree(j, depths, graph)))
-    rank = np.argsort(order)
     prior = [sorted(k for k, nodes in enumerate(joined) if j in nodes) for j in range(len(order))]
     members = [joints[j] for j in order]
     row_order = np.array([row for rows_of_joint in members for row in rows_of_joint], dtype=np.int64)
@@ -90,11 +87,8 @@ def layout(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int, equations: int, coupl
     return Layout(
         blocks=np.array([[len(nodes), *nodes] + [0] * (width - len(nodes)) for nodes in blocks], dtype=np.int64),
         rows=np.stack([np.repeat(np.arange(len(order)), list(map(len, members))), row_order], axis=1),
-        joints=np.stack(
-            [_starts(members), positions, _starts(prior), _starts([near[j] for j in order]), slack_of_joint], axis=1
-        ),
+        joints=np.stack([_starts(members), positions, _starts(prior), slack_of_joint], axis=1),
         prior=np.array(adjacent, dtype=np.int64).reshape(-1, 2),
-        near=np.array([rank[k] for j in order for k in sorted(near[j])], dtype=np.int64),
     ), _storage(h, body_order, later, _entries(rows, columns, np.argsort(row_order), body_rank, blocks, width))
 
 

@@ -26,7 +26,6 @@ from tolcontact.compiled import inlined_inner
 JOINTS, RELEASE, ROWS = range(3)  # phases: all joints at once; drop rows that pull; single rows
 ATTEMPTS = 3  # of the search for single rows, each from what the attempt before it ended with
 LOOSER = 10.0  # by which rows may be violated more in every further attempt
-EAGER_ROUNDS = 3  # afterwards, a row only enters if no row of a neighbouring joint is violated by more
 ROUNDS_IN_CONFLICT = 6  # of all joints at once: where a slack is open, they mostly go round
 ROUNDING = 1e-15  # of the largest multiplier
 COARSE = 1e-9  # mm: most that counts as rounding
@@ -41,12 +40,12 @@ def _tolerance(layout, work, refines):  # type: ignore[no-untyped-def]
 
 
 @inlined_inner
-def _hold_joints(layout, work, tolerance, depths, deepest, eager):  # type: ignore[no-untyped-def]
+def _hold_joints(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-def]
     """Let rows enter and leave in all joints at once; return whether the solution is reached."""
     changes = release(layout, work, tolerance) + close_slacks(layout, work, tolerance)
     if not scan(layout, work, tolerance, depths, deepest):
         return changes == 0
-    enter_joints(layout, work, depths, deepest, eager)
+    enter_joints(layout, work, deepest)
     return False
 
 
@@ -83,7 +82,7 @@ def find_carrying(layout, work, limits, depths, deepest, counters):  # type: ign
             tolerance = _tolerance(layout, work, phase == ROWS) * looseness
         if phase == JOINTS:
             counters[0] += 1
-            if _hold_joints(layout, work, tolerance, depths, deepest, counters[0] <= EAGER_ROUNDS):
+            if _hold_joints(layout, work, tolerance, depths, deepest):
                 return True
             if counters[0] >= limits[0] or (counters[0] >= ROUNDS_IN_CONFLICT and any_open(work)):
                 phase = RELEASE
