@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.allowed_space import Region
+from tolcontact.analyses.allowed_space import AllowedRegion
 from tolcontact.analyses.engine import Engine
 from tolcontact.analyses.ridge import ridge_end
 
@@ -59,9 +59,9 @@ class Effort:
 
 
 class Evaluation:
-    """Measures at points of the region (see Region). No point is simulated twice."""
+    """Measures at points of the region (see AllowedRegion). No point is simulated twice."""
 
-    def __init__(self, engine: Engine, region: Region) -> None:
+    def __init__(self, engine: Engine, region: AllowedRegion) -> None:
         self._engine, self._region = engine, region
         self._known: dict[bytes, np.ndarray] = {}
 
@@ -167,8 +167,8 @@ class Searcher:
     """
 
     def __init__(
-        self, region: Region, evaluation: Evaluation, spread: np.ndarray, is_active: np.ndarray, rng: np.random.Generator,
-        finest_step: float,
+        self, region: AllowedRegion, evaluation: Evaluation, spread: np.ndarray, is_active: np.ndarray,
+        rng: np.random.Generator, finest_step: float,
     ) -> None:  # fmt: skip
         self._region, self._evaluation, self._spread, self._rng = region, evaluation, spread, rng
         self._is_active, self._finest_step = is_active, finest_step

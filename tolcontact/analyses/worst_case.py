@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import poses, vocabulary as terms
-from tolcontact.analyses.allowed_space import Region
+from tolcontact.analyses.allowed_space import AllowedRegion
 from tolcontact.analyses.analysis import Analysis
 from tolcontact.analyses.engine import Engine, Progress
 from tolcontact.analyses.extreme_search import Effort, Evaluation, Searcher, Searches
@@ -80,7 +80,7 @@ def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
             f'"{analysis.assembly}" has faces with form, in whose zone no worst case is searched; give their tolerances '
             "of form form=None"
         )
-    region = Region(program.draws, seed=analysis.seed)
+    region = AllowedRegion(program.draws, seed=analysis.seed)
     analysis.check_varies(region.varies.size)
     linear, evaluation, rng = linear_model(program), Evaluation(engine, region), np.random.default_rng(analysis.seed)
     engine.total += _expected(np.full(len(program.nominal.measures), region.moves.size), effort)
@@ -160,7 +160,7 @@ class Forecast:
 
 
 def _starts(
-    region: Region, linear: LinearModel, rng: np.random.Generator, samples: int, evaluation: Evaluation
+    region: AllowedRegion, linear: LinearModel, rng: np.random.Generator, samples: int, evaluation: Evaluation
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return points (n, contributor), and their measures (n, state, measure).
 
@@ -180,7 +180,7 @@ def _starts(
     return np.vstack([points, further]), np.concatenate([measured, evaluation.corrected(further)])
 
 
-def _far_ends(region: Region, slopes: np.ndarray) -> np.ndarray:
+def _far_ends(region: AllowedRegion, slopes: np.ndarray) -> np.ndarray:
     """Return the points (n, contributor) farthest along slopes (measure, contributor), in both senses."""
     ends = [region.exactly_farthest(sense * row) for row in slopes for sense in terms.SENSES]
     return np.array(ends).reshape(-1, slopes.shape[1])
