@@ -139,7 +139,7 @@ def show_warnings(records: Iterable[warnings.WarningMessage]) -> None:
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    """Print a warning: in a terminal as wide as that, else on one line."""
+    """Print a warning, wrapped to the width of a terminal, else on one line."""
     if sys.stderr is None:
         return
     text = f"warning: {shown(str(message))}"

@@ -283,7 +283,7 @@ contact seat: plate -z (moving) against base +z (reference), spacing 5 mm
 
 from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.contact_pair import ContactPair
-from tolcontact.declaration.contributor import Correlation, Population, Variable
+from tolcontact.declaration.dependence import Correlation, Population, Variable
 from tolcontact.declaration.feature_tolerance import (
     Angularity,
     CircularRunout,

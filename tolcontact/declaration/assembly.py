@@ -5,14 +5,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
 from tolcontact.declaration.contact_pair import ContactPair
-from tolcontact.declaration.contributor import (
+from tolcontact.declaration.declarations import Declarations, expect
+from tolcontact.declaration.dependence import (
     Correlation,
     Population,
     Variable,
     correlation as _correlation,
     population as _population,
 )
-from tolcontact.declaration.declarations import Declarations, expect
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.joint import Joint

@@ -14,7 +14,7 @@ from msgspec import UNSET, Meta, UnsetType
 from tolcontact.declaration.assembly import MAX_COUNTS, Assembly
 from tolcontact.declaration.codec import CODECS, Choice, DocumentRecord, Inline, Items, Optional, Plain
 from tolcontact.declaration.contact_pair import VERTICES, ContactPair
-from tolcontact.declaration.contributor import Correlation, Population, Variable
+from tolcontact.declaration.dependence import Correlation, Population, Variable
 from tolcontact.declaration.face_entry import (
     FLOAT,
     FREE_DIRECTION,

@@ -18,7 +18,7 @@ from tolcontact.workflow.run_sums import RunSums
 from tolcontact.workflow.until import Target
 
 SURFACES = 64
-Progress = Callable[[int], None]
+RunProgress = Callable[[int], None]  # is called with the number of finished realizations
 
 log = logging.getLogger(__name__)
 
@@ -34,7 +34,7 @@ def write_run(
     resume: bool = False,
     until: str | None = None,
     client: Any = None,
-    progress: Progress | None = None,
+    progress: RunProgress | None = None,
 ) -> Path:
     """Simulate into the archive `out` (see `run`), and return the path of the file, which is another if `out` is a link."""
     check_counts(samples=settings.samples, seed=settings.seed, surfaces=settings.surfaces)
@@ -71,7 +71,7 @@ def write_archive(
     settings: Run,
     target: Target | None = None,
     client: Any = None,
-    progress: Progress | None = None,
+    progress: RunProgress | None = None,
     *,
     is_resumed: bool = False,
 ) -> None:
@@ -92,7 +92,7 @@ def write_archive(
 
 
 def _simulate(
-    program: Program, writer: ArchiveWriter, sums: RunSums, seed: int, blocks: MapBlocks, progress: Progress | None
+    program: Program, writer: ArchiveWriter, sums: RunSums, seed: int, blocks: MapBlocks, progress: RunProgress | None
 ) -> None:
     """Simulate the rows that an archive lacks, write them with their sums, and check some against the surfaces."""
     sums.start_from(writer)

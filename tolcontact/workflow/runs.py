@@ -11,7 +11,7 @@ from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.vocabulary import MONTE_CARLO
 from tolcontact.workflow.accessor import Results
-from tolcontact.workflow.archived_run import SURFACES, Progress, write_run
+from tolcontact.workflow.archived_run import SURFACES, RunProgress, write_run
 from tolcontact.workflow.models import Choice, Model
 
 __all__ = ["open_archive", "run"]
@@ -36,7 +36,7 @@ def run(
     plan: str = MONTE_CARLO,
     until: str | None = None,
     client: Any = None,
-    progress: Progress | None = None,
+    progress: RunProgress | None = None,
 ) -> xr.DataTree:
     """Simulate `samples` realizations, raw and corrected, into the archive `out`, and open it.
 
