@@ -24,7 +24,7 @@ from tolcontact.workflow.models import Choice, Model
 PER_LEVEL, PER_CONTRIBUTOR = 20.0, 6.0  # combinations that a search needs at each length of its steps
 PER_POLISH, PER_POLISHED_CONTRIBUTOR = 110.0, 22.0  # combinations that polishing an end needs
 EXCHANGES = 24  # combinations that influences are looked for at
-MAX_RESTARTS, RESTART_STEP = 3, 0.25  # of searches that go on, and the step that they begin with
+MAX_RESTARTS, RESTART_STEP = 3, 0.25  # of searches that continue, and the step that they begin with
 END_TOLERANCE = 1e-3  # of a measure's spread: searches that end at values closer than this have the same end
 
 
@@ -58,7 +58,7 @@ def worst_case(
     they are exchanged all at once, in 24 random combinations and at each end (see tolcontact.analyses.influences).
     `samples` / 256 searches begin at the best of all combinations tried: random ones, the far ends along nominal sensitivities,
     and those along the slopes of a regression; `samples` / 128 begin at any of them (see tolcontact.analyses.extreme_search).
-    The best one goes on in other random directions until it gains no more. `unseen` is the estimate w (w + 1) / (n (n - 1))
+    The best one continues in other random directions until it gains no more. `unseen` is the estimate w (w + 1) / (n (n - 1))
     for w different ends of n searches from any of them (Boender, Rinnooy Kan, 1987). The linear estimate is exact to first
     order in the deviations: large tilts may exceed it.
     Only certified realizations count. `progress` is called with the number of realizations simulated, and with the
@@ -121,7 +121,7 @@ def _searched(
     """Search, and return the best search for each extreme value.
 
     Where contributors without known influence turn out to have one at an end, by exchange with partners (n, contributor), the
-    searches of that measure go on along them, too.
+    searches of that measure continue along them, too.
     """
     for _ in range(MAX_RESTARTS):
         searcher.search(searches, forecast.advanced)

@@ -45,7 +45,7 @@ class Measurement(Readable):
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """The parts that are measured, and those that choose faces."""
+        """The parts that are measured, and the parts that choose faces."""
         own = [part for face in self.faces for part in face.parts] + [point.part for point in self.points]
         return (*own, *(part for nested in self._nested for part in nested.parts))
 

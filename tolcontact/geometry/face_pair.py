@@ -20,7 +20,7 @@ MAX_POINTS = 20_000
 MAX_HALVED = 20  # times the desired number of points: if halving long triangles gives more, points are drawn
 POSES_PER_BLOCK = 16
 MORE_POINTS = 8  # times as many points of a row are looked at next
-THINNED = 32  # one point in so many tells nearly always that faces penetrate each other
+THINNED = 32  # every 32nd point tells nearly always that faces penetrate each other
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 A model without faults may still not be the assembly that you mean. `tolcontact check`, `tolcontact run`, the analyses and
 `tc.build` issue a `tc.NominalWarning` for everything below. Each one names the declaration with the line of the script, states
-the number, and says what probably caused it. Nothing is changed, and the run goes on.
+the number, and says what probably caused it. Nothing is changed, and the run continues.
 
 >>> import warnings
 >>> import tolcontact as tc
@@ -30,7 +30,7 @@ displacement from the nominal place; absolute=True measures the coordinate
 | `[overlap]` | faces of a contact pair, or bodies that are no pair, that lie in each other |
 | `[gap]` | faces of a contact pair that are too far apart to touch |
 | `[limits]` | limits that exclude the nominal value, or that are more than 100 sigma away from it |
-| `[reach]` | clearances by triangles whose faces move farther than the triangles that are looked at allow |
+| `[reach]` | clearances by triangles whose faces move so far that other triangles may be nearer |
 | `[friction]` | seats that forces may not push their part onto, at the stated coefficients of friction (see `tc.seating`) |
 
 The faces of a pair overlap if their deepest point stays inside in nearly every realization without contact: the median of its

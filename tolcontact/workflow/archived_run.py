@@ -112,7 +112,7 @@ def _simulate(
     except KeyboardInterrupt:
         if is_summed and writer.is_between_blocks:
             writer.write_checkpoint(sums.numbers)
-        elif not is_summed:  # the interrupt may have come within a sum: only those of the last checkpoint are sure
+        elif not is_summed:  # the interrupt may have come within a sum: only sums of the last checkpoint are sure
             is_summed = sums.start_from(writer)
         if is_summed:
             sums.write_to(writer)

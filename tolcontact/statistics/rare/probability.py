@@ -39,7 +39,7 @@ ROUNDS, ROUND = 2, 0.15  # of importance sampling, before the last one, and thei
 MIN_REFIT, REFIT = 40, 500  # hits from which centres are found again, and how many are drawn of them
 MAX_UNSEEN = 0.9  # of an event
 MIN_EFFECTIVE, MAX_WEIGHT = 200, 0.02  # hits that importance sampling needs, and the largest share of one of them
-SIGNIFICANT = 1.7  # times both half widths: by so much more a search says what importance sampling missed (0.25 % by chance)
+SIGNIFICANT = 1.7  # times both half widths: a search that says more shows what importance sampling missed (0.25 % by chance)
 
 
 class Tail(NamedTuple):
