@@ -16,7 +16,7 @@ from tolcontact.checksums import crc32
 from tolcontact.vocabulary import ArchiveVariable
 
 
-class BytePlace(NamedTuple):
+class Place(NamedTuple):
     """Where the values of a variable lie: chunks of `rows` rows (along the first dimension), each at its offset."""
 
     kind: np.dtype
@@ -24,12 +24,12 @@ class BytePlace(NamedTuple):
     offsets: list[int]
 
 
-class RawFile:
+class LaidOut:
     """The values of an archive on its disk. A row is what stands at one index of a variable's first dimension."""
 
     def __init__(self, path: Path) -> None:
         """Open the file. Raises OSError if it cannot be read and written."""
-        self._places: dict[str, BytePlace] = {}
+        self._places: dict[str, Place] = {}
         with h5py.File(path, "r", locking=False) as file:
             file.visititems(self._add_place)
         self._file = path.open("r+b", buffering=0)
@@ -39,11 +39,11 @@ class RawFile:
             return
         if item.chunks is None:
             offset = item.id.get_offset()
-            self._places[name] = BytePlace(item.dtype, max((1, *item.shape[:1])), [] if offset is None else [offset])
+            self._places[name] = Place(item.dtype, max((1, *item.shape[:1])), [] if offset is None else [offset])
             return
         chunks: list[tuple[int, int]] = []
         item.id.chunk_iter(lambda chunk: chunks.append((chunk.chunk_offset[0], chunk.byte_offset)))
-        self._places[name] = BytePlace(item.dtype, item.chunks[0], [offset for _, offset in sorted(chunks)])
+        self._places[name] = Place(item.dtype, item.chunks[0], [offset for _, offset in sorted(chunks)])
 
     def close(self) -> None:
         self._file.close()
