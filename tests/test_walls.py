@@ -43,7 +43,7 @@ LAZY = {
     "dask": ("simulation/cluster.py", "simulation/lazy.py"),
     "dask.array": ("simulation/lazy.py",),
     "distributed": ("simulation/cluster.py",),
-    "pandas": ("declaration/contributor.py",),
+    "pandas": ("declaration/dependence.py",),
     "trimesh": ("geometry/files/worker.py",),  # in a process that mostly reads STEP files
     "openpyxl": ("report/spreadsheet.py",),
     "tolcontact.kernel.step_bodies": ("geometry/files/worker.py",),  # in a process of its own

@@ -27,7 +27,10 @@ BATCHES = 32  # of realizations, for intervals of effects
 MAX_STEPS, USUAL_STEPS = 24, 8  # of one search: at most, and for the forecast
 FIRST_RADIUS, LAST_RADIUS = 0.5, 0.004  # of the region that a step stays in, in logarithms of the factors
 IDLE = 1e-6  # of a measure's spread: a group that changes no decisive realization by more has no influence
-MIN_EFFECT_SAMPLES, EFFECT_SHARE = 512, 4  # realizations for effects: at least, and one in so many; of all groups so many times
+MIN_EFFECT_SAMPLES, EFFECT_SHARE = (
+    512,
+    4,
+)  # realizations for the effect of a group: at least; at most samples / 4, and 4 samples / groups
 COMMON_FACTORS = np.geomspace(MIN_FACTOR, MAX_FACTOR, 13)  # of all ranges, where requirements cannot be met
 PENALTY = 10.0  # for missed margins, in the costs that the same margins save to first order
 MIN_GAIN = 1e-4  # of the cost

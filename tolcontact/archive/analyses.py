@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.archive_lock import taken
+from tolcontact.archive.archive_lock import locked_archive
 from tolcontact.archive.inspection import inspect
 from tolcontact.archive.resuming import check_same_model
 from tolcontact.archive.writer import opened_locked, replacing_archive
@@ -36,7 +36,7 @@ def keep(path: str | Path, record: terms.AnalysisRecord, dataset: "xr.Dataset", 
 
     The file is replaced only when all of the new one is written.
     """
-    with taken(path, resume=True) as archive:
+    with locked_archive(path, resume=True) as archive:
         check_room_for(archive, record, program)
         with replacing_archive(archive) as part:
             shutil.copyfile(archive, part)

@@ -92,8 +92,8 @@ def _checksums(variable: ArchiveVariable, values: "Column | xr.DataArray", rows:
 def choose(file: netCDF4.Dataset, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the numbers (row,) of at most `count` certified realizations, in order, and whether each is a random choice.
 
-    A third are those that penetrate most at contact points, a third those with most carrying points; the others are random.
-    The random ones are a fair sample of all certified realizations.
+    One third penetrate most at contact points, one third have most carrying points, and the rest are random: a fair
+    sample of all certified realizations.
     """
     rows = len(file.dimensions[terms.REALIZATION]) if count else 0
     deepest, busiest, random = (_Largest(count // 3), _Largest(count // 3), _Largest(count))

@@ -19,7 +19,7 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive.disk_space import check_room, lay_out_rows
-from tolcontact.archive.file_tables import opened_tables
+from tolcontact.archive.file_tables import open_tables_unchecked
 from tolcontact.archive.header import empty_field, empty_touching, write_header
 from tolcontact.archive.inspection import inspect
 from tolcontact.archive.netcdf_library import library_lock, small_caches
@@ -36,7 +36,7 @@ from tolcontact.replacing import replacing
 
 
 class ArchiveWriter:
-    """An archive being written, whose name is taken (see `taken`). Use it as a context manager.
+    """An archive being written, whose file is locked (see `locked_archive`). Use it as a context manager.
 
     rows      realizations that are in it; the next block starts there
     samples   realizations that it was begun for
@@ -65,7 +65,7 @@ class ArchiveWriter:
         with replacing_archive(path) as copy:
             # Only the copy is opened: the old file may be open in this process, and HDF5 does not open a file twice.
             shutil.copyfile(path, copy)
-            with opened_tables(copy) as results:
+            with open_tables_unchecked(copy) as results:
                 check_rows(results)
             with opened_locked(copy, "r+") as file:
                 check_same_run(file, path, program, run_settings(program, run), run.surfaces)
@@ -163,7 +163,7 @@ class ArchiveWriter:
                 {terms.field_of(part): values for part, values in zip(self._parts, fields, strict=True)}
             )
 
-    def chosen(self, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    def rows_to_check(self, seed: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the numbers (row,) of the realizations to check against the surfaces, and whether each is a random choice."""
         with opened_locked(self._path, "r") as file:
             return choose(file, self._checked, seed)

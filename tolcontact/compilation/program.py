@@ -93,7 +93,7 @@ class Program(Pictured):
         ]
         rows += [f"  contact {pair.name}: {self.contact_in_words(k)}" for k, pair in enumerate(nominal.pairs)]
         rows += [
-            f"  measure {measure.name}: nominally {value:.6g} {measure.units}"
+            f"  measurement {measure.name}: nominally {value:.6g} {measure.units}"
             for measure, value in zip(nominal.measures, self.nominal_measures, strict=True)
         ]
         return "\n".join(rows)

@@ -256,7 +256,7 @@ model's own, the defaults, or set by options.
 ...     print(error)
 model "nothing" has 2 faults:
   - it has no parts; declare at least one with assembly.part(name, geometry)
-  - it measures nothing; declare at least one measure with assembly.measure(...)
+  - it measures nothing; declare at least one measurement with assembly.measure(...)
 
 ## Scripts, and models as data
 
@@ -283,7 +283,7 @@ contact seat: plate -z (moving) against base +z (reference), spacing 5 mm
 
 from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.contact_pair import ContactPair
-from tolcontact.declaration.contributor import Correlation, Population, Variable
+from tolcontact.declaration.dependence import Correlation, Population, Variable
 from tolcontact.declaration.feature_tolerance import (
     Angularity,
     CircularRunout,

@@ -5,14 +5,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
 from tolcontact.declaration.contact_pair import ContactPair
-from tolcontact.declaration.contributor import (
+from tolcontact.declaration.declarations import Declarations, expect
+from tolcontact.declaration.dependence import (
     Correlation,
     Population,
     Variable,
     correlation as _correlation,
     population as _population,
 )
-from tolcontact.declaration.declarations import Declarations, expect
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.joint import Joint
@@ -172,7 +172,7 @@ class Assembly(Declarations, Pictured):
     def omissions(self) -> Iterator[str]:
         """Yield the faults of a model that is not complete yet: declarations that only a run needs."""
         if not self.measures:
-            yield "it measures nothing; declare at least one measure with assembly.measure(...)"
+            yield "it measures nothing; declare at least one measurement with assembly.measure(...)"
         for part in self.parts:
             if self.location_of(part) is None and part.fixed is not True:
                 advice = "it is not located; call locate(...), or declare it fixed=True to hold it at its nominal place"
@@ -188,7 +188,7 @@ class Assembly(Declarations, Pictured):
         for name, most in MAX_COUNTS.items():
             if (count := len(self._declared[name])) > most:
                 yield f"it has {count} {name}; expected at most {most}"
-        keyed = {"part": "parts", "contact pair": "pairs", "measure": "measures", "force": "forces"}
+        keyed = {"part": "parts", "contact pair": "pairs", "measurement": "measures", "force": "forces"}
         for kind, name in keyed.items():
             yield from key_faults(kind, [thing.name for thing in self._declared[name]])
         for part in self.parts:
@@ -203,7 +203,7 @@ class Assembly(Declarations, Pictured):
         references: list[tuple[str, Any, Iterable[Part]]] = [
             *(("contact pair", pair, pair.parts) for pair in self.pairs),
             *(("force", force, force.parts) for force in self.forces),
-            *(("measure", measure, measure.parts) for measure in self.measures),
+            *(("measurement", measure, measure.parts) for measure in self.measures),
             *(("variable", variable, ()) for variable in self.variables),
             *(("correlation", correlation, ()) for correlation in self.correlations),
             *(("population", population, ()) for population in self.populations),
@@ -214,7 +214,7 @@ class Assembly(Declarations, Pictured):
         yield from key_faults("variable", [variable.name for variable in self.variables])
         for number, measure in enumerate(self.measures):
             earlier = [other for other in self.measures[:number] if other.station == measure.station]
-            yield from _located("measure", measure, measure.reference_faults(earlier))
+            yield from _located("measurement", measure, measure.reference_faults(earlier))
         if self.stations:
             yield from sequence_faults(self)
             for scene in self.scenes:

@@ -54,8 +54,8 @@ that.
 >>> print(caught[0].message)
 contact pair "foot" (...): parts may be off by up to 0.0092 mm between flat triangles and the round faces ...
 
-A `tc.FaceWarning` names a feature or contact pair whose B-rep faces are only some of those that make up a cylinder, or another
-curved surface: files split holes into halves. `tc.Brep(number, whole=True)` chooses all of them.
+A `tc.FaceWarning` names a feature or contact pair whose B-rep faces are only a part of a cylinder, or of another curved
+surface: files split holes into halves. `tc.Brep(number, whole=True)` chooses all of them.
 
 A `tc.UnitsWarning` names a mesh without stated units whose size is implausible in mm, either in itself (below 1 mm or above 10
 m) or compared with a part that it touches. It also names a mesh if all declared points would lie on it in another unit.

@@ -162,9 +162,10 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
     Each face is taken as its bounding rectangle along the edges that it shares with the other two. Raises GeometryFault if the
     three faces are not independent, or the inset leaves no room.
     """
-    local = [_vertices_and_normal(face, meshes) for face in scheme.faces]
-    placed = [(v @ R.T + t, R @ n) for (v, n), (R, t) in zip(local, placements, strict=True)] if placements else local
-    corners, normals = zip(*placed, strict=True)
+    faces = [_vertices_and_normal(face, meshes) for face in scheme.faces]
+    if placements:
+        faces = [(v @ R.T + t, R @ n) for (v, n), (R, t) in zip(faces, placements, strict=True)]
+    corners, normals = zip(*faces, strict=True)
     outward = np.array(normals)
     if abs(np.linalg.det(outward)) < MIN_DETERMINANT:
         raise GeometryFault(
@@ -175,9 +176,9 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
     edges /= np.linalg.norm(edges, axis=1, keepdims=True)
     a, b, c = edges
     primary, secondary, tertiary = corners
-    near_c, far_c = _stations(primary, c, scheme.inset)
-    near_b, far_b = _stations(primary, b, scheme.inset)
-    side_near, side_far = _stations(secondary, c, scheme.inset)
+    near_c, far_c = _support_places(primary, c, scheme.inset)
+    near_b, far_b = _support_places(primary, b, scheme.inset)
+    side_near, side_far = _support_places(secondary, c, scheme.inset)
     points = [
         _place(edges, outward, primary, 0, {1: near_b, 2: near_c}),
         _place(edges, outward, primary, 0, {1: near_b, 2: far_c}),
@@ -201,7 +202,7 @@ def _vertices_and_normal(face: Face, meshes: Meshes) -> tuple[np.ndarray, np.nda
     return np.asarray(mesh.vertices), normal / np.linalg.norm(normal)
 
 
-def _stations(points: np.ndarray, along: np.ndarray, inset: float) -> tuple[float, float]:
+def _support_places(points: np.ndarray, along: np.ndarray, inset: float) -> tuple[float, float]:
     """Return the places [mm] along a direction at an inset from both ends of a face."""
     places = points @ along
     lower, upper = places.min() + inset, places.max() - inset
@@ -216,7 +217,7 @@ def _middle(points: np.ndarray, along: np.ndarray) -> float:
     return float(places.min() + places.max()) / 2
 
 
-def _place(edges: np.ndarray, outward: np.ndarray, points: np.ndarray, face: int, stations: dict[int, float]) -> np.ndarray:
-    """Return the point on the plane of a face whose coordinates along edges are `stations`, by the edges' numbers."""
-    rows = [outward[face], *(edges[axis] for axis in stations)]
-    return np.linalg.solve(np.array(rows), np.array([float((points @ outward[face]).max()), *stations.values()]))
+def _place(edges: np.ndarray, outward: np.ndarray, points: np.ndarray, face: int, coordinates: dict[int, float]) -> np.ndarray:
+    """Return the point on the plane of a face with these coordinates along edges, by the edges' numbers."""
+    rows = [outward[face], *(edges[axis] for axis in coordinates)]
+    return np.linalg.solve(np.array(rows), np.array([float((points @ outward[face]).max()), *coordinates.values()]))

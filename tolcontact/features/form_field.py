@@ -194,7 +194,7 @@ def longest_extent(points: np.ndarray) -> float:
 
 
 def displaced_about_origin(displacements: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """Return displacements (7, n) that turn about the origin, of those that turn about a centre (3,) [mm]."""
+    """Return displacements (7, n) with turns about the origin that equal some with turns about a centre (3,) [mm]."""
     growth, translation, rotation = np.split(displacements, [1, TERMS - 3])
     return np.vstack([growth, translation + np.cross(centre, rotation, axisb=0).T, rotation])
 

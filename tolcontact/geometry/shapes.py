@@ -10,7 +10,7 @@ from tolcontact.geometry.edges import edges
 from tolcontact.geometry.files.reading import Contents, Shape, read, read_files
 from tolcontact.geometry.pin_shape import pin_shape
 
-FIELD_STATIONS = 12  # of a part's size, over which displacement is shown
+FIELD_DIVISIONS = 12  # of a part's size, over which displacement is shown
 
 
 def shape(geometry: Geometry, contents: Contents | None = None) -> Shape:
@@ -84,7 +84,7 @@ def _per_body(limit: np.ufunc, corners: np.ndarray, body: np.ndarray, count: int
 
 def field_surface(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
     """Return vertices (vertex, 3) and faces (face, 3) fine enough to show how displacement varies over a part."""
-    step = mesh.scale / FIELD_STATIONS
+    step = mesh.scale / FIELD_DIVISIONS
     vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, max_edge=step, max_iter=20)
     merged = trimesh.Trimesh(vertices, faces, process=True)
     return np.asarray(merged.vertices), np.asarray(merged.faces)

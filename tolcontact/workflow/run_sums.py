@@ -131,7 +131,7 @@ class RunSums:
         counted = counted_realizations(self._program.nominal) if is_known else 0
         self.of_blocks = _BlockReduction(tuple(row.label for row in writer.kept), self._fields, counted)
         checkpoint = writer.take_up()
-        self._fields.go_on_from(checkpoint)
+        self._fields.resume_from(checkpoint)
         self._touching = TouchingShares(self._points)
         if end := min(writer.rows, counted):
             rows, poses = writer.first_poses(end)
