@@ -129,7 +129,8 @@ class Candidates:
                 self._all_scans.append(round_scan)
                 self._carrying_scans.append(round_scan)
                 continue
-            clusters = FORM_CLUSTERS if pair.has_form else MAX_CLUSTERS
+            # Places of bounded pairs are found at every pose, so that no cluster offers a point of its own.
+            clusters = 1 if index in program.meetings else FORM_CLUSTERS if pair.has_form else MAX_CLUSTERS
             self._all_scans.append(pair_scan(pair, gaps, tables, clusters))
             # If the paper's set of points may carry, those between the corners count, too.
             corners = self._method.corners_suffice and index not in program.meetings
