@@ -173,23 +173,24 @@ class AdaptiveFunction:
 
     def _compiled(self, count: int) -> NativeFunction | None:
         """Return the machine code for `count` more evaluations, None while CasADi interprets."""
-        if self.native is None and (compiler := self._due_compiler(count)):
-            # CasADi interprets what LLVM cannot compile on this machine.
-            with contextlib.suppress(UnknownInstructionError, RuntimeError):
-                self.native = compiler(self._function)  # other threads interpret meanwhile
+        # CasADi interprets what LLVM cannot compile on this machine.
+        with contextlib.suppress(UnknownInstructionError, RuntimeError):
+            if self.native is None and self._is_due(count):
+                self.native = NativeFunction(self._function)  # other threads interpret meanwhile
         return self.native
 
-    def _due_compiler(self, count: int) -> Callable[[ca.Function], NativeFunction | None] | None:
-        """Return the way to get machine code before `count` evaluations, or None; each way is returned to one caller only."""
-        with self._lock:
+    def _is_due(self, count: int) -> bool:
+        """Return whether to compile before `count` evaluations, which is true once. The first call looks for stored code."""
+        with self._lock:  # other threads wait for stored code: to interpret takes longer
             self._remaining -= count
             if self._is_new and self._remaining < math.inf:
                 self._is_new = False
-                return NativeFunction.from_cache
-            if self._remaining >= 0:
-                return None
+                self.native = NativeFunction.from_cache(self._function)
+                return False
+            if self.native is not None or self._remaining >= 0:
+                return False
             self._remaining = math.inf
-            return NativeFunction
+            return True
 
 
 class NamedFunction:
