@@ -68,18 +68,23 @@ class ContactSolver:
         size = sum(qp.sparsity("a").shape) + qp.slacks  # of the linear system that polishes an answer
         self._layouts: Layouts = {}
         self._max_polished = max(MAX_POLISHED_ENTRIES // size**2, 1)
-        self.start_over()
+        self._renew()
 
     def twin(self) -> "ContactSolver":
         """Return an equal solver for another thread."""
         twin = copy.copy(self)
-        twin.start_over()
+        twin._renew()
         return twin
 
     def start_over(self) -> None:
         """Forget all previous problems: some plugins start from the last one."""
+        if not self._is_new:
+            self._renew()
+
+    def _renew(self) -> None:
         self._solver = _new_solver(self._qp, self._plugin, self._layouts)
         self._fallbacks: dict[str, _Solver] = {}
+        self._is_new = True
 
     def __call__(self, **arrays: Float[Array, "realization ..."]) -> Arrays:
         """Return the outputs of contact_qp by name, (realization, entry), for its inputs by name, (realization, ...).
@@ -91,6 +96,7 @@ class ContactSolver:
         infinite, and other outputs may be NaN.
         """
         inputs = {name: flat(values) for name, values in arrays.items()}
+        self._is_new = False
         answer = self._solved(self._solver, inputs)
         answer["second"] = np.zeros_like(answer["residual"])
         self._retry(self._solver, answer, inputs, _is_lost(answer) & (inputs["newton"][:, 0] != 0), second=0.0)
