@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.declaration.locator import FIRST_ORDER
-from tolcontact.discretization import CountedPoints, Nominal
+from tolcontact.discretization import CountedPoints, Nominal, counted_points
 from tolcontact.mechanics.correction import Mobility
 from tolcontact.mechanics.displacement import moment_table
 from tolcontact.mechanics.pose import Number, Vector
@@ -18,7 +18,7 @@ BALL_SHARE = 0.01  # of the group's length: radius of the ball that a point repr
 class Side:
     """One side of a pair whose points can be displaced: its points, and the position of their part in the group.
 
-    radii         (point,) [mm]: of the spheres that the points stand for (see ContactPoints.counted)
+    radii         (point,) [mm]: of the spheres that the points stand for (see counted_points)
     centre        (3,) [mm]: nominal point about which moments are taken
     all_moments   (10,): the moments of all points as small balls, so that points on a line hold all rotations, too
     """
@@ -168,7 +168,7 @@ def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int,
             position, parts.index(part), counted, pair.weights if weighs_areas else np.ones(len(pair.P_m)), centre[part], ball
         )
         for position, (_, pair) in enumerate(members)
-        for part, counted in zip((pair.moving, pair.reference), pair.counted, strict=True)
+        for part, counted in zip((pair.moving, pair.reference), counted_points(pair), strict=True)
         if part is not None and chains[part]
     ]
     holds = [_hold(nominal, part, parts) for part in free if nominal.parts[part].locators.exact.any()]
