@@ -3,7 +3,7 @@
 Realizations are simulated in blocks of 4096. Blocks are smaller if a realization takes long: 512 with curved faces in an exact
 resolution, and fewer with more than 24 coupled bodies. One thread draws, places, corrects and measures a block; there are as
 many threads as processors that the process may use. Blocks are returned in order. If the last block of a run has fewer
-realizations than the others may have, it is divided into pieces of at most 256, which several threads share.
+realizations than the others may have, it is divided into pieces of at most 512, which several threads share.
 
 >>> import numpy as np
 >>> import tolcontact as tc

@@ -22,7 +22,7 @@ from tolcontact.simulation.block import Block, simulate_block
 from tolcontact.vocabulary import BLOCK_ROWS
 
 CURVED_ROWS, MIN_ROWS = 512, 16
-PIECE_ROWS = 256  # at most; a thread needs some milliseconds to begin
+PIECE_ROWS = 512  # at most; a thread needs some milliseconds to begin
 MAX_BODIES = 24  # that are coupled; a whole block of more bodies would take longer than some ten seconds
 
 T = TypeVar("T")
