@@ -5,7 +5,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tolcontact.arrays import Array, Bool, Float
+from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.compilation.band_order import band_order
 from tolcontact.compilation.contact_qp import ContactQP
 from tolcontact.compilation.elements import ElementQP
 from tolcontact.compilation.functions import InterpretedFunction, flat
@@ -20,12 +21,17 @@ REFINEMENTS = 4
 
 
 def polished(
-    problem: Mapping[str, np.ndarray], answer: Mapping[str, np.ndarray], equations: int, slacks: int
+    problem: Mapping[str, np.ndarray],
+    answer: Mapping[str, np.ndarray],
+    equations: int,
+    slacks: int,
+    order: Int[Array, " unknown"],
 ) -> dict[str, np.ndarray]:
     """Return x, lam_a and lam_x (QP, entry) of min x'Hx/2 + g'x, a x >= lba; the last rows are equations, the last x >= 0.
 
     problem     h (QP, n, n), g (QP, n), a (QP, m, n), lba (QP, m)
     answer      x (QP, n), lam_a (QP, m), lam_x (QP, n) of a solver; multipliers are below 0 if a row carries
+    order       of the unknowns, see solve_conditions
 
     They are NaN if the conditions have no solution.
     """
@@ -35,14 +41,9 @@ def polished(
     # Of a row and its multiplier the smaller one is rounding, for every solver.
     carries = -lam_a > np.einsum("kij,kj->ki", A, x) - lower
     carries[:, rows - equations :] = True
-    at_zero = (-lam_x > x)[:, size - slacks :]
-    slack_rows = np.zeros((count, slacks, size))
-    slack_rows[:, :, size - slacks :] = np.eye(slacks)
-    all_rows = np.concatenate([A, slack_rows], axis=1)
-    is_equation = np.concatenate([carries, at_zero], axis=1)
-    all_bounds = np.concatenate([lower, np.zeros((count, slacks))], axis=1)
+    is_open = (-lam_x <= x)[:, size - slacks :]
     solution = np.empty((count, size + rows + slacks))
-    solve_conditions(H, g, all_rows, all_bounds, is_equation, COMPLIANCE, REFINEMENTS, solution)
+    solve_conditions((H, g, A, lower), carries, is_open, order, COMPLIANCE, REFINEMENTS, solution)
     x, multipliers = solution[:, :size], solution[:, size:]
     lam_x = np.zeros_like(x)
     lam_x[:, size - slacks :] = -multipliers[:, rows:]
@@ -65,9 +66,9 @@ class ContactSolver:
         self._qp = qp
         self._assemble, self._finish, self._energy, self._relate = qp.evaluators
         self._plugin = qp.plugin
-        size = sum(qp.sparsity("a").shape) + qp.slacks  # of the linear system that polishes an answer
+        self._order = band_order(qp.sparsity("h"), qp.sparsity("a"), slacks=qp.slacks)
         self._layouts: Layouts = {}
-        self._max_polished = max(MAX_POLISHED_ENTRIES // size**2, 1)
+        self._max_polished = max(MAX_POLISHED_ENTRIES // (sum(qp.sparsity("a").shape) + qp.slacks) ** 2, 1)
         self._renew()
 
     def twin(self) -> "ContactSolver":
@@ -163,7 +164,7 @@ class ContactSolver:
 
     def _polished(self, problem: Arrays, solution: Arrays) -> Arrays:
         dense = {name: self._dense(name, problem[name]) for name in ("h", "g", "a", "lba")}
-        return polished(dense, solution, self._qp.equations, self._qp.slacks)
+        return polished(dense, solution, self._qp.equations, self._qp.slacks, self._order)
 
     def _dense(self, name: str, stored: np.ndarray) -> np.ndarray:
         """Return all entries of an output of `assemble`: (realization, row, column), or (realization, row) of a vector."""

@@ -85,6 +85,8 @@ pulls; its gap is minus its elongation or compression.
 A contact pair with a `stiffness` (N/mm) gives way, too: `contact(..., stiffness=5000)` states the force that presses its faces
 into each other evenly by 1 mm, as the data sheet of a pad or a press test does, for any number of contact points. These
 share it by the areas that they stand for, and push only. The faces must be flat, or those of balls and shafts against walls.
+The points are those of the nominal assembly, and push against the plane of the reference face without end, in every search.
+Where a part slides over an edge, a spring beyond it still pushes, so slides should be small beside the face.
 
 A part that contact alone holds in some directions (a shaft in a V, a lid over studs) is `floating=True` and has fewer
 locators, or none. In the directions that its locators leave open, it keeps its nominal position in the raw state. Contact then
