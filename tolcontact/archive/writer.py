@@ -95,16 +95,19 @@ class ArchiveWriter:
             with opened_locked(path, "r") as file:
                 self._length, self._block_rows = len(file.dimensions[terms.REALIZATION]), int(file.block_rows)
                 self.samples, self._checked = int(file.samples), len(file["surface"].dimensions[terms.CHECKED])
+                self._go_back(last_checkpoint(file, path, self._parts))
         self.kept = tuple(row for row in kept_rows(nominal, "all") if self._values.has(row.group, row.variable))
-        self.rows = self._place = 0
-        self.take_up()
 
     def take_up(self) -> list[np.ndarray]:
         """Go back to the last checkpoint, and return its sums of fields, (state, number) for each part; empty without one."""
         with opened_locked(self._path, "r") as file:
-            self.rows, self._place, sums = last_checkpoint(file, self._path, self._parts)
+            checkpoint = last_checkpoint(file, self._path, self._parts)
+        self._go_back(checkpoint)
+        return checkpoint.sums
+
+    def _go_back(self, checkpoint: "Checkpoint") -> None:
+        self.rows, self._place = checkpoint.rows, checkpoint.place
         self._since = time.monotonic()
-        return sums
 
     def __enter__(self) -> "ArchiveWriter":
         return self

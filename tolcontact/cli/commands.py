@@ -6,6 +6,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from tolcontact import cli, interrupts
+from tolcontact.cli.quick_imports import quick_imports
 
 # The module of each command in this folder, and the line that describes the command in the list of commands.
 COMMANDS = {
@@ -84,7 +85,8 @@ class Commands(TyperGroup):
 def declared_command(name: str) -> Any:
     """Return a command with its options. The module that declares the command is imported."""
     module, _ = COMMANDS[name]
-    getattr(cli, module)  # its import declares the command
+    with quick_imports():
+        getattr(cli, module)  # its import declares the command
     app = cli.app.app
     return next(
         typer.main.get_command_from_info(

@@ -9,7 +9,7 @@ from tolcontact.arrays import Array, Bool, Float
 from tolcontact.compilation.contact_qp import ContactQP
 from tolcontact.compilation.elements import ElementQP
 from tolcontact.compilation.functions import InterpretedFunction, flat
-from tolcontact.compilation.graph import GraphSolver
+from tolcontact.compilation.graph import GraphSolver, Layouts
 from tolcontact.compilation.outcome import SOLUTION
 from tolcontact.compilation.plugins import ACCURACY, PLUGINS, Plugin, solver
 from tolcontact.compilation.polish_kernel import solve_conditions
@@ -66,19 +66,25 @@ class ContactSolver:
         self._assemble, self._finish, self._energy, self._relate = qp.evaluators
         self._plugin = qp.plugin
         size = sum(qp.sparsity("a").shape) + qp.slacks  # of the linear system that polishes an answer
+        self._layouts: Layouts = {}
         self._max_polished = max(MAX_POLISHED_ENTRIES // size**2, 1)
-        self.start_over()
+        self._renew()
 
     def twin(self) -> "ContactSolver":
         """Return an equal solver for another thread."""
         twin = copy.copy(self)
-        twin.start_over()
+        twin._renew()
         return twin
 
     def start_over(self) -> None:
         """Forget all previous problems: some plugins start from the last one."""
-        self._solver = _new_solver(self._qp, self._plugin)
+        if not self._is_new:
+            self._renew()
+
+    def _renew(self) -> None:
+        self._solver = _new_solver(self._qp, self._plugin, self._layouts)
         self._fallbacks: dict[str, _Solver] = {}
+        self._is_new = True
 
     def __call__(self, **arrays: Float[Array, "realization ..."]) -> Arrays:
         """Return the outputs of contact_qp by name, (realization, entry), for its inputs by name, (realization, ...).
@@ -90,6 +96,7 @@ class ContactSolver:
         infinite, and other outputs may be NaN.
         """
         inputs = {name: flat(values) for name, values in arrays.items()}
+        self._is_new = False
         answer = self._solved(self._solver, inputs)
         answer["second"] = np.zeros_like(answer["residual"])
         self._retry(self._solver, answer, inputs, _is_lost(answer) & (inputs["newton"][:, 0] != 0), second=0.0)
@@ -98,7 +105,7 @@ class ContactSolver:
             if not lost.any():
                 break
             if name not in self._fallbacks:
-                self._fallbacks[name] = _new_solver(self._qp, PLUGINS[name])
+                self._fallbacks[name] = _new_solver(self._qp, PLUGINS[name], self._layouts)
             self._retry(self._fallbacks[name], answer, inputs, lost, second=1.0)
             if PLUGINS[name].remembers:
                 del self._fallbacks[name]
@@ -206,11 +213,11 @@ class _PluginSolver:
 _Solver = _PluginSolver | GraphSolver
 
 
-def _new_solver(qp: ContactQP | ElementQP, plugin: Plugin) -> _Solver:
+def _new_solver(qp: ContactQP | ElementQP, plugin: Plugin, layouts: Layouts) -> _Solver:
     if plugin.is_conic:
         return _PluginSolver(qp, plugin)
     sparsities = {name: qp.sparsity(name) for name in ("h", "g", "a", "lba")}
-    return GraphSolver(sparsities, slacks=qp.slacks, equations=qp.equations)
+    return GraphSolver(sparsities, slacks=qp.slacks, equations=qp.equations, layouts=layouts)
 
 
 def _is_lost(answer: Arrays) -> Bool[Array, " realization"]:

@@ -37,7 +37,9 @@ class Limits:
         for k in curved_pairs(nominal, group):
             surface, points = self._group_pairs[k].reference_face, self._group_pairs[k].P_m
             self._round[k] = (surface.curvature if surface is not None else 0.0, *_ball(points))
-        self._balls = [(side.part, *_ball(side.points)) for side in group.sides]
+        balls = [_ball(side.points) for side in group.sides]
+        self._ball_parts = np.array([side.part for side in group.sides])
+        self._centres, self._radii = np.array([centre for centre, _ in balls]), np.array([radius for _, radius in balls])
 
     def is_near(self, task: Task, state: State) -> Bool[Array, " n"]:
         """Return whether no part has turned, and no contact point travelled, beyond the method's limits (n,)."""
@@ -117,16 +119,17 @@ class Limits:
 
         It is the displacement of the centre of a ball around the points, and the ball's radius times the turn.
         """
-        bound = np.zeros(len(start))
-        for part, centre, radius in self._balls:
-            bound = np.maximum(bound, _displacement(end[:, part] - start[:, part], centre, radius))
-        return bound
+        difference = end[:, self._ball_parts] - start[:, self._ball_parts]
+        return np.asarray(_displacement(difference, self._centres, self._radii).max(axis=1))
 
 
-def _displacement(difference: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
-    """Return a bound of how far points of a ball move (n,) [mm], for differences of two poses (n, 12)."""
-    turn = np.sqrt((difference[:, :9] ** 2).sum(axis=1))
-    return np.linalg.norm(pose.apply(difference, centre)[:, 0], axis=1) + radius * turn
+def _displacement(difference: np.ndarray, centre: np.ndarray, radius: float | np.ndarray) -> np.ndarray:
+    """Return a bound of how far points of balls move (..., ball) [mm], for differences of two poses (..., ball, 12).
+
+    centre, radius   (ball, 1, 3), (ball,) [mm]; or of one ball (1, 3), for differences (..., 12)
+    """
+    turn = np.sqrt((difference[..., :9] ** 2).sum(axis=-1))
+    return np.asarray(np.linalg.norm(pose.apply(difference, centre)[..., 0, :], axis=-1) + radius * turn)
 
 
 def _ball(points: np.ndarray) -> tuple[np.ndarray, float]:

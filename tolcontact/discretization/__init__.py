@@ -93,11 +93,11 @@ its wall, is detected only afterwards (see the checks of surfaces in `tolcontact
 from tolcontact.discretization.discretizing import discretize
 from tolcontact.discretization.form_places import FIRST_POINT, raised_places, rim_points
 from tolcontact.discretization.locators import Locators
-from tolcontact.discretization.nominal import ContactPoints, Nominal, Offsets
+from tolcontact.discretization.nominal import ContactPoints, CountedPoints, Nominal, Offsets
 from tolcontact.discretization.nominal_part import NominalPart
 from tolcontact.discretization.round_points import RoundPoint, RoundPoints
 
 __all__ = [
-    "FIRST_POINT", "ContactPoints", "Locators", "Nominal", "NominalPart", "Offsets", "RoundPoint", "RoundPoints",
-    "discretize", "raised_places", "rim_points",
+    "FIRST_POINT", "ContactPoints", "CountedPoints", "Locators", "Nominal", "NominalPart", "Offsets", "RoundPoint",
+    "RoundPoints", "discretize", "raised_places", "rim_points",
 ]  # fmt: skip

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from tolcontact.discretization.measured_geometry import NominalMeasurement
 from tolcontact.discretization.nominal_part import NominalPart
 from tolcontact.discretization.pair_form import PairForm
 from tolcontact.discretization.point_weights import point_weights
-from tolcontact.discretization.round_points import RoundPoints
+from tolcontact.discretization.round_points import Ball, RoundPoints
 from tolcontact.features import Datum, FaceDeviation, Features, NominalFeature, NominalPattern
 from tolcontact.features.zone_kernel import sum_modes
 from tolcontact.geometry.curvature import chord_height
@@ -64,6 +65,18 @@ class Offsets:
         for column, row in zip(self.columns, self.matrix, strict=True):
             heights += deviations[:, column, None] * row[points]
         return heights
+
+
+class CountedPoints(NamedTuple):
+    """Points (point, 3) whose displacement an objective counts, each as that of a sphere with a radius (point,) [mm]."""
+
+    points: np.ndarray
+    radii: np.ndarray
+
+    @classmethod
+    def around(cls, balls: Sequence[Ball]) -> "CountedPoints":
+        """Return the surfaces of balls."""
+        return cls(np.array([ball.centre for ball in balls]), np.array([ball.radius for ball in balls]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,6 +183,18 @@ class ContactPoints:
                 of_points -= self.form_heights(deviations[rows])
             gaps[rows] = of_points.min(axis=1)
         return gaps if deviations is None else gaps - self.heights(deviations)
+
+    @property
+    def counted(self) -> "tuple[CountedPoints, CountedPoints]":
+        """What objectives count of the moving and of the reference part: contact points, but of round faces their centres.
+
+        A point on a round face would leave its part free to roll: it could move aside at no cost until it is clear. Where a
+        wall is around a ball or shaft, its tangent planes have contact points on all sides, which is as good.
+        """
+        if self.round is None or not self.round.are_beside:
+            return CountedPoints(self.P_m, np.zeros(len(self.P_m))), CountedPoints(self.P_r, np.zeros(len(self.P_r)))
+        moving, reference = zip(*(point.centres() for point in self.round), strict=True)
+        return CountedPoints.around(moving), CountedPoints.around(reference)
 
     @cached_property
     def weights(self) -> Float[Array, " point"]:

@@ -11,6 +11,7 @@ import trimesh
 from tolcontact import poses as pose
 from tolcontact.geometry.curvature import chord_height
 from tolcontact.geometry.edges import rim
+from tolcontact.geometry.spreading import distinct
 from tolcontact.geometry.surface import Piece, Surface
 from tolcontact.vocabulary import ROUNDED
 
@@ -186,7 +187,7 @@ def body_face(face: Surface, body: trimesh.Trimesh, contacts: int) -> BodyFace:
     """Return a face and its body, for a pair with `contacts` contact points."""
     count = min(max(MIN_POINTS, contacts * DENSITY**2), MAX_POINTS)
     step = float(np.sqrt(face.mesh.area / count))
-    points = np.unique(_spread(face.mesh, step, count), axis=0)
+    points = distinct(_spread(face.mesh, step, count))
     if len(points) > MAX_POINTS:
         points = points[np.random.default_rng(0).choice(len(points), MAX_POINTS, replace=False)]
     flat = _plane_of(face)
