@@ -196,7 +196,7 @@ def test_tests_reach_no_private_name_and_change_no_module():
         "import tolcontact._version",
         "program.place._evaluate",
         "class A(B):\n    def f(self): self._write(0)",
-        "from tolcontact.archive import writer\nwriter.LaidOut = None",
+        "from tolcontact.archive import writer\nwriter.RawFile = None",
         "from tolcontact.archive import ArchiveWriter\nArchiveWriter.checkpoint_interval = 0.0",
         "from tolcontact.compilation.plugins import PLUGINS\nPLUGINS['daqp'] = 1",
         "from models import hinge\npatched.setattr(hinge, 'PLACE', 0)",

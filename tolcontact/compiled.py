@@ -30,7 +30,7 @@ CONSTANTS = (bool, int, float, str, bytes, tuple, type(None))
 
 
 def compiled(function: Callable[..., Any], *, inline: bool = False, counts: bool = True, inner: bool = False) -> Any:
-    """Return the function, compiled when it is first called; `inline`, it becomes part of those that call it.
+    """Return the function, compiled when it is first called; with `inline`, it becomes part of its callers.
 
     counts   whether it counts references to arrays. A function that creates no array need not; if it passes on tuples of many
              arrays, counting takes longer than the arithmetic.

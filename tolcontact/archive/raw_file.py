@@ -16,7 +16,7 @@ from tolcontact.checksums import crc32
 from tolcontact.vocabulary import ArchiveVariable
 
 
-class Place(NamedTuple):
+class BytePlace(NamedTuple):
     """Where the values of a variable lie: chunks of `rows` rows (along the first dimension), each at its offset."""
 
     kind: np.dtype
@@ -24,12 +24,12 @@ class Place(NamedTuple):
     offsets: list[int]
 
 
-class LaidOut:
+class RawFile:
     """The values of an archive on its disk. A row is what stands at one index of a variable's first dimension."""
 
     def __init__(self, path: Path) -> None:
         """Open the file. Raises OSError if it cannot be read and written."""
-        self._places: dict[str, Place] = {}
+        self._places: dict[str, BytePlace] = {}
         with h5py.File(path, "r", locking=False) as file:
             names: list[bytes] = []
             h5py.h5o.visit(file.id, names.append)
@@ -83,14 +83,14 @@ class LaidOut:
             self.overwrite(group, terms.GROUP_CHECKSUM, checksum)
 
 
-def _place(item: h5py.h5d.DatasetID) -> Place:
+def _place(item: h5py.h5d.DatasetID) -> BytePlace:
     """Return where the values of a variable lie.
 
     It is given by its handle: the objects that h5py makes of handles take several times as long.
     """
     if item.get_create_plist().get_layout() != h5py.h5d.CHUNKED:
         offset = item.get_offset()
-        return Place(item.dtype, max((1, *item.shape[:1])), [] if offset is None else [offset])
+        return BytePlace(item.dtype, max((1, *item.shape[:1])), [] if offset is None else [offset])
     chunks: list[tuple[int, int]] = []
     item.chunk_iter(lambda chunk: chunks.append((chunk.chunk_offset[0], chunk.byte_offset)))
-    return Place(item.dtype, item.get_create_plist().get_chunk()[0], [offset for _, offset in sorted(chunks)])
+    return BytePlace(item.dtype, item.get_create_plist().get_chunk()[0], [offset for _, offset in sorted(chunks)])

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float
-from tolcontact.contact.acceptance import Limits
+from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.linear_step import PENETRATION, LinearStep, Step
 from tolcontact.contact.progress import Progress
@@ -57,7 +57,7 @@ STEPS_WHERE_FACES_END = (
 )
 
 
-def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task, state: State, stride: float) -> None:
+def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, task: Task, state: State, stride: float) -> None:
     """Take the steps of `state` to their end. Without rest there is an answer only if the parts contradict each other."""
     unsettled, trail = Unsettled(task, state), list[np.ndarray]()
     progress: Progress | None = None

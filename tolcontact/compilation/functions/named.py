@@ -11,7 +11,7 @@ import numpy as np
 
 from tolcontact.arrays import Array, Float, Int, Real
 from tolcontact.compilation.functions.native import NativeFunction, UnknownInstructionError
-from tolcontact.compilation.functions.places import Located, Places
+from tolcontact.compilation.functions.places import ArgumentPlaces, Located
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 
 WIDTHS = (256, 16)  # realizations in a call of CasADi
@@ -156,7 +156,7 @@ class AdaptiveFunction:
         with CONSTRUCTION_LOCK:
             return InterpretedFunction(self._function)
 
-    def evaluate(self, count: int, arrays: Sequence[Located], places: Places) -> None:
+    def evaluate(self, count: int, arrays: Sequence[Located], places: ArgumentPlaces) -> None:
         """Evaluate the Function for all elements of `count` realizations; see NativeFunction."""
         if native := self._compiled(count * places.elements):
             native.evaluate(count, arrays, places)
@@ -208,7 +208,7 @@ class NamedFunction:
     def at(self, places: Mapping[str, Int[Array, "element _"]]) -> "IndexedFunction":
         """Return the function of several elements, whose inputs and results stand in these columns of arrays, by name."""
         names = [*self._names, *self._results]
-        return IndexedFunction(self._evaluate, names, Places([places[name] for name in names]))
+        return IndexedFunction(self._evaluate, names, ArgumentPlaces([places[name] for name in names]))
 
     @classmethod
     def dense(cls, function: ca.Function) -> "NamedFunction":
@@ -229,7 +229,7 @@ class NamedFunction:
 class IndexedFunction:
     """A Function that is evaluated for several elements of each realization, on arrays that hold the numbers of all."""
 
-    def __init__(self, function: AdaptiveFunction, names: Sequence[str], places: Places) -> None:
+    def __init__(self, function: AdaptiveFunction, names: Sequence[str], places: ArgumentPlaces) -> None:
         self._function, self._names, self._places = function, names, places
 
     def __call__(self, count: int, arrays: Mapping[str, Located]) -> None:
