@@ -24,7 +24,15 @@ from tolcontact.declaration.size import Size
 from tolcontact.declaration.station import Station
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import tolerance as _tolerance
-from tolcontact.declaration.values import friction_faults, key_faults, repetitions, script_line, text_faults, vector as _vector
+from tolcontact.declaration.values import (
+    friction_faults,
+    group_faults,
+    key_faults,
+    repetitions,
+    script_line,
+    text_faults,
+    vector as _vector,
+)
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
 
@@ -206,6 +214,7 @@ class Assembly(Declarations, Pictured):
         keyed = {"part": "parts", "contact pair": "pairs", "measure": "measures", "force": "forces"}
         for kind, name in keyed.items():
             yield from key_faults(kind, [thing.name for thing in self._declared[name]])
+        yield from group_faults("part", [part.name for part in self.parts])
         for part in self.parts:
             yield from _located("part", part, part.faults())
             if not self.stations:
