@@ -30,6 +30,17 @@ MISTAKES = {
         {"measure": "    a.measure('height', tc.Assembly('B').part('lid', tc.Box(1, 1, 1)).point(0, 0, 0), along='z')\n"},
         ['measurement "height"', 'unknown part "lid"', "base, top"],
     ),
+    "part that is located on itself": (
+        {"top": GOOD["top"].replace("tolerance", "on=top, tolerance")},
+        ['part "top"', 'is located on itself: "top" on "top"; locate'],
+    ),
+    "two parts that are located on each other": (
+        {
+            "top": GOOD["top"].replace("tolerance", "on=base, tolerance"),
+            "base": GOOD["base"].replace("tolerance", "on=top, tolerance"),
+        },
+        ['part "base"', 'is located on itself: "base" on "top" on "base"; locate'],
+    ),
     "part that is not located": ({"top": ""}, ['part "top"', "not located"]),
     "mesh file that is missing": (
         {"top": GOOD["top"] + "    a.part('extra', tc.Mesh('nowhere.stl'), fixed=True)\n"},

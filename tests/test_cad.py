@@ -197,6 +197,13 @@ def test_what_a_file_does_not_hold_is_told(file, tmp_path):
             tc.build(model)
 
 
+def test_a_place_that_has_only_the_kernels_label_is_called_after_its_product(tmp_path):
+    """The kernel's writer states its own labels as names."""
+    path = tmp_path / "labels.step"
+    path.write_text(assembly(("pin", (0, 0, 0)), ("pin", (9, 0, 0))).replace("use 0", "=>[0:1:1:2]"))
+    assert [(body.name, body.path) for body in tc.bodies_in(path)] == [("pin", ("whole", "pin")), ("use 1", ("whole", "use 1"))]
+
+
 def test_names_that_no_part_may_have_are_changed(tmp_path):
     path = tmp_path / "odd.step"
     path.write_text(assembly(("pin", (0, 0, 0)), ("pin", (9, 0, 0))).replace("use 0", "M6/12").replace("use 1", "-x ?"))

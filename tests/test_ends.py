@@ -24,6 +24,35 @@ from tolcontact.simulation.block import simulate_block
 FAULTS = ("false contact", "missed contact", "lifted off", "inside")
 
 
+def block_of(mesh):
+    """A block of a mesh that slides over the end of a table."""
+    a = tc.Assembly("a block at an end")
+    table = a.part("table", tc.Box(100, 50, 10), fixed=True)
+    block = a.part("block", tc.Mesh(mesh), at=(70, 12, 10))
+    bottom, stops = [(5, 5, 0), (45, 5, 0), (25, 20, 0)], [(5, 0, 5), (45, 0, 5), (0, 12, 5)]
+    points = zip([*bottom, *stops], "zzzyyx", strict=True)
+    a.locate(block, [tc.Locator(str(k), p, n) for k, (p, n) in enumerate(points)], tolerance=0.4)
+    a.contact("interface", moving=block.face("-z"), reference=table.face("+z"))
+    a.measure("height", block.point(50, 0, 10), along="z")
+    return a
+
+
+def test_a_body_that_stands_twice_in_a_mesh_is_one_body():
+    box = trimesh.creation.box(bounds=[(0, 0, 0), (50, 25, 10)])
+    once, twice = (
+        tc.run(block_of(mesh), samples=20, seed=1, method=METHOD, surfaces=0).measured.values
+        for mesh in (box, trimesh.util.concatenate([box, box.copy()]))
+    )
+    assert np.array_equal(once, twice)
+
+
+def test_bodies_in_one_place_with_other_triangles_have_no_ends():
+    box = trimesh.creation.box(bounds=[(0, 0, 0), (50, 25, 10)])
+    mirrored = trimesh.Trimesh(box.vertices * (-1, 1, 1) + (50, 0, 0), box.faces[:, ::-1], process=False)
+    with pytest.raises(tc.ModelError, match=r'"interface": the face of part "block" has no ends, .* export one of them'):
+        tc.build(block_of(trimesh.util.concatenate([box, mirrored])))
+
+
 def printed(summary):
     console = Console(width=200, record=True, file=io.StringIO())
     console.print(summary_text(summary))

@@ -85,5 +85,15 @@ def test_files_that_are_no_points_of_the_face_are_refused(batch, tmp_path):
         np.savetxt(tmp_path / "far" / f"{number}.csv", points)
         (tmp_path / f"{number}.csv").write_text("x,y\n1,2\n")
     assert "mm away from the face; expected points of the face" in fault(tc.Form(measured=str(tmp_path / "far" / "*")))
-    assert "has no points; expected lines of three numbers" in fault(tc.Form(measured=str(tmp_path / "*.csv")))
+    lines = "expected lines of three numbers x, y, z [mm], in the frame of the part"
+    texts = {
+        "x,y\n1,2\n": f"0.csv\" cannot be read as measured points: line 2 is '1,2'; {lines}",
+        "1 2 3\n4 5 6 7": f"0.csv\" cannot be read as measured points: line 2 is '4 5 6 7'; {lines}",
+        "x;y;z\n1,5;2;3": f"line 2 is '1,5;2;3'; {lines}; write decimals with points",
+        "": f'0.csv" has no points; {lines}',
+        "1,2,3\n4,nan,6\n": '0.csv": point 2 is (4, nan, 6); expected finite numbers, so leave it out',
+    }
+    for text, message in texts.items():
+        (tmp_path / "0.csv").write_text(text)
+        assert message in fault(tc.Form(measured=str(tmp_path / "*.csv")))
     assert "has a covariance, a length or lobes beside" in fault(tc.Form(measured=str(batch[0] / "*"), length=3.0))

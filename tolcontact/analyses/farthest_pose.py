@@ -21,6 +21,7 @@ import scipy
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.allowed_space import AllowedRegion
+from tolcontact.analyses.c_stdout import muted_c_stdout
 from tolcontact.analyses.linear_model import LinearModel
 from tolcontact.compilation import Program
 
@@ -160,10 +161,11 @@ class _Problem:
         bound, contributors = np.inf, len(self._region.lower)
         for _ in range(MAX_ROUNDS):
             self._add(planes, -np.inf, ends)
-            solution = scipy.optimize.milp(
-                -self._goal, constraints=self._constraints, bounds=self._bounds, integrality=self._integer,
-                options={"time_limit": MAX_SECONDS},
-            )  # fmt: skip
+            with muted_c_stdout():  # HiGHS prints a line when a solution needs another solve in the space of all variables
+                solution = scipy.optimize.milp(
+                    -self._goal, constraints=self._constraints, bounds=self._bounds, integrality=self._integer,
+                    options={"time_limit": MAX_SECONDS},
+                )  # fmt: skip
             if solution.x is None:
                 break
             bound = min(bound, -float(solution.mip_dual_bound if self._integer.any() else solution.fun))

@@ -271,9 +271,9 @@ are named from the folder of the JSON file, and errors state the place: `parts[2
 schema follows from the classes of this chapter: `python -m tolcontact.declaration.json_model > model.schema.json` writes it.
 
 A model of a stranger is data, and cannot ask for everything: files have at most 64 MiB, assemblies 1000 parts and 2000
-measures, pairs 100 000 contact points, names 500 characters, expressions 100 000 steps, and a draw of a distribution takes at
-most 10 ms. What is more is refused with the place in the file before anything is computed. (Scripts run code: run only those
-that you trust.)
+measures, pairs 100 000 contact points, names 500 characters (of parts and stations 255 bytes in UTF-8), expressions 100 000
+steps, and a draw of a distribution takes at most 10 ms. What is more is refused with the place in the file before anything is
+computed. (Scripts run code: run only those that you trust.)
 
 Every archive holds its model as JSON, too, with the triangles of meshes beside it: `tc.model_of(results)` rebuilds the
 assembly without running any code of the script. Functions of poses are kept as lists of elementary operations.

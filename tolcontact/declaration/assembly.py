@@ -24,7 +24,15 @@ from tolcontact.declaration.size import Size
 from tolcontact.declaration.station import Station
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import tolerance as _tolerance
-from tolcontact.declaration.values import friction_faults, key_faults, repetitions, script_line, text_faults, vector as _vector
+from tolcontact.declaration.values import (
+    friction_faults,
+    group_faults,
+    key_faults,
+    repetitions,
+    script_line,
+    text_faults,
+    vector as _vector,
+)
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
 
@@ -152,6 +160,21 @@ class Assembly(Declarations, Pictured):
         """Return the parts of the rigid body to which a part of a scene belongs; the first one carries the others."""
         return next((joint.members for joint in self.joints if part in joint.members), (part,))
 
+    def support_chain(self, part: Part) -> tuple[Part, ...]:
+        """Return the first part of a part's body, the first one of the body that it is located on, and so on to the ground.
+
+        A circle of locations ends with the part that closes it: it stands in the chain twice.
+        """
+        chain: list[Part] = []
+        support: Part | None = part
+        while support is not None:
+            carrier = self.body_of(support)[0]
+            is_closed = carrier in chain
+            chain.append(carrier)
+            location = None if is_closed else self.location_of(carrier)
+            support = location.parent if location else None
+        return tuple(chain)
+
     def smallest_zone(self) -> float:
         """Return the smallest width of a tolerance zone [mm] of any locator, feature or measure; infinite without a zone.
 
@@ -191,6 +214,7 @@ class Assembly(Declarations, Pictured):
         keyed = {"part": "parts", "contact pair": "pairs", "measurement": "measures", "force": "forces"}
         for kind, name in keyed.items():
             yield from key_faults(kind, [thing.name for thing in self._declared[name]])
+        yield from group_faults("part", [part.name for part in self.parts])
         for part in self.parts:
             yield from _located("part", part, part.faults())
             if not self.stations:
@@ -259,15 +283,10 @@ class Assembly(Declarations, Pictured):
                 yield "it is floating, and in no contact pair, so nothing decides its place; declare its contacts"
             if part.fixed is True:
                 yield "it is floating, so contact has to move it; leave fixed out"
-        chain: list[Part] = []
-        support: Part | None = part
-        while support is not None:
-            if support in chain:
-                yield f"it is located on itself, through {' on '.join(link.name for link in chain)}; break the circle"
-                return
-            chain.append(support)
-            location = self.location_of(support)
-            support = location.parent if location else None
+        first, *rest = self.support_chain(part)
+        if first in rest:
+            circle = " on ".join(f'"{link.name}"' for link in (first, *rest))
+            yield f"it is located on itself: {circle}; locate one of them on another part, or on the ground"
 
     def _unknown_parts(self, label: str, line: str, *parts: Part | None) -> Iterator[str]:
         for part in parts:
