@@ -279,8 +279,12 @@ class Assembly(Declarations, Pictured):
         location = self.location_of(part)
         if location is not None and location.floating:
             body = self.body_of(part)
-            if not any(side.part in body for pair in self.pairs for side in (pair.moving, pair.reference)):
-                yield "it is floating, and in no contact pair, so nothing decides its place; declare its contacts"
+            touches = any(side.part in body for pair in self.pairs for side in (pair.moving, pair.reference))
+            if not (touches or location.has_supports):
+                yield (
+                    "it is floating, in no contact pair and on no one-sided locator, so nothing decides its place; "
+                    "declare its contacts"
+                )
             if part.fixed is True:
                 yield "it is floating, so contact has to move it; leave fixed out"
         first, *rest = self.support_chain(part)

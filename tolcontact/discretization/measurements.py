@@ -262,8 +262,8 @@ def _check_varies(parts: Iterable[Any], deviations: Iterable[Any]) -> None:
 
 
 def _is_outer_cylinder(face: MeasuredFace) -> bool:
-    pieces = face.surface.pieces
-    return len(pieces) == 1 and isinstance(pieces[0].surface, Cylinder) and not pieces[0].is_hollow
+    pieces, is_whole = face.surface.pieces, not len(face.surface.unknown.mesh.faces)
+    return is_whole and len(pieces) == 1 and isinstance(pieces[0].surface, Cylinder) and not pieces[0].is_hollow
 
 
 def _kind(face: MeasuredFace) -> str:

@@ -32,6 +32,7 @@ displacement from the nominal place; absolute=True measures the coordinate
 | `[limits]` | limits that exclude the nominal value, or that are more than 100 sigma away from it |
 | `[reach]` | clearances by triangles whose faces move so far that other triangles may be nearer |
 | `[friction]` | seats that forces may not push their part onto, at the stated coefficients of friction (see `tc.seating`) |
+| `[form]` | measured faces that lie in no zone as wide as the tolerance of form that is stated |
 
 The faces of a pair overlap if their deepest point stays inside in nearly every realization without contact: the median of its
 gap is more than three sigma below 0. They are too far apart if the smallest gap exceeds 30 sigma and the distance by which
