@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.optimize import minimize
 from scipy.stats import norm
 
 import tolcontact as tc
@@ -178,6 +179,46 @@ def test_what_cannot_be_met_is_said_with_the_best_that_was_found(tmp_path):
     assert "is not met by any tolerances allowed" in " ".join(done.stdout.split()) and "the best found" in done.stdout
     done = call(tmp_path, "allocate", "pile.json", "--require", "top: ppm 300000", "--samples", "1024", "--quiet")
     assert done.returncode == 0 and "not met" not in done.stdout + done.stderr
+
+
+def supported(shift):
+    """A block that is pressed against two supports at one point: x is the larger one of X1 and X2 + shift, exactly."""
+    a = tc.Assembly("supported", method=tc.Method(objective="seating"))
+    block = a.part("b", tc.Box(100, 50, 10))
+    rigid = [("Z1", (5, 5, 0), "z"), ("Z2", (95, 5, 0), "z"), ("Z3", (50, 45, 0), "z"), ("Y1", (5, 0, 5), "y")]
+    supports = [("X1", tc.Tolerance(0.6)), ("X2", tc.Tolerance(0.3, shift=shift))]
+    a.locate(
+        block,
+        [
+            *(tc.Locator(*each, 0) for each in rigid),
+            tc.Locator("Y2", (95, 0, 5), "y", 0.4),
+            *(tc.Locator(name, (0, 25, 5), "x", zone, one_sided=True) for name, zone in supports),
+        ],
+    )
+    a.force("f", at=block.point(0, 25, 5), vector=(-10, 0, 0))
+    a.measure("x", block.point(0, 25, 5), along="x", limits=(None, 0.2))
+    return a
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("shift", [0.0, -0.4])
+def test_a_tolerance_that_decides_nothing_before_it_is_wider_gets_the_range_of_least_cost(shift):
+    """P(x <= 0.2) is the product of two normal distributions; with a shift of -0.4, X2 decides above twice its range alone."""
+    found = tc.allocate(supported(shift), "x: ppm 2000", samples=5000, solver="daqp")
+    idle, widths = (dict(zip(found.group.values, x.values, strict=True)) for x in (found.idle, found.range.sel(stage="after")))
+    assert idle == {"b.X1": 0, "b.X2": 0, "b.Y2": 1} and widths["b.Y2"] == 0.4
+
+    def log_share(x):
+        return norm.logcdf(0.2, 0, x[0] / 6) + norm.logcdf(0.2 - shift, 0, x[1] / 6) - np.log(0.998)
+
+    least = minimize(
+        lambda x: 0.6 / x[0] + 0.3 / x[1], [0.4, 0.4], method="SLSQP", bounds=[(0.06, 1.8), (0.03, 0.9)],
+        constraints={"type": "ineq", "fun": log_share},
+    )  # fmt: skip
+    x = [widths["b.X1"], widths["b.X2"]]
+    assert 0.6 / x[0] + 0.3 / x[1] < 1.04 * least.fun and least.x[1] > 0.33
+    assert x[1] == pytest.approx(least.x[1], rel=0.12)
+    assert -np.expm1(log_share(x) + np.log(0.998)) < 0.0029  # of 20 000 fresh ones 0.002 lie outside, +- 0.0006
 
 
 def test_groups_without_influence_keep_their_ranges_and_those_at_a_limit_are_named(tmp_path):

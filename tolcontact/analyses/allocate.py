@@ -14,6 +14,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis
 from tolcontact.analyses.engine import VERIFICATION_FACTOR, Progress
 from tolcontact.analyses.grouping import check_grouping, owners
+from tolcontact.analyses.idle_groups import NEGLIGIBLE, IdleSearch
 from tolcontact.analyses.requirement import MIN_DECISIVE, Requirement
 from tolcontact.analyses.scaled_trials import ScaledTrials
 from tolcontact.compilation import Program
@@ -26,11 +27,8 @@ STEP = 0.1  # of ranges, for differences
 BATCHES = 32  # of realizations, for intervals of effects
 MAX_STEPS, USUAL_STEPS = 24, 8  # of one search: at most, and for the forecast
 FIRST_RADIUS, LAST_RADIUS = 0.5, 0.004  # of the region that a step stays in, in logarithms of the factors
-IDLE = 1e-6  # of a measure's spread: a group that changes no decisive realization by more has no influence
-MIN_EFFECT_SAMPLES, EFFECT_SHARE = (
-    512,
-    4,
-)  # realizations for the effect of a group: at least; at most samples / 4, and 4 samples / groups
+# Realizations for the effect of a group: at least; at most samples / 4, and 4 samples / groups.
+MIN_EFFECT_SAMPLES, EFFECT_SHARE = 512, 4
 COMMON_FACTORS = np.geomspace(MIN_FACTOR, MAX_FACTOR, 13)  # of all ranges, where requirements cannot be met
 PENALTY = 10.0  # for missed margins, in the costs that the same margins save to first order
 MIN_GAIN = 1e-4  # of the cost
@@ -53,7 +51,7 @@ def allocate(
         required     (requirement)                       the share or the Ppk that is required
         met          (requirement)                       1: kept in the fresh run after; 0: it cannot be met, and `kept` is the
                                                          best that was reached
-        idle         (group)                             1: the group has no influence on any requirement, and keeps its range
+        idle         (group)                             1: no influence on any requirement at any range; it keeps its range
         effect       (measure, of_effect, group, interval)  change of 6 sigma, and of the share outside, if a group's zones were
                                                          a tenth narrower: which to tighten first
 
@@ -62,10 +60,10 @@ def allocate(
     keep their ranges. If `costs` is left out, all groups may change with c = 1. `by` is as in `contributions`: "contributor",
     "feature" or "part".
 
-    Ranges stay between a tenth and three times the present ones. Groups without influence on any requirement keep theirs. Each
-    step replaces the margins of the requirements by functions of squared ranges with the same values and slopes, on the same
-    draws; slopes follow from realizations near the limits alone. scipy's SLSQP minimizes the cost within a region that shrinks
-    when a step fails (a sequential separable approximation; Svanberg, 1987). If the fresh run misses a requirement, the search
+    Ranges stay between a tenth and three times the present ones. Groups at whose ends of range no required measure changes in
+    any realization keep theirs. Each step replaces the margins of the requirements by functions of squared ranges with the same
+    values and slopes, on the same draws; slopes follow from realizations near the limits alone. SLSQP minimizes the cost within
+    a region that shrinks when a step fails (a sequential separable approximation; Svanberg, 1987). If the fresh run misses a requirement, the search
     continues with a larger margin. Effects follow from samples / 4 realizations, or 4 samples / groups if that is less, but at
     least 512. `progress` is called with the number of realizations simulated, and with the approximate number of all.
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses. Raises OptionError also for a
@@ -183,8 +181,10 @@ def _allocated(search: "Search", expected: int) -> tuple[np.ndarray, list[list[E
     corrected = trials.corrected(np.ones(len(trials)), verification=1)
     before = [requirement.estimate(corrected[:, requirement.measure]) for requirement in requirements]
     aims = np.zeros(len(requirements))
+    searched = trials.corrected(np.exp(logs))
+    search.release(logs, searched)
     for number in range(VERIFICATIONS):
-        logs = search.least_cost(logs, aims)
+        logs, searched = search.least_cost(logs, searched, aims)
         corrected = trials.corrected(np.exp(logs), verification=2 + number)
         margins = _margins(requirements, corrected)
         if (margins >= 0).all():
@@ -193,6 +193,7 @@ def _allocated(search: "Search", expected: int) -> tuple[np.ndarray, list[list[E
         trials.engine.total += expected
     else:
         logs = search.least_missing(logs)
+        search.release(logs, trials.corrected(np.exp(logs)))
         corrected = trials.corrected(np.exp(logs), verification=2 + VERIFICATIONS)
     after = [requirement.estimate(corrected[:, requirement.measure]) for requirement in requirements]
     return logs, [before, after], _margins(requirements, corrected) >= 0
@@ -209,23 +210,44 @@ class Search:
     trials: ScaledTrials
     requirements: Sequence[Requirement]
     prices: Prices
-    idle: np.ndarray = field(init=False)  # (group,) whether a group has no influence on any requirement
+    idle: np.ndarray = field(init=False)  # (group,) whether a group has no influence on any requirement, as far as is known
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "idle", np.zeros(len(self.trials), dtype=bool))
+        object.__setattr__(self, "idle", self.prices.is_free.copy())
 
     @property
     def is_free(self) -> np.ndarray:
         """Whether the range of a group may change, (group,)."""
         return self.prices.is_free & ~self.idle
 
-    def least_cost(self, logs: np.ndarray, aims: np.ndarray) -> np.ndarray:
-        """Return the logarithms of least cost with margins of at least `aims` (requirement,), from `logs` on.
+    def release(self, logs: np.ndarray, corrected: np.ndarray) -> bool:
+        """Free the ranges of idle groups that have an influence at `logs`, where measures are `corrected` (n, measure).
+
+        Return whether there are any.
+        """
+        before = self.idle.copy()
+        measures = sorted({requirement.measure for requirement in self.requirements})
+        self.idle[:] = IdleSearch(self.trials, measures, (MIN_FACTOR, MAX_FACTOR)).idle(logs, corrected, before)
+        return bool((before & ~self.idle).any())
+
+    def least_cost(self, logs: np.ndarray, corrected: np.ndarray, aims: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the logarithms of least cost with margins of at least `aims` (requirement,), and measures there.
+
+        The search begins at `logs`, where measures are `corrected` (n, measure). Groups that turn out to have an influence at
+        the ranges found join it.
+        """
+        logs, corrected = self._descend(logs, corrected, aims)
+        while self.release(logs, corrected):
+            logs, corrected = self._descend(logs, corrected, aims)
+        return logs, corrected
+
+    def _descend(self, logs: np.ndarray, corrected: np.ndarray, aims: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the logarithms of least cost that steps from `logs` on lead to, and measures there (n, measure).
 
         The merit of a point is its cost plus a penalty for missed margins. A step that improves the merit is taken, and the
         region of the next one doubles; after any other step the region halves.
         """
-        corrected, radius = self.trials.corrected(np.exp(logs)), FIRST_RADIUS
+        radius = FIRST_RADIUS
         margins, slopes = _margins(self.requirements, corrected) - aims, None
         for _ in range(MAX_STEPS):
             if radius < LAST_RADIUS:
@@ -242,7 +264,7 @@ class Search:
                 radius = min(2 * radius, FIRST_RADIUS)
             else:
                 radius /= 2
-        return logs
+        return logs, corrected
 
     def least_missing(self, logs: np.ndarray) -> np.ndarray:
         """Return the point that misses the requirements least: `logs`, or all ranges that may change times one factor.
@@ -263,20 +285,14 @@ class Search:
         """Return derivatives (requirement, group) of the margins, by central differences; 0 for groups that do not change.
 
         A margin follows from the realizations beyond it and near it (Hong, 2009): only these are simulated again, and
-        measures of the others (n, measure) stay. Groups that change none of them are idle from then on.
+        measures of the others (n, measure) stay.
         """
         slopes = np.zeros((len(self.requirements), len(logs)))
         rows = np.unique(np.concatenate([r.decisive(corrected[:, r.measure]) for r in self.requirements]))
-        measures = sorted({requirement.measure for requirement in self.requirements})
-        spreads = corrected.std(axis=0)[measures]
         for group in np.flatnonzero(self.is_free):
             step = STEP * np.eye(len(logs))[group]
             wide, narrow = corrected.copy(), corrected.copy()
             wide[rows] = self.trials.corrected_rows(np.exp(logs + step), rows)
-            changes = np.abs(wide - corrected)[:, measures]
-            if (changes.max(axis=0) <= IDLE * spreads).all():
-                self.idle[group] = True
-                continue
             narrow[rows] = self.trials.corrected_rows(np.exp(logs - step), rows)
             slopes[:, group] = (_margins(self.requirements, wide) - _margins(self.requirements, narrow)) / (2 * STEP)
         return slopes
@@ -318,7 +334,7 @@ def _effects(trials: ScaledTrials, program: Program) -> np.ndarray:
     for group in range(len(trials)):
         factors, first = ones - STEP * np.eye(len(trials))[group], rows[:MIN_DECISIVE]
         narrowed = trials.corrected_rows(factors, first)
-        if (np.abs(narrowed - present[: len(first)]).max(axis=0) <= IDLE * present.std(axis=0)).all():
+        if (np.abs(narrowed - present[: len(first)]).max(axis=0) <= NEGLIGIBLE * present.std(axis=0)).all():
             continue
         if len(rows) > len(first):
             narrowed = np.concatenate([narrowed, trials.corrected_rows(factors, rows[len(first) :])])

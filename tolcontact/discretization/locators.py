@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tolcontact.declaration import Face, Locator, ThreeTwoOne, Tolerance
+from tolcontact.declaration import Locator, ThreeTwoOne, Tolerance
 from tolcontact.declaration.locator import BEST_FIT, FIRST_ORDER
+from tolcontact.discretization.locating_faces import LocatingFace
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation, Placement
-from tolcontact.geometry.faces import Meshes, patch
+from tolcontact.geometry.faces import Meshes
 
 MAX_CONDITION = 1e8
 MIN_DETERMINANT = 0.1  # of the normals of three faces that count as independent
@@ -159,14 +160,14 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
 
     Each face of a joint belongs to a part of its own, with these `placements`; so do its locators.
 
-    Each face is taken as its bounding rectangle along the edges that it shares with the other two. Raises GeometryFault if the
-    three faces are not independent, or the inset leaves no room.
+    Each face is taken as its bounding rectangle along the edges that it shares with the other two. A point of it that lies
+    beside the material of the face moves to where the support is widest (see LocatingFace). Raises GeometryFault if the three
+    faces are not independent, or the inset leaves no room.
     """
-    faces = [_vertices_and_normal(face, meshes) for face in scheme.faces]
+    faces = [LocatingFace.of(face, meshes) for face in scheme.faces]
     if placements:
-        faces = [(v @ R.T + t, R @ n) for (v, n), (R, t) in zip(faces, placements, strict=True)]
-    corners, normals = zip(*faces, strict=True)
-    outward = np.array(normals)
+        faces = [face.moved(placement) for face, placement in zip(faces, placements, strict=True)]
+    outward = np.array([face.outward for face in faces])
     if abs(np.linalg.det(outward)) < MIN_DETERMINANT:
         raise GeometryFault(
             "the three faces of its 3-2-1 scheme are not independent; choose faces at wide angles to each other"
@@ -175,11 +176,11 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
     edges = -np.linalg.inv(outward).T
     edges /= np.linalg.norm(edges, axis=1, keepdims=True)
     a, b, c = edges
-    primary, secondary, tertiary = corners
+    primary, secondary, tertiary = (face.vertices for face in faces)
     near_c, far_c = _support_places(primary, c, scheme.inset)
     near_b, far_b = _support_places(primary, b, scheme.inset)
     side_near, side_far = _support_places(secondary, c, scheme.inset)
-    points = [
+    rectangular = [
         _place(edges, outward, primary, 0, {1: near_b, 2: near_c}),
         _place(edges, outward, primary, 0, {1: near_b, 2: far_c}),
         _place(edges, outward, primary, 0, {1: far_b, 2: (near_c + far_c) / 2}),
@@ -187,6 +188,8 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
         _place(edges, outward, secondary, 1, {0: _middle(secondary, a), 2: side_far}),
         _place(edges, outward, tertiary, 2, {0: _middle(tertiary, a), 1: _middle(tertiary, b)}),
     ]
+    sides = ((0, slice(0, 3), None), (1, slice(3, 5), c), (2, slice(5, 6), None))  # face, its points, what spreads them
+    points = np.vstack([faces[k].on_material(np.array(rectangular[rows]), scheme.inset, along) for k, rows, along in sides])
     directions = -outward[list(FACES_OF_SCHEME)]
     if not placements:
         return tuple(Locator(name, p, n) for name, p, n in zip(SCHEME_NAMES, points, directions, strict=True))
@@ -194,12 +197,6 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
         Locator(name, (p - placements[face][1]) @ placements[face][0], n @ placements[face][0], part=scheme.faces[face].part)
         for name, p, n, face in zip(SCHEME_NAMES, points, directions, FACES_OF_SCHEME, strict=True)
     )
-
-
-def _vertices_and_normal(face: Face, meshes: Meshes) -> tuple[np.ndarray, np.ndarray]:
-    mesh = patch(face, meshes).mesh
-    normal = mesh.area_faces @ mesh.face_normals
-    return np.asarray(mesh.vertices), normal / np.linalg.norm(normal)
 
 
 def _support_places(points: np.ndarray, along: np.ndarray, inset: float) -> tuple[float, float]:

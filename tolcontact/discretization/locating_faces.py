@@ -1,0 +1,150 @@
+"""Faces that a 3-2-1 scheme locates a part by, and the places on their material for its points."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tolcontact.declaration import Face
+from tolcontact.errors import GeometryFault
+from tolcontact.features import Placement
+from tolcontact.geometry.faces import Meshes, patch
+
+ROUNDING = 1e-6  # of a face's size
+CLOSE = 1e-3  # of a face's size: a point that lies no farther beside or above the material is on it
+STATIONS = 37  # places that are tried along each side of the bounding rectangle
+ROUNDS = 8  # of moves of each point
+TIE = 1e-9  # of the widest support
+MAX_PAIRS = 1 << 21  # of points and triangles that are compared at once
+
+
+@dataclass(frozen=True, eq=False)
+class LocatingFace:
+    """A face as its outward normal sees it.
+
+    name      of the face
+    vertices  (vertex, 3) [mm]
+    faces     (triangle, 3) numbers of vertices
+    outward   (3,): the mean outward normal
+    """
+
+    name: str
+    vertices: np.ndarray
+    faces: np.ndarray
+    outward: np.ndarray
+
+    @classmethod
+    def of(cls, face: Face, meshes: Meshes) -> "LocatingFace":
+        """Return a face in its part's own frame."""
+        mesh = patch(face, meshes).mesh
+        normal = mesh.area_faces @ mesh.face_normals
+        return cls(str(face), np.asarray(mesh.vertices), np.asarray(mesh.faces), normal / np.linalg.norm(normal))
+
+    def moved(self, placement: Placement) -> "LocatingFace":
+        """Return the face after a motion."""
+        R, t = placement
+        return LocatingFace(self.name, self.vertices @ R.T + t, self.faces, R @ self.outward)
+
+    @property
+    def axes(self) -> np.ndarray:
+        """Two unit vectors (2, 3) at right angles to the outward normal."""
+        return np.linalg.svd(self.outward[None])[2][1:]
+
+    @property
+    def size(self) -> float:
+        """The diagonal of the bounding box [mm]."""
+        return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+
+    def on_material(self, points: np.ndarray, inset: float, along: np.ndarray | None) -> np.ndarray:
+        """Return points (k, 3) [mm] of the bounding rectangle on the material of the face.
+
+        A point that has material below it moves along the outward normal alone. Any other moves to where the support is
+        widest, at least `inset` from all edges: three points span the largest triangle, two lie farthest apart `along` an edge
+        (3,), one lies nearest to where it was, as all of them do among places of equal width. Raises GeometryFault if there is
+        no place.
+        """
+        heights = self._heights(points @ self.axes.T, CLOSE * self.size)
+        beside = np.flatnonzero(np.isnan(heights))
+        places = points.copy()
+        if len(beside):
+            candidates = self._candidates(inset)
+            if not len(candidates):
+                raise GeometryFault(
+                    f"{len(beside)} of {len(points)} points of its 3-2-1 scheme lie beside the material of face {self.name}, "
+                    f"and no place on the face is {inset:g} mm from its edges; make the inset smaller, or state the locators"
+                )
+            places = _spread(places, beside, candidates, lambda support: self._width(support, along))
+            heights[beside] = self._heights(places[beside] @ self.axes.T, CLOSE * self.size)
+        lifts = heights - places @ self.outward
+        lifts[np.abs(lifts) <= CLOSE * self.size] = 0.0
+        return np.asarray(places + lifts[:, None] * self.outward)
+
+    def _width(self, support: np.ndarray, along: np.ndarray | None) -> np.ndarray:
+        """Return the widths (n,) of supports (n, k, 3): twice the area of triangles, lengths along an edge, 0 for one point."""
+        if along is not None:
+            return np.asarray(np.abs((support[:, 1] - support[:, 0]) @ along))
+        if support.shape[1] == 1:
+            return np.zeros(len(support))
+        sides = support[:, 1:] - support[:, :1]
+        return np.asarray(np.abs(np.cross(sides[:, 0], sides[:, 1]) @ self.outward))
+
+    def _heights(self, places: np.ndarray, margin: float) -> np.ndarray:
+        """Return the heights (n,) [mm] of the outermost material at places (n, 2) on the axes; NaN beside the material."""
+        corners, levels = (self.vertices @ self.axes.T)[self.faces], (self.vertices @ self.outward)[self.faces]
+        sides = np.roll(corners, -1, axis=1) - corners
+        area = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
+        regular = np.abs(area) > (ROUNDING * self.size) ** 2
+        corners, levels, sides, area = corners[regular], levels[regular], sides[regular], area[regular]
+        heights = np.full(len(places), np.nan)
+        lengths = np.linalg.norm(sides, axis=2)
+        for rows in np.array_split(np.arange(len(places)), len(places) * len(corners) // MAX_PAIRS + 1):
+            offsets = places[rows, None, None] - corners  # (row, triangle, corner, 2)
+            inward = (sides[..., 0] * offsets[..., 1] - sides[..., 1] * offsets[..., 0]) * np.sign(area)[:, None]
+            weights = np.clip(np.roll(inward, -1, axis=2) / np.abs(area)[:, None], 0, 1)
+            values = (weights * levels).sum(axis=2) / weights.sum(axis=2)
+            values[(inward < -margin * lengths).any(axis=2)] = -np.inf
+            highest = values.max(axis=1)
+            heights[rows] = np.where(np.isfinite(highest), highest, np.nan)
+        return heights
+
+    def _candidates(self, inset: float) -> np.ndarray:
+        """Return places (n, 3) [mm] on the material at least `inset` from all edges: vertices, and a lattice."""
+        flat = self.vertices @ self.axes.T
+        lower, upper = flat.min(axis=0) + inset, flat.max(axis=0) - inset
+        lattice = np.stack(np.meshgrid(*np.linspace(lower, upper, STATIONS).T), axis=-1).reshape(-1, 2)
+        places = np.concatenate([flat, lattice])
+        heights = self._heights(places, ROUNDING * self.size)
+        places, heights = places[~np.isnan(heights)], heights[~np.isnan(heights)]
+        distant = self._distances_from_edges(places) >= inset - ROUNDING * self.size
+        return places[distant] @ self.axes + heights[distant, None] * self.outward
+
+    def _distances_from_edges(self, places: np.ndarray) -> np.ndarray:
+        """Return the distances (n,) [mm] of places (n, 2) from the edges of the face."""
+        merged = np.unique(np.round(self.vertices / (ROUNDING * self.size)), axis=0, return_inverse=True)[1].ravel()
+        pairs = np.sort(merged[self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)], axis=1)
+        _, first, counts = np.unique(pairs, axis=0, return_index=True, return_counts=True)
+        ends = (self.vertices @ self.axes.T)[self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)[first[counts == 1]]]
+        distances = np.full(len(places), np.inf)
+        for start, end in ends:
+            side = end - start
+            share = np.clip((places - start) @ side / max(float(side @ side), 1e-300), 0, 1)
+            distances = np.minimum(distances, np.linalg.norm(places - start - share[:, None] * side, axis=1))
+        return distances
+
+
+def _spread(
+    points: np.ndarray, beside: np.ndarray, candidates: np.ndarray, width: Callable[[np.ndarray], np.ndarray]
+) -> np.ndarray:
+    """Return points (k, 3), those beside the material moved to the candidates (n, 3) of the widest support, one at a time."""
+    places = points.copy()
+    for _ in range(ROUNDS):
+        before = places.copy()
+        for number in beside:
+            supports = np.repeat(places[None], len(candidates), axis=0)
+            supports[:, number] = candidates
+            widths = width(supports)
+            widest = candidates[widths >= (1 - TIE) * widths.max()]
+            places[number] = widest[np.linalg.norm(widest - points[number], axis=1).argmin()]
+        if np.array_equal(places, before):
+            break
+    return places
