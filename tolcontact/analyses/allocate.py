@@ -63,9 +63,10 @@ def allocate(
     Ranges stay between a tenth and three times the present ones. Groups at whose ends of range no required measure changes in
     any realization keep theirs. Each step replaces the margins of the requirements by functions of squared ranges with the same
     values and slopes, on the same draws; slopes follow from realizations near the limits alone. SLSQP minimizes the cost within
-    a region that shrinks when a step fails (a sequential separable approximation; Svanberg, 1987). If the fresh run misses a requirement, the search
-    continues with a larger margin. Effects follow from samples / 4 realizations, or 4 samples / groups if that is less, but at
-    least 512. `progress` is called with the number of realizations simulated, and with the approximate number of all.
+    a region that shrinks when a step fails (a sequential separable approximation; Svanberg, 1987). If the fresh run misses a
+    requirement, the search continues with a larger margin. Effects follow from samples / 4 realizations, or 4 samples / groups
+    if that is less, but at least 512. `progress` is called with the number of realizations simulated, and with the approximate
+    number of all.
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses. Raises OptionError also for a
     model in which no range varies.
     """
