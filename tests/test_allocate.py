@@ -125,7 +125,7 @@ def test_groups_without_a_cost_keep_their_ranges_and_a_cost_may_be_a_curve():
     ("options", "said"),
     [
         ({"require": "top"}, "require is 'top'"),
-        ({"require": "bottom: ppm 1000"}, 'the measure "bottom"; expected one of: top'),
+        ({"require": "bottom: ppm 1000"}, 'the measurement "bottom"; expected one of: top'),
         ({"require": "top: ppm 10"}, "expected samples=1000000 or more"),
         ({"require": []}, "require is empty"),
         ({"require": "top: Ppk 1", "by": "colour"}, "by is 'colour'"),

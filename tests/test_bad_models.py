@@ -28,7 +28,18 @@ MISTAKES = {
     "unknown face": ({"contact": GOOD["contact"].replace("'+z'", "'up'")}, ['"up"', 'part "base"', "+x, -x"]),
     "measure on an unknown part": (
         {"measure": "    a.measure('height', tc.Assembly('B').part('lid', tc.Box(1, 1, 1)).point(0, 0, 0), along='z')\n"},
-        ['measure "height"', 'unknown part "lid"', "base, top"],
+        ['measurement "height"', 'unknown part "lid"', "base, top"],
+    ),
+    "part that is located on itself": (
+        {"top": GOOD["top"].replace("tolerance", "on=top, tolerance")},
+        ['part "top"', 'is located on itself: "top" on "top"; locate'],
+    ),
+    "two parts that are located on each other": (
+        {
+            "top": GOOD["top"].replace("tolerance", "on=base, tolerance"),
+            "base": GOOD["base"].replace("tolerance", "on=top, tolerance"),
+        },
+        ['part "base"', 'is located on itself: "base" on "top" on "base"; locate'],
     ),
     "part that is not located": ({"top": ""}, ['part "top"', "not located"]),
     "mesh file that is missing": (
@@ -91,7 +102,7 @@ MISTAKES = {
         {"contact": GOOD["contact"].replace("'+z'", "tc.Near(tc.Assembly('B').part('lid', tc.Box(1, 1, 1)), 1)")},
         ['contact pair "interface"', 'unknown part "lid"'],
     ),
-    "two names alike": ({"measure": 2 * GOOD["measure"]}, ['measure "height"', "2 times"]),
+    "two names alike": ({"measure": 2 * GOOD["measure"]}, ['measurement "height"', "2 times"]),
     "distribution that gives NaN": (
         {"top": GOOD["top"].replace("tolerance=10", "tolerance=__import__('scipy.stats').stats.norm(math.nan, 1)")},
         ['part "top"', "finite"],

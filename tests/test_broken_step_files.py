@@ -8,7 +8,7 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import nightly
 from tolcontact.errors import GeometryFault, OptionError
-from tolcontact.geometry.files import Limits, read_files
+from tolcontact.geometry.files import ReadingLimits, read_files
 
 pytestmark = pytest.mark.slow
 WHOLE = (cases.MODELS / "cover.step").read_text()
@@ -55,7 +55,7 @@ NAMED = ("cut off in the middle", "without its data", "without points", "without
 
 @pytest.mark.parametrize("kinds", [NAMED, *nightly([*BROKEN])], ids=len)
 def test_broken_files_end_in_a_message_each_or_are_read(kinds, tmp_path):
-    limits = Limits(seconds=8.0)  # in which the whole one is read ten times over
+    limits = ReadingLimits(seconds=8.0)  # in which the whole one is read ten times over
     paths = {}
     for number, (kind, text) in enumerate((kind, BROKEN[kind]) for kind in kinds):
         paths[kind] = tmp_path / f"{number}.step"

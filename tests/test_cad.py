@@ -19,7 +19,7 @@ from tolcontact.cli.app import app
 from tolcontact.discretization import discretize
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder, Plane, Sphere, Torus
-from tolcontact.geometry.files import BREP, SURFACES, Limits, read_files
+from tolcontact.geometry.files import BREP, SURFACES, ReadingLimits, read_files
 from tolcontact.geometry.files.product import rigid_motion
 from tolcontact.geometry.files.reading import usual_chord
 from tolcontact.geometry.files.step_surfaces import credible, onto
@@ -197,6 +197,13 @@ def test_what_a_file_does_not_hold_is_told(file, tmp_path):
             tc.build(model)
 
 
+def test_a_place_that_has_only_the_kernels_label_is_called_after_its_product(tmp_path):
+    """The kernel's writer states its own labels as names."""
+    path = tmp_path / "labels.step"
+    path.write_text(assembly(("pin", (0, 0, 0)), ("pin", (9, 0, 0))).replace("use 0", "=>[0:1:1:2]"))
+    assert [(body.name, body.path) for body in tc.bodies_in(path)] == [("pin", ("whole", "pin")), ("use 1", ("whole", "use 1"))]
+
+
 def test_names_that_no_part_may_have_are_changed(tmp_path):
     path = tmp_path / "odd.step"
     path.write_text(assembly(("pin", (0, 0, 0)), ("pin", (9, 0, 0))).replace("use 0", "M6/12").replace("use 1", "-x ?"))
@@ -271,11 +278,11 @@ def test_a_wrong_body_has_a_message_that_lists_the_bodies(file):
 def test_a_file_that_would_be_too_fine_is_cut_more_coarsely(caplog):
     whole = len(shape(tc.Mesh(COVER)).mesh.faces)
     with caplog.at_level(logging.WARNING):
-        coarse = shape(tc.Mesh(COVER), read_files([tc.Mesh(COVER)], Limits(triangles=whole - 1))).mesh
+        coarse = shape(tc.Mesh(COVER), read_files([tc.Mesh(COVER)], ReadingLimits(triangles=whole - 1))).mesh
     assert len(coarse.faces) < whole / 2 and coarse.is_watertight
     assert "triangles within 0.06 mm, since finer ones are too many" in caplog.text
     with pytest.raises(GeometryFault, match="more than the limit of 10"):
-        shape(tc.Mesh(COVER), read_files([tc.Mesh(COVER)], Limits(triangles=10)))
+        shape(tc.Mesh(COVER), read_files([tc.Mesh(COVER)], ReadingLimits(triangles=10)))
 
 
 @pytest.mark.slow

@@ -198,14 +198,14 @@ def test_limits_are_compared_with_the_measure_as_it_is_said(absolute, sides):
 )
 def test_wrong_limits_are_named(limited, said):
     faults = tc.check(stand(**limited))
-    assert len(faults) == 2 and all(said in fault and 'measure "' in fault for fault in faults)
+    assert len(faults) == 2 and all(said in fault and 'measurement "' in fault for fault in faults)
 
 
 def test_a_function_has_its_own_value():
     a = stand()
     a.measure("own", lambda poses: poses.translation(a.parts[0])[2], absolute=True)
     (fault,) = tc.check(a)
-    assert "absolute is for measures of points" in fault
+    assert "absolute is for measurements of points" in fault
 
 
 @pytest.mark.slow

@@ -140,6 +140,16 @@ def test_tables_that_cannot_be_read_are_named(tmp_path):
     a = cases.ra1()
     with pytest.raises(ValueError, match=r'population "none.csv" cannot be read as CSV'):
         a.population(tmp_path / "none.csv")
+    texts = {
+        "one;two\n0.1;0.2\n": r"expected commas between columns, got semicolons; .*\(pandas.read_csv\(\"p.csv\", sep=';'\)\)",
+        "one;two\n0,1;0,2\n": r"""got semicolons; read it with pandas: .* sep=';', decimal=","\)\)""",
+        "one\ttwo\n0.1\t0.2\n": r"got tabs; .* sep='\\t'\)\)",
+        "one\n0,1\n0,2\n": "its rows have more entries than its heading has columns; expected one for each",
+    }
+    for text, message in texts.items():
+        (tmp_path / "p.csv").write_text(text)
+        with pytest.raises(ValueError, match=f'^population "p.csv": .*{message}'):
+            a.population(tmp_path / "p.csv", {"top.A1": "one"})
     with pytest.raises(ValueError, match="a population is a int that is no table"):
         a.population(3)
     with pytest.raises(ValueError, match=r"has no column 'width'; its columns are: one, two"):

@@ -1,6 +1,7 @@
 """A QP that is assembled from its elements is the QP of the whole group."""
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -9,12 +10,13 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import EXACT, PAPER, ROOT, joined, nightly, simulate
 from tolcontact.compilation import ContactGroup
-from tolcontact.compilation.contact_qp import contact_qp
+from tolcontact.compilation.contact_qp import ENERGY_INPUTS, ContactQP, Evaluators, contact_qp
 from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.elements import ElementQP
 from tolcontact.simulation import simulate_blocks
 
 ACCURACY = 1e-11  # mm: rounding of poses, over parts of some 100 mm
+WHITENED_ACCURACY = 1e-8  # of QPs in the norm of the objective, which amplifies rounding where it holds freedoms weakly
 WEAK_ACCURACY = 1e-8  # mm: of freedoms that only eta holds, where few points count
 TOWER, CELLS, CHANNEL, COVER = (str(ROOT / "models" / f"{name}.py") for name in ("tower", "cells", "channel", "cover"))
 CLOSED = tc.Method(resolution="exact", objective="active points")
@@ -34,6 +36,71 @@ def tower(blocks, *, toleranced=False):
         below = block
     a.measure("top", below.point(40, 40, 10), along="z", tolerance=1)
     return a
+
+
+def pressed(blocks, kind):
+    """A tower of blocks that are pressed down: on rigid faces, on springy locators beside them, or on springy faces.
+
+    The second block is located on the first one. On rigid faces the third one is held where it is placed, by turns of any size,
+    and does not touch the second one.
+    """
+    a = tc.Assembly(f"tower on {kind}", method=tc.Method(objective="seating"))
+    below = a.part("base", tc.Box(60, 60, 10), at=(-10, -10, 0), fixed=True)
+    for k in range(1, blocks + 1):
+        is_placed = kind == "rigid faces" and k == 3
+        block = a.part(f"block {k}", tc.Box(40, 40, 10), at=(0, 0, 10 * k + is_placed), fixed=False)
+        sides = {"B1": (5, 0, 5, "y"), "B2": (35, 0, 5, "y"), "C": (0, 20, 5, "x")}
+        feet = {"A1": (5, 5, 0), "A2": (35, 5, 0), "A3": (20, 35, 0)}
+        scheme = [tc.Locator(name, place, along, 0.2) for name, (*place, along) in sides.items()]
+        if kind == "springy locators":
+            scheme += [tc.Locator(n, p, "z", 0.2, stiffness=500 + k, one_sided=n == "A1" and k == 1) for n, p in feet.items()]
+        scheme += [tc.Locator(name, foot, "z", 0.2) for name, foot in feet.items() if is_placed]
+        placing = {"placing": "exact"} if is_placed else {"floating": len(scheme) < 6}
+        a.locate(block, scheme, on=below if k == 2 else None, **placing)
+        block.feature("A", block.face("-z"), datum="A")
+        block.feature("top", block.face("+z"), tc.Profile(0.1, "A"), tc.Parallelism(0.05, "A"))
+        stiffness = 4000 + k if kind == "springy faces" else None
+        a.contact(f"joint {k}", moving=block.face("-z"), reference=below.face("+z"), stiffness=stiffness, points=9)
+        a.force(f"weight {k}", at=block.point(20 + k, 20, 5), vector=(0, 0, -10))
+        below = block
+    a.force("push", at=below.point(40, 20, 10), vector=(-1, 0.5, -3))
+    a.measure("top", below.point(40, 40, 10), along="z", tolerance=1)
+    return a
+
+
+def dense(qp, name, stored):
+    """All entries (realization, entry) of a matrix or a vector of a QP."""
+    sparsity = qp.sparsity(name)
+    entries = np.zeros((len(stored), sparsity.numel()))
+    entries[:, sparsity.find()] = stored
+    return entries
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedQP(ContactQP):
+    """The whole function, with the QPs of all calls: their inputs, matrices and solutions by name."""
+
+    calls: list = field(default_factory=list)
+
+    @property
+    def evaluators(self):
+        functions = super().evaluators
+
+        def finish(**arrays):
+            self.calls.append({name: values.copy() for name, values in arrays.items()})
+            return functions.finish(**arrays)
+
+        return Evaluators(functions.assemble, finish, functions.energy, functions.relate)
+
+
+def recorded(program, samples):
+    """The whole function of a program with one group, after a run."""
+    group = program.groups[0].group
+    qp = contact_qp(program.nominal, group, program.gaps, program.method, program.plugin, program.groups[0].qp.standing)
+    recorded_qp = RecordedQP(**vars(qp))
+    groups = (ContactGroup(group, recorded_qp, ContactSolver(recorded_qp)),)
+    list(simulate_blocks(replace(program, groups=groups), samples=samples, seed=1, threads=1))
+    return recorded_qp
 
 
 def both_ways(model, samples, method):
@@ -66,6 +133,39 @@ def test_elements_give_what_the_whole_function_gives(name, method):
         assert np.abs(whole[quantity] - elements[quantity]).max() < accuracy, quantity
 
 
+@pytest.mark.parametrize(
+    ("name", "objective"),
+    [
+        *product(("rigid faces", "springy locators", "springy faces", "clutch"), ("seating",)),
+        ("rigid faces", "locator stiffness"), *nightly(*product(("hinge", "spindle", "bracket"), ("seating",))),
+    ],
+)  # fmt: skip
+def test_functions_of_elements_are_those_of_the_whole(name, objective):
+    model = pressed(3, name) if name.endswith(("faces", "locators")) else cases.model(name)
+    program = tc.build(model, solver="daqp", method={"objective": objective})
+    whole = recorded(program, samples=8)
+    group = program.groups[0].group
+    elements = ElementQP(program.nominal, group, program.gaps, program.method, program.plugin, whole.standing)
+    for size in ("slacks", "equations", "has_springs"):
+        assert getattr(elements, size) == getattr(whole, size)
+    assert whole.calls
+    for arrays in whole.calls:
+        problem = elements.assemble(**arrays)
+        for matrix in ("h", "g", "a", "lba"):
+            expected, actual = dense(whole, matrix, arrays[matrix]), dense(elements, matrix, problem[matrix])
+            assert np.abs(actual - expected).max() < WHITENED_ACCURACY * max(1, np.abs(expected).max()), matrix
+        for function, inputs in (("finish", arrays | problem), ("energy", {n: arrays[n] for n in ENERGY_INPUTS})):
+            expected, actual = (
+                getattr(qp.evaluators, function)(**values) for qp, values in ((whole, arrays), (elements, inputs))
+            )
+            assert set(actual) == set(expected)
+            for quantity, values in expected.items():
+                accuracy = WHITENED_ACCURACY if quantity == "residual" else ACCURACY
+                assert np.abs(actual[quantity] - values).max(initial=0) < accuracy * max(1, np.abs(values).max(initial=0)), (
+                    quantity
+                )
+
+
 def test_blocks_of_realizations_do_not_change_a_bit():
     runs = [simulate(tower(6), samples=30, block=block, solver="daqp")[1] for block in (7, 1000)]
     for name, values in runs[0].items():
@@ -75,11 +175,14 @@ def test_blocks_of_realizations_do_not_change_a_bit():
 def test_functions_are_shared_by_bodies_however_many():
     kinds = [tc.build(tower(blocks)).groups[0].qp.kinds for blocks in (6, 9)]
     assert kinds[0] == kinds[1] == 2  # a joint with the ground, and one between two blocks
+    # The first three joints differ, since the second block is located on the first one, and so do three blocks: one on the
+    # ground, that one on another block, and the last one with two forces.
+    kinds = [tc.build(pressed(blocks, "springy faces")).groups[0].qp.kinds for blocks in (6, 9)]
+    assert kinds[0] == kinds[1] == 7
 
 
 def test_few_bodies_have_one_function():
     assert not isinstance(tc.build(tower(5)).groups[0].qp, ElementQP)
     assert isinstance(tc.build(tower(6)).groups[0].qp, ElementQP)
-    seated = tower(6)
-    seated.force("weight", at=seated.parts[-1].point(20, 20, 10), vector=(0, 0, -10))
-    assert not isinstance(tc.build(seated, method=tc.Method(objective="seating")).groups[0].qp, ElementQP)
+    by_origin = tc.Method(objective="all points", regularization="identity")
+    assert not isinstance(tc.build(tower(6), method=by_origin).groups[0].qp, ElementQP)

@@ -10,16 +10,47 @@ from rich.console import Console
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
+from models import tower
 from studies.certificates.ends import METHOD, Convex, judged, piece, scene, separation
 from tests.cases.ends import CASES, case, whole_case
 from tests.helpers import PAPER, nightly, simulate
 from tolcontact import poses as pose
+from tolcontact.contact import ContactResolver
 from tolcontact.geometry.meeting import Reach, meeting
 from tolcontact.geometry.surface import Surface
 from tolcontact.report import summary_text
 from tolcontact.simulation.block import simulate_block
 
 FAULTS = ("false contact", "missed contact", "lifted off", "inside")
+
+
+def block_of(mesh):
+    """A block of a mesh that slides over the end of a table."""
+    a = tc.Assembly("a block at an end")
+    table = a.part("table", tc.Box(100, 50, 10), fixed=True)
+    block = a.part("block", tc.Mesh(mesh), at=(70, 12, 10))
+    bottom, stops = [(5, 5, 0), (45, 5, 0), (25, 20, 0)], [(5, 0, 5), (45, 0, 5), (0, 12, 5)]
+    points = zip([*bottom, *stops], "zzzyyx", strict=True)
+    a.locate(block, [tc.Locator(str(k), p, n) for k, (p, n) in enumerate(points)], tolerance=0.4)
+    a.contact("interface", moving=block.face("-z"), reference=table.face("+z"))
+    a.measure("height", block.point(50, 0, 10), along="z")
+    return a
+
+
+def test_a_body_that_stands_twice_in_a_mesh_is_one_body():
+    box = trimesh.creation.box(bounds=[(0, 0, 0), (50, 25, 10)])
+    once, twice = (
+        tc.run(block_of(mesh), samples=20, seed=1, method=METHOD, surfaces=0).measured.values
+        for mesh in (box, trimesh.util.concatenate([box, box.copy()]))
+    )
+    assert np.array_equal(once, twice)
+
+
+def test_bodies_in_one_place_with_other_triangles_have_no_ends():
+    box = trimesh.creation.box(bounds=[(0, 0, 0), (50, 25, 10)])
+    mirrored = trimesh.Trimesh(box.vertices * (-1, 1, 1) + (50, 0, 0), box.faces[:, ::-1], process=False)
+    with pytest.raises(tc.ModelError, match=r'"interface": the face of part "block" has no ends, .* export one of them'):
+        tc.build(block_of(trimesh.util.concatenate([box, mirrored])))
 
 
 def printed(summary):
@@ -204,3 +235,32 @@ def test_deviations_beyond_all_that_were_tried_are_resolved_too(solver):
     assert block.status.tolist() == [1, 1, 0, 1, 1, 0]
     assert block.gap_min[heights < 0, 0, 0] == pytest.approx(heights[heights < 0])
     assert np.abs(block.gap_min[heights < 0, 1]).max() < 1e-9 and np.abs(block.measured[heights < 0, 1, 0]).max() < 1e-9
+
+
+@pytest.mark.parametrize("solver", ["daqp", "graph"])
+@pytest.mark.parametrize("blocks, samples", [(2, 600), *nightly((6, 600))])
+def test_faces_under_load_touch(blocks, samples, solver):
+    """A place that stayed beside its edge would hold faces apart, by up to 1e-4 mm: complementarity is that of the bodies."""
+    _, run = simulate(tower.assembly(blocks), samples=samples, solver=solver)
+    certified = run["status"] == tc.Status.RESOLVED
+    loaded = run["reaction"][certified] > 1e-6 * run["reaction"][certified].max(axis=1, keepdims=True)
+    assert certified.mean() > 0.9 and loaded.sum() > samples
+    assert np.abs(run["gap_min"][certified, 1][loaded]).max() < 1e-9
+
+
+def test_answers_do_not_depend_on_which_of_two_near_places_carries():
+    """In this realization, places of two kinds nearly coincide, and solvers let different ones carry in the first step."""
+    programs = [tc.build(tower.assembly(6), solver=solver) for solver in ("daqp", "graph")]
+    daqp, graph = (simulate_block(p, p.draws(seed=1, start=366, stop=367)) for p in programs)
+    assert daqp.status.tolist() == graph.status.tolist() == [tc.Status.RESOLVED]
+    assert graph.poses == pytest.approx(daqp.poses, abs=1e-9)
+
+
+def test_rounds_of_a_step_do_not_grow_with_the_bodies():
+    """Which places wait beside a deeper one hangs on how far deviations move a pair, not on the length of the chain."""
+    program = tc.build(tower.assembly(48), solver="graph")
+    deviations = program.draws(seed=1, start=0, stop=20)
+    resolvers = [ContactResolver(program, group, max_rounds=2) for group in program.groups]
+    two, all_rounds = (simulate_block(program, deviations, resolvers=rs) for rs in (resolvers, None))
+    assert two.iterations.mean() < 1.05 * all_rounds.iterations.mean()
+    assert two.poses == pytest.approx(all_rounds.poses, abs=1e-9)

@@ -193,4 +193,24 @@ def test_a_part_that_floats_has_to_touch_something():
     a.locate(block, [], floating=True)
     a.measure("z", block.point(0, 0, 0), along="z")
     (fault,) = tc.check(a)
-    assert "floating, and in no contact pair, so nothing decides its place" in fault
+    assert "floating, in no contact pair and on no one-sided locator, so nothing decides its place" in fault
+
+
+def test_one_sided_locators_hold_a_floating_part_as_they_hold_any_other():
+    def on_three_supports(is_floating):
+        a = tc.Assembly("on supports", method=tc.Method(objective="seating"))
+        block = a.part("block", tc.Box(100, 50, 10))
+        points = [(5, 5, 0), (95, 5, 0), (50, 45, 0), (5, 0, 5), (95, 0, 5), (0, 25, 5)]
+        a.locate(
+            block,
+            [tc.Locator(str(k), p, n, 0.2, one_sided=n == "z") for k, (p, n) in enumerate(zip(points, "zzzyyx", strict=True))],
+            floating=is_floating,
+        )
+        a.force("weight", at=block.point(50, 20, 5), vector=(0, 0, -10))
+        a.measure("height", block.point(50, 20, 0), along="z")
+        return a
+
+    afloat, fixed = (tc.run(on_three_supports(k), samples=200, seed=1, surfaces=0) for k in (True, False))
+    assert_resolved(afloat)
+    heights = [results.measured.sel(state="corrected").values for results in (afloat, fixed)]
+    assert np.abs(heights[0] - heights[1]).max() < 1e-9

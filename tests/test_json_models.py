@@ -13,7 +13,7 @@ import tolcontact as tc
 from tests import cases
 from tests.cases import floating, toleranced
 from tests.helpers import nightly, run
-from tolcontact.declaration.codec import Named, Record
+from tolcontact.declaration.codec import DocumentRecord, Named
 from tolcontact.declaration.json_model import json_schema
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import ScriptError
@@ -59,7 +59,7 @@ def test_the_schema_is_sound_and_defines_all_that_it_refers_to():
 
 def test_every_field_of_a_declared_class_stands_in_the_document():
     for record in Named.registry.values():
-        if isinstance(record, Record):
+        if isinstance(record, DocumentRecord):
             members = {name for member in record.fields for name in member.names}
             missing = {name for name in inspect.signature(record.cls).parameters if name not in members}
             assert missing <= {"part", "which", "distribution", "of"}, record.cls

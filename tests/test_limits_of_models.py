@@ -58,6 +58,24 @@ def test_a_model_that_asks_for_too_much_is_refused_at_once(name, tmp_path):
     assert time.process_time() < began + 20 and len(str(caught.value)) < 1000
 
 
+def named(part, station):
+    a = tc.Assembly("names")
+    block = a.part(part, tc.Box(50, 25, 10))
+    check = a.station(station)
+    check.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=0.5)
+    check.measure("height", block.point(0, 0, 0), along="z")
+    return a
+
+
+def test_names_of_parts_and_stations_are_as_long_as_those_of_groups_in_an_archive(tmp_path):
+    """In UTF-8 an umlaut takes two bytes, or three as a letter and its dots, which the archive composes."""
+    longest = "ö" * 127
+    tc.run(named("o\u0308" * 127 + "s", longest + "s"), samples=4, seed=1, out=tmp_path / "long.nc")
+    part_fault, station_fault = tc.check(named("ö" * 128, longest + "st"))
+    assert part_fault.startswith(f"part {'ö' * 40!r}...: the name takes 256 bytes in UTF-8; expected at most 255 (the archive")
+    assert station_fault.startswith(f"station {'ö' * 40!r}...: the name takes 256 bytes")
+
+
 def test_a_name_that_stands_twice_is_refused(tmp_path):
     (tmp_path / "m.json").write_text(json.dumps(PLAIN).replace('"inset": 5', '"inset": 5, "inset": 6'))
     with pytest.raises(tc.ScriptError, match='"inset" stands twice'):

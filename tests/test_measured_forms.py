@@ -1,5 +1,8 @@
 """Forms of measured faces: a seat varies as it does with the measured faces themselves; files that are none of points."""
 
+import re
+import warnings
+
 import numpy as np
 import pytest
 import trimesh
@@ -72,6 +75,25 @@ def test_a_seat_of_measured_faces_varies_as_with_the_faces_themselves(batch, tmp
     assert_gaps_recompute(path)
 
 
+def test_measured_faces_beyond_the_stated_flatness_are_a_warning(tmp_path):
+    """A saddle h u v lies between planes that are 2 h apart, and no closer."""
+    u, v = (grid.ravel() for grid in np.meshgrid(np.linspace(-1, 1, 41), np.linspace(-1, 1, 21)))
+    for name, height in {"a": 0.01, "b": 0.02, "c": 0.06}.items():
+        points = np.column_stack([50 * u + 50, 25 * v + 25, height * u * v + 0.1 * u])
+        np.savetxt(tmp_path / f"{name}.csv", points, delimiter=",")
+    form = tc.Form(measured=str(tmp_path / "*.csv"))
+    with pytest.warns(tc.NominalWarning) as records:
+        tc.build(seat(form))
+    (text,) = [str(record.message) for record in records if "[form]" in str(record.message)]
+    assert re.search(r'part "block": feature "under" \(seats.py:\d+\): 1 of 3 measured faces', text)
+    width = float(re.search(r'the flatness of 0.05 mm that is stated; "c.csv" has (\S+) mm', text)[1])
+    assert width == pytest.approx(0.12, rel=0.03)
+    with warnings.catch_warnings(record=True) as records:
+        warnings.simplefilter("always")
+        tc.build(seat(form, width=0.125))
+    assert not [record for record in records if "[form]" in str(record.message)]
+
+
 def test_files_that_are_no_points_of_the_face_are_refused(batch, tmp_path):
     def fault(form):
         with pytest.raises(tc.ModelError) as error:
@@ -85,5 +107,15 @@ def test_files_that_are_no_points_of_the_face_are_refused(batch, tmp_path):
         np.savetxt(tmp_path / "far" / f"{number}.csv", points)
         (tmp_path / f"{number}.csv").write_text("x,y\n1,2\n")
     assert "mm away from the face; expected points of the face" in fault(tc.Form(measured=str(tmp_path / "far" / "*")))
-    assert "has no points; expected lines of three numbers" in fault(tc.Form(measured=str(tmp_path / "*.csv")))
+    lines = "expected lines of three numbers x, y, z [mm], in the frame of the part"
+    texts = {
+        "x,y\n1,2\n": f"0.csv\" cannot be read as measured points: line 2 is '1,2'; {lines}",
+        "1 2 3\n4 5 6 7": f"0.csv\" cannot be read as measured points: line 2 is '4 5 6 7'; {lines}",
+        "x;y;z\n1,5;2;3": f"line 2 is '1,5;2;3'; {lines}; write decimals with points",
+        "": f'0.csv" has no points; {lines}',
+        "1,2,3\n4,nan,6\n": '0.csv": point 2 is (4, nan, 6); expected finite numbers, so leave it out',
+    }
+    for text, message in texts.items():
+        (tmp_path / "0.csv").write_text(text)
+        assert message in fault(tc.Form(measured=str(tmp_path / "*.csv")))
     assert "has a covariance, a length or lobes beside" in fault(tc.Form(measured=str(batch[0] / "*"), length=3.0))

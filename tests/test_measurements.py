@@ -108,12 +108,12 @@ def nested(depth, measurement):
 
 
 BAD = {
-    "unknown measure": (lambda m, a, b: m("x", tc.Minimum("earlier", "later")), 'unknown measure "later"; those declared'),
+    "unknown measure": (lambda m, a, b: m("x", tc.Minimum("earlier", "later")), 'unknown measurement "later"; those declared'),
     "a cycle": (
         lambda m, a, b: (m("x", tc.Minimum("earlier", "y")), m("y", tc.Maximum("x", "earlier"))),
-        'measure "x" (test_measurements.py:',
+        'measurement "x" (test_measurements.py:',
     ),
-    "itself": (lambda m, a, b: m("x", tc.Sum("x", "earlier")), 'unknown measure "x"'),
+    "itself": (lambda m, a, b: m("x", tc.Sum("x", "earlier")), 'unknown measurement "x"'),
     "one measurement": (lambda m, a, b: m("x", tc.Minimum("earlier")), "expected two or more"),
     "three": (lambda m, a, b: m("x", tc.Difference(*["earlier"] * 3)), "expected two"),
     "unlike units": (
@@ -183,8 +183,8 @@ def refused(folder):
     [
         ({"kind": "gape", "face": 1}, "a point, or a measurement whose kind is one of gap, flush, clearance"),
         ({"kind": "gap", "station": {"part": "table", "position": [0, 0, 0]}}, "it has no 'face'"),
-        ({"kind": "minimum", "measurements": ["later", "gap 0"]}, 'unknown measure "later"'),
-        ({"kind": "minimum", "measurements": [{"kind": "point"}, "gap 0"]}, "the name of a measure, or a measurement"),
+        ({"kind": "minimum", "measurements": ["later", "gap 0"]}, 'unknown measurement "later"'),
+        ({"kind": "minimum", "measurements": [{"kind": "point"}, "gap 0"]}, "the name of a measurement, or a measurement"),
         ({"kind": "angle", "first": {"part": "table"}, "second": {"part": "nobody"}}, "the name of a part"),
     ],
 )

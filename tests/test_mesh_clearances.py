@@ -8,7 +8,7 @@ import trimesh
 from scipy.optimize import lsq_linear
 
 import tolcontact as tc
-from tests.cases.measured import check_invariance, motions, observed, placed, two
+from tests.cases.measured import check_invariance, motions, observed, placed, shaft, two
 from tests.helpers import nightly
 
 SIZES = np.array([40.0, 30.0, 10.0]), np.array([12.0, 8.0, 6.0])
@@ -71,6 +71,21 @@ def test_overlaps_are_as_deep_as_a_tip_in_a_face_and_as_two_ridges_that_cross():
             np.testing.assert_allclose(values[:3], heights[:3], atol=1e-9)
         else:
             np.testing.assert_allclose(values, heights, atol=tolerance)
+
+
+def test_whole_shafts_end_where_their_ends_do():
+    """Their round faces alone are two outer cylinders, but their ends are nearer."""
+    still = {"first_at": (0, 0, 0), "first_rotation": (0, 0, 0)}
+    R, t = np.tile(np.eye(3), (3, 2, 1, 1)), np.zeros((3, 2, 3))
+    for axis, nearest, chords in ((2, 10.0, 0.0), (0, 3.0, 7 * (1 - np.cos(np.pi / 48)))):
+        assembly, first, second = two(
+            shaft(4.0), shaft(3.0), at=(nearest + (30 if axis == 2 else 7)) * np.eye(3)[axis], **still
+        )
+        assembly.measure("clearance", tc.Clearance(first.face(), second.face()))
+        t[:, 1, axis] = steps = np.array([0.0, -0.1, -0.2])
+        values = observed(assembly, R, t)[:, 0]
+        assert (values >= nearest + steps - 1e-9).all() and (values <= nearest + steps + chords + 1e-9).all()
+        t[:] = 0
 
 
 def test_a_ring_of_triangles_is_as_far_from_a_wall_as_its_tube():

@@ -44,7 +44,7 @@ KINDS = {
     "part": "part",
     "locator": "locator",
     "pair": "contact pair",
-    "measure": "measure",
+    "measure": "measurement",
     "force": "force",
 }
 

@@ -62,7 +62,7 @@ MISTAKES = {
     "gap of a pair": ({"at": (20, 12.5, 13)}, r'\[gap\] contact pair "interface" .* 3 mm apart .* never touch'),
     "point of a measure": (
         {"point": (500, 0, 10)},
-        r'\[point\] measure "height" .* \(500, 0, 10\) lies 450 mm off part "block"',
+        r'\[point\] measurement "height" .* \(500, 0, 10\) lies 450 mm off part "block"',
     ),
     "point of the assembly": (
         {"at": (70, 25, 10), "changes": off("A2", (118, 27, 10), "z")},
@@ -79,7 +79,7 @@ MISTAKES = {
     ),
     "limits beside the displacement": (
         {"limits": (19, 21)},
-        r'\[limits\] measure "height" .* 0 is outside .*\(19 to 21 mm\).*absolute=True measures the coordinate',
+        r'\[limits\] measurement "height" .* 0 is outside .*\(19 to 21 mm\).*absolute=True measures the coordinate',
     ),
     "open limit": ({"limits": (None, -5)}, r"\[limits\] .*\(open to -5 mm\); check the limits"),
     "limits far off": ({"limits": (-90, 90)}, r"\[limits\] .* sigma away from its nominal value 0"),

@@ -158,7 +158,7 @@ def test_the_command_says_that_an_interval_is_not_reached(quiet, tmp_path):
         ({"until": "corner height"}, "until is 'corner height'"),
         ({"until": "corner height: mean +-0"}, "until is"),
         ({"until": "corner height: width +-1 %"}, '"width"; expected one of: ppm, mean'),
-        ({"until": "height: mean +-1 %"}, 'the measure "height"; expected one of: corner height'),
+        ({"until": "height: mean +-1 %"}, 'the measurement "height"; expected one of: corner height'),
         ({"until": 3}, "until is 3"),
     ],
 )

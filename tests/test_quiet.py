@@ -1,6 +1,8 @@
 """Solvers print nothing, whatever becomes of their problems, and what users print is not lost."""
 
+import ctypes
 import io
+import os
 import sys
 import threading
 from contextlib import redirect_stdout
@@ -10,6 +12,7 @@ import pytest
 import tolcontact as tc
 from tests import cases
 from tests.helpers import SEATED, nightly, run, script
+from tolcontact.analyses.c_stdout import muted_c_stdout
 from tolcontact.compilation import usable_plugins
 from tolcontact.mechanics.quiet import quiet
 
@@ -23,6 +26,44 @@ def test_solvers_print_nothing(solver, case, capfd):
     a = {"block on six": lambda: cases.block_on_six(1.0), "parked": cases.shaft_in_a_v}[case]()
     tc.run(a, samples=300 if solver == "qpoases" else 4, seed=1, solver=solver, method=SEATED, surfaces=0)
     assert capfd.readouterr() == ("", "")
+
+
+def test_the_worst_case_prints_nothing(capfd):
+    """HiGHS prints a line of its own at an integer program of the shift."""
+    a = tc.Assembly("a block on a table")
+    table = a.part("table", tc.Box(100, 50, 10), fixed=True)
+    block = a.part("block", tc.Box(50, 25, 10), at=(40, 12.5, 10))
+    a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=0.5)
+    a.contact("interface", moving=block.face("-z"), reference=table.face("+z"))
+    a.measure("height", block.point(50, 0, 10), along="z")
+    a.measure("shift", block.point(0, 0, 10), along="x")
+    tc.worst_case(a, solver="daqp")
+    ctypes.CDLL(None).fflush(None)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_only_c_code_is_muted_and_only_while_a_thread_is_inside(capfd):
+    library = ctypes.CDLL(None)
+    entered, printed = threading.Event(), threading.Event()
+
+    def muted():
+        with muted_c_stdout():
+            library.puts(b"a solver's line")
+            entered.set()
+            printed.wait(10)
+            library.puts(b"another line")
+
+    worker = threading.Thread(target=muted)
+    worker.start()
+    entered.wait(10)
+    with muted_c_stdout():
+        library.puts(b"a second solver's line")
+        os.write(1, b"a user's line\n")
+    printed.set()
+    worker.join()
+    library.puts(b"the end")
+    library.fflush(None)
+    assert capfd.readouterr() == ("a user's line\nthe end\n", "")
 
 
 def test_what_other_threads_print_is_not_lost(capsys):

@@ -101,7 +101,7 @@ def test_a_place_where_nothing_holds_the_part_is_passed_over():
         ({"between": ((0, 0), (1, 1))}, "expected two different corners"),
         ({"between": ((1, 1, 0), (1, 1, 0))}, "expected two different corners"),
         ({"least": "height: mean"}, 'least has "mean"; expected one of: 6 sigma, ppm'),
-        ({"least": "depth: ppm"}, 'the measure "depth"; expected one of: height'),
+        ({"least": "depth: ppm"}, 'the measurement "depth"; expected one of: height'),
         ({"between": ((10, 0, 0), (50, 0, 0))}, "cannot stand anywhere"),
         ({"samples": 1}, "samples is 1"),
     ],

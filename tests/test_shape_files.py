@@ -12,7 +12,7 @@ import tolcontact as tc
 from tests.shapes import BLOCK, refusal
 from tests.step_files import step_block
 from tolcontact.errors import GeometryFault
-from tolcontact.geometry.files import Limits
+from tolcontact.geometry.files import ReadingLimits
 from tolcontact.geometry.shapes import shape
 
 STL, ASCII_STL = BLOCK.export(file_type="stl"), BLOCK.export(file_type="stl_ascii").encode()
@@ -123,7 +123,7 @@ def test_ten_million_triangles_are_refused_with_their_number_before_they_are_rea
     with path.open("wb") as file:
         file.write(b"\0" * 80 + (10_000_000).to_bytes(4, "little"))
         file.truncate(84 + 50 * 10_000_000)
-    with pytest.raises(GeometryFault, match=f"10000000 triangles, more than the limit of {Limits().triangles}"):
+    with pytest.raises(GeometryFault, match=f"10000000 triangles, more than the limit of {ReadingLimits().triangles}"):
         shape(tc.Mesh(path))
     (tmp_path / "huge.ply").write_bytes(b"ply\nformat ascii 1.0\nelement vertex 3\nelement face 10000000\nend_header\n")
     with pytest.raises(GeometryFault, match="10000000 triangles"):

@@ -18,7 +18,7 @@ from tests.helpers import finish, run, script, start
 from tests.shapes import BLOCK, refusal
 from tests.step_files import Step, step_block
 from tolcontact.discretization import discretize
-from tolcontact.geometry.files import Limits, read_files
+from tolcontact.geometry.files import ReadingLimits, read_files
 from tolcontact.geometry.shapes import shape
 
 
@@ -83,7 +83,7 @@ def test_all_faults_are_said_at_once_though_the_reader_dies_twice(tmp_path):
 @pytest.mark.slow
 def test_a_file_that_takes_too_much_memory_is_a_fault(tmp_path):
     trimesh.creation.icosphere(7).export(tmp_path / "fine.obj")
-    (fault,) = read_files([tc.Mesh(tmp_path / "fine.obj")], Limits(memory=350 * 2**20)).values()
+    (fault,) = read_files([tc.Mesh(tmp_path / "fine.obj")], ReadingLimits(memory=350 * 2**20)).values()
     assert "takes more than 0.342 GiB of memory" in str(fault)
 
 

@@ -139,5 +139,5 @@ def test_a_mesh_in_inches_taken_as_mm_is_warned_of_by_its_size(tmp_path):
         discretize(wrongly)
         assert discretize(lid_on(path, "in")).parts[0].mesh.extents[0] == pytest.approx(203.2)
     wrongly.measure("far end", wrongly.parts[0].point(203.2, 0, 0), along="z")
-    with pytest.warns(UnitsWarning, match='10.05 mm across, but the point of measure "far end" lies 195.2 mm away from it'):
+    with pytest.warns(UnitsWarning, match='10.05 mm across, but the point of measurement "far end" lies 195.2 mm away from it'):
         discretize(wrongly)

@@ -131,3 +131,14 @@ def test_without_forces_locators_hold_as_ever():
         for stiffness in ([400.0, None, 700.0], [None, None, None])
     )
     assert (stated == left_out).all()
+
+
+def test_a_stiffness_of_a_fixed_part_is_refused():
+    model = bar_on_springs()
+    base = model.part("base", tc.Box(10, 10, 10), at=(500, 0, 0), fixed=True)
+    places = {"S": ((0, 0, 0), "z"), "A2": ((10, 0, 0), "z"), "A3": ((0, 10, 0), "z"), "B1": ((0, 0, 0), "y")}
+    places |= {"B2": ((10, 0, 0), "y"), "C": ((0, 5, 0), "x")}
+    stiffness = dict.fromkeys(places) | {"S": 100}
+    model.locate(base, [tc.Locator(name, p, n, 0.1, stiffness=stiffness[name]) for name, (p, n) in places.items()])
+    with pytest.raises(tc.ModelError, match=r'locator "base.S": .*part "base" is fixed=True.*leave stiffness out'):
+        tc.build(model)

@@ -134,3 +134,16 @@ def test_poses_do_not_depend_on_blocks():
     _, whole = simulate(padded_block(), samples=40, solver="graph")
     _, single = simulate(padded_block(), samples=40, solver="graph", block=1)
     assert np.array_equal(whole["poses"], single["poses"])
+
+
+def test_a_pressed_pad_is_not_in_conflict():
+    """A block that is too long for two walls, pressed on a pad."""
+    model = padded_block()
+    (block,) = (part for part in model.parts if part.name == "block")
+    for name, x, own, facing in (("left", 50, "-x", "+x"), ("right", 219.9, "+x", "-x")):
+        wall = model.part(name, tc.Box(50, 300, 50), at=(x, 0, 50), fixed=True)
+        model.contact(name, moving=block.face(own), reference=wall.face(facing))
+    results = tc.run(model, samples=5, solver="daqp")
+    assert (results["status"] == Status.NOT_ASSEMBLABLE).any()
+    conflicts = dict(zip(results["pair"].values.tolist(), tc.summarize(results)["conflicts"].values.tolist(), strict=True))
+    assert conflicts["pad"] == 0 and conflicts["left"] > 0 and conflicts["right"] > 0

@@ -116,8 +116,8 @@ def pinned(a, b):
 FAULTS = {
     "a part is not held": (
         lambda line, a, b, weld, check, ab: check.locate(line.part("c", tc.Box(20, 20, 20)), []),
-        'measure "height" (test_station_runs.py:{}): station "check" does not hold joint "ab" with part "b"; locate it there: '
-        "check.locate(...)",
+        'measurement "height" (test_station_runs.py:{}): station "check" does not hold joint "ab" with part "b"; locate it '
+        "there: check.locate(...)",
     ),
     "a part of a joint is located": (
         lambda line, a, b, weld, check, ab: check.locate(b, cases.box_scheme(b), tolerance=1),
@@ -159,7 +159,7 @@ FAULTS = {
         lambda line, a, b, weld, check, ab: (
             check.locate(ab, pinned(a, b), tolerance=1), line.measure("b", b.point(0, 0, 0), along="x")
         ),
-        'measure "b" (test_station_runs.py:{}) belongs to no station; declare it in one: station.measure(...)',
+        'measurement "b" (test_station_runs.py:{}) belongs to no station; declare it in one: station.measure(...)',
     ),
 }  # fmt: skip
 

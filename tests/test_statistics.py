@@ -140,7 +140,7 @@ def test_sums_of_fields_go_on_from_where_they_were():
     for fields, spans in ((whole, [(0, 20), (20, 40), (40, 60)]), (half, [(0, 20), (20, 40)])):
         for first, last in spans:
             fields.merge(fields.sums(poses[first:last], first))
-    rest.go_on_from(half.numbers)
+    rest.resume_from(half.numbers)
     rest.merge(rest.sums(poses[40:], 40))
     assert all(np.array_equal(one, other) for one, other in zip(whole.numbers, rest.numbers, strict=True))
 

@@ -190,7 +190,7 @@ def test_a_limit_at_a_stop_hides_nothing(limits):
 
 
 def test_what_has_no_rare_event_is_refused():
-    with pytest.raises(tc.OptionError, match="no measure has limits"):
+    with pytest.raises(tc.OptionError, match="no measurement has limits"):
         tc.tails(cases.one_dimensional(0), method=PAPER)
     with pytest.raises(tc.OptionError, match="samples is 100;"):
         tc.tails(limited(4), samples=100)

@@ -43,7 +43,7 @@ LAZY = {
     "dask": ("simulation/cluster.py", "simulation/lazy.py"),
     "dask.array": ("simulation/lazy.py",),
     "distributed": ("simulation/cluster.py",),
-    "pandas": ("declaration/contributor.py",),
+    "pandas": ("declaration/dependence.py",),
     "trimesh": ("geometry/files/worker.py",),  # in a process that mostly reads STEP files
     "openpyxl": ("report/spreadsheet.py",),
     "tolcontact.kernel.step_bodies": ("geometry/files/worker.py",),  # in a process of its own
@@ -196,7 +196,7 @@ def test_tests_reach_no_private_name_and_change_no_module():
         "import tolcontact._version",
         "program.place._evaluate",
         "class A(B):\n    def f(self): self._write(0)",
-        "from tolcontact.archive import writer\nwriter.LaidOut = None",
+        "from tolcontact.archive import writer\nwriter.RawFile = None",
         "from tolcontact.archive import ArchiveWriter\nArchiveWriter.checkpoint_interval = 0.0",
         "from tolcontact.compilation.plugins import PLUGINS\nPLUGINS['daqp'] = 1",
         "from models import hinge\npatched.setattr(hinge, 'PLACE', 0)",

@@ -17,7 +17,7 @@ from tests.cases.fasteners import fasteners
 from tests.helpers import PAPER, call, nightly
 from tests.test_datums import plate
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.allowed_space import Region
+from tolcontact.analyses.allowed_space import AllowedRegion
 from tolcontact.analyses.analysis import Analysis
 from tolcontact.analyses.engine import Engine
 from tolcontact.analyses.extreme_search import Effort, Evaluation
@@ -101,7 +101,7 @@ def test_what_is_found_is_what_the_engine_says_of_the_combination():
     assert few_searches(program, 64).equals(found)
     for state in (0, 1):
         own = found.deviations.isel(measure=0, state=state).values
-        measured = Evaluation(Engine(program, map_blocks), Region(program.draws, seed=1)).corrected(own)
+        measured = Evaluation(Engine(program, map_blocks), AllowedRegion(program.draws, seed=1)).corrected(own)
         assert measured[:, state, 0] == pytest.approx(found.worst.isel(measure=0, state=state).values, abs=1e-12)
 
 
@@ -115,7 +115,7 @@ def with_idle_parts(a, count):
 
 def influences_of(a, count=16):
     program, rng = tc.build(a, solver="daqp"), np.random.default_rng(1)
-    area = Region(program.draws, seed=1)
+    area = AllowedRegion(program.draws, seed=1)
     points = area.scattered(rng, count)
     evaluation = Evaluation(Engine(program, map_blocks), area)
     influences = Influences(area, evaluation, np.ones(len(program.nominal.measures)))
@@ -140,7 +140,7 @@ def test_influences_are_those_of_contact_too():
 def test_an_influence_that_shows_only_at_some_points_is_found_there():
     """CASES C1: the height max(0, z) does not change between two points below, and does between one below and one above."""
     program = tc.build(cases.one_dimensional(0), solver="daqp", method=PAPER)
-    area = Region(program.draws, seed=1)
+    area = AllowedRegion(program.draws, seed=1)
     influences = Influences(area, Evaluation(Engine(program, map_blocks), area), np.ones(1))
     is_height = np.array([label == "block.Z" for label in program.nominal.contributors])
     low, lower, above = (np.where(is_height, z, area.middle)[None] for z in (-1.5, -2.5, 2.5))
@@ -171,7 +171,7 @@ def varied():
 
 
 def region(a):
-    return Region(tc.build(a, solver="daqp").draws, seed=1), list(tc.build(a).nominal.contributors)
+    return AllowedRegion(tc.build(a, solver="daqp").draws, seed=1), list(tc.build(a).nominal.contributors)
 
 
 def test_every_contributor_has_the_range_of_its_drawing():

@@ -184,7 +184,7 @@ def test_a_measure_has_limits_around_its_nominal_value():
 @pytest.mark.parametrize("wrong", ["H7", "abc", "±0.1 inch", (0.1, -0.1), (0.1, 0.1), 0, "0", -1, True, {}])
 def test_a_wrong_tolerance_of_a_measure_has_one_message_that_names_it(wrong):
     (fault,) = tc.check(block(0.2, tolerance=wrong))
-    assert fault.startswith('measure "height" (')
+    assert fault.startswith('measurement "height" (')
     assert "tolerance is" in fault
 
 

@@ -1,4 +1,4 @@
-"""Checksums, which show whether values are still those that were written."""
+"""Checksums, which show whether values have changed since they were written."""
 
 from typing import Any
 

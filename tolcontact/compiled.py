@@ -6,9 +6,10 @@ refuses to import if no folder can be written.
 
 import functools
 import hashlib
+import io
 import pickle
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from types import CodeType
 from typing import Any
 
@@ -18,16 +19,18 @@ from numba import njit
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
+from numba.core.environment import Environment, lookup_environment
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from tolcontact import code_cache
 
+_REBUILDER = ("numba.core.environment", "_rebuild_env")  # what Numba stores to get an environment back
 CONSTANTS = (bool, int, float, str, bytes, tuple, type(None))
 
 
 def compiled(function: Callable[..., Any], *, inline: bool = False, counts: bool = True, inner: bool = False) -> Any:
-    """Return the function, compiled when it is first called; `inline`, it becomes part of those that call it.
+    """Return the function, compiled when it is first called; with `inline`, it becomes part of its callers.
 
     counts   whether it counts references to arrays. A function that creates no array need not; if it passes on tuples of many
              arrays, counting takes longer than the arithmetic.
@@ -59,7 +62,7 @@ class _Cache(NullCache):  # type: ignore[misc]
         rtsys.initialize(target_context)
         code = code_cache.load(self._key(sig, target_context.codegen()))
         try:
-            return None if code is None else CompileResult._rebuild(target_context, *pickle.loads(code))
+            return None if code is None else CompileResult._rebuild(target_context, *_Unpickler(io.BytesIO(code)).load())
         except Exception:  # another build of the same version may lack anything
             return None
 
@@ -71,6 +74,27 @@ class _Cache(NullCache):  # type: ignore[misc]
     def _key(self, sig: Any, codegen: Any) -> str:
         parts = [numba.__version__, sys.version, repr(sig), repr(codegen.magic_tuple()), *_description(self._dispatcher, set())]
         return hashlib.blake2b("\n".join(parts).encode(), digest_size=20).hexdigest()
+
+
+class _Unpickler(pickle.Unpickler):
+    """The reader of stored code, which does not import the modules of Numba that the functions in it come from.
+
+    It takes as long to import these as to load the code, and only a compiler needs their names.
+    """
+
+    def find_class(self, module: str, name: str) -> Any:
+        return _environment if (module, name) == _REBUILDER else super().find_class(module, name)
+
+
+def _environment(module: str, constants: Sequence[Any], name: str) -> Environment:
+    """Return the environment of a function: objects that its code may need, such as those of an exception."""
+    environment = lookup_environment(name)
+    if environment is None:
+        environment = Environment(sys.modules[module].__dict__ if module in sys.modules else {"__name__": module})
+        environment.consts[:] = constants
+        environment.env_name = name
+        Environment._memo[name] = environment
+    return environment
 
 
 def _description(dispatcher: Dispatcher, known: set[Dispatcher]) -> Iterator[str]:

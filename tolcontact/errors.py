@@ -26,8 +26,8 @@ def clipped(text: str, max_length: int = 400) -> str:
     return line if len(line) <= max_length else f"{line[:max_length]}..."
 
 
-class Declared(Protocol):
-    """A declared thing with a name and the line of the script that declares it."""
+class NamedDeclaration(Protocol):
+    """A declaration with its name and the line of the script."""
 
     @property
     def name(self) -> str: ...
@@ -42,7 +42,7 @@ def nearest_name(name: str, names: Iterable[str]) -> str:
     return f'; the nearest name is "{shown(nearest)}"' if likeness.get(nearest, 0.0) >= MIN_LIKENESS else ""
 
 
-def designation(kind: str, thing: Declared) -> str:
+def designation(kind: str, thing: NamedDeclaration) -> str:
     """Return how a message names a declared thing: its kind, its name and the line of the script."""
     return f'{kind} "{thing.name}" ({thing.declared_at})'
 

@@ -50,7 +50,7 @@ class Limits(NamedTuple):
         return self.below(x) | self.above(x)
 
     def settled(self, x: np.ndarray) -> np.ndarray:
-        """Return values of which those that are a limit, to the accuracy, equal it."""
+        """Return values; each that lies at a limit, to the accuracy, equals the limit."""
         for limit in (self.lower, self.upper):
             x = np.where(np.abs(x - limit) <= self.accuracy, limit, x)
         return x

@@ -21,7 +21,7 @@ import tolcontact as tc
 from studies.robustness.attempts import Ending, Table, attempt, contents
 from studies.robustness.step_texts import damaged, hostile
 from tests.hostile import HOSTILE
-from tolcontact.geometry.files import Limits
+from tolcontact.geometry.files import ReadingLimits
 
 ROOT = Path(__file__).resolve().parents[2]
 MODELS = ("ra1", "channel")
@@ -154,7 +154,7 @@ def _try_step(group: str, kind: str, path: Path, content: bytes, table: Table) -
 
 def _step_fault(ending: Ending, megabytes: float) -> str:
     """Return what is wrong with the ending of a command that reads a STEP file; empty if nothing is."""
-    limits = Limits()
+    limits = ReadingLimits()
     if ending.code == 1 or (ending.code == 2 and ending.error.count("error: ") != 1):
         return "not one message"
     if ending.seconds > 2 * (limits.seconds + limits.seconds_per_mb * megabytes) + 10:  # it is tried twice

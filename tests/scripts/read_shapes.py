@@ -4,11 +4,11 @@ import sys
 
 import tolcontact as tc
 from tolcontact.errors import GeometryFault
-from tolcontact.geometry.files import Limits, read_files
+from tolcontact.geometry.files import ReadingLimits, read_files
 from tolcontact.geometry.shapes import shape
 
 meshes = [tc.Mesh(name) for name in sys.argv[2:]]
-contents = read_files(meshes, Limits(seconds=float(sys.argv[1])))
+contents = read_files(meshes, ReadingLimits(seconds=float(sys.argv[1])))
 for mesh in meshes:
     try:
         shape(mesh, contents)

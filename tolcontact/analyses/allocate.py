@@ -27,7 +27,8 @@ STEP = 0.1  # of ranges, for differences
 BATCHES = 32  # of realizations, for intervals of effects
 MAX_STEPS, USUAL_STEPS = 24, 8  # of one search: at most, and for the forecast
 FIRST_RADIUS, LAST_RADIUS = 0.5, 0.004  # of the region that a step stays in, in logarithms of the factors
-MIN_EFFECT_SAMPLES, EFFECT_SHARE = 512, 4  # realizations for effects: at least, and one in so many; of all groups so many times
+# Realizations for the effect of a group: at least; at most samples / 4, and 4 samples / groups.
+MIN_EFFECT_SAMPLES, EFFECT_SHARE = 512, 4
 COMMON_FACTORS = np.geomspace(MIN_FACTOR, MAX_FACTOR, 13)  # of all ranges, where requirements cannot be met
 PENALTY = 10.0  # for missed margins, in the costs that the same margins save to first order
 MIN_GAIN = 1e-4  # of the cost
@@ -64,7 +65,7 @@ def allocate(
     values and slopes, on the same draws; slopes follow from realizations near the limits alone. SLSQP minimizes the cost within
     a region that shrinks when a step fails (a sequential separable approximation; Svanberg, 1987). If the fresh run misses a
     requirement, the search continues with a larger margin. Effects follow from samples / 4 realizations, or 4 samples / groups
-    if that is less, but at least 512. `progress` is called with the numbers of realizations simulated, and of all (roughly).
+    if that is less, but at least 512. `progress` is called with the number of realizations simulated, and about that of all.
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses. Raises OptionError also for a
     model in which no range varies.
     """

@@ -20,7 +20,7 @@ LP_TOLERANCES = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolera
 COARSE_TOLERANCE, FINE_TOLERANCE = 1e-2, 1e-7  # of a zone's width: distance between tangents and a round zone
 
 
-class Region:
+class AllowedRegion:
     """The region of a model. A point (contributor,) is a combination of deviations before shared causes drive them.
 
     lower, upper   (contributor,) bounds of points

@@ -58,7 +58,7 @@ def contributions(
         method=method, into=into, client=client, progress=progress,
     )  # fmt: skip
     program = analysis.program
-    deviations = program.draws.own(analysis.sampled_deviations())
+    deviations = program.draws.without_shared_causes(analysis.sampled_deviations())
     groups, units = (_varying_groups(program, by, deviations, correlated=correlated) for correlated in (True, False))
     analysis.check_varies(groups)
     released = ReleasedDraws(program.draws, units) if len(units) > len(groups) else None
@@ -70,7 +70,7 @@ def contributions(
         samples = int(np.clip((BUDGET - engine.simulated) // realizations_each, MIN_SAMPLES, MAX_SAMPLES))
     engine.total = engine.simulated + samples * realizations_each
     measured, A, _ = engine.simulate_design(mixed, samples, seed=seed, observe=_FirstDeviations(mixed.size))
-    slopes, A = total_derivatives(program), program.draws.own(A[:, 0])
+    slopes, A = total_derivatives(program), program.draws.without_shared_causes(A[:, 0])
     values = {
         **_indices(screening, measured, program.accuracies),
         "shapley": _shapley_effects(engine, released, samples, seed),

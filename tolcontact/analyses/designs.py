@@ -83,13 +83,13 @@ class MixedDraws(Design):
 
     def members(self, seed: int, start: int, stop: int) -> np.ndarray:
         """Return deviations (base, member, contributor) of base realizations `start` to `stop`."""
-        A = self._draws.own(self._draws(seed=seed, start=start, stop=stop))
-        B = self._draws.own(self._draws(seed=seed, start=REDRAWN_START + start, stop=REDRAWN_START + stop))
+        A = self._draws.without_shared_causes(self._draws(seed=seed, start=start, stop=stop))
+        B = self._draws.without_shared_causes(self._draws(seed=seed, start=REDRAWN_START + start, stop=REDRAWN_START + stop))
         members = np.repeat(A[:, None], self.size, axis=1)
         members[:, 1] = B
         for member, columns in enumerate(self._groups, start=2):
             members[:, member, columns] = B[:, columns]
-        members = self._draws.driven(members)
+        members = self._draws.with_shared_causes(members)
         self._draws.add_shifts(members.reshape(-1, members.shape[2]))
         return members
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.allowed_space import Region
+from tolcontact.analyses.allowed_space import AllowedRegion
 from tolcontact.analyses.engine import Engine
 from tolcontact.analyses.ridge import ridge_end
 
@@ -25,7 +25,7 @@ NEARBY_POINTS, NEARBY_STEP = 4, 0.1  # points about a search that did not gain, 
 MAX_STEPS = 200
 MAX_POLISHES, POLISHING_STEP, POLISHED = 3, 0.25, 0.2  # of the best searches; their first step, the finest one over that before
 POLISHING_SHARE = 0.15  # of the combinations tried before: after as many more, polishing ends
-MIN_POLISH = 1e-3  # of a measure's spread: a smaller gain is no reason to go on
+MIN_POLISH = 1e-3  # of a measure's spread: a smaller gain is no reason to continue
 MAX_FINISHES = 4
 DIFFERENCE_STEP = 1e-4  # of the ranges, for slopes at an end
 
@@ -35,7 +35,7 @@ class Effort:
     """The thoroughness of searches.
 
     best, random  number of searches for each extreme value, from the best combinations and from random ones
-    finest_step   the step at which a search ends, in shares of the ranges; the best ones go on to a fifth of that
+    finest_step   the step at which a search ends, in shares of the ranges; the best ones continue to a fifth of that
     """
 
     best: int
@@ -59,9 +59,9 @@ class Effort:
 
 
 class Evaluation:
-    """Measures at points of the region (see Region). No point is simulated twice."""
+    """Measures at points of the region (see AllowedRegion). No point is simulated twice."""
 
-    def __init__(self, engine: Engine, region: Region) -> None:
+    def __init__(self, engine: Engine, region: AllowedRegion) -> None:
         self._engine, self._region = engine, region
         self._known: dict[bytes, np.ndarray] = {}
 
@@ -167,8 +167,8 @@ class Searcher:
     """
 
     def __init__(
-        self, region: Region, evaluation: Evaluation, spread: np.ndarray, is_active: np.ndarray, rng: np.random.Generator,
-        finest_step: float,
+        self, region: AllowedRegion, evaluation: Evaluation, spread: np.ndarray, is_active: np.ndarray,
+        rng: np.random.Generator, finest_step: float,
     ) -> None:  # fmt: skip
         self._region, self._evaluation, self._spread, self._rng = region, evaluation, spread, rng
         self._is_active, self._finest_step = is_active, finest_step

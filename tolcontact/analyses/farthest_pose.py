@@ -20,7 +20,8 @@ import numpy as np
 import scipy
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.allowed_space import Region
+from tolcontact.analyses.allowed_space import AllowedRegion
+from tolcontact.analyses.c_stdout import muted_c_stdout
 from tolcontact.analyses.linear_model import LinearModel
 from tolcontact.compilation import Program
 
@@ -30,7 +31,7 @@ MAX_BINARY, MAX_SECONDS = 64, 30.0  # rows that may carry or be open; time for o
 MAX_CONDITION = 1e8  # of the objective's quadratic term: contact points with a larger one do not hold all freedoms
 
 
-def farthest_poses(program: Program, region: Region, model: LinearModel) -> np.ndarray:
+def farthest_poses(program: Program, region: AllowedRegion, model: LinearModel) -> np.ndarray:
     """Return bounds (measure, state, end); those of the raw state are without contact."""
     bounds = np.empty((len(model.measures), len(terms.STATES), len(terms.ENDS)))
     # With stations, reactions of a later one do not act on the motions of an earlier one.
@@ -62,7 +63,7 @@ class _Reactions:
     largest_reaction: np.ndarray
 
 
-def _reactions(model: LinearModel, region: Region) -> _Reactions | None:
+def _reactions(model: LinearModel, region: AllowedRegion) -> _Reactions | None:
     """Return bounds of gaps and reactions.
 
     There are none if there are too many rows, if contact points do not hold all freedoms, or if no motion opens all gaps.
@@ -102,7 +103,14 @@ class _Problem:
     """
 
     def __init__(
-        self, model: LinearModel, region: Region, measure: int, sense: int, *, is_moved: bool, reactions: _Reactions | None
+        self,
+        model: LinearModel,
+        region: AllowedRegion,
+        measure: int,
+        sense: int,
+        *,
+        is_moved: bool,
+        reactions: _Reactions | None,
     ) -> None:
         self._region = region
         contributors = len(region.lower)
@@ -153,10 +161,11 @@ class _Problem:
         bound, contributors = np.inf, len(self._region.lower)
         for _ in range(MAX_ROUNDS):
             self._add(planes, -np.inf, ends)
-            solution = scipy.optimize.milp(
-                -self._goal, constraints=self._constraints, bounds=self._bounds, integrality=self._integer,
-                options={"time_limit": MAX_SECONDS},
-            )  # fmt: skip
+            with muted_c_stdout():  # HiGHS prints a line when a solution needs another solve in the space of all variables
+                solution = scipy.optimize.milp(
+                    -self._goal, constraints=self._constraints, bounds=self._bounds, integrality=self._integer,
+                    options={"time_limit": MAX_SECONDS},
+                )  # fmt: skip
             if solution.x is None:
                 break
             bound = min(bound, -float(solution.mip_dual_bound if self._integer.any() else solution.fun))

@@ -7,7 +7,7 @@ result lie in the region, too. A contributor without influence anywhere is found
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.allowed_space import Region
+from tolcontact.analyses.allowed_space import AllowedRegion
 from tolcontact.analyses.extreme_search import Evaluation
 
 NEGLIGIBLE = 1e-6  # of a measure's spread: smaller changes are no influence
@@ -22,7 +22,7 @@ class Influences:
     is_active  (measure, contributor)
     """
 
-    def __init__(self, region: Region, evaluation: Evaluation, spread: np.ndarray) -> None:
+    def __init__(self, region: AllowedRegion, evaluation: Evaluation, spread: np.ndarray) -> None:
         self._evaluation, self._units = evaluation, region.independent_columns
         self._tolerances = NEGLIGIBLE * spread
         self.is_active = np.zeros((len(spread), len(region.lower)), dtype=bool)

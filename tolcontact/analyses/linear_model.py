@@ -179,11 +179,11 @@ def _displacements(program: Program) -> np.ndarray:
     for compiled in program.groups:
         count = sum(len(side.points) for side in compiled.group.sides)
         for side in compiled.group.sides:
-            movers = compiled.group.mobilities[side.part].movers
+            movers, points = compiled.group.mobilities[side.part].movers, side.spread_points
             columns = [
-                _moves(group, mover, axis, side.points).ravel() / np.sqrt(2 * count)
+                _moves(group, mover, axis, points).ravel() / np.sqrt(2 * count * len(points) / len(side.points))
                 if group is compiled.group and mover in movers
-                else np.zeros(side.points.size)
+                else np.zeros(points.size)
                 for group, mover, axis in freedoms
             ]
             rows.append(np.column_stack(columns))

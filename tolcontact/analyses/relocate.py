@@ -19,8 +19,8 @@ from tolcontact.limits import Limits
 from tolcontact.statistics import intervals, two_samples
 from tolcontact.statistics.capability import share_outside
 from tolcontact.statistics.intervals import Estimate
-from tolcontact.statistics.question import Question
 from tolcontact.statistics.sample import Sample
+from tolcontact.statistics.statistic_request import StatisticRequest
 from tolcontact.workflow.models import DEFAULT_SOLVER, Choice, Model
 
 GRID_POINTS = {1: 9, 2: 5, 3: 4}  # places tried along each side, by the number of sides
@@ -59,7 +59,7 @@ def relocate(
     analysis.check_affordable(VERIFICATION_FACTOR * samples)
     goal = Goal.parse(least, analysis.program)
     trials = RelocatedTrials(analysis.program.nominal.assembly, analysis, locator, goal.measure)
-    places = Places(trials, goal, *_corners(between))
+    places = TriedPlaces(trials, goal, *_corners(between))
     places.try_grid()
     if not np.isfinite(places.values).any():
         lower, upper = places.lower.tolist(), places.upper.tolist()
@@ -95,12 +95,12 @@ class Goal:
     @classmethod
     def parse(cls, text: str, program: Program) -> "Goal":
         """Return the goal of a text such as "corner height: 6 sigma" or "gap: ppm". Raises OptionError for others."""
-        question = Question.parse(text, "least", statistics=(SIX_SIGMA, terms.PPM), examples=EXAMPLES)
-        measures, is_spread = program.nominal.measures, question.statistic == SIX_SIGMA
-        number = question.number_of([measure.name for measure in measures])
+        request = StatisticRequest.parse(text, "least", statistics=(SIX_SIGMA, terms.PPM), examples=EXAMPLES)
+        measures, is_spread = program.nominal.measures, request.statistic == SIX_SIGMA
+        number = request.number_of([measure.name for measure in measures])
         limits = program.limits(number)
         if not is_spread and limits.are_open:
-            raise OptionError(f"least is {text!r}, and the measure has no limits; give it tolerance=... or limits=...")
+            raise OptionError(f"least is {text!r}, and the measurement has no limits; give it tolerance=... or limits=...")
         return cls(number, is_spread, limits, measures[number].units if is_spread else "1")
 
     def estimate(self, x: np.ndarray) -> Estimate:
@@ -157,7 +157,7 @@ class RelocatedTrials:
         )
 
 
-class Places:
+class TriedPlaces:
     """Places in a box that are tried, and the value of the goal at each.
 
     lower, upper    (3,) corners of the box [mm]

@@ -10,8 +10,8 @@ from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
 from tolcontact.statistics.capability import by_percentiles, share_outside
 from tolcontact.statistics.intervals import Estimate
-from tolcontact.statistics.question import VALUE, Question
 from tolcontact.statistics.sample import Sample
+from tolcontact.statistics.statistic_request import VALUE, StatisticRequest
 from tolcontact.vocabulary import PPK, PPM
 
 TAIL, HEAD = 0.00135, 0.99865
@@ -39,14 +39,14 @@ class Requirement:
     @classmethod
     def parse(cls, text: str, program: Program) -> "Requirement":
         """Return the requirement "corner height: ppm 1000" or "corner height: Ppk 1.33". Raises OptionError for others."""
-        question = Question.parse(text, "require", statistics=(PPM, PPK), form=VALUE, examples=EXAMPLES)
+        request = StatisticRequest.parse(text, "require", statistics=(PPM, PPK), form=VALUE, examples=EXAMPLES)
         measures = program.nominal.measures
-        number = question.number_of([measure.name for measure in measures])
+        number = request.number_of([measure.name for measure in measures])
         limits = program.limits(number)
         if limits.are_open:
-            raise OptionError(f'require names "{question.measure}", which has no limits; give it tolerance=... or limits=...')
-        is_share = question.statistic == PPM
-        return cls(text.strip(), number, limits, is_share, question.value * (1e-6 if is_share else 1))
+            raise OptionError(f'require names "{request.measure}", which has no limits; give it tolerance=... or limits=...')
+        is_share = request.statistic == PPM
+        return cls(text.strip(), number, limits, is_share, request.value * (1e-6 if is_share else 1))
 
     def check(self, samples: int) -> None:
         """Raise OptionError if `samples` are too few to estimate the share or the Ppk."""

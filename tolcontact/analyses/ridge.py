@@ -3,11 +3,16 @@
 import numpy as np
 import scipy
 
-from tolcontact.analyses.allowed_space import Region
+from tolcontact.analyses.allowed_space import AllowedRegion
 
 
 def ridge_end(
-    region: Region, center: np.ndarray, half_widths: np.ndarray, points: np.ndarray, values: np.ndarray, slopes: np.ndarray
+    region: AllowedRegion,
+    center: np.ndarray,
+    half_widths: np.ndarray,
+    points: np.ndarray,
+    values: np.ndarray,
+    slopes: np.ndarray,
 ) -> np.ndarray:
     """Return the point (contributor,) of the region near `center` (contributor,) at which the least linear function is largest.
 

@@ -7,7 +7,7 @@ from tolcontact.compilation import Program, compile_program
 from tolcontact.discretization import raised_places
 from tolcontact.method import Method
 from tolcontact.simulation import simulate_blocks
-from tolcontact.statics import TOUCH_SHARE, Places, Touching, contacts_at
+from tolcontact.statics import TOUCH_SHARE, Touching, TouchingPlaces, contacts_at
 from tolcontact.variation import GivenDraws
 
 STEP = 1e-6  # mm, of differences of the gaps of round faces
@@ -30,12 +30,12 @@ def seated_contacts(program: Program) -> Touching | None:
     return contacts_at(program.nominal, poses[0], places)
 
 
-def _in_assembly(places: Places, X_WR: np.ndarray) -> Places:
+def _in_assembly(places: TouchingPlaces, X_WR: np.ndarray) -> TouchingPlaces:
     """Return places of the frame of a reference part at X_WR (12,) in that of the assembly."""
-    return Places(pose.apply(X_WR, places.points), places.normals @ pose.rotation(X_WR).T)
+    return TouchingPlaces(pose.apply(X_WR, places.points), places.normals @ pose.rotation(X_WR).T)
 
 
-def _touching(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray) -> Places:
+def _touching(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray) -> TouchingPlaces:
     """Return the places at which pair k touches at X_RM (1, 12), in the frame of its reference part."""
     pair = program.nominal.pairs[k]
     assert pair.moving_face is not None and pair.reference_face is not None
@@ -45,12 +45,12 @@ def _touching(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray
     if k in program.meetings:
         raised = raised_places(pair, program.meetings[k], X_RM, deviations)
         is_near = raised.gaps[0] < nearness
-        return Places(pose.apply(X_RM[0], raised.places.P_m[0, is_near]), raised.places.n_r[0, is_near])
+        return TouchingPlaces(pose.apply(X_RM[0], raised.places.P_m[0, is_near]), raised.places.n_r[0, is_near])
     gaps = ((pose.apply(X_RM, pair.P_m) - pair.P_r) * pair.n_r).sum(axis=2)[0]
-    return Places(pose.apply(X_RM[0], pair.P_m[gaps < nearness]), pair.n_r[gaps < nearness])
+    return TouchingPlaces(pose.apply(X_RM[0], pair.P_m[gaps < nearness]), pair.n_r[gaps < nearness])
 
 
-def _touching_round(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray, nearness: float) -> Places:
+def _touching_round(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray, nearness: float) -> TouchingPlaces:
     """Return the places at which balls and shafts touch walls; normals are the derivatives of the gaps by the translation."""
     pair = program.nominal.pairs[k]
     assert pair.round is not None
@@ -63,4 +63,4 @@ def _touching_round(program: Program, k: int, X_RM: np.ndarray, deviations: np.n
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     centres, radii, on_moving = (pair.round.points[name][is_near] for name in ("centre", "radius", "on_moving"))
     at_body = np.where(on_moving[:, None], pose.apply(X_RM[0], centres), centres)
-    return Places(at_body - np.where(on_moving, radii, -radii)[:, None] * normals, normals)
+    return TouchingPlaces(at_body - np.where(on_moving, radii, -radii)[:, None] * normals, normals)

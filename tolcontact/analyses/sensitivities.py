@@ -51,7 +51,7 @@ def sensitivities(
         progress=progress,
     )  # fmt: skip
     program = analysis.program
-    deviation = program.draws.own(analysis.sampled_deviations()).std(axis=0)
+    deviation = program.draws.without_shared_causes(analysis.sampled_deviations()).std(axis=0)
     columns = np.flatnonzero(deviation > 0)
     analysis.check_varies(columns.size)
     steps = STEP * deviation[columns]

@@ -159,8 +159,8 @@ def _events(program: Program) -> dict[str, _Event]:
         events["not assemblable"] = _Event([not_assemblable], leads=False)
     if not events:
         raise OptionError(
-            f'"{program.nominal.assembly.name}" has no rare event: no measure has limits, and parts can always be assembled; '
-            "give measures tolerance=... or limits=..."
+            f'"{program.nominal.assembly.name}" has no rare event: no measurement has limits, and parts can always be '
+            "assembled; give measurements tolerance=... or limits=..."
         )
     return events
 

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import poses, vocabulary as terms
-from tolcontact.analyses.allowed_space import Region
+from tolcontact.analyses.allowed_space import AllowedRegion
 from tolcontact.analyses.analysis import Analysis
 from tolcontact.analyses.engine import Engine, Progress
 from tolcontact.analyses.extreme_search import Effort, Evaluation, Searcher, Searches
@@ -24,7 +24,7 @@ from tolcontact.workflow.models import Choice, Model
 PER_LEVEL, PER_CONTRIBUTOR = 20.0, 6.0  # combinations that a search needs at each length of its steps
 PER_POLISH, PER_POLISHED_CONTRIBUTOR = 110.0, 22.0  # combinations that polishing an end needs
 EXCHANGES = 24  # combinations that influences are looked for at
-MAX_RESTARTS, RESTART_STEP = 3, 0.25  # of searches that go on, and the step that they begin with
+MAX_RESTARTS, RESTART_STEP = 3, 0.25  # of searches that continue, and the step that they begin with
 END_TOLERANCE = 1e-3  # of a measure's spread: searches that end at values closer than this have the same end
 
 
@@ -58,7 +58,7 @@ def worst_case(
     they are exchanged all at once, in 24 random combinations and at each end (see tolcontact.analyses.influences).
     `samples` / 256 searches begin at the best of all combinations tried: random ones, the far ends along nominal sensitivities,
     and those along the slopes of a regression; `samples` / 128 begin at any of them (see tolcontact.analyses.extreme_search).
-    The best one goes on in other random directions until it gains no more. `unseen` is the estimate w (w + 1) / (n (n - 1))
+    The best one continues in other random directions until it gains no more. `unseen` is the estimate w (w + 1) / (n (n - 1))
     for w different ends of n searches from any of them (Boender, Rinnooy Kan, 1987). The linear estimate is exact to first
     order in the deviations: large tilts may exceed it.
     Only certified realizations count. `progress` is called with the number of realizations simulated, and with the
@@ -80,7 +80,7 @@ def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
             f'"{analysis.assembly}" has faces with form, in whose zone no worst case is searched; give their tolerances '
             "of form form=None"
         )
-    region = Region(program.draws, seed=analysis.seed)
+    region = AllowedRegion(program.draws, seed=analysis.seed)
     analysis.check_varies(region.varies.size)
     linear, evaluation, rng = linear_model(program), Evaluation(engine, region), np.random.default_rng(analysis.seed)
     engine.total += _expected(np.full(len(program.nominal.measures), region.moves.size), effort)
@@ -121,7 +121,7 @@ def _searched(
     """Search, and return the best search for each extreme value.
 
     Where contributors without known influence turn out to have one at an end, by exchange with partners (n, contributor), the
-    searches of that measure go on along them, too.
+    searches of that measure continue along them, too.
     """
     for _ in range(MAX_RESTARTS):
         searcher.search(searches, forecast.advanced)
@@ -160,7 +160,7 @@ class Forecast:
 
 
 def _starts(
-    region: Region, linear: LinearModel, rng: np.random.Generator, samples: int, evaluation: Evaluation
+    region: AllowedRegion, linear: LinearModel, rng: np.random.Generator, samples: int, evaluation: Evaluation
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return points (n, contributor), and their measures (n, state, measure).
 
@@ -180,7 +180,7 @@ def _starts(
     return np.vstack([points, further]), np.concatenate([measured, evaluation.corrected(further)])
 
 
-def _far_ends(region: Region, slopes: np.ndarray) -> np.ndarray:
+def _far_ends(region: AllowedRegion, slopes: np.ndarray) -> np.ndarray:
     """Return the points (n, contributor) farthest along slopes (measure, contributor), in both senses."""
     ends = [region.exactly_farthest(sense * row) for row in slopes for sense in terms.SENSES]
     return np.array(ends).reshape(-1, slopes.shape[1])

@@ -1,9 +1,14 @@
 from .analyses import check_room_for as check_room_for, keep as keep
-from .archive_lock import taken as taken
+from .archive_lock import locked_archive as locked_archive
 from .disk_space import bytes_of_rows as bytes_of_rows, size_in_words as size_in_words
-from .file_tables import open_tables as open_tables, opened_tables as opened_tables
+from .file_tables import open_tables as open_tables, open_tables_unchecked as open_tables_unchecked
 from .labelled_rows import labelled as labelled
-from .reader import method_of_run as method_of_run, model_of as model_of, open_archive as open_archive, opened as opened
+from .reader import (
+    method_of_run as method_of_run,
+    model_of as model_of,
+    open_archive as open_archive,
+    open_unchecked as open_unchecked,
+)
 from .rows import Row as Row, kept_rows as kept_rows, row_values as row_values
 from .settings import Run as Run, run_settings as run_settings
 from .stored_rows import check_rows as check_rows, stored as stored

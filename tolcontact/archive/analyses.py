@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.archive_lock import taken
+from tolcontact.archive.archive_lock import locked_archive
 from tolcontact.archive.inspection import inspect
 from tolcontact.archive.resuming import check_same_model
-from tolcontact.archive.writer import opened_locked, replacing_archive
+from tolcontact.archive.writer import open_locked, replacing_archive
 from tolcontact.checksums import crc32
 from tolcontact.compilation import Program
 from tolcontact.errors import ArchiveError
@@ -24,7 +24,7 @@ def check_room_for(path: str | Path, record: terms.AnalysisRecord, program: Prog
     if not archive.is_file():
         raise ArchiveError(f'archive "{path}" does not exist; write one with: tolcontact run MODEL.py --out {path}')
     inspect(archive)
-    with opened_locked(archive, "r") as file:
+    with open_locked(archive, "r") as file:
         check_same_model(file, archive, program)
         if terms.ANALYSES_GROUP in file.groups and record.name in file[terms.ANALYSES_GROUP].groups:
             group = f"{terms.ANALYSES_GROUP}/{record.name}"
@@ -36,7 +36,7 @@ def keep(path: str | Path, record: terms.AnalysisRecord, dataset: "xr.Dataset", 
 
     The file is replaced only when all of the new one is written.
     """
-    with taken(path, resume=True) as archive:
+    with locked_archive(path, resume=True) as archive:
         check_room_for(archive, record, program)
         with replacing_archive(archive) as part:
             shutil.copyfile(archive, part)

@@ -13,7 +13,7 @@ from tolcontact.replacing import remove_abandoned
 
 
 @contextlib.contextmanager
-def taken(path: str | Path, *, overwrite: bool = False, resume: bool = False) -> Iterator[Path]:
+def locked_archive(path: str | Path, *, overwrite: bool = False, resume: bool = False) -> Iterator[Path]:
     """Lock the file that `path` stands for (the target of a link) against other runs, and yield its path.
 
     The system releases the lock of a run that was killed.

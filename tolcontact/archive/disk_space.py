@@ -60,7 +60,7 @@ def lay_out_rows(file: netCDF4.Dataset, start: int, stop: int) -> None:
             initial = np.nan if np.dtype(variable.kind).kind == "f" else terms.UNFINISHED
             stored.set_var_chunk_cache(0)  # whole chunks go straight to the file
             rows = CHUNKS * rows_together(np.dtype(variable.kind).itemsize * prod(stored.shape[1:]))
-            piece = np.full((rows, *stored.shape[1:]), initial, dtype=variable.kind)
+            piece = np.full((min(rows, stop - start), *stored.shape[1:]), initial, dtype=variable.kind)
             for begin in range(start, stop, rows):
                 end = min(begin + rows, stop)
                 stored[begin:end] = piece[: end - begin]

@@ -16,8 +16,8 @@ from tolcontact.labelled import Group, Table
 
 
 @contextlib.contextmanager
-def opening(path: Path) -> Iterator[None]:
-    """Give each variable of an archive that is being opened a small cache. Raises ArchiveError for an error of a library."""
+def library_errors(path: Path) -> Iterator[None]:
+    """Raise errors of libraries that open an archive as ArchiveError, and give its variables small caches."""
     try:
         with small_caches():
             yield
@@ -29,15 +29,15 @@ def opening(path: Path) -> Iterator[None]:
 def open_tables(path: Path) -> Iterator[Group]:
     """Open an archive as tables that are read on demand. Raises ArchiveError as `open_archive` does."""
     check_archive(path)
-    with opened_tables(path) as tables:
+    with open_tables_unchecked(path) as tables:
         yield tables
 
 
 @contextlib.contextmanager
-def opened_tables(path: Path) -> Iterator[Group]:
+def open_tables_unchecked(path: Path) -> Iterator[Group]:
     """Open an archive that is known to be undamaged, as tables that are read on demand."""
     with library_lock():
-        with opening(path):
+        with library_errors(path):
             file = netCDF4.Dataset(path)
             file.set_auto_maskandscale(False)
             tables = _group(file, {})

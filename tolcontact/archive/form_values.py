@@ -49,9 +49,9 @@ def form_values(program: Program) -> dict[ArchiveVariable, Any]:
         **{terms.FORM_SURFACE[name]: values for name, values in surface_arrays(surfaces).items()},
         **numbers,
         terms.FORM_CONTRIBUTOR: columns,
-        terms.FACE_OF_STATION: np.concatenate([np.full(len(form.stations), number) for number, _, form in with_form]),
-        terms.STATION: np.concatenate([form.stations for _, _, form in with_form]),
-        terms.STATION_WEIGHT: np.concatenate(weights),
+        terms.FACE_OF_FORM_STATION: np.concatenate([np.full(len(form.stations), number) for number, _, form in with_form]),
+        terms.FORM_STATION_PLACE: np.concatenate([form.stations for _, _, form in with_form]),
+        terms.FORM_STATION_WEIGHT: np.concatenate(weights),
         terms.FORM_REMOVED: removed,
     }
 

@@ -16,7 +16,7 @@ from tolcontact.checksums import crc32
 from tolcontact.vocabulary import ArchiveVariable
 
 
-class Place(NamedTuple):
+class BytePlace(NamedTuple):
     """Where the values of a variable lie: chunks of `rows` rows (along the first dimension), each at its offset."""
 
     kind: np.dtype
@@ -24,26 +24,20 @@ class Place(NamedTuple):
     offsets: list[int]
 
 
-class LaidOut:
+class RawFile:
     """The values of an archive on its disk. A row is what stands at one index of a variable's first dimension."""
 
     def __init__(self, path: Path) -> None:
         """Open the file. Raises OSError if it cannot be read and written."""
-        self._places: dict[str, Place] = {}
+        self._places: dict[str, BytePlace] = {}
         with h5py.File(path, "r", locking=False) as file:
-            file.visititems(self._add_place)
+            names: list[bytes] = []
+            h5py.h5o.visit(file.id, names.append)
+            for name in names:
+                item = h5py.h5o.open(file.id, name)
+                if isinstance(item, h5py.h5d.DatasetID):
+                    self._places[name.decode()] = _place(item)
         self._file = path.open("r+b", buffering=0)
-
-    def _add_place(self, name: str, item: h5py.Group | h5py.Dataset) -> None:
-        if not isinstance(item, h5py.Dataset):
-            return
-        if item.chunks is None:
-            offset = item.id.get_offset()
-            self._places[name] = Place(item.dtype, max((1, *item.shape[:1])), [] if offset is None else [offset])
-            return
-        chunks: list[tuple[int, int]] = []
-        item.id.chunk_iter(lambda chunk: chunks.append((chunk.chunk_offset[0], chunk.byte_offset)))
-        self._places[name] = Place(item.dtype, item.chunks[0], [offset for _, offset in sorted(chunks)])
 
     def close(self) -> None:
         self._file.close()
@@ -87,3 +81,16 @@ class LaidOut:
             for variable, array in variables.items():
                 checksum = crc32(variable, array, checksum)
             self.overwrite(group, terms.GROUP_CHECKSUM, checksum)
+
+
+def _place(item: h5py.h5d.DatasetID) -> BytePlace:
+    """Return where the values of a variable lie.
+
+    It is given by its handle: the objects that h5py makes of handles take several times as long.
+    """
+    if item.get_create_plist().get_layout() != h5py.h5d.CHUNKED:
+        offset = item.get_offset()
+        return BytePlace(item.dtype, max((1, *item.shape[:1])), [] if offset is None else [offset])
+    chunks: list[tuple[int, int]] = []
+    item.chunk_iter(lambda chunk: chunks.append((chunk.chunk_offset[0], chunk.byte_offset)))
+    return BytePlace(item.dtype, item.get_create_plist().get_chunk()[0], [offset for _, offset in sorted(chunks)])

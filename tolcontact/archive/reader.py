@@ -10,7 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.file_tables import opening
+from tolcontact.archive.file_tables import library_errors
 from tolcontact.archive.inspection import check_archive
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.document import from_document
@@ -31,12 +31,12 @@ def open_archive(path: str | Path) -> xr.DataTree:
     """
     path = Path(path)
     check_archive(path)
-    return opened(path)
+    return open_unchecked(path)
 
 
-def opened(path: Path) -> xr.DataTree:
+def open_unchecked(path: Path) -> xr.DataTree:
     """Open an archive that is known to be undamaged."""
-    with opening(path):
+    with library_errors(path):
         # Numbers of realizations are not read, which takes as much memory as all else together: they are 0, 1, 2, ...
         tree = xr.open_datatree(path, engine="netcdf4", drop_variables=terms.REALIZATION)
     numbers = pd.RangeIndex(tree.sizes[terms.REALIZATION])

@@ -19,11 +19,11 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive.disk_space import check_room, lay_out_rows
-from tolcontact.archive.file_tables import opened_tables
+from tolcontact.archive.file_tables import open_tables_unchecked
 from tolcontact.archive.header import empty_field, empty_touching, write_header
 from tolcontact.archive.inspection import inspect
 from tolcontact.archive.netcdf_library import library_lock, small_caches
-from tolcontact.archive.raw_file import LaidOut
+from tolcontact.archive.raw_file import RawFile
 from tolcontact.archive.resuming import check_same_run
 from tolcontact.archive.rows import kept_rows
 from tolcontact.archive.settings import Run, now, run_settings, versions
@@ -36,7 +36,7 @@ from tolcontact.replacing import replacing
 
 
 class ArchiveWriter:
-    """An archive being written, whose name is taken (see `taken`). Use it as a context manager.
+    """An archive being written, whose file is locked (see `locked_archive`). Use it as a context manager.
 
     rows      realizations that are in it; the next block starts there
     samples   realizations that it was begun for
@@ -49,7 +49,7 @@ class ArchiveWriter:
         Raises ArchiveError if it cannot be written, or if there is no room for it.
         """
         check_room(path, program.nominal, kept_rows(program.nominal, run.keep), run.samples)
-        with replacing_archive(path) as part, opened_locked(part, "w") as file:
+        with replacing_archive(path) as part, open_locked(part, "w") as file:
             write_header(file, program, run, sums)
             lay_out_rows(file, 0, min(run.samples, terms.FIRST_ROWS))
         self._go_on(path, program.nominal, run.checkpoint_interval)
@@ -65,9 +65,9 @@ class ArchiveWriter:
         with replacing_archive(path) as copy:
             # Only the copy is opened: the old file may be open in this process, and HDF5 does not open a file twice.
             shutil.copyfile(path, copy)
-            with opened_tables(copy) as results:
+            with open_tables_unchecked(copy) as results:
                 check_rows(results)
-            with opened_locked(copy, "r+") as file:
+            with open_locked(copy, "r+") as file:
                 check_same_run(file, path, program, run_settings(program, run), run.surfaces)
                 rows = last_checkpoint(file, path, [part.name for part in program.nominal.last_parts]).rows
                 samples, length = max(run.samples, int(file.samples)), len(file.dimensions[terms.REALIZATION])
@@ -79,7 +79,7 @@ class ArchiveWriter:
             # Fields and checks were of the earlier rows.
             initial = {terms.field_of(part.name): empty_field(len(part.vertices)) for part in program.nominal.last_parts}
             initial["surface"] = empty_checks(run.surfaces, len(program.nominal.pairs))
-            with contextlib.closing(LaidOut(copy)) as values:
+            with contextlib.closing(RawFile(copy)) as values:
                 if values.has("contact", terms.TOUCHING_SHARE):  # not in archives that were begun before
                     initial["contact"] = empty_touching(sum(len(pair.P_m) for pair in program.nominal.pairs))
                 values.overwrite_together(initial)
@@ -91,20 +91,23 @@ class ArchiveWriter:
         self._stations = [scene.station for scene in nominal.scenes]
         self._checkpoint_interval = checkpoint_interval
         with _as_archive_error(path):
-            self._values = LaidOut(path)
-            with opened_locked(path, "r") as file:
+            self._values = RawFile(path)
+            with open_locked(path, "r") as file:
                 self._length, self._block_rows = len(file.dimensions[terms.REALIZATION]), int(file.block_rows)
                 self.samples, self._checked = int(file.samples), len(file["surface"].dimensions[terms.CHECKED])
+                self._go_back(last_checkpoint(file, path, self._parts))
         self.kept = tuple(row for row in kept_rows(nominal, "all") if self._values.has(row.group, row.variable))
-        self.rows = self._place = 0
-        self.take_up()
 
-    def take_up(self) -> list[np.ndarray]:
+    def load_checkpoint(self) -> list[np.ndarray]:
         """Go back to the last checkpoint, and return its sums of fields, (state, number) for each part; empty without one."""
-        with opened_locked(self._path, "r") as file:
-            self.rows, self._place, sums = last_checkpoint(file, self._path, self._parts)
+        with open_locked(self._path, "r") as file:
+            checkpoint = last_checkpoint(file, self._path, self._parts)
+        self._go_back(checkpoint)
+        return checkpoint.sums
+
+    def _go_back(self, checkpoint: "Checkpoint") -> None:
+        self.rows, self._place = checkpoint.rows, checkpoint.place
         self._since = time.monotonic()
-        return sums
 
     def __enter__(self) -> "ArchiveWriter":
         return self
@@ -130,11 +133,11 @@ class ArchiveWriter:
         try:
             with replacing_archive(self._path) as part:
                 shutil.copyfile(self._path, part)
-                with opened_locked(part, "r+") as file:
+                with open_locked(part, "r+") as file:
                     lay_out_rows(file, self._length, self.samples)
             self._length = self.samples
         finally:  # a run may be stopped here, and still writes its fields
-            self._values = LaidOut(self._path)
+            self._values = RawFile(self._path)
 
     @property
     def is_between_blocks(self) -> bool:
@@ -163,14 +166,14 @@ class ArchiveWriter:
                 {terms.field_of(part): values for part, values in zip(self._parts, fields, strict=True)}
             )
 
-    def chosen(self, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    def rows_to_check(self, seed: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the numbers (row,) of the realizations to check against the surfaces, and whether each is a random choice."""
-        with opened_locked(self._path, "r") as file:
+        with open_locked(self._path, "r") as file:
             return choose(file, self._checked, seed)
 
     def poses(self, rows: np.ndarray) -> np.ndarray | None:
         """Return corrected poses (row, part, 12) of some rows; None if they are not kept."""
-        with opened_locked(self._path, "r") as file:
+        with open_locked(self._path, "r") as file:
             return archived_poses(file, rows, self._stations)
 
     def first_poses(self, end: int) -> tuple[np.ndarray, np.ndarray]:
@@ -178,7 +181,7 @@ class ArchiveWriter:
 
         poses   (row, part, 12), which the archive has to keep
         """
-        with opened_locked(self._path, "r") as file:
+        with open_locked(self._path, "r") as file:
             rows = np.flatnonzero(file[terms.SEARCHED.name][:end] == 0)
             poses = archived_poses(file, rows, self._stations)
         assert poses is not None
@@ -218,7 +221,7 @@ def _as_archive_error(path: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def opened_locked(path: Path, mode: Literal["w", "r+", "r"]) -> Iterator[netCDF4.Dataset]:
+def open_locked(path: Path, mode: Literal["w", "r+", "r"]) -> Iterator[netCDF4.Dataset]:
     """Open a file while no other thread may use the netCDF library: garbage collection there could close a file."""
     with library_lock(), small_caches(), netCDF4.Dataset(path, mode, format="NETCDF4") as file:
         file.set_auto_maskandscale(False)  # values are what they are; looking for masks takes longer than writing them
@@ -249,7 +252,7 @@ def last_checkpoint(file: netCDF4.Dataset, path: Path, parts: Sequence[str]) -> 
     return Checkpoint(rows, place, sums)
 
 
-def write_checkpoint(archive: LaidOut, checkpoint: Checkpoint, parts: Sequence[str]) -> None:
+def write_checkpoint(archive: RawFile, checkpoint: Checkpoint, parts: Sequence[str]) -> None:
     """Write a checkpoint to its place."""
     archive.overwrite("", terms.SUMMED_ROWS, [terms.UNFINISHED], checkpoint.place)
     for part, of_part in zip(parts, checkpoint.sums, strict=True):

@@ -12,9 +12,9 @@
     tolcontact compare MODEL.py --solvers daqp,qpoases         compare solvers on the same draws
     tolcontact compare MODEL.py --resolution linearized,exact  compare resolutions; --objective compares objectives
     tolcontact compare A.nc B.nc [--report FILE.html]          compare runs, from the same draws or not
-    tolcontact contributions MODEL.py [--by part]              sources of the variance of each measure
-    tolcontact sensitivities MODEL.py                          slope of each measure by each contributor
-    tolcontact worst MODEL.py                                  extreme values of each measure, and the deviations
+    tolcontact contributions MODEL.py [--by part]              sources of the variance of each measurement
+    tolcontact sensitivities MODEL.py                          slope of each measurement by each contributor
+    tolcontact worst MODEL.py                                  extreme values of each measurement, and the deviations
     tolcontact tails MODEL.py                                  probabilities of rare violations of limits
     tolcontact allocate MODEL.py --require "gap: ppm 1000"     tolerance ranges at the lowest cost
     tolcontact relocate MODEL.py --locator top.A3 ...          best position of a locator

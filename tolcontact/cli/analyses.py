@@ -19,7 +19,7 @@ from tolcontact.analyses.sensitivities import sensitivities
 from tolcontact.analyses.tails import tails
 from tolcontact.analyses.worst_case import worst_case
 from tolcontact.archive import open_archive
-from tolcontact.cli import app as common
+from tolcontact.cli import app as common, commands
 from tolcontact.cli.json_output import print_data
 from tolcontact.cli.output import console
 from tolcontact.cli.progress import shown_progress
@@ -52,7 +52,6 @@ class AnalysisCommand:
     """
 
     name: str
-    purpose: str
     analysis: Callable[..., xr.Dataset]
     record: terms.AnalysisRecord
     samples: str
@@ -82,7 +81,7 @@ class AnalysisCommand:
             ]
         )
         command.__annotations__ = {}  # type: ignore[attr-defined]
-        common.app.command(self.name, help=self.purpose, epilog=common.examples(*self.examples))(command)
+        common.app.command(self.name, help=commands.COMMANDS[self.name][1], epilog=common.examples(*self.examples))(command)
 
     @property
     def _parameters(self) -> Mapping[str, inspect.Parameter]:
@@ -107,7 +106,7 @@ class AnalysisCommand:
             options |= {name: value for name, value in _settings_of_run(model, context).items() if name in self._parameters}
         arguments = self.arguments(options)
         with shown_progress(model.stem, 1, quiet=quiet) as show, client_of(workers, scheduler) as client:
-            method = common.chosen(resolution=resolution, objective=objective)
+            method = common.method_choices(resolution=resolution, objective=objective)
             shared = {"method": method, "client": client, "progress": show}
             arguments |= {name: value for name, value in shared.items() if name in self._parameters}
             dataset = self.analysis(model, **arguments)
@@ -185,7 +184,6 @@ def _corner(text: str, option: str) -> tuple[float, ...]:
 COMMANDS = (
     AnalysisCommand(
         "contributions",
-        "Print the contributors that cause the variance of each measure, with and without contact.",
         contributions,
         terms.CONTRIBUTIONS,
         "Number of base realizations; each is simulated again for every group that matters. "
@@ -196,7 +194,6 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "sensitivities",
-        "Print how much each measure changes with each contributor, with and without contact.",
         sensitivities,
         terms.SENSITIVITIES,
         "Number of realizations.",
@@ -205,7 +202,6 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "tails",
-        "Print rare-event (ppm) estimates: how often measures are outside their limits, or parts cannot be assembled.",
         tails,
         terms.TAILS,
         "Approximate largest number of realizations for each event; by default all events share 60 000. "
@@ -215,7 +211,6 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "worst",
-        "Print the worst-case minimum and maximum of each measure, and the deviations that give them.",
         worst_case,
         terms.WORST_CASE,
         "Number of random combinations; three searches for each extreme start for every 256 of them.",
@@ -224,7 +219,6 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "allocate",
-        "Print the tolerance ranges of least cost for what is required, and the ranges to tighten first.",
         allocate,
         terms.ALLOCATION,
         "Number of realizations of each trial.",
@@ -237,7 +231,9 @@ COMMANDS = (
             "require": (
                 Annotated[
                     list[str],
-                    typer.Option(metavar="TEXT", help='Requirement on a measure: "MEASURE: ppm 1000", "MEASURE: Ppk 1.33".'),
+                    typer.Option(
+                        metavar="TEXT", help='Requirement on a measurement: "MEASURE: ppm 1000", "MEASURE: Ppk 1.33".'
+                    ),
                 ],
                 REQUIRED,
             ),
@@ -256,7 +252,6 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "relocate",
-        "Print the place of a locator, within a box, at which a measure varies least.",
         relocate,
         terms.RELOCATION,
         "Number of realizations of each trial.",
@@ -283,7 +278,6 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "seating",
-        "Print the least friction at which parts can be held short of their locators and seats, and what holds them.",
         seating,
         terms.SEATING,
         "",

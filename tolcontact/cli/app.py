@@ -101,7 +101,7 @@ def examples(*commands: str) -> str:
     return "Examples:\n\n" + "\n\n".join(f"tolcontact {command}" for command in commands)
 
 
-def chosen(**options: str | None) -> dict[str, str]:
+def method_choices(**options: str | None) -> dict[str, str]:
     """Return the choices of a method that options replace."""
     return {name: value for name, value in options.items() if value is not None}
 
@@ -139,7 +139,7 @@ def show_warnings(records: Iterable[warnings.WarningMessage]) -> None:
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    """Print a warning: in a terminal as wide as that, else on one line."""
+    """Print a warning, wrapped to the width of a terminal, else on one line."""
     if sys.stderr is None:
         return
     text = f"warning: {shown(str(message))}"

@@ -6,24 +6,28 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from tolcontact import cli, interrupts
+from tolcontact.cli.quick_imports import quick_imports
 
 # The module of each command in this folder, and the line that describes the command in the list of commands.
 COMMANDS = {
-    "contributions": ("analyses", "Print the contributors that cause the variance of each measure, with and without contact."),
-    "sensitivities": ("analyses", "Print how much each measure changes with each contributor, with and without contact."),
+    "contributions": (
+        "analyses",
+        "Print the contributors that cause the variance of each measurement, with and without contact.",
+    ),
+    "sensitivities": ("analyses", "Print how much each measurement changes with each contributor, with and without contact."),
     "tails": (
         "analyses",
-        "Print rare-event (ppm) estimates: how often measures are outside their limits, or parts cannot be assembled.",
+        "Print rare-event (ppm) estimates: how often measurements are outside their limits, or parts cannot be assembled.",
     ),
     "worst": (
         "analyses",
-        "Print the worst-case minimum and maximum of each measure, and the deviations that give them.",
+        "Print the worst-case minimum and maximum of each measurement, and the deviations that give them.",
     ),
     "allocate": (
         "analyses",
         "Print the tolerance ranges of least cost for what is required, and the ranges to tighten first.",
     ),
-    "relocate": ("analyses", "Print the place of a locator, within a box, at which a measure varies least."),
+    "relocate": ("analyses", "Print the place of a locator, within a box, at which a measurement varies least."),
     "seating": (
         "analyses",
         "Print the least friction at which parts can be held short of their locators and seats, and what holds them.",
@@ -38,7 +42,7 @@ COMMANDS = {
         "Compare solvers, resolutions or objectives of a model on the same draws, or archives with each other.",
     ),
     "new": ("models", "Write a small model with comments as a starting point."),
-    "check": ("models", "Check a model and its options without a run, and list all faults, and what is probably a mistake."),
+    "check": ("models", "Check a model and its options without a run; list all faults and probable mistakes."),
     "view": (
         "models",
         "Show an assembly before a run: faces, features with their tolerances, locators, contact points and nominal gaps.",
@@ -81,7 +85,8 @@ class Commands(TyperGroup):
 def declared_command(name: str) -> Any:
     """Return a command with its options. The module that declares the command is imported."""
     module, _ = COMMANDS[name]
-    getattr(cli, module)  # its import declares the command
+    with quick_imports():
+        getattr(cli, module)  # its import declares the command
     app = cli.app.app
     return next(
         typer.main.get_command_from_info(

@@ -9,8 +9,20 @@ import typer
 import xarray as xr
 
 from tolcontact import report as reports
-from tolcontact.archive import open_archive, replacing_archive, taken
-from tolcontact.cli.app import AsJson, Overwrite, Samples, Scheduler, Seed, Workers, app, chosen, examples, or_, set_options
+from tolcontact.archive import locked_archive, open_archive, replacing_archive
+from tolcontact.cli.app import (
+    AsJson,
+    Overwrite,
+    Samples,
+    Scheduler,
+    Seed,
+    Workers,
+    app,
+    examples,
+    method_choices,
+    or_,
+    set_options,
+)
 from tolcontact.cli.json_output import print_data
 from tolcontact.cli.output import check_page, console
 from tolcontact.declaration.script import load_model
@@ -67,11 +79,13 @@ def compare(
         if not all(are_archives):
             raise OptionError("--report applies to archives; write an archive for each solver (run --out), and compare these")
         check_page(report, overwrite=overwrite)
-    with contextlib.nullcontext() if out is None else taken(out, overwrite=overwrite) as path:
+    with contextlib.nullcontext() if out is None else locked_archive(out, overwrite=overwrite) as path:
         if all(are_archives):
             comparison = _compare_archives(inputs, report)
         else:
-            methods = [chosen(resolution=name, objective=goal) for name in _names(resolution) for goal in _names(objective)]
+            methods = [
+                method_choices(resolution=name, objective=goal) for name in _names(resolution) for goal in _names(objective)
+            ]
             with client_of(workers, scheduler) as client:
                 comparison = compare_solvers(
                     load_model(inputs[0]), _listed(solvers), samples=samples, seed=seed, methods=methods, client=client

@@ -10,7 +10,19 @@ from typing import Annotated
 import typer
 
 from tolcontact.archive import open_archive
-from tolcontact.cli.app import Model, Objective, Overwrite, Resolution, Seed, Solver, app, chosen, examples, flag, show_warnings
+from tolcontact.cli.app import (
+    Model,
+    Objective,
+    Overwrite,
+    Resolution,
+    Seed,
+    Solver,
+    app,
+    examples,
+    flag,
+    method_choices,
+    show_warnings,
+)
 from tolcontact.cli.output import check_page, console
 from tolcontact.cli.progress import waiting
 from tolcontact.declaration import Assembly
@@ -64,14 +76,14 @@ def check(
     seed: Seed = 1,
     view: Annotated[bool, flag("--view", "Also open the page of `tolcontact view`, with marked faults.")] = False,
 ) -> None:
-    """Check a model and its options without a run, and list all faults, and what is probably a mistake."""
+    """Check a model and its options without a run; list all faults and probable mistakes."""
     if population is not None:
         check_counts(population=population)
     assembly, doubts = None, list[warnings.WarningMessage]()
     try:
         with waiting(f"checking {model}"), warnings.catch_warnings(record=True) as doubts:
             assembly = load_model(model)
-            program = build(assembly, solver=solver, method=chosen(resolution=resolution, objective=objective))
+            program = build(assembly, solver=solver, method=method_choices(resolution=resolution, objective=objective))
     except ModelError as error:
         show_warnings(doubts)
         if view and assembly is not None:
@@ -110,7 +122,7 @@ def view(
 ) -> None:
     """Show an assembly before a run: faces, features with their tolerances, locators, contact points and nominal gaps.
 
-    The page lists the faults of a model, which may be incomplete: it needs no measures. For an archive it is the report.
+    The page lists the faults of a model, which may be incomplete: it needs no measurements. For an archive it is the report.
     """
     if out is not None:
         check_page(out, overwrite=overwrite)

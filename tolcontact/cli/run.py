@@ -21,9 +21,9 @@ from tolcontact.cli.app import (
     Solver,
     Workers,
     app,
-    chosen,
     examples,
     flag,
+    method_choices,
     or_,
 )
 from tolcontact.cli.output import check_page, print_summary
@@ -100,7 +100,7 @@ def run(
     and if an interval is not as narrow as --until states.
     """
     _check_files(out, report, overwrite=overwrite, resume=resume)
-    method = chosen(resolution=resolution, objective=objective)
+    method = method_choices(resolution=resolution, objective=objective)
     titles = title_entries(title, part_number, author, revision, date, company)
     note_kept_title(out if resume else None, titles)
     # Stopping first gives the cursor back.
@@ -135,12 +135,12 @@ def _check_files(out: Path | None, report: Path | None, *, overwrite: bool, resu
 
 def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Table, str]:
     """Return the summary of the archive at a path, and what it lacks that `until` states; write its page."""
-    with archive.opened_tables(path) as results:
+    with archive.open_tables_unchecked(path) as results:
         archive.check_rows(results)
         summary = statistics.summary_table(results)
         shortfall = Target.of(until).shortfall(results) if until is not None else ""
     if report is not None:
-        with archive.opened(path) as tree:
+        with archive.open_unchecked(path) as tree:
             reports.write_page(tree, statistics.dataset_of(summary), report)
     return summary, shortfall
 

@@ -51,10 +51,11 @@ times are compiled to machine code, which gives the same results to the last bit
 kept in the user's cache folder (`~/.cache/tolcontact` on Linux, 268 MB at most), so the next process that simulates the same
 model need not compile it again.
 
-A group of few bodies has one function that assembles its QP, and one that judges the answer. From six coupled bodies on, if
-points are the objective, a QP is assembled from its elements: each pair of faces with the parts that its increments move.
-Elements of one kind share their functions, whose inputs are the constants of the element, too. So thirty blocks in a tower
-are compiled as fast as six; pairs of round faces are of one kind only if they are equal. Both ways agree to 1e-11 mm.
+A group of few bodies has one function that assembles its QP, and one that judges the answer. From six coupled bodies on, a QP
+is assembled from its elements: each pair of faces with the parts that its increments move, and, if forces press, each part with
+its forces and two-sided locators. Elements of one kind share their functions, whose inputs are the constants of the element,
+too. So thirty blocks in a tower are compiled as fast as six. Pairs are of one kind if they have equally many rows, and pairs of
+round faces only if they are equal. Both ways agree to 1e-11 mm. The regularization "identity" has no elements.
 """
 
 from tolcontact.compilation.contact_rows import SLOTS

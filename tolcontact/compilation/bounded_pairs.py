@@ -8,7 +8,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.discretization import ContactPoints, Nominal, raised_places
-from tolcontact.errors import ContactWarning, shown
+from tolcontact.errors import ContactWarning, ModelError, shown
 from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.meeting import Meeting, Reach, meeting
 
@@ -82,7 +82,9 @@ def bounded_pair(
         clearance=clearance(pair),
     )
     places = meeting((pair.moving_face, pair.reference_face), bodies, reach)
-    if places is None:
+    if places is not None:
+        _check_corners(nominal, pair, places)
+    else:
         warnings.warn(
             f'contact pair "{shown(pair.name)}": its faces have too many edges to find contact where they end; '
             "use coarser meshes, or choose smaller faces",
@@ -96,6 +98,18 @@ def bounded_pair(
     allowed = max(ALLOWED_SHARE * smallest, FACET_FACTOR * bulge if stands_for_curves else 0.0)
     trial = Trial(error, allowed, most)
     return (places if trial.error > trial.allowed else None), trial
+
+
+def _check_corners(nominal: Nominal, pair: ContactPoints, places: Meeting) -> None:
+    """Raise ModelError if a face has no corners: then more than two triangles of its body meet at each of its edges."""
+    for face, number in ((places.moving, pair.moving), (places.reference, pair.reference)):
+        if number is not None and not len(face.vertices):
+            part = nominal.parts[number].name
+            fault = (
+                f'contact pair "{shown(pair.name)}": the face of part "{shown(part)}" has no ends, since more than two '
+                "triangles meet at each of its edges; the mesh holds several bodies in one place: export one of them"
+            )
+            raise ModelError(nominal.assembly.name, [fault])
 
 
 def _error_of_planes(

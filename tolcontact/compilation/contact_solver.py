@@ -5,11 +5,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tolcontact.arrays import Array, Bool, Float
+from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.compilation.band_order import band_order
 from tolcontact.compilation.contact_qp import ContactQP
 from tolcontact.compilation.elements import ElementQP
 from tolcontact.compilation.functions import InterpretedFunction, flat
-from tolcontact.compilation.graph import GraphSolver
+from tolcontact.compilation.graph import GraphSolver, Layouts
 from tolcontact.compilation.outcome import SOLUTION
 from tolcontact.compilation.plugins import ACCURACY, PLUGINS, Plugin, solver
 from tolcontact.compilation.polish_kernel import solve_conditions
@@ -20,12 +21,17 @@ REFINEMENTS = 4
 
 
 def polished(
-    problem: Mapping[str, np.ndarray], answer: Mapping[str, np.ndarray], equations: int, slacks: int
+    problem: Mapping[str, np.ndarray],
+    answer: Mapping[str, np.ndarray],
+    equations: int,
+    slacks: int,
+    order: Int[Array, " unknown"],
 ) -> dict[str, np.ndarray]:
     """Return x, lam_a and lam_x (QP, entry) of min x'Hx/2 + g'x, a x >= lba; the last rows are equations, the last x >= 0.
 
     problem     h (QP, n, n), g (QP, n), a (QP, m, n), lba (QP, m)
     answer      x (QP, n), lam_a (QP, m), lam_x (QP, n) of a solver; multipliers are below 0 if a row carries
+    order       of the unknowns, see solve_conditions
 
     They are NaN if the conditions have no solution.
     """
@@ -35,14 +41,9 @@ def polished(
     # Of a row and its multiplier the smaller one is rounding, for every solver.
     carries = -lam_a > np.einsum("kij,kj->ki", A, x) - lower
     carries[:, rows - equations :] = True
-    at_zero = (-lam_x > x)[:, size - slacks :]
-    slack_rows = np.zeros((count, slacks, size))
-    slack_rows[:, :, size - slacks :] = np.eye(slacks)
-    all_rows = np.concatenate([A, slack_rows], axis=1)
-    is_equation = np.concatenate([carries, at_zero], axis=1)
-    all_bounds = np.concatenate([lower, np.zeros((count, slacks))], axis=1)
+    is_open = (-lam_x <= x)[:, size - slacks :]
     solution = np.empty((count, size + rows + slacks))
-    solve_conditions(H, g, all_rows, all_bounds, is_equation, COMPLIANCE, REFINEMENTS, solution)
+    solve_conditions((H, g, A, lower), carries, is_open, order, COMPLIANCE, REFINEMENTS, solution)
     x, multipliers = solution[:, :size], solution[:, size:]
     lam_x = np.zeros_like(x)
     lam_x[:, size - slacks :] = -multipliers[:, rows:]
@@ -65,20 +66,26 @@ class ContactSolver:
         self._qp = qp
         self._assemble, self._finish, self._energy, self._relate = qp.evaluators
         self._plugin = qp.plugin
-        size = sum(qp.sparsity("a").shape) + qp.slacks  # of the linear system that polishes an answer
-        self._max_polished = max(MAX_POLISHED_ENTRIES // size**2, 1)
-        self.start_over()
+        self._order = band_order(qp.sparsity("h"), qp.sparsity("a"), slacks=qp.slacks)
+        self._layouts: Layouts = {}
+        self._max_polished = max(MAX_POLISHED_ENTRIES // (sum(qp.sparsity("a").shape) + qp.slacks) ** 2, 1)
+        self._renew()
 
     def twin(self) -> "ContactSolver":
         """Return an equal solver for another thread."""
         twin = copy.copy(self)
-        twin.start_over()
+        twin._renew()
         return twin
 
     def start_over(self) -> None:
         """Forget all previous problems: some plugins start from the last one."""
-        self._solver = _new_solver(self._qp, self._plugin)
+        if not self._is_new:
+            self._renew()
+
+    def _renew(self) -> None:
+        self._solver = _new_solver(self._qp, self._plugin, self._layouts)
         self._fallbacks: dict[str, _Solver] = {}
+        self._is_new = True
 
     def __call__(self, **arrays: Float[Array, "realization ..."]) -> Arrays:
         """Return the outputs of contact_qp by name, (realization, entry), for its inputs by name, (realization, ...).
@@ -90,6 +97,7 @@ class ContactSolver:
         infinite, and other outputs may be NaN.
         """
         inputs = {name: flat(values) for name, values in arrays.items()}
+        self._is_new = False
         answer = self._solved(self._solver, inputs)
         answer["second"] = np.zeros_like(answer["residual"])
         self._retry(self._solver, answer, inputs, _is_lost(answer) & (inputs["newton"][:, 0] != 0), second=0.0)
@@ -98,7 +106,7 @@ class ContactSolver:
             if not lost.any():
                 break
             if name not in self._fallbacks:
-                self._fallbacks[name] = _new_solver(self._qp, PLUGINS[name])
+                self._fallbacks[name] = _new_solver(self._qp, PLUGINS[name], self._layouts)
             self._retry(self._fallbacks[name], answer, inputs, lost, second=1.0)
             if PLUGINS[name].remembers:
                 del self._fallbacks[name]
@@ -156,7 +164,7 @@ class ContactSolver:
 
     def _polished(self, problem: Arrays, solution: Arrays) -> Arrays:
         dense = {name: self._dense(name, problem[name]) for name in ("h", "g", "a", "lba")}
-        return polished(dense, solution, self._qp.equations, self._qp.slacks)
+        return polished(dense, solution, self._qp.equations, self._qp.slacks, self._order)
 
     def _dense(self, name: str, stored: np.ndarray) -> np.ndarray:
         """Return all entries of an output of `assemble`: (realization, row, column), or (realization, row) of a vector."""
@@ -206,11 +214,11 @@ class _PluginSolver:
 _Solver = _PluginSolver | GraphSolver
 
 
-def _new_solver(qp: ContactQP | ElementQP, plugin: Plugin) -> _Solver:
+def _new_solver(qp: ContactQP | ElementQP, plugin: Plugin, layouts: Layouts) -> _Solver:
     if plugin.is_conic:
         return _PluginSolver(qp, plugin)
     sparsities = {name: qp.sparsity(name) for name in ("h", "g", "a", "lba")}
-    return GraphSolver(sparsities, slacks=qp.slacks, equations=qp.equations)
+    return GraphSolver(sparsities, slacks=qp.slacks, equations=qp.equations, layouts=layouts)
 
 
 def _is_lost(answer: Arrays) -> Bool[Array, " realization"]:

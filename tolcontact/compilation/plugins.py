@@ -1,4 +1,4 @@
-"""The QP solvers: those that CasADi offers, with their options, that of this package, and why some are refused."""
+"""The QP solvers: plugins of CasADi with their options, the solver of this package, and why some are refused."""
 
 from dataclasses import dataclass, field
 from typing import Any

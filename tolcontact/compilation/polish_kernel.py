@@ -9,76 +9,157 @@ from tolcontact.compiled import compiled, uncounted
 
 
 @compiled
-def solve_conditions(H, gradient, rows, bounds, carries, compliance, refinements, solution):  # type: ignore[no-untyped-def]
-    """Solve H x - C'm = -g, C x = b, C the rows that carry; write x and the multipliers m (QP, n + row), 0 of other rows.
+def solve_conditions(problem, carries, is_open, order, compliance, refinements, solution):  # type: ignore[no-untyped-def]
+    """Solve H x + g - C'm - (0, p) = 0, C x = b, C the rows that carry; write x, m (QP, n + row), 0 of other rows, and p.
 
-    H (QP, n, n), gradient (QP, n), rows (QP, row, n), bounds (QP, row), carries (QP, row). The rows yield by a `compliance` in
-    the factorization, whose effect refinements remove. Without a solution all is NaN.
+    problem    H (QP, n, n), g (QP, n), rows (QP, row, n), b (QP, row); H is the identity for slacks, the last variables
+    carries    (QP, row)
+    is_open    (QP, slack): other slacks are 0, and have a multiplier p
+    order      (n - slack + row,): variables but slacks, and rows after them, in an order that makes the system a narrow band
+
+    An open slack is s = C'm - g, and leaves entries C C' of rows that share it. The rows yield by a `compliance` in the
+    factorization, whose effect refinements remove. Without a solution all is NaN.
     """
-    size = H.shape[1]
-    for k in range(H.shape[0]):
-        active = np.flatnonzero(carries[k])
-        total = size + active.size
-        K, right, x = np.zeros((total, total)), np.empty(total), np.zeros(total)
-        K[:size, :size] = H[k]
-        right[:size] = -gradient[k]
-        for p in range(active.size):
-            right[size + p] = bounds[k, active[p]]
-            for i in range(size):
-                K[size + p, i], K[i, size + p] = rows[k, active[p], i], -rows[k, active[p], i]
-        factor, pivots, remainder, buffer = K.copy(), np.arange(total), np.empty(total), np.empty(total)
-        for p in range(size, total):
-            factor[p, p] += compliance
-        solution[k] = np.nan
-        if not _factorize(factor, pivots):
-            continue
-        for _ in range(refinements):
-            for i in range(total):
-                remainder[i] = right[i]
-                for j in range(total):
-                    remainder[i] -= K[i, j] * x[j]
-            _add_solution(factor, pivots, remainder, buffer, x)
-        solution[k] = 0.0
-        solution[k, :size] = x[:size]
-        for p in range(active.size):
-            solution[k, size + active[p]] = x[size + p]
+    H, gradient, rows, bounds = problem
+    for k in range(len(H)):
+        place, total = _places(carries[k], H.shape[1] - is_open.shape[1], order)
+        K, right = _conditions(H[k], gradient[k], rows[k], bounds[k], is_open[k], place, total)
+        x = np.zeros(total)
+        if _solve(K, right, place[len(place) - rows.shape[1] :], compliance, refinements, x):
+            _write(x, place, gradient[k], rows[k], is_open[k], solution[k])
+        else:
+            solution[k] = np.nan
+
+
+@compiled
+def _places(carries, size, order):  # type: ignore[no-untyped-def]
+    """Return the place of each variable and row among the unknowns, -1 for rows that do not carry, and their number."""
+    place, total = np.full(len(order), -1), 0
+    for unknown in order:
+        if unknown < size or carries[unknown - size]:
+            place[unknown] = total
+            total += 1
+    return place, total
+
+
+@compiled
+def _solve(K, right, rows, compliance, refinements, x):  # type: ignore[no-untyped-def]
+    """Add to x the solution of K x = right, whose `rows` yield in the factorization; return whether there is one."""
+    factor, pivots, remainder, width = K.copy(), np.arange(len(x)), np.empty(len(x)), _half_width(K)
+    for row in rows:
+        if row >= 0:
+            factor[row, row] += compliance
+    if not _factorize(factor, pivots, width):
+        return False
+    for _ in range(refinements):
+        for i in range(len(x)):
+            remainder[i] = right[i]
+            for j in range(max(i - width, 0), min(i + width + 1, len(x))):
+                remainder[i] -= K[i, j] * x[j]
+        _add_solution(factor, pivots, width, remainder, x)
+    return True
 
 
 @uncounted
-def _factorize(factor, pivots):  # type: ignore[no-untyped-def]
-    """Replace a matrix by its factors L and U, with rows exchanged as `pivots` say; return whether it is regular."""
+def _write(x, place, gradient, rows, is_open, solution):  # type: ignore[no-untyped-def]
+    """Write variables, multipliers of rows and multipliers of slacks into a solution (n + row + slack,)."""
+    size, slacks, count = len(gradient) - len(is_open), len(is_open), len(rows)
+    solution[:] = 0.0
+    for i in range(size):
+        solution[i] = x[place[i]]
+    multipliers = solution[size + slacks :]
+    for row in range(count):
+        if place[size + row] >= 0:
+            multipliers[row] = x[place[size + row]]
+    for slack in range(slacks):
+        pull = -gradient[size + slack]
+        for row in range(count):
+            pull += rows[row, size + slack] * multipliers[row]
+        if is_open[slack]:
+            solution[size + slack] = pull
+        else:
+            multipliers[count + slack] = -pull
+
+
+@compiled
+def _conditions(H, gradient, rows, bounds, is_open, place, total):  # type: ignore[no-untyped-def]
+    """Return the matrix and the right side of the conditions, whose unknowns have a `place`, or -1 if they are left out."""
+    size = H.shape[0] - len(is_open)
+    K, right, sharing = np.zeros((total, total)), np.empty(total), np.empty(len(bounds), dtype=np.int64)
+    for i in range(size):
+        right[place[i]] = -gradient[i]
+        for j in range(size):
+            K[place[i], place[j]] = H[i, j]
+    for row in range(len(bounds)):
+        p = place[size + row]
+        if p >= 0:
+            right[p] = bounds[row]
+            for i in range(size):
+                K[p, place[i]], K[place[i], p] = rows[row, i], -rows[row, i]
+    for slack in range(len(is_open)):
+        if is_open[slack]:
+            column, count = size + slack, 0
+            for row in range(len(bounds)):
+                if place[size + row] >= 0 and rows[row, column] != 0:
+                    sharing[count] = row
+                    count += 1
+            for row in sharing[:count]:
+                p = place[size + row]
+                right[p] += rows[row, column] * gradient[column]
+                for other in sharing[:count]:
+                    K[p, place[size + other]] += rows[row, column] * rows[other, column]
+    return K, right
+
+
+@uncounted
+def _half_width(K):  # type: ignore[no-untyped-def]
+    """Return the largest distance of an entry from the diagonal."""
+    total, width = len(K), 0
+    for i in range(total):
+        for j in range(i + width + 1, total):
+            if K[i, j] != 0 or K[j, i] != 0:
+                width = j - i
+    return width
+
+
+@uncounted
+def _factorize(factor, pivots, width):  # type: ignore[no-untyped-def]
+    """Replace a band matrix by its factors L and U; `pivots` are the rows with which each row was exchanged.
+
+    Return whether the matrix is regular. Columns of L stay as they were before later exchanges.
+    """
     total = factor.shape[0]
     for c in range(total):
-        best = c
-        for i in range(c + 1, total):
+        best, below, right = c, min(c + width + 1, total), min(c + 2 * width + 1, total)
+        for i in range(c + 1, below):
             if abs(factor[i, c]) > abs(factor[best, c]):
                 best = i
         if not abs(factor[best, c]) > 0:  # nor for numbers that are none
             return False
+        pivots[c] = best
         if best != c:
-            pivots[c], pivots[best] = pivots[best], pivots[c]
-            for j in range(total):
+            for j in range(c, right):
                 factor[c, j], factor[best, j] = factor[best, j], factor[c, j]
-        for i in range(c + 1, total):
+        for i in range(c + 1, below):
             if factor[i, c] != 0:
                 factor[i, c] /= factor[c, c]
                 share = factor[i, c]
-                for j in range(c + 1, total):
+                for j in range(c + 1, right):
                     factor[i, j] -= share * factor[c, j]
     return True
 
 
 @uncounted
-def _add_solution(factor, pivots, right, solved, x):  # type: ignore[no-untyped-def]
-    """Add to x the solution of the factorized system for a right side, which is computed in the buffer `solved`."""
+def _add_solution(factor, pivots, width, right, x):  # type: ignore[no-untyped-def]
+    """Add to x the solution of the factorized system for a right side, which is overwritten."""
     total = factor.shape[0]
-    for i in range(total):
-        solved[i] = right[pivots[i]]
-        for j in range(i):
-            solved[i] -= factor[i, j] * solved[j]
+    for c in range(total):
+        right[c], right[pivots[c]] = right[pivots[c]], right[c]
+        for i in range(c + 1, min(c + width + 1, total)):
+            right[i] -= factor[i, c] * right[c]
     for i in range(total - 1, -1, -1):
-        for j in range(i + 1, total):
-            solved[i] -= factor[i, j] * solved[j]
-        solved[i] /= factor[i, i]
+        for j in range(i + 1, min(i + 2 * width + 1, total)):
+            right[i] -= factor[i, j] * right[j]
+        right[i] /= factor[i, i]
     for i in range(total):
-        x[i] += solved[i]
+        x[i] += right[i]

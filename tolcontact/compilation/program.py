@@ -93,7 +93,7 @@ class Program(Pictured):
         ]
         rows += [f"  contact {pair.name}: {self.contact_in_words(k)}" for k, pair in enumerate(nominal.pairs)]
         rows += [
-            f"  measure {measure.name}: nominally {value:.6g} {measure.units}"
+            f"  measurement {measure.name}: nominally {value:.6g} {measure.units}"
             for measure, value in zip(nominal.measures, self.nominal_measures, strict=True)
         ]
         return "\n".join(rows)
@@ -253,7 +253,15 @@ def _check_placing(nominal: Nominal, method: Method) -> None:
 
 
 def _check_springs(nominal: Nominal, method: Method) -> None:
-    """Raise ModelError for contact with a stiffness, where no forces weigh it, or steps do not look at true gaps."""
+    """Raise ModelError for a stiffness without effect, or where no forces weigh it, or steps do not look at true gaps."""
+    faults = [
+        f'locator "{part.locators.labels[number]}": it has a stiffness, but part "{part.name}" is fixed=True, so forces do not '
+        "move it; leave stiffness out, or declare the part fixed=False"
+        for part in nominal.parts
+        for number in (np.flatnonzero(part.locators.springy)[:1] if not part.free else ())
+    ]
+    if faults:
+        raise ModelError(nominal.assembly.name, faults)
     if method.minimizes.presses and method.is_exact and not method.is_iterated:
         return
     faults = [

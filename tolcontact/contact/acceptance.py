@@ -22,7 +22,7 @@ DEPTH_SIZES = 1e-4  # sizes of the parts
 DEPTH_SHARE = 0.01  # of the smallest tolerance range
 
 
-class Limits:
+class AcceptanceLimits:
     """The limits of a method for one group of parts, the largest of which has a certain `size` [mm]."""
 
     def __init__(self, nominal: Nominal, group: Group, method: Method, size: float) -> None:

@@ -129,7 +129,8 @@ class Candidates:
                 self._all_scans.append(round_scan)
                 self._carrying_scans.append(round_scan)
                 continue
-            clusters = FORM_CLUSTERS if pair.has_form else MAX_CLUSTERS
+            # Places of bounded pairs are found at every pose, so that no cluster offers a point of its own.
+            clusters = 1 if index in program.meetings else FORM_CLUSTERS if pair.has_form else MAX_CLUSTERS
             self._all_scans.append(pair_scan(pair, gaps, tables, clusters))
             # If the paper's set of points may carry, those between the corners count, too.
             corners = self._method.corners_suffice and index not in program.meetings
@@ -152,13 +153,15 @@ class Candidates:
         projected: bool = False,
         slots: Sequence[Slots] = (),
         width: float = 1.0,
+        at_rest: Bool[Array, " realization"] | None = None,
         earlier: Sequence[Scan] = (),
     ) -> list[Scan]:
         """Return scans of the points that may carry, projected again if the method requires it.
 
         Places of bounded pairs are found anew; in steps, with the `slots` of the pairs with changing points, places that carry
-        remain a little beyond their edges, `width` times as far as they may in an answer. With `projected`, points against
-        curved faces are projected again in any case. `earlier` are scans of the same realizations, whose heights are summed up.
+        remain a little beyond their edges, `width` times as far as they may in an answer, unless the realization is `at_rest`.
+        With `projected`, points against curved faces are projected again in any case. `earlier` are scans of the same
+        realizations, whose heights are summed up.
         """
         scans = list(self._carrying_scans)
         for k in self._with_form:
@@ -170,6 +173,8 @@ class Candidates:
                 scans[k] = self.projected(k, relative[:, k])
         for k, places in self.bounded.items():
             kept, error = (slots[self._varying.index(k)].labels, width * self._edge_error) if slots else (None, 0.0)
+            if kept is not None and at_rest is not None:
+                kept[at_rest] = -1
             nearness = NEARNESS if width == 1 else np.inf
             scans[k] = bounded_scan(scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness)
         return scans

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tolcontact.contact.acceptance import Limits
+from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.linear_step import LinearStep
 from tolcontact.contact.scan import min_gaps, undone
@@ -26,7 +26,7 @@ STEP_TOLERANCE = 1e-8  # mm: a smaller step is the last one
 
 def search(
     step: LinearStep,
-    limits: Limits,
+    limits: AcceptanceLimits,
     candidates: Candidates,
     energy_of: Callable[[Task, State], np.ndarray],
     task: Task,

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float
-from tolcontact.contact.acceptance import Limits
+from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.linear_step import PENETRATION, LinearStep, Step
 from tolcontact.contact.progress import Progress
@@ -20,24 +20,35 @@ from tolcontact.contact.state import State, Task, Unsettled
 
 STEP_TOLERANCE = 1e-9  # mm: a smaller step is the last one
 ROUNDING = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that next to nothing holds
+NEARLY_AT_REST = 1e-3  # mm: after a smaller step, places do not stay beside sharp edges
 CLOSED = 1e-6  # mm, and of rotation matrices: steps that come back so near to where they were will do so again
 
 
 class StepKind(NamedTuple):
-    """How firmly a step holds what the objective leaves open, whether it counts curvature, and how wide edges are taken."""
+    """How a step is taken.
+
+    firmness   how firmly it holds what the objective leaves open
+    newton     whether it counts curvature
+    width      how wide edges are taken (see Candidates.scans)
+    sharp      whether edges are sharp after it, where realizations are nearly at rest
+    """
 
     firmness: float
     newton: bool
     width: float = 1.0
+    sharp: bool = False
 
 
 FIRM_STEPS = (*[StepKind(1e4, newton=True)] * 6, *[StepKind(1e2, newton=True)] * 6)
 STEPS = (*[StepKind(1.0, newton=False)] * 8, *FIRM_STEPS, *[StepKind(1.0, newton=True)] * 80)
 # Where faces end, places come and go. Newton's curvature is that of places that stay, so steps like the paper's come first and,
-# held back, again later, with places that stay longer: they do not jump to and fro between places.
+# held back, again later, with places that stay longer: they do not jump to and fro between places. Beside its edge
+# a place holds bodies apart that would touch nearby, at a lower objective. So places only stay while steps are large, unless
+# that takes too long.
 WIDE = 32.0
 STEPS_WHERE_FACES_END = (
-    *[StepKind(1.0, newton=False)] * 24,
+    *[StepKind(1.0, newton=False, sharp=True)] * 12,
+    *[StepKind(1.0, newton=False)] * 12,
     *(kind._replace(width=WIDE) for kind in FIRM_STEPS),
     *[StepKind(10.0, newton=False, width=WIDE)] * 30,
     *[StepKind(3.0, newton=False, width=WIDE)] * 20,
@@ -46,7 +57,7 @@ STEPS_WHERE_FACES_END = (
 )
 
 
-def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task, state: State, stride: float) -> None:
+def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, task: Task, state: State, stride: float) -> None:
     """Take the steps of `state` to their end. Without rest there is an answer only if the parts contradict each other."""
     unsettled, trail = Unsettled(task, state), list[np.ndarray]()
     progress: Progress | None = None
@@ -82,9 +93,9 @@ def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task,
         if not len(unsettled):
             return
         if candidates.bounded:
-            scans = candidates.scans(
-                unsettled.state.relative, unsettled.task.deviations, slots=unsettled.state.slots, width=kind.width
-            )
+            poses, deviations, slots = unsettled.state.relative, unsettled.task.deviations, unsettled.state.slots
+            at_rest = (size[moves] < NEARLY_AT_REST) & kind.sharp
+            scans = candidates.scans(poses, deviations, slots=slots, width=kind.width, at_rest=at_rest)
             unsettled.task = replace(unsettled.task, scans=scans)
         if kind.newton:
             penetration = _true_penetration(unsettled.task, unsettled.state)

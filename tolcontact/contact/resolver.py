@@ -14,7 +14,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ACCURACY, ContactGroup, Program
-from tolcontact.contact.acceptance import Limits
+from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.iterated_search import search
 from tolcontact.contact.linear_step import MAX_ROUNDS, PENETRATION, LinearStep
@@ -60,7 +60,7 @@ class ContactResolver:
         self.contact_points = [program.nominal.pairs[index] for index in group.group.pairs]
         self._springy = [k for k, pair in enumerate(self.contact_points) if pair.is_springy]
         size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
-        self._limits = Limits(program.nominal, group.group, self._method, size)
+        self._limits = AcceptanceLimits(program.nominal, group.group, self._method, size)
 
     def twin(self) -> "ContactResolver":
         """Return the same resolver for another thread."""

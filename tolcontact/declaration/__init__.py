@@ -85,6 +85,8 @@ pulls; its gap is minus its elongation or compression.
 A contact pair with a `stiffness` (N/mm) gives way, too: `contact(..., stiffness=5000)` states the force that presses its faces
 into each other evenly by 1 mm, as the data sheet of a pad or a press test does, for any number of contact points. These
 share it by the areas that they stand for, and push only. The faces must be flat, or those of balls and shafts against walls.
+The points are those of the nominal assembly, and push against the plane of the reference face without end, in every search.
+Where a part slides over an edge, a spring beyond it still pushes, so slides should be small beside the face.
 
 A part that contact alone holds in some directions (a shaft in a V, a lid over studs) is `floating=True` and has fewer
 locators, or none. In the directions that its locators leave open, it keeps its nominal position in the raw state. Contact then
@@ -256,7 +258,7 @@ model's own, the defaults, or set by options.
 ...     print(error)
 model "nothing" has 2 faults:
   - it has no parts; declare at least one with assembly.part(name, geometry)
-  - it measures nothing; declare at least one measure with assembly.measure(...)
+  - it measures nothing; declare at least one measurement with assembly.measure(...)
 
 ## Scripts, and models as data
 
@@ -269,9 +271,9 @@ are named from the folder of the JSON file, and errors state the place: `parts[2
 schema follows from the classes of this chapter: `python -m tolcontact.declaration.json_model > model.schema.json` writes it.
 
 A model of a stranger is data, and cannot ask for everything: files have at most 64 MiB, assemblies 1000 parts and 2000
-measures, pairs 100 000 contact points, names 500 characters, expressions 100 000 steps, and a draw of a distribution takes at
-most 10 ms. What is more is refused with the place in the file before anything is computed. (Scripts run code: run only those
-that you trust.)
+measures, pairs 100 000 contact points, names 500 characters (of parts and stations 255 bytes in UTF-8), expressions 100 000
+steps, and a draw of a distribution takes at most 10 ms. What is more is refused with the place in the file before anything is
+computed. (Scripts run code: run only those that you trust.)
 
 Every archive holds its model as JSON, too, with the triangles of meshes beside it: `tc.model_of(results)` rebuilds the
 assembly without running any code of the script. Functions of poses are kept as lists of elementary operations.
@@ -283,7 +285,7 @@ contact seat: plate -z (moving) against base +z (reference), spacing 5 mm
 
 from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.contact_pair import ContactPair
-from tolcontact.declaration.contributor import Correlation, Population, Variable
+from tolcontact.declaration.dependence import Correlation, Population, Variable
 from tolcontact.declaration.feature_tolerance import (
     Angularity,
     CircularRunout,

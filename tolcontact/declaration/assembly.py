@@ -5,14 +5,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
 from tolcontact.declaration.contact_pair import ContactPair
-from tolcontact.declaration.contributor import (
+from tolcontact.declaration.declarations import Declarations, expect
+from tolcontact.declaration.dependence import (
     Correlation,
     Population,
     Variable,
     correlation as _correlation,
     population as _population,
 )
-from tolcontact.declaration.declarations import Declarations, expect
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.joint import Joint
@@ -24,7 +24,15 @@ from tolcontact.declaration.size import Size
 from tolcontact.declaration.station import Station
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import tolerance as _tolerance
-from tolcontact.declaration.values import friction_faults, key_faults, repetitions, script_line, text_faults, vector as _vector
+from tolcontact.declaration.values import (
+    friction_faults,
+    group_faults,
+    key_faults,
+    repetitions,
+    script_line,
+    text_faults,
+    vector as _vector,
+)
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
 
@@ -152,6 +160,21 @@ class Assembly(Declarations, Pictured):
         """Return the parts of the rigid body to which a part of a scene belongs; the first one carries the others."""
         return next((joint.members for joint in self.joints if part in joint.members), (part,))
 
+    def support_chain(self, part: Part) -> tuple[Part, ...]:
+        """Return the first part of a part's body, the first one of the body that it is located on, and so on to the ground.
+
+        A circle of locations ends with the part that closes it: it stands in the chain twice.
+        """
+        chain: list[Part] = []
+        support: Part | None = part
+        while support is not None:
+            carrier = self.body_of(support)[0]
+            is_closed = carrier in chain
+            chain.append(carrier)
+            location = None if is_closed else self.location_of(carrier)
+            support = location.parent if location else None
+        return tuple(chain)
+
     def smallest_zone(self) -> float:
         """Return the smallest width of a tolerance zone [mm] of any locator, feature or measure; infinite without a zone.
 
@@ -172,7 +195,7 @@ class Assembly(Declarations, Pictured):
     def omissions(self) -> Iterator[str]:
         """Yield the faults of a model that is not complete yet: declarations that only a run needs."""
         if not self.measures:
-            yield "it measures nothing; declare at least one measure with assembly.measure(...)"
+            yield "it measures nothing; declare at least one measurement with assembly.measure(...)"
         for part in self.parts:
             if self.location_of(part) is None and part.fixed is not True:
                 advice = "it is not located; call locate(...), or declare it fixed=True to hold it at its nominal place"
@@ -188,9 +211,10 @@ class Assembly(Declarations, Pictured):
         for name, most in MAX_COUNTS.items():
             if (count := len(self._declared[name])) > most:
                 yield f"it has {count} {name}; expected at most {most}"
-        keyed = {"part": "parts", "contact pair": "pairs", "measure": "measures", "force": "forces"}
+        keyed = {"part": "parts", "contact pair": "pairs", "measurement": "measures", "force": "forces"}
         for kind, name in keyed.items():
             yield from key_faults(kind, [thing.name for thing in self._declared[name]])
+        yield from group_faults("part", [part.name for part in self.parts])
         for part in self.parts:
             yield from _located("part", part, part.faults())
             if not self.stations:
@@ -203,7 +227,7 @@ class Assembly(Declarations, Pictured):
         references: list[tuple[str, Any, Iterable[Part]]] = [
             *(("contact pair", pair, pair.parts) for pair in self.pairs),
             *(("force", force, force.parts) for force in self.forces),
-            *(("measure", measure, measure.parts) for measure in self.measures),
+            *(("measurement", measure, measure.parts) for measure in self.measures),
             *(("variable", variable, ()) for variable in self.variables),
             *(("correlation", correlation, ()) for correlation in self.correlations),
             *(("population", population, ()) for population in self.populations),
@@ -214,7 +238,7 @@ class Assembly(Declarations, Pictured):
         yield from key_faults("variable", [variable.name for variable in self.variables])
         for number, measure in enumerate(self.measures):
             earlier = [other for other in self.measures[:number] if other.station == measure.station]
-            yield from _located("measure", measure, measure.reference_faults(earlier))
+            yield from _located("measurement", measure, measure.reference_faults(earlier))
         if self.stations:
             yield from sequence_faults(self)
             for scene in self.scenes:
@@ -255,19 +279,18 @@ class Assembly(Declarations, Pictured):
         location = self.location_of(part)
         if location is not None and location.floating:
             body = self.body_of(part)
-            if not any(side.part in body for pair in self.pairs for side in (pair.moving, pair.reference)):
-                yield "it is floating, and in no contact pair, so nothing decides its place; declare its contacts"
+            touches = any(side.part in body for pair in self.pairs for side in (pair.moving, pair.reference))
+            if not (touches or location.has_supports):
+                yield (
+                    "it is floating, in no contact pair and on no one-sided locator, so nothing decides its place; "
+                    "declare its contacts"
+                )
             if part.fixed is True:
                 yield "it is floating, so contact has to move it; leave fixed out"
-        chain: list[Part] = []
-        support: Part | None = part
-        while support is not None:
-            if support in chain:
-                yield f"it is located on itself, through {' on '.join(link.name for link in chain)}; break the circle"
-                return
-            chain.append(support)
-            location = self.location_of(support)
-            support = location.parent if location else None
+        first, *rest = self.support_chain(part)
+        if first in rest:
+            circle = " on ".join(f'"{link.name}"' for link in (first, *rest))
+            yield f"it is located on itself: {circle}; locate one of them on another part, or on the ground"
 
     def _unknown_parts(self, label: str, line: str, *parts: Part | None) -> Iterator[str]:
         for part in parts:

@@ -1,8 +1,8 @@
 """Codecs: they write values into documents of plain values (dicts, lists, numbers, texts), and read them.
 
-A `Record` follows from a class: the names, the types and the defaults of its fields stand in that class alone. msgspec checks
-the structure of an entry and describes it as JSON schema; `faults()` of the class checks its values. Nothing is converted, and
-nothing in a document is run. References between declared things are codecs of `tolcontact.declaration.document`.
+A `DocumentRecord` follows from a class: the names, the types and the defaults of its fields stand in that class alone. msgspec
+checks the structure of an entry and describes it as JSON schema; `faults()` of the class checks its values. Nothing is
+converted, and nothing in a document is run. References between declared things are codecs of `tolcontact.declaration.document`.
 """
 
 import inspect
@@ -180,7 +180,7 @@ class Field:
         return getattr(thing, self.names[0]) if len(self.names) == 1 else tuple(getattr(thing, name) for name in self.names)
 
 
-class Record(Named):
+class DocumentRecord(Named):
     """Things of one class: an entry has a key for each field, or for those in `keys`.
 
     keys     in the order of the document: "name", "key=field", "key=field+field" for a list of several fields; "name?" is

@@ -12,9 +12,9 @@ import msgspec
 from msgspec import UNSET, Meta, UnsetType
 
 from tolcontact.declaration.assembly import MAX_COUNTS, Assembly
-from tolcontact.declaration.codec import CODECS, Choice, Inline, Items, Optional, Plain, Record
+from tolcontact.declaration.codec import CODECS, Choice, DocumentRecord, Inline, Items, Optional, Plain
 from tolcontact.declaration.contact_pair import VERTICES, ContactPair
-from tolcontact.declaration.contributor import Correlation, Population, Variable
+from tolcontact.declaration.dependence import Correlation, Population, Variable
 from tolcontact.declaration.face_entry import (
     FLOAT,
     FREE_DIRECTION,
@@ -147,10 +147,10 @@ def _measured(entries: Mapping[str, Any], place: Place) -> Point | Measurement |
     return tape_of(entries["tape"], place["tape"])
 
 
-def _tolerance_record(cls: Any) -> Record:
+def _tolerance_record(cls: Any) -> DocumentRecord:
     """Return the record of a geometric tolerance: its width, and all fields that differ from their defaults."""
     keys = ["width", *(f"{member.name}?" for member in fields(cls) if member.name != "width")]
-    return Record(
+    return DocumentRecord(
         cls, " ".join(keys), kind=cls.kind, width=Plain(NOT_NEGATIVE),
         zone=Plain(text_type(ZONES) | None), along=Optional(FREE_DIRECTION),
         material=Plain(text_type(MATERIALS)), bonus=Plain(text_type(BONUSES)), rule=Plain(text_type(RULES)),
@@ -163,37 +163,37 @@ DISTRIBUTION = Inline(
     _distribution_entries,
     _distribution,
 )
-ZONE = Record(
+ZONE = DocumentRecord(
     Tolerance, "range? distribution shift? cp? cpk?", name="Zone", range=Plain(NOT_NEGATIVE | str | None), shift=FLOAT,
     distribution=DISTRIBUTION, cp=Plain(POSITIVE | None, write=floats), cpk=Plain(float | None, write=floats),
 )  # fmt: skip
 WIDTH = Plain(NOT_NEGATIVE | str, read=lambda width, place: place.checked(Tolerance(width)))
 CODECS[Tolerance] = Choice("Tolerance", "a width in mm, a text such as '±0.1', or named values", ZONE, WIDTH)
-SIZE = Record(
+SIZE = DocumentRecord(
     Size, "nominal upper lower cp cpk moves distribution tolerance_class?", kind="size", nominal=Plain(POSITIVE),
     upper=Plain(float | str), lower=Plain(float | None), moves=Plain(text_type(MOVES)), distribution=DISTRIBUTION,
 )  # fmt: skip
-CODECS[Form] = Record(Form, "covariance? length? modes? lobes? measured?", covariance=Plain(text_type(COVARIANCES)))
+CODECS[Form] = DocumentRecord(Form, "covariance? length? modes? lobes? measured?", covariance=Plain(text_type(COVARIANCES)))
 CONTROL = Choice(
     "FeatureTolerance", f"kind: one of {', '.join(['size', *KINDS])}", SIZE, *map(_tolerance_record, KINDS.values())
 )
-FEATURE = Record(
+FEATURE = DocumentRecord(
     Feature, "faces tolerances name datum association? declared_at",
     tolerances=Items(CONTROL), association=Plain(text_type(ASSOCIATIONS)),
 )  # fmt: skip
 MEMBER = Choice("Member", "a list of faces, or the name of a feature", Items(CODECS[Face]), CODECS[Feature])
-PATTERN = Record(
+PATTERN = DocumentRecord(
     Pattern, "members=constituents tolerances name datum declared_at", mark="members", members=Items(MEMBER),
     tolerances=Items(CONTROL),
 )  # fmt: skip
-TARGETS = Record(DatumTargets, "datum=letter targets=points declared_at", name="DatumTargets")
+TARGETS = DocumentRecord(DatumTargets, "datum=letter targets=points declared_at", name="DatumTargets")
 TOLERANCED = Choice("Toleranced", "a feature, or a pattern with members", PATTERN, FEATURE)
 SHAPE = Shape(
     "Shape",
     "a box, a pin, or a file",
-    Record(Box, "box=x+y+z", mark="box"),
-    Record(Pin, "pin=diameter+length head?", mark="pin"),
-    Record(
+    DocumentRecord(Box, "box=x+y+z", mark="box"),
+    DocumentRecord(Pin, "pin=diameter+length head?", mark="pin"),
+    DocumentRecord(
         Mesh, "file=source units? body? chord?", mark="file", units=Plain(text_type(UNITS) | None),
         chord=Plain(POSITIVE | None), file=Plain(Annotated[str, Meta(description="path, from the folder of this file")],
         _file_name, _file),
@@ -201,7 +201,7 @@ SHAPE = Shape(
     Wrapped("mesh", Plain(str, read=lambda text, place: _mesh(place))),
 )  # fmt: skip
 STIFFNESS = Inline({"stiffness": POSITIVE, "springy": bool}, _stiffness_entries, _stiffness)
-LOCATOR = Record(
+LOCATOR = DocumentRecord(
     Locator, "name point direction one_sided stiffness tolerance part? on?",
     direction=UNIT_VECTOR, stiffness=STIFFNESS,
 )  # fmt: skip
@@ -209,16 +209,16 @@ SCHEME = Choice(
     "Scheme",
     "a list of locators, or a 3-2-1 scheme",
     Items(LOCATOR),
-    Record(ThreeTwoOne, "three_two_one=primary+secondary+tertiary inset", inset=Plain(NOT_NEGATIVE, write=floats)),
+    DocumentRecord(ThreeTwoOne, "three_two_one=primary+secondary+tertiary inset", inset=Plain(NOT_NEGATIVE, write=floats)),
 )
-METHOD = Record(
+METHOD = DocumentRecord(
     Method, " ".join(member.name for member in fields(Method)),
     resolution=Plain(text_type(RESOLUTIONS)),
     objective=Plain(text_type(OBJECTIVES)), regularization=Plain(text_type(REGULARIZATIONS)),
     active_set=Plain(text_type(ACTIVE_SETS)),
     search=Plain(text_type(SEARCHES)),
 )  # fmt: skip
-TITLE_BLOCK = Record(TitleBlock, " ".join(f"{name}?" for name in TitleBlock().entries))
+TITLE_BLOCK = DocumentRecord(TitleBlock, " ".join(f"{name}?" for name in TitleBlock().entries))
 GROUND = Inline({"on": str | None, "on_feature": str}, _ground_entries, _ground)
 # A part is read without its features, whose faces may refer to all parts.
 FEATURES = Inline(
@@ -230,30 +230,32 @@ FEATURES = Inline(
     lambda entries, place: UNSET,
 )
 RECORDS = {
-    "parts": Record(Part, "geometry name at rotation fixed declared_at features", geometry=SHAPE, features=FEATURES),
-    "locations": Record(
+    "parts": DocumentRecord(Part, "geometry name at rotation fixed declared_at features", geometry=SHAPE, features=FEATURES),
+    "locations": DocumentRecord(
         Location, "part on tolerance scheme declared_at floating? station? joint? placing?",
         scheme=SCHEME, on=GROUND, placing=Plain(text_type(PLACINGS)),
     ),
-    "pairs": Record(
+    "pairs": DocumentRecord(
         ContactPair, "moving reference name points spacing within declared_at mu? station? stiffness?",
         points=Plain(INDEX | text_type([VERTICES]) | None, read=indices_of),
         spacing=Plain(POSITIVE | None), within=Plain(POSITIVE | None), mu=Plain(NOT_NEGATIVE | None, write=floats),
         stiffness=Plain(POSITIVE | None, write=floats),
     ),
-    "measures": Record(
+    "measures": DocumentRecord(
         Measure, "name of to? along tolerance units declared_at absolute? limits? station?", of=Inline(
             {"of": MEASURED.wire, "tape": Annotated[list[list[str | int | float]], Meta(description="steps of an expression")]},
             _measured_entries, _measured,
         ), along=Optional(UNIT_VECTOR), tolerance=Plain(POSITIVE | tuple[float, float] | str | None),
         limits=Plain(tuple[float | None, float | None] | None, write=floats),
     ),
-    "forces": Record(Force, "at name vector declared_at station?"),
-    "variables": Record(Variable, "tolerance drives name units declared_at", drives=Plain(Mapping[str, float], write=floats)),
-    "correlations": Record(Correlation, "labels matrix declared_at"),
-    "populations": Record(Population, "values columns source declared_at"),
-    "stations": Record(Station, "name declared_at"),
-    "joints": Record(Joint, "name members station declared_at"),
+    "forces": DocumentRecord(Force, "at name vector declared_at station?"),
+    "variables": DocumentRecord(
+        Variable, "tolerance drives name units declared_at", drives=Plain(Mapping[str, float], write=floats)
+    ),
+    "correlations": DocumentRecord(Correlation, "labels matrix declared_at"),
+    "populations": DocumentRecord(Population, "values columns source declared_at"),
+    "stations": DocumentRecord(Station, "name declared_at"),
+    "joints": DocumentRecord(Joint, "name members station declared_at"),
 }  # fmt: skip
 DOCUMENT = msgspec.defstruct("Document", [
     ("name", str), ("parts", Items(RECORDS["parts"]).wire), ("measures", Items(RECORDS["measures"]).wire),

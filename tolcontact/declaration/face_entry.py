@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 from msgspec import UNSET, Meta, UnsetType
 
-from tolcontact.declaration.codec import CODECS, Choice, Codec, Named, Optional, Plain, Record
+from tolcontact.declaration.codec import CODECS, Choice, Codec, DocumentRecord, Named, Optional, Plain
 from tolcontact.declaration.measure import Tape
 from tolcontact.declaration.part import Face, Feature, Part
 from tolcontact.declaration.place import Place
@@ -211,10 +211,10 @@ CRITERION = Choice(
     "Criterion",
     "a direction, or one of facing, inside, near, brep, cylinder, largest, triangles",
     AXIS,
-    Record(Facing, "facing=direction angle", mark="facing", facing=FREE_DIRECTION, angle=Plain(POSITIVE)),
-    Record(Inside, "inside=lower+upper", mark="inside"),
-    Record(Near, "near=part within", mark="near", near=CODECS[Part], within=Plain(POSITIVE)),
-    Record(
+    DocumentRecord(Facing, "facing=direction angle", mark="facing", facing=FREE_DIRECTION, angle=Plain(POSITIVE)),
+    DocumentRecord(Inside, "inside=lower+upper", mark="inside"),
+    DocumentRecord(Near, "near=part within", mark="near", near=CODECS[Part], within=Plain(POSITIVE)),
+    DocumentRecord(
         Brep,
         "brep=which whole?",
         mark="brep",
@@ -222,14 +222,14 @@ CRITERION = Choice(
         brep=Plain(INDEX | str | Vector | dict[str, list[INDEX | str | Vector]], _brep_entry, _brep_faces),  # type: ignore[misc]
         whole=Plain(bool | text_type(FACE_GROUPS)),
     ),
-    Wrapped("cylinder", Record(Cylinder, "radius? inner?", radius=Plain(POSITIVE | None))),
-    Record(
+    Wrapped("cylinder", DocumentRecord(Cylinder, "radius? inner?", radius=Plain(POSITIVE | None))),
+    DocumentRecord(
         Largest,
         "largest=kind direction?",
         mark="largest",
         largest=Plain(text_type(SURFACES)),
         direction=Optional(FREE_DIRECTION),
     ),
-    Record(Triangles, "triangles=indices", mark="triangles", triangles=TRIANGLES),
+    DocumentRecord(Triangles, "triangles=indices", mark="triangles", triangles=TRIANGLES),
 )
 CODECS[Face] = Faces()

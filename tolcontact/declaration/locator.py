@@ -190,7 +190,7 @@ class Location(Readable):
         yield from self._faces_faults() if isinstance(self.scheme, ThreeTwoOne) else self._locator_faults(self.scheme)
         if self.placing not in PLACINGS:
             yield f"placing is {self.placing!r}; expected one of: {', '.join(PLACINGS)}"
-        elif self.placing != FIRST_ORDER and (self.floating or self._has_supports):
+        elif self.placing != FIRST_ORDER and (self.floating or self.has_supports):
             yield f'placing="{self.placing}" needs locators that hold both ways; leave floating and one_sided out'
         if self.tolerance is not None:
             yield from (f"locators: {fault}" for fault in self.tolerance.faults())
@@ -241,7 +241,7 @@ class Location(Readable):
             yield "it is floating, but six locators hold it both ways; leave floating out, or some of them"
 
     @property
-    def _has_supports(self) -> bool:
+    def has_supports(self) -> bool:
         return isinstance(self.scheme, tuple) and any(locator.one_sided for locator in self.scheme)
 
     def __str__(self) -> str:

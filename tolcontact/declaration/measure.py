@@ -43,7 +43,7 @@ class Measure(Readable):
     limits: tuple[float | None, float | None] | None = None
     absolute: bool | None = None
     station: str = ""
-    noun: ClassVar[str] = "measure"
+    noun: ClassVar[str] = "measurement"
 
     def __post_init__(self) -> None:
         with contextlib.suppress(TextFault):  # faults() reports it
@@ -110,7 +110,7 @@ class Measure(Readable):
         if not isinstance(self.absolute, bool | None):
             yield f"absolute is {self.absolute!r}; expected True or False"
         elif self.absolute is not None and not isinstance(self.of, Point):
-            yield f"absolute is for measures of points; a {self._noun} has its own value, so leave it out"
+            yield f"absolute is for measurements of points; a {self._noun} has its own value, so leave it out"
 
     def _subject_faults(self) -> Iterator[str]:
         if isinstance(self.of, Point):
@@ -124,7 +124,7 @@ class Measure(Readable):
                 "or a function of the poses"
             )
         elif self.along is not None or self.to is not None:
-            yield f"a {self._noun} defines its measure by itself; leave out to and along"
+            yield f"a {self._noun} defines its value by itself; leave out to and along"
         if isinstance(self.of, Measurement):
             yield from self.of.faults()
 
@@ -160,7 +160,7 @@ class Measure(Readable):
         units = {measure.name: measure.units for measure in earlier}
         for name in dict.fromkeys(self.of.names):
             if name not in units:
-                yield f'unknown measure "{name}"; those declared before it are: {", ".join(units) or "none"}'
+                yield f'unknown measurement "{name}"; those declared before it are: {", ".join(units) or "none"}'
         own = self.of.units_among(units)
         if len(own) > 1:
             yield f"it combines measurements in {' and '.join(sorted(own))}; expected the same units"

@@ -45,7 +45,7 @@ class Measurement(Readable):
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """The parts that are measured, and those that choose faces."""
+        """The parts that are measured, and the parts that choose faces."""
         own = [part for face in self.faces for part in face.parts] + [point.part for point in self.points]
         return (*own, *(part for nested in self._nested for part in nested.parts))
 
@@ -247,7 +247,7 @@ class Combination(Measurement):
         for operand in measurements:
             value = operand if isinstance(operand, str | Measurement) else getattr(operand, "name", None)
             if not isinstance(value, str | Measurement):
-                raise TypeError(f"{self.kind}: {type(operand).__name__} is no measurement; expected a measure or its name")
+                raise TypeError(f"{self.kind}: {type(operand).__name__} is no measurement; expected one, or the name of one")
             operands.append(value)
         object.__setattr__(self, "measurements", tuple(operands))
         object.__setattr__(self, "depth", 1 + max((nested.depth for nested in self._nested), default=0))

@@ -3,7 +3,7 @@
 from dataclasses import fields
 from typing import Any
 
-from tolcontact.declaration.codec import CODECS, Choice, Items, Optional, Plain, Record
+from tolcontact.declaration.codec import CODECS, Choice, DocumentRecord, Items, Optional, Plain
 from tolcontact.declaration.face_entry import UNIT_VECTOR
 from tolcontact.declaration.measurement import MAX_DEPTH, MEASUREMENTS, Combination
 from tolcontact.declaration.part import Point
@@ -19,20 +19,20 @@ class Operands(Items):
         return super().decode(entry, place, **arguments)
 
 
-def _record(cls: Any) -> Record:
+def _record(cls: Any) -> DocumentRecord:
     """Return the record of a kind of measurement: its faces and points, and directions if it has some."""
     if issubclass(cls, Combination):
-        return Record(
+        return DocumentRecord(
             cls, "measurements", kind=cls.kind, measurements=Operands(OPERAND), build=lambda measurements: cls(*measurements)
         )
     keys = " ".join(f"{member.name}?" if member.default is None else member.name for member in fields(cls))
     vector = Optional(UNIT_VECTOR)
-    return Record(cls, keys, kind=cls.kind, across=vector, along=vector, about=vector)
+    return DocumentRecord(cls, keys, kind=cls.kind, across=vector, along=vector, about=vector)
 
 
-CODECS[Point] = Record(Point, "part on? end? position?", mark="part")
+CODECS[Point] = DocumentRecord(Point, "part on? end? position?", mark="part")
 KIND = f"a measurement whose kind is one of {', '.join(MEASUREMENTS)}"
-OPERAND = Choice("Operand", f"the name of a measure, or {KIND}")
+OPERAND = Choice("Operand", f"the name of a measurement, or {KIND}")
 KINDS = tuple(map(_record, MEASUREMENTS.values()))
 OPERAND.codecs = (*KINDS, Plain(str))
 MEASURED = Choice("Measured", f"a point, or {KIND}", *KINDS, CODECS[Point])

@@ -30,11 +30,14 @@ def movers(assembly: Assembly, part: Part, *, springs: bool) -> tuple[Part, ...]
 
     A part of a joint is moved by the first part of the joint. Locators that are `springs` count as supports.
     """
+    chain = dict.fromkeys(assembly.support_chain(part))
+    return tuple(link for link in reversed(chain) if _moves(assembly, link, springs=springs))
+
+
+def _moves(assembly: Assembly, part: Part, *, springs: bool) -> bool:
+    """Return True if the first part of a body is free, and something in the model holds it or pushes it."""
     body = assembly.body_of(part)
-    part = body[0]
-    location = assembly.location_of(part)
-    supports = movers(assembly, location.parent, springs=springs) if location and location.parent else ()
     touches = has_supports(assembly, part, springs=springs) or any(
         side.part in body for pair in assembly.pairs for side in (pair.moving, pair.reference)
     )
-    return (*supports, part) if touches and is_free(assembly, part, springs=springs) else supports
+    return touches and is_free(assembly, part, springs=springs)

@@ -11,7 +11,7 @@ from tolcontact.declaration.joint import Joint
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.part import Part
 from tolcontact.declaration.station import Station
-from tolcontact.declaration.values import key_faults, repetitions
+from tolcontact.declaration.values import group_faults, key_faults, repetitions
 from tolcontact.errors import designation
 
 SETTINGS = {"locations": "locate", "pairs": "contact", "measures": "measure", "forces": "force"}  # lists, and their methods
@@ -75,6 +75,7 @@ def sequence_faults(line: Line) -> Iterator[str]:
     """Yield the faults of the sequence: each names the station, the part and the script line."""
     names = [station.name for station in line.stations]
     yield from key_faults("station", names)
+    yield from group_faults("station", names)
     yield from key_faults("joint", [joint.name for joint in line.joints])
     yield from repetitions("part or joint", [part.name for part in line.parts] + [joint.name for joint in line.joints])
     for list_name, method in SETTINGS.items():

@@ -15,7 +15,7 @@ T = TypeVar("T")
 class Station(Declarations, Readable):
     """A step in which an assembly is built or measured: `assembly.station(name)` declares it, in the order of the steps.
 
-    Parts and joints are located anew in each station; a station that only measures is an inspection. Features belong to parts:
+    Parts and joints are located again in each station; a station that only measures is an inspection. Features belong to parts:
     they deviate alike in all stations. A locator is a contributor of its own in each station, "weld.panel.A1".
     """
 

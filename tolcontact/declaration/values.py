@@ -13,6 +13,7 @@ from typing import Any, overload
 from tolcontact.errors import CONTROL_CHARACTERS, shown
 
 MAX_NAME = 500  # characters
+MAX_GROUP_NAME = 255  # bytes in UTF-8: the netCDF library's NC_MAX_NAME is 256, with which some groups cannot be written
 MAX_FRICTION = 10  # more does not exist
 _KEY = re.compile(r"\w(?:[^/]*[^/\s])?")
 
@@ -37,6 +38,18 @@ def key_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
                 'no "/" and no control character, and does not end in a space (the archive uses it)'
             )
     yield from repetitions(kind, names)
+
+
+def group_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
+    """Yield the faults of names after which the archive calls groups, in addition to those of `key_faults`."""
+    for name in dict.fromkeys(names):
+        if isinstance(name, str) and len(name) <= MAX_NAME:
+            size = len(unicodedata.normalize("NFC", name).encode("utf-8", "replace"))
+            if size > MAX_GROUP_NAME:
+                yield (
+                    f"{kind} {name[:40]!r}...: the name takes {size} bytes in UTF-8; expected at most {MAX_GROUP_NAME} "
+                    "(the archive has groups of that name)"
+                )
 
 
 def _length_fault(kind: str, name: Any) -> str:

@@ -54,8 +54,8 @@ that.
 >>> print(caught[0].message)
 contact pair "foot" (...): parts may be off by up to 0.0092 mm between flat triangles and the round faces ...
 
-A `tc.FaceWarning` names a feature or contact pair whose B-rep faces are only some of those that make up a cylinder, or another
-curved surface: files split holes into halves. `tc.Brep(number, whole=True)` chooses all of them.
+A `tc.FaceWarning` names a feature or contact pair whose B-rep faces are only a part of a cylinder, or of another curved
+surface: files split holes into halves. `tc.Brep(number, whole=True)` chooses all of them.
 
 A `tc.UnitsWarning` names a mesh without stated units whose size is implausible in mm, either in itself (below 1 mm or above 10
 m) or compared with a part that it touches. It also names a mesh if all declared points would lie on it in another unit.
@@ -90,6 +90,7 @@ The ends of the faces are those of the nominal assembly. A shaft that is pushed 
 its wall, is detected only afterwards (see the checks of surfaces in `tolcontact.contact`).
 """
 
+from tolcontact.discretization.counted_points import CountedPoints, counted_points
 from tolcontact.discretization.discretizing import discretize
 from tolcontact.discretization.form_places import FIRST_POINT, raised_places, rim_points
 from tolcontact.discretization.locators import Locators
@@ -98,6 +99,6 @@ from tolcontact.discretization.nominal_part import NominalPart
 from tolcontact.discretization.round_points import RoundPoint, RoundPoints
 
 __all__ = [
-    "FIRST_POINT", "ContactPoints", "Locators", "Nominal", "NominalPart", "Offsets", "RoundPoint", "RoundPoints",
-    "discretize", "raised_places", "rim_points",
+    "FIRST_POINT", "ContactPoints", "CountedPoints", "Locators", "Nominal", "NominalPart", "Offsets", "RoundPoint",
+    "RoundPoints", "counted_points", "discretize", "raised_places", "rim_points",
 ]  # fmt: skip

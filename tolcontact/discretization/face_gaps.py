@@ -3,7 +3,7 @@
 import numpy as np
 
 from tolcontact.discretization.form_points import form_lengths, form_spacing, with_rims
-from tolcontact.discretization.measured_geometry import FaceGap, MeasuredFace, Station
+from tolcontact.discretization.measured_geometry import FaceGap, MeasuredFace, MeasuredPoint
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.curvature import is_flat
@@ -32,12 +32,12 @@ def face_gap(moving: MeasuredFace, reference: MeasuredFace, is_largest: bool) ->
             "behind both"
         )
     weights = point_weights(places, float(np.linalg.norm(places - feet, axis=1).max()), moving.surface, reference.surface)
-    stations = [
-        (Station(moving.part, place, moving.deviation, direction), reference.wall(place))
+    points = [
+        (MeasuredPoint(moving.part, place, moving.deviation, direction), reference.wall(place))
         for place, direction in zip(places, outward, strict=True)
     ]
     shown = np.abs(places - weights @ places / weights.sum()).sum(axis=1).argmin()
-    return FaceGap(np.array([[places[shown], feet[shown]]]), stations, weights / weights.sum(), is_largest)
+    return FaceGap(np.array([[places[shown], feet[shown]]]), points, weights / weights.sum(), is_largest)
 
 
 def _places(moving: MeasuredFace, reference: MeasuredFace) -> np.ndarray:

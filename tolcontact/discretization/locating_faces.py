@@ -12,7 +12,7 @@ from tolcontact.geometry.faces import Meshes, patch
 
 ROUNDING = 1e-6  # of a face's size
 CLOSE = 1e-3  # of a face's size: a point that lies no farther beside or above the material is on it
-STATIONS = 37  # places that are tried along each side of the bounding rectangle
+DIVISIONS = 37  # places that are tried along each side of the bounding rectangle
 ROUNDS = 8  # of moves of each point
 TIE = 1e-9  # of the widest support
 MAX_PAIRS = 1 << 21  # of points and triangles that are compared at once
@@ -111,7 +111,7 @@ class LocatingFace:
         """Return places (n, 3) [mm] on the material at least `inset` from all edges: vertices, and a lattice."""
         flat = self.vertices @ self.axes.T
         lower, upper = flat.min(axis=0) + inset, flat.max(axis=0) - inset
-        lattice = np.stack(np.meshgrid(*np.linspace(lower, upper, STATIONS).T), axis=-1).reshape(-1, 2)
+        lattice = np.stack(np.meshgrid(*np.linspace(lower, upper, DIVISIONS).T), axis=-1).reshape(-1, 2)
         places = np.concatenate([flat, lattice])
         heights = self._heights(places, ROUNDING * self.size)
         places, heights = places[~np.isnan(heights)], heights[~np.isnan(heights)]

@@ -177,9 +177,9 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
     edges /= np.linalg.norm(edges, axis=1, keepdims=True)
     a, b, c = edges
     primary, secondary, tertiary = (face.vertices for face in faces)
-    near_c, far_c = _stations(primary, c, scheme.inset)
-    near_b, far_b = _stations(primary, b, scheme.inset)
-    side_near, side_far = _stations(secondary, c, scheme.inset)
+    near_c, far_c = _support_places(primary, c, scheme.inset)
+    near_b, far_b = _support_places(primary, b, scheme.inset)
+    side_near, side_far = _support_places(secondary, c, scheme.inset)
     rectangular = [
         _place(edges, outward, primary, 0, {1: near_b, 2: near_c}),
         _place(edges, outward, primary, 0, {1: near_b, 2: far_c}),
@@ -199,7 +199,7 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
     )
 
 
-def _stations(points: np.ndarray, along: np.ndarray, inset: float) -> tuple[float, float]:
+def _support_places(points: np.ndarray, along: np.ndarray, inset: float) -> tuple[float, float]:
     """Return the places [mm] along a direction at an inset from both ends of a face."""
     places = points @ along
     lower, upper = places.min() + inset, places.max() - inset
@@ -214,7 +214,7 @@ def _middle(points: np.ndarray, along: np.ndarray) -> float:
     return float(places.min() + places.max()) / 2
 
 
-def _place(edges: np.ndarray, outward: np.ndarray, points: np.ndarray, face: int, stations: dict[int, float]) -> np.ndarray:
-    """Return the point on the plane of a face whose coordinates along edges are `stations`, by the edges' numbers."""
-    rows = [outward[face], *(edges[axis] for axis in stations)]
-    return np.linalg.solve(np.array(rows), np.array([float((points @ outward[face]).max()), *stations.values()]))
+def _place(edges: np.ndarray, outward: np.ndarray, points: np.ndarray, face: int, coordinates: dict[int, float]) -> np.ndarray:
+    """Return the point on the plane of a face with these coordinates along edges, by the edges' numbers."""
+    rows = [outward[face], *(edges[axis] for axis in coordinates)]
+    return np.linalg.solve(np.array(rows), np.array([float((points @ outward[face]).max()), *coordinates.values()]))

@@ -77,7 +77,7 @@ class MeasuredFace:
 
 
 @dataclass(frozen=True, eq=False)
-class Station:
+class MeasuredPoint:
     """A point (3,) [mm] of a part, and the deviation and the outward normal (3,) of the face that it is on, if any."""
 
     part: int
@@ -141,17 +141,17 @@ class Crossing:
 
 @dataclass(frozen=True, eq=False)
 class Heights(NominalMeasurement):
-    """The least height of stations over walls, and of edges over edges that they cross."""
+    """The least height of points over walls, and of edges over edges that they cross."""
 
-    stations: Sequence[tuple[Station, Wall]]
+    points: Sequence[tuple[MeasuredPoint, Wall]]
     crossings: Sequence[Crossing] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class FaceGap(NominalMeasurement):
-    """The largest or the mean height of stations all over a face, each over its wall; `weights` are shares of the area."""
+    """The largest or the mean height of points all over a face, each over its wall; `weights` are shares of the area."""
 
-    stations: Sequence[tuple[Station, Wall]]
+    points: Sequence[tuple[MeasuredPoint, Wall]]
     weights: np.ndarray
     is_largest: bool
 

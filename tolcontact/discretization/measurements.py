@@ -29,12 +29,12 @@ from tolcontact.discretization.measured_geometry import (
     DirectionPair,
     Heights,
     MeasuredFace,
+    MeasuredPoint,
     MeshClearance,
     NominalMeasurement,
     Outline,
     PlaneClearance,
     RoundClearance,
-    Station,
     Wall,
 )
 from tolcontact.discretization.nominal import Nominal
@@ -91,7 +91,7 @@ def nominal_measurements(nominal: Nominal) -> tuple[NominalMeasurement | None, .
             if isinstance(measure.of, Measurement):
                 measurements[measure.name] = _with_numbers(measure.of, faces, measurements)
         except GeometryFault as fault:
-            faults.append(f"{designation('measure', measure)}: {fault}")
+            faults.append(f"{designation(measure.noun, measure)}: {fault}")
     if faults:
         raise ModelError(nominal.assembly.name, faults)
     return tuple(measurements.values())
@@ -124,10 +124,10 @@ def _lines(nominal: Nominal, number: int, measurements: Mapping[str, NominalMeas
 def _gap(gap: Gap, faces: MeasuredFaces) -> Heights:
     face, point, nominal = faces[gap.face], gap.station, faces.nominal
     position, deviation = nominal.position(point), nominal.face_at(point)
-    station = Station(nominal.part_index(point.part), position, deviation, nominal.outward(point))
-    _check_varies([gap.station.part, gap.face.part], [station.deviation, face.deviation])
+    measured_point = MeasuredPoint(nominal.part_index(point.part), position, deviation, nominal.outward(point))
+    _check_varies([gap.station.part, gap.face.part], [measured_point.deviation, face.deviation])
     wall = face.wall(position)
-    return Heights(np.array([[position, wall.foot(position)]]), [(station, wall)])
+    return Heights(np.array([[position, wall.foot(position)]]), [(measured_point, wall)])
 
 
 def _clearance(clearance: Clearance, faces: MeasuredFaces) -> NominalMeasurement:
@@ -135,7 +135,7 @@ def _clearance(clearance: Clearance, faces: MeasuredFaces) -> NominalMeasurement
     for face in (moving, reference):
         if face.deviation is not None and face.deviation.form is not None:
             raise GeometryFault(
-                f"the clearance of {face.face}, which has form, cannot be measured; measure the gaps of stations with tc.Gap, "
+                f"the clearance of {face.face}, which has form, cannot be measured; measure the gaps of points with tc.Gap, "
                 "or what is left between the faces with tc.LargestGap, or give its tolerance of form form=None"
             )
     if is_flat(moving.surface) and is_flat(reference.surface):
@@ -164,7 +164,9 @@ def _clearance_of_meshes(moving: MeasuredFace, reference: MeasuredFace) -> MeshC
         elements = nearest_elements(moving.surface.mesh, reference.surface.mesh, float(min(distances)))
     except GeometryFault as fault:
         kinds = " and ".join(_kind(face) for face in (moving, reference))
-        raise GeometryFault(f"the clearance of {kinds} cannot be measured: {fault}; or measure stations with tc.Gap") from fault
+        raise GeometryFault(
+            f"the clearance of {kinds} cannot be measured: {fault}; or measure the gaps of points with tc.Gap"
+        ) from fault
     return MeshClearance(elements.line[None], moving, reference, elements, trimesh.bounds.corners(moving.surface.mesh.bounds))
 
 
@@ -174,18 +176,18 @@ def _clearance_of_planes(moving: MeasuredFace, reference: MeasuredFace) -> Heigh
         raise GeometryFault(
             f"its planes {moving.face} and {reference.face} do not face each other; choose planes with material behind both"
         )
-    stations: list[tuple[Station, Wall]] = []
+    points: list[tuple[MeasuredPoint, Wall]] = []
     for face, target in ((moving, reference), (reference, moving)):
         corners = np.asarray(face.surface.mesh.vertices)[np.unique(rim(np.asarray(face.surface.mesh.faces)))]
         _, _, is_over = target.surface.project(corners)
         outward, wall = face.plane.axis, Wall(target.part, target.plane, 1.0, target.deviation)
         corners = _outline(corners[is_over], outward)
-        stations += [(Station(face.part, corner, face.deviation, outward), wall) for corner in corners]
+        points += [(MeasuredPoint(face.part, corner, face.deviation, outward), wall) for corner in corners]
     crossings = []
     for edges in zip(*crossing_edges(moving.surface, reference.surface), strict=True):
         p, q = (end - start for start, end in edges)
         crossings.append(Crossing(moving, reference, edges, float(np.sign(np.cross(p, q) @ reference.plane.axis))))
-    lines = [[station.position, wall.foot(station.position)] for station, wall in stations]
+    lines = [[point.position, wall.foot(point.position)] for point, wall in points]
     lines += [list(_nearest_places(*crossing.edges)) for crossing in crossings]
     if not lines:
         raise GeometryFault(
@@ -194,7 +196,7 @@ def _clearance_of_planes(moving: MeasuredFace, reference: MeasuredFace) -> Heigh
         )
     shortest = min(lines, key=lambda line: float(np.linalg.norm(line[1] - line[0])))
     heights, outlines = (
-        Heights(np.array([shortest]), stations, crossings),
+        Heights(np.array([shortest]), points, crossings),
         (Outline.of(moving.surface), Outline.of(reference.surface)),
     )
     if len(outlines[0].edges) * len(outlines[1].edges) > MAX_EDGE_PAIRS:
@@ -260,8 +262,8 @@ def _check_varies(parts: Iterable[Any], deviations: Iterable[Any]) -> None:
 
 
 def _is_outer_cylinder(face: MeasuredFace) -> bool:
-    pieces = face.surface.pieces
-    return len(pieces) == 1 and isinstance(pieces[0].surface, Cylinder) and not pieces[0].is_hollow
+    pieces, is_whole = face.surface.pieces, not len(face.surface.unknown.mesh.faces)
+    return is_whole and len(pieces) == 1 and isinstance(pieces[0].surface, Cylinder) and not pieces[0].is_hollow
 
 
 def _kind(face: MeasuredFace) -> str:

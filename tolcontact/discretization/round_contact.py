@@ -15,7 +15,7 @@ from tolcontact.geometry.surface import Piece, Surface
 MAX_POINTS = 40  # of a pair
 PARALLEL_TOLERANCE = 1e-3  # rad between the axis of a shaft and its wall
 ARC_MARGIN = math.radians(5.0)  # between the line of contact and the ends of a shaft's arc
-STATIONS = 200  # places along an axis that are examined
+AXIS_PLACES = 200  # places along an axis that are examined
 BISECTIONS = 40
 MAX_FACET_SINE = 0.3  # of half the angle between facets
 PLACE_TOLERANCE = 1e-6  # of a face's size
@@ -149,7 +149,7 @@ class _ContactLine:
         shaft = self._body.surface
         vertices = [np.asarray(piece.face.mesh.vertices) for piece in (self._body, self._wall)]
         of_vertices = np.concatenate([(points - shaft.origin) @ shaft.axis for points in vertices])
-        places = np.unique(np.concatenate([np.linspace(start, end, STATIONS + 1), of_vertices.clip(start, end)]))
+        places = np.unique(np.concatenate([np.linspace(start, end, AXIS_PLACES + 1), of_vertices.clip(start, end)]))
         return np.unique(np.concatenate([places, (places[1:] + places[:-1]) / 2]))
 
     def bracket(self, inside: float, outside: float) -> tuple[float, float]:
@@ -215,7 +215,7 @@ def _shaft_in_hole(
         hole.radius - shaft.radius - float(np.linalg.norm(offset - (offset @ hole.axis) * hole.axis)) for offset in offsets
     ]
     if min(clearances) > reach or ends[1][0] - ends[0][0] <= tolerance:
-        return _no_points(wall, shaft.origin + np.linspace(start, end, STATIONS)[:, None] * shaft.axis, shaft.radius)
+        return _no_points(wall, shaft.origin + np.linspace(start, end, AXIS_PLACES)[:, None] * shaft.axis, shaft.radius)
     (towards, opening), (_, shaft_opening) = arc(wall), arc(body)
     is_wide = hole.radius >= shaft.radius or opening == math.pi
     is_square = _has_square_ends(body) and _has_square_ends(wall)

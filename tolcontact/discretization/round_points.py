@@ -6,6 +6,7 @@ points are computed at every pose from a few numbers. They are exact; no point i
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -176,6 +177,29 @@ class RoundPoint:
             on_body = on_wall = self.centre
         return (on_body, on_wall, n) if self.on_moving else (on_wall, on_body, -n)
 
+    def centres(self) -> tuple["Ball", "Ball"]:
+        """Return balls around the centres of curvature of the moving and the reference face, where they touch nominally.
+
+        That of a plane is around the point of contact, and as large as the ball or shaft. The place on a shaft's axis has no
+        radius: the other end holds the shaft.
+        """
+        body = Ball(self.centre, 0.0 if self.axis.any() else self.radius)
+        on_moving, on_reference, _ = self.nominal()
+        on_wall = on_reference if self.on_moving else on_moving
+        if isinstance(self.wall, Plane):
+            wall = Ball(on_wall, self.radius)
+        else:
+            offset = self.wall.offset(on_wall)
+            wall = Ball(on_wall - offset, float(np.linalg.norm(offset)))
+        return (body, wall) if self.on_moving else (wall, body)
+
+
+class Ball(NamedTuple):
+    """A centre (3,) and a radius [mm]."""
+
+    centre: np.ndarray
+    radius: float
+
 
 @dataclass(frozen=True, eq=False)
 class RoundPoints:
@@ -193,6 +217,11 @@ class RoundPoints:
         names = [field.name for field in fields(RoundPoint) if field.name != "wall"]
         arrays = {name: np.array([getattr(point, name) for point in points]) for name in names}
         return cls(surface_arrays([point.wall for point in points]), arrays)
+
+    @property
+    def are_beside(self) -> bool:
+        """Whether no wall is around a ball or shaft."""
+        return not bool(self.points["is_hollow"].any())
 
     def __iter__(self) -> Iterator[RoundPoint]:
         for k, wall in enumerate(surfaces_of(self.walls)):

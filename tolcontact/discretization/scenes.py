@@ -37,7 +37,7 @@ class Scene:
         return tuple(map(self.index, movers(self.assembly, part, springs=self.presses)))
 
     def label(self, name: str) -> str:
-        """Return the name of something in this scene that is declared anew in each station."""
+        """Return the name of something in this scene that is declared again in each station."""
         return f"{self.station}.{name}" if self.station else name
 
 

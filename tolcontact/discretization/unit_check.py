@@ -39,7 +39,7 @@ def _far_point(assembly: Assembly, part: Part, geometry: Mesh, shape: Shape) -> 
     declared = [
         *((f'its locator "{locator.name}"', locator.point) for locator in scheme),
         *(
-            (f'the point of measure "{m.name}"', p.position)
+            (f'the point of measurement "{m.name}"', p.position)
             for m in assembly.measures
             for p in m.points
             if p.part is part and p.position

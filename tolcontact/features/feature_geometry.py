@@ -138,15 +138,15 @@ class AxisFeature(FeatureGeometry):
     def end(self, number: int) -> np.ndarray:
         return self.centre + (2 * number - 1) * self.half * self.axis
 
-    def axis_rows(self, stations: np.ndarray, across: np.ndarray | None = None) -> np.ndarray:
-        """Return rows (station, component, coordinate) of displacements of the axis at `stations`.
+    def axis_rows(self, places: np.ndarray, across: np.ndarray | None = None) -> np.ndarray:
+        """Return rows (place, component, coordinate) of displacements of the axis at `places`.
 
-        Stations are in halves of the axis' length from its middle. The components are the two directions across the axis, or
+        Places are in halves of the axis' length from its middle. The components are the two directions across the axis, or
         the one direction whose parts in these two are `across` (2,).
         """
-        rows = np.zeros((len(stations), 2, len(self.names)))
+        rows = np.zeros((len(places), 2, len(self.names)))
         rows[:, 0, 0] = rows[:, 1, 1] = 1.0
-        rows[:, 0, 2] = rows[:, 1, 3] = stations
+        rows[:, 0, 2] = rows[:, 1, 3] = places
         return rows if across is None else np.einsum("c,pcq->pq", across, rows)[:, None]
 
 

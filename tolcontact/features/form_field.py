@@ -5,6 +5,7 @@ a pivoted Cholesky factor of the covariance, so that they are known at any place
 - removed. All that uses a face thus shares one field.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -40,6 +41,7 @@ class FormField:
     left_out    share of the variance of the field that the modes leave out
     spreads     (mode,) [mm] standard deviations of the coefficients, as measured; None if these follow from a tolerance
     means       (mode,) [mm] of the coefficients; None: 0
+    scans       widths [mm] of the least zones of the measured faces, by file; empty if the form follows from a tolerance
     """
 
     form: Form
@@ -52,6 +54,7 @@ class FormField:
     left_out: float
     spreads: np.ndarray | None
     means: np.ndarray | None
+    scans: Mapping[str, float]
 
     @property
     def modes(self) -> int:
@@ -151,6 +154,7 @@ def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> Form
         left_out=float(1 - variances[-count:].sum() / (variances.sum() + rest @ shares)),
         spreads=None,
         means=None,
+        scans={},
     )
 
 
@@ -194,7 +198,7 @@ def longest_extent(points: np.ndarray) -> float:
 
 
 def displaced_about_origin(displacements: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """Return displacements (7, n) that turn about the origin, of those that turn about a centre (3,) [mm]."""
+    """Return displacements (7, n) with turns about the origin that equal some with turns about a centre (3,) [mm]."""
     growth, translation, rotation = np.split(displacements, [1, TERMS - 3])
     return np.vstack([growth, translation + np.cross(centre, rotation, axisb=0).T, rotation])
 

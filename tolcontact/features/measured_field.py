@@ -14,6 +14,7 @@ from tolcontact.errors import GeometryFault
 from tolcontact.features.associated_features import AssociatedFeature
 from tolcontact.features.covariances import Lengths, covariance
 from tolcontact.features.form_field import FormField, associated_covariance, beside_displacements
+from tolcontact.features.least_zone import least_widths
 from tolcontact.geometry.measured_points import measured_points
 from tolcontact.geometry.spreading import spread
 from tolcontact.geometry.surface import Surface
@@ -37,7 +38,8 @@ def measured_field(form: Form, pattern: str, face: Surface, associated: Associat
     heights = np.column_stack([_heights_at(stations, cloud, str(path), face, associated) for path, cloud in clouds.items()])
     weights = np.linalg.solve(covariance(form, lengths, associated.surface, stations, stations), heights)
     functions = associated_covariance(form, lengths, associated, places, stations) @ weights  # (place, part)
-    remainder, removed = beside_displacements(functions, associated, places, areas / areas.sum())
+    shares = areas / areas.sum()
+    remainder, removed = beside_displacements(functions, associated, places, shares)
     mean, count = remainder.mean(axis=1), remainder.shape[1]
     _, spreads, directions = np.linalg.svd((remainder - mean[:, None]) / np.sqrt(count - 1), full_matrices=False)
     kept = min(form.modes, int((spreads**2 > MIN_VARIANCE * spreads[0] ** 2).sum()))
@@ -46,7 +48,7 @@ def measured_field(form: Form, pattern: str, face: Surface, associated: Associat
     mixes[:, 1:] -= mixes[:, 1:].mean(axis=0)
     size = max(float(np.linalg.norm(mean)), 1e-300)
     mixes[:, 0] /= size
-    return FormField(
+    field = FormField(
         form=form,
         associated=associated,
         lengths=lengths,
@@ -57,7 +59,10 @@ def measured_field(form: Form, pattern: str, face: Surface, associated: Associat
         left_out=float((spreads[kept:] ** 2).sum() / (spreads**2).sum()),
         spreads=np.array([0.0, *spreads[:kept]]),
         means=np.array([size, *[0.0] * kept]),
+        scans={},
     )
+    widths = least_widths(field.zone, (remainder / np.sqrt(shares)[:, None]).T)
+    return replace(field, scans={str(path): float(width) for path, width in zip(clouds, widths, strict=True)})
 
 
 def _heights_at(stations: np.ndarray, cloud: np.ndarray, name: str, face: Surface, associated: AssociatedFeature) -> np.ndarray:

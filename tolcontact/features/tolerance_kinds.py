@@ -105,7 +105,7 @@ class AxisZone(Zone):
 
     @property
     def rows(self) -> np.ndarray:
-        return self.feature.axis_rows(self._stations, self._across)
+        return self.feature.axis_rows(self._ends, self._across)
 
     @property
     def probes(self) -> Probes:
@@ -138,7 +138,7 @@ class AxisZone(Zone):
         return parts
 
     @property
-    def _stations(self) -> np.ndarray:
+    def _ends(self) -> np.ndarray:
         """The ends of the zone on the axis, in halves of the axis' length from its middle."""
         if self.tolerance.projected is None:
             return np.array([-1.0, 1.0])
@@ -165,7 +165,7 @@ class DirectionZone(AxisZone):
 
     @property
     def rows(self) -> np.ndarray:
-        length = (self._stations[1] - self._stations[0]) / 2  # of the zone, in lengths of the axis
+        length = (self._ends[1] - self._ends[0]) / 2  # of the zone, in lengths of the axis
         rows = self.feature.axis_rows(np.array([abs(length)]), self._across)
         rows[..., :2] = 0
         return rows

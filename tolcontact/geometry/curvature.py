@@ -22,7 +22,7 @@ SMALLEST_MOVE = 0.1  # of the smallest tolerance range
 def curvature_points(face: Surface, target: Surface, *, chord: float, within: float) -> np.ndarray:
     """Return points (point, 3) [mm] of a face, so dense that `target` cannot sink between them by more than `chord` [mm].
 
-    Only points within `within` [mm] of the target are returned, at most MAX_POINTS. If there are more, those that are the
+    Only points within `within` [mm] of the target are returned, at most MAX_POINTS. If there are more, the
     deepest after random displacements are taken; the seed is fixed.
     """
     points = distinct(_refined(face, target, chord, within).reshape(-1, 3), 1e-9 * face.mesh.scale)

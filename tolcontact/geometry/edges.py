@@ -30,6 +30,16 @@ def rim(faces: np.ndarray) -> np.ndarray:
     return ends[triangles[edge] == 1]
 
 
+def distinct_triangles(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the indices (distinct,) of triangles in `faces` (face, 3) without repetitions, and for each face its place there.
+
+    Triangles are the same if they have the same corners in the same sense.
+    """
+    lowest = np.argmin(faces, axis=1)
+    turned = np.take_along_axis(faces, (lowest[:, None] + np.arange(3)) % 3, axis=1)
+    return trimesh.grouping.unique_rows(turned)
+
+
 def smooth_pieces(mesh: trimesh.Trimesh, indices: np.ndarray) -> np.ndarray:
     """Return the smooth piece of each triangle in `indices` (face,), from 0: no two neighbours in a piece meet in a crease."""
     place = np.full(len(mesh.faces), -1)

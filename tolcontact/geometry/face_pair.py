@@ -11,6 +11,7 @@ import trimesh
 from tolcontact import poses as pose
 from tolcontact.geometry.curvature import chord_height
 from tolcontact.geometry.edges import rim
+from tolcontact.geometry.spreading import distinct
 from tolcontact.geometry.surface import Piece, Surface
 from tolcontact.vocabulary import ROUNDED
 
@@ -20,7 +21,7 @@ MAX_POINTS = 20_000
 MAX_HALVED = 20  # times the desired number of points: if halving long triangles gives more, points are drawn
 POSES_PER_BLOCK = 16
 MORE_POINTS = 8  # times as many points of a row are looked at next
-THINNED = 32  # one point in so many tells nearly always that faces penetrate each other
+THINNED = 32  # every 32nd point tells nearly always that faces penetrate each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,10 +124,10 @@ class BodyFace:
         return np.ascontiguousarray(self.body.faces, dtype=np.int64)
 
 
-class Form(Protocol):
+class PairForm(Protocol):
     """The forms of both faces of a pair."""
 
-    def take(self, rows: slice | np.ndarray) -> "Form":
+    def take(self, rows: slice | np.ndarray) -> "PairForm":
         """Return the forms of some rows."""
 
     def at(self, row: np.ndarray, P_m: np.ndarray, P_r: np.ndarray) -> np.ndarray:
@@ -143,7 +144,7 @@ class FacePair:
     moving: BodyFace
     reference: BodyFace
 
-    def penetrate(self, X_RM: np.ndarray, heights: np.ndarray, form: "Form | None" = None) -> np.ndarray:
+    def penetrate(self, X_RM: np.ndarray, heights: np.ndarray, form: "PairForm | None" = None) -> np.ndarray:
         """Return whether (row,) either face lies in the other's body at X_RM (row, 12), `heights` and `form` as for `depth`."""
         hits = np.zeros(len(X_RM), dtype=bool)
         for every in (THINNED, 1):
@@ -152,7 +153,7 @@ class FacePair:
             hits[rows] = self.depth(X_RM[rows], heights[rows], of_rows, every=every) > 0
         return hits
 
-    def depth(self, X_RM: np.ndarray, heights: np.ndarray, form: "Form | None" = None, *, every: int = 1) -> np.ndarray:
+    def depth(self, X_RM: np.ndarray, heights: np.ndarray, form: "PairForm | None" = None, *, every: int = 1) -> np.ndarray:
         """Return the largest depth (row,) [mm] of either face in the other's body at X_RM (row, 12).
 
         `heights` (row,) [mm] are the sum by which both faces lie farther out than nominally; each face counts it in full.
@@ -186,7 +187,7 @@ def body_face(face: Surface, body: trimesh.Trimesh, contacts: int) -> BodyFace:
     """Return a face and its body, for a pair with `contacts` contact points."""
     count = min(max(MIN_POINTS, contacts * DENSITY**2), MAX_POINTS)
     step = float(np.sqrt(face.mesh.area / count))
-    points = np.unique(_spread(face.mesh, step, count), axis=0)
+    points = distinct(_spread(face.mesh, step, count))
     if len(points) > MAX_POINTS:
         points = points[np.random.default_rng(0).choice(len(points), MAX_POINTS, replace=False)]
     flat = _plane_of(face)

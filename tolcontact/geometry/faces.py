@@ -20,7 +20,7 @@ from tolcontact.geometry.files import BREP, FACE_NAMES, SURFACES
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.surface_recognition import analytic_surfaces
 
-NEAR_STATIONS = 100
+NEAR_DIVISIONS = 100
 CUT = 4  # how much finer the pieces of triangles become in one step
 BREP_REACH = 1e-3  # of the part's size: how far a point may stand off the B-rep face that it names
 FLAT_ANGLE = 2e-4  # rad: between neighbouring triangles of one flat face, after single precision
@@ -253,7 +253,7 @@ def _near_pieces(sampled: trimesh.Trimesh, target: trimesh.Trimesh, within: floa
     Pieces are parts of triangles whose centres lie `within` [mm] of the target. Triangles are cut step by step, and what lies
     too far away is left out after each step.
     """
-    finest, surface = max(within, sampled.scale / NEAR_STATIONS), Surface(target)
+    finest, surface = max(within, sampled.scale / NEAR_DIVISIONS), Surface(target)
     # What lies outside of this box is too far away.
     low, high = np.asarray(target.bounds) + within * np.array([[-1.0], [1.0]])
     corners = np.asarray(sampled.triangles)

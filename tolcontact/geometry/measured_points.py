@@ -8,6 +8,7 @@ import trimesh
 from tolcontact.errors import GeometryFault
 
 MIN_FILES = 3  # parts whose spread means something
+EXPECTED = "expected lines of three numbers x, y, z [mm], in the frame of the part"
 
 
 def measured_points(pattern: str) -> dict[Path, np.ndarray]:
@@ -33,18 +34,30 @@ def _points(path: Path) -> np.ndarray:
             points = _of_table(path)
     except (OSError, ValueError, IndexError, KeyError) as error:
         raise GeometryFault(f'"{path}" cannot be read as measured points: {error}') from error
-    if points.ndim != 2 or points.shape[1] != 3 or not len(points) or not np.isfinite(points).all():
-        raise GeometryFault(f'"{path}" has no points; expected lines of three numbers x, y, z [mm], in the frame of the part')
+    if not len(points):
+        raise GeometryFault(f'"{path}" has no points; {EXPECTED}')
+    if not np.isfinite(points).all():
+        row = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
+        point = ", ".join(f"{coordinate:g}" for coordinate in points[row])
+        raise GeometryFault(f'"{path}": point {row + 1} is ({point}); expected finite numbers, so leave it out')
     return points
 
 
 def _of_table(path: Path) -> np.ndarray:
     """Return the points of a table with commas, semicolons or blanks between columns, and a heading or none."""
-    lines = path.read_text(encoding="utf-8-sig").replace(",", " ").replace(";", " ").splitlines()
-    rows = [line.split() for line in lines if line.strip() and not line.lstrip().startswith("#")]
-    if rows and not _is_number(rows[0][0]):
+    lines = path.read_text(encoding="utf-8-sig").splitlines()
+    rows = [
+        (number, line.replace(",", " ").replace(";", " ").split())
+        for number, line in enumerate(lines, start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if rows and not _is_number(rows[0][1][0]):
         rows = rows[1:]
-    return np.array(rows, dtype=float).reshape(len(rows), -1)
+    for number, row in rows:
+        if len(row) != 3 or not all(map(_is_number, row)):
+            advice = "; write decimals with points" if ";" in lines[number - 1] and "," in lines[number - 1] else ""
+            raise ValueError(f"line {number} is {lines[number - 1][:60]!r}; {EXPECTED}{advice}")
+    return np.array([row for _, row in rows], dtype=float).reshape(-1, 3)
 
 
 def _is_number(text: str) -> bool:

@@ -137,6 +137,11 @@ class Meeting:
         return reached
 
     @cached_property
+    def _bodies(self) -> tuple[kernel.Body, kernel.Body]:
+        """The moving and the reference body as compiled passes take them."""
+        return _touching_parts(self.moving), _touching_parts(self.reference)
+
+    @cached_property
     def _extremes(self) -> Float[Array, "v 3"]:
         """The vertices of the moving body that are outermost in some directions."""
         numbers = np.unique((self.moving.vertices @ np.vstack([DIRECTIONS, CORNERS]).T).argmax(axis=0))
@@ -188,7 +193,7 @@ class Meeting:
             np.zeros((len(X_RM), 0), dtype=np.int64) if retained is None else np.where(retained < len(self), retained, -1)
         )
         places_kernel.find(
-            _touching_parts(self.moving), _touching_parts(self.reference), self.candidates,
+            *self._bodies, self.candidates,
             np.array([self.reach.depth, self.reach.height]), kernel.MARGIN * self.size,
             np.array([error, self.reach.depth, nearness]),
             np.ascontiguousarray(X_RM), retained, DIRECTIONS, *places,

@@ -1,16 +1,20 @@
 """Geometry to triangle surfaces whose normals point outward. Part's own frame, mm."""
 
+import logging
+
 import igl
 import numpy as np
 import trimesh
 
 from tolcontact.declaration import Box, Geometry, Mesh, Pin
 from tolcontact.errors import GeometryFault
-from tolcontact.geometry.edges import edges
+from tolcontact.geometry.edges import distinct_triangles, edges
 from tolcontact.geometry.files.reading import Contents, Shape, read, read_files
 from tolcontact.geometry.pin_shape import pin_shape
 
-FIELD_STATIONS = 12  # of a part's size, over which displacement is shown
+log = logging.getLogger(__name__)
+
+FIELD_DIVISIONS = 12  # of a part's size, over which displacement is shown
 
 
 def shape(geometry: Geometry, contents: Contents | None = None) -> Shape:
@@ -28,8 +32,19 @@ def shape(geometry: Geometry, contents: Contents | None = None) -> Shape:
         raise GeometryFault(f"{geometry} holds no triangles; expected a triangle surface")
     if not mesh.area > 0:
         raise GeometryFault(f"{geometry} has no area: all its triangles are degenerate")
+    _leave_out_repetitions(mesh, geometry)
     _check_outward(mesh, geometry)
     return surface
+
+
+def _leave_out_repetitions(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
+    """Leave out triangles of a mesh that stand twice: a body that stands twice in its file is one body."""
+    _, place = trimesh.grouping.unique_rows(mesh.vertices)
+    distinct, _ = distinct_triangles(place[mesh.faces])
+    if len(distinct) < len(mesh.faces):
+        log.info("%s: %d triangles that stand twice are left out", geometry, len(mesh.faces) - len(distinct))
+        mesh.update_faces(np.sort(distinct))
+        mesh.remove_unreferenced_vertices()
 
 
 def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
@@ -84,7 +99,7 @@ def _per_body(limit: np.ufunc, corners: np.ndarray, body: np.ndarray, count: int
 
 def field_surface(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
     """Return vertices (vertex, 3) and faces (face, 3) fine enough to show how displacement varies over a part."""
-    step = mesh.scale / FIELD_STATIONS
+    step = mesh.scale / FIELD_DIVISIONS
     vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, max_edge=step, max_iter=20)
     merged = trimesh.Trimesh(vertices, faces, process=True)
     return np.asarray(merged.vertices), np.asarray(merged.faces)

@@ -86,4 +86,11 @@ def _rim_corners(surface: trimesh.Trimesh) -> np.ndarray:
 
 def distinct_vertices(surface: trimesh.Trimesh) -> np.ndarray:
     """Return the vertices of the surface's triangles, each once, shape (point, 3) [mm]."""
-    return np.unique(np.asarray(surface.vertices), axis=0)
+    return distinct(np.asarray(surface.vertices))
+
+
+def distinct(points: np.ndarray) -> np.ndarray:
+    """Return points (point, 3), each once, in the order of their coordinates. NumPy's `unique` takes several times as long."""
+    points = points[np.lexsort(points.T[::-1])]
+    is_new = np.append(True, (points[1:] != points[:-1]).any(axis=1))[: len(points)]
+    return np.asarray(points[is_new])

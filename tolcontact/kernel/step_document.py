@@ -85,7 +85,9 @@ class Document:
         referred = TDF_Label()
         if not XCAFDoc_ShapeTool.GetReferredShape_s(label, referred):
             referred = label
-        names = parents if is_nameless(name := label_name(label) or label_name(referred)) else [*parents, name]
+        # A place without a name of its own has that of its product.
+        own = [name for name in (label_name(label), label_name(referred)) if not is_nameless(name)]
+        names = [*parents, *own[:1]]
         if XCAFDoc_ShapeTool.IsAssembly_s(referred):
             components = LabelSequence()
             XCAFDoc_ShapeTool.GetComponents_s(referred, components, False)

@@ -77,6 +77,9 @@ measured from the raw state.
 | "locator stiffness" | parts are clamped to their locators |
 | "seating" | parts are pressed onto supports and neighbours; reactions are in N |
 
+A ball beside a wall counts by its centre, as a sphere with its radius, and a shaft by the ends of its axis: a point on the face
+would let it roll aside at no cost. So does a round wall by its own centre, and a flat one by the point of contact.
+
 In the exact resolution points count by the areas of the moving face that they stand for, with its centroid, so that results
 hardly depend on their number; in a linearized one each counts once, as in the paper (`weighting` in the archive).
 

@@ -13,10 +13,13 @@ MOMENTS = 10
 _UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
-def moment_table(P: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """Return the moments (moment, point) of each of the points P (point, 3) [mm] about `centre`."""
-    p = (P - centre).T
-    return np.vstack([np.ones(len(P)), p, *(p[i] * p[j] for i, j in _UPPER)])
+def moment_table(P: np.ndarray, centre: np.ndarray, radii: np.ndarray | float = 0.0) -> np.ndarray:
+    """Return the moments (moment, point) of each of the points P (point, 3) [mm] about `centre`.
+
+    A point stands for all points of a sphere around it, of which `radii` (point,) [mm] are the radii.
+    """
+    p, inside = (P - centre).T, np.asarray(radii) ** 2 / 3  # the mean square of a coordinate on a sphere
+    return np.vstack([np.ones(len(P)), p, *(p[i] * p[j] + (inside if i == j else 0.0) for i, j in _UPPER)])
 
 
 def displacement_energy(moments: ca.SX, centre: Vector, start: Pose, end: Pose) -> ca.SX:

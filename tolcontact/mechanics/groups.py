@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.declaration.locator import FIRST_ORDER
-from tolcontact.discretization import Nominal
+from tolcontact.discretization import CountedPoints, Nominal, counted_points
 from tolcontact.mechanics.correction import Mobility
 from tolcontact.mechanics.displacement import moment_table
 from tolcontact.mechanics.pose import Number, Vector
@@ -18,6 +18,7 @@ BALL_SHARE = 0.01  # of the group's length: radius of the ball that a point repr
 class Side:
     """One side of a pair whose points can be displaced: its points, and the position of their part in the group.
 
+    radii         (point,) [mm]: of the spheres that the points stand for (see counted_points)
     centre        (3,) [mm]: nominal point about which moments are taken
     all_moments   (10,): the moments of all points as small balls, so that points on a line hold all rotations, too
     """
@@ -25,6 +26,7 @@ class Side:
     pair: int
     part: int
     points: np.ndarray
+    radii: np.ndarray
     weights: np.ndarray
     centre: Vector
     all_moments: Vector
@@ -32,7 +34,15 @@ class Side:
     @property
     def table(self) -> np.ndarray:
         """The moments of each point, shape (moment, point), times its weight."""
-        return moment_table(self.points, np.asarray(self.centre)) * self.weights
+        return moment_table(self.points, np.asarray(self.centre), self.radii) * self.weights
+
+    @property
+    def spread_points(self) -> np.ndarray:
+        """Points (_, 3) [mm], equally many for each point, that have the moments of the spheres together."""
+        if not self.radii.any():
+            return self.points
+        ends = np.vstack([np.eye(3), -np.eye(3)])
+        return (self.points[:, None] + self.radii[:, None, None] * ends).reshape(-1, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,9 +164,11 @@ def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int,
     length = spread or float(nominal.parts[members[0][1].moving].mesh.scale)
     ball = BALL_SHARE * length
     sides = [
-        _side(position, parts.index(part), P, pair.weights if weighs_areas else np.ones(len(P)), centre[part], ball)
+        _side(
+            position, parts.index(part), counted, pair.weights if weighs_areas else np.ones(len(pair.P_m)), centre[part], ball
+        )
         for position, (_, pair) in enumerate(members)
-        for part, P in ((pair.moving, pair.P_m), (pair.reference, pair.P_r))
+        for part, counted in zip((pair.moving, pair.reference), counted_points(pair), strict=True)
         if part is not None and chains[part]
     ]
     holds = [_hold(nominal, part, parts) for part in free if nominal.parts[part].locators.exact.any()]
@@ -207,8 +219,8 @@ def _points_near(
     return points[part] or points[mover] or [P for other in points if chains[other] == chains[mover] for P in points[other]]
 
 
-def _side(pair: int, part: int, points: np.ndarray, weights: np.ndarray, centre: np.ndarray, radius: float) -> Side:
+def _side(pair: int, part: int, counted: CountedPoints, weights: np.ndarray, centre: np.ndarray, radius: float) -> Side:
     """Return a side whose points are balls of a radius [mm] in the regularization."""
-    all_moments = (moment_table(points, centre) * weights).sum(axis=1)
+    all_moments = (moment_table(counted.points, centre, counted.radii) * weights).sum(axis=1)
     all_moments[[4, 7, 9]] += weights.sum() * radius**2
-    return Side(pair, part, points, weights, centre, all_moments)
+    return Side(pair, part, *counted, weights, centre, all_moments)

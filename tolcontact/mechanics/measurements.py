@@ -14,11 +14,11 @@ from tolcontact.discretization.measured_geometry import (
     FaceGap,
     Heights,
     MeasuredFace,
+    MeasuredPoint,
     MeshClearance,
     NominalMeasurement,
     PlaneClearance,
     RoundClearance,
-    Station,
     Wall,
 )
 from tolcontact.features import FaceDeviation
@@ -44,10 +44,10 @@ class Observed:
         X_face = face_pose(face, self.deviations)
         return self.poses[part] if X_face is None else self.poses[part] @ X_face
 
-    def position(self, station: Station) -> ca.SX:
-        """Return the position (3, 1) [mm] of a station, which moves with the face that it is on."""
-        height = face_height(station.deviation, self.deviations, station.position)
-        return self.pose(station.part, station.deviation).apply(ca.DM(station.position) + height * ca.DM(station.outward))
+    def position(self, point: MeasuredPoint) -> ca.SX:
+        """Return the position (3, 1) [mm] of a point, which moves with the face that it is on."""
+        height = face_height(point.deviation, self.deviations, point.position)
+        return self.pose(point.part, point.deviation).apply(ca.DM(point.position) + height * ca.DM(point.outward))
 
 
 def value_of(measurement: NominalMeasurement, observed: Observed) -> ca.SX:
@@ -56,13 +56,13 @@ def value_of(measurement: NominalMeasurement, observed: Observed) -> ca.SX:
 
 
 def _least_height(heights: Heights, observed: Observed) -> ca.SX:
-    over_walls = [_height(station, wall, observed) for station, wall in heights.stations]
+    over_walls = [_height(point, wall, observed) for point, wall in heights.points]
     return least([*over_walls, *(_edge_height(crossing, observed) for crossing in heights.crossings)])
 
 
 def _face_gap(gap: FaceGap, observed: Observed) -> ca.SX:
-    """Return the largest gap of all stations, or their mean by area [mm]."""
-    heights = ca.vertcat(*(_height(station, wall, observed) for station, wall in gap.stations))
+    """Return the largest gap of all points, or their mean by area [mm]."""
+    heights = ca.vertcat(*(_height(point, wall, observed) for point, wall in gap.points))
     return ca.mmax(heights) if gap.is_largest else ca.dot(ca.DM(gap.weights), heights)
 
 
@@ -86,11 +86,11 @@ def _edge_height(crossing: Crossing, observed: Observed) -> ca.SX:
     return ca.dot(n, moving[0] - reference[0]) / ca.norm_2(n)
 
 
-def _height(station: Station, wall: Wall, observed: Observed) -> ca.SX:
-    """Return the height of a station over a wall, which may have grown [mm]."""
+def _height(point: MeasuredPoint, wall: Wall, observed: Observed) -> ca.SX:
+    """Return the height of a point over a wall, which may have grown [mm]."""
     X = observed.pose(wall.part, wall.deviation)
-    place = X.R.T @ (observed.position(station) - X.t)
-    height = face_height(wall.deviation, observed.deviations, wall.foot(station.position))
+    place = X.R.T @ (observed.position(point) - X.t)
+    height = face_height(wall.deviation, observed.deviations, wall.foot(point.position))
     return wall.side * distance(wall.surface, place) - height
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from tolcontact.declaration import Measure, Part, Point
 from tolcontact.declaration.measure import BINARY, MAX_STEPS, UNARY, Tape
 from tolcontact.discretization import Nominal
-from tolcontact.errors import ModelError
+from tolcontact.errors import ModelError, designation
 from tolcontact.mechanics.measurements import Observed, value_of
 from tolcontact.mechanics.pose import ENTRIES, Pose
 from tolcontact.mechanics.setting import face_height, face_pose
@@ -129,7 +129,7 @@ def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list
             expressions.append(_expression(measure, nominal, poses, deviations))
         except Exception as error:  # a user's function may raise anything; it becomes a fault of the model
             faults.append(
-                f'measure "{measure.name}" ({measure.declared_at}): its function failed with '
+                f"{designation(measure.noun, measure)}: its function failed with "
                 f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
             )
             expressions.append(ca.SX.nan(1))

@@ -2,7 +2,7 @@
 
 A model without faults may still not be the assembly that you mean. `tolcontact check`, `tolcontact run`, the analyses and
 `tc.build` issue a `tc.NominalWarning` for everything below. Each one names the declaration with the line of the script, states
-the number, and says what probably caused it. Nothing is changed, and the run goes on.
+the number, and says what probably caused it. Nothing is changed, and the run continues.
 
 >>> import warnings
 >>> import tolcontact as tc
@@ -18,20 +18,21 @@ the number, and says what probably caused it. Nothing is changed, and the run go
 >>> for warning in caught:
 ...     print(warning.message)
 [overlap] contact pair "interface" (...): its faces overlap by 5 mm in the nominal assembly, far beyond what varies there ...
-[limits] measure "height" (...): its nominal value 0 is outside of its limits (14.5 to 15.5 mm); it measures the displacement
-from the nominal place; absolute=True measures the coordinate
+[limits] measurement "height" (...): its nominal value 0 is outside of its limits (14.5 to 15.5 mm); it measures the
+displacement from the nominal place; absolute=True measures the coordinate
 
 | kind | what is looked at |
 |---|---|
 | `[angle]` | rotations beyond a full turn, or beyond half a turn in whole numbers: these are probably degrees |
-| `[point]` | points of locators, measures and forces that lie off their part by more than a quarter of its size |
+| `[point]` | points of locators, measurements and forces that lie off their part by more than a quarter of its size |
 | `[direction]` | locators whose directions all fit in the assembly frame alone; one-sided ones that point out of their part |
 | `[tolerance]` | zones wider than half of their part; locators that turn their part by more than 45 degrees at three sigma |
 | `[overlap]` | faces of a contact pair, or bodies that are no pair, that lie in each other |
 | `[gap]` | faces of a contact pair that are too far apart to touch |
 | `[limits]` | limits that exclude the nominal value, or that are more than 100 sigma away from it |
-| `[reach]` | clearances by triangles whose faces move farther than the triangles that are looked at allow |
+| `[reach]` | clearances by triangles whose faces move so far that other triangles may be nearer |
 | `[friction]` | seats that forces may not push their part onto, at the stated coefficients of friction (see `tc.seating`) |
+| `[form]` | measured faces that lie in no zone as wide as the tolerance of form that is stated |
 
 The faces of a pair overlap if their deepest point stays inside in nearly every realization without contact: the median of its
 gap is more than three sigma below 0. They are too far apart if the smallest gap exceeds 30 sigma and the distance by which

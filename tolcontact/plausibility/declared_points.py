@@ -104,7 +104,7 @@ def _declared_points(draws: TrialDraws) -> "defaultdict[Part, list[DeclaredPoint
     for measure in assembly.measures:
         for point in measure.points:
             if point.position is not None:
-                points[point.part].append(DeclaredPoint(designation("measure", measure), np.array(point.position)))
+                points[point.part].append(DeclaredPoint(designation(measure.noun, measure), np.array(point.position)))
     for force in assembly.forces:
         if force.at.position is not None:
             points[force.at.part].append(DeclaredPoint(designation("force", force), np.array(force.at.position)))

@@ -23,7 +23,7 @@ def measure_limits(draws: TrialDraws) -> Iterator[str]:
         nominal, limits = float(program.nominal_measures[k]), program.limits(k)
         if limits.are_open or not math.isfinite(nominal):
             continue
-        place = designation("measure", measure)
+        place = designation(measure.noun, measure)
         stated = f"limits ({_side(limits.lower)} to {_side(limits.upper)} {measure.units})"
         if limits.outside(np.array(nominal)):
             yield f"{place}: its nominal value {_number(nominal)} is outside of its {stated}; {_cause(program, k, nominal)}"

@@ -24,8 +24,9 @@ def _doubts(measure: Measure, clearance: MeshClearance, X: np.ndarray) -> Iterat
     motion = np.linalg.norm(moved[0] - moved[1], axis=2).max(axis=1)
     spare = (clearance.elements.horizon - float(np.linalg.norm(clearance.lines[0, 1] - clearance.lines[0, 0]))) / 2
     if count := int((motion > spare).sum()):
+        place = designation(measure.noun, measure)
         yield (
-            f"{designation('measure', measure)}: its faces move by more than {spare:.3g} mm in {count} of {len(motion)} draws "
+            f"{place}: its faces move by more than {spare:.3g} mm in {count} of {len(motion)} draws "
             "without contact; triangles that are not compared may then be nearer, so the clearance is only a lower bound; "
             "choose smaller faces, or read the parts with a larger chord"
         )

@@ -9,6 +9,7 @@ from tolcontact.plausibility.body_overlaps import body_overlaps
 from tolcontact.plausibility.declared_points import far_points, unfit_directions
 from tolcontact.plausibility.magnitudes import rotations, wide_tolerances
 from tolcontact.plausibility.measure_limits import measure_limits
+from tolcontact.plausibility.measured_forms import measured_forms
 from tolcontact.plausibility.measured_reach import measured_reach
 from tolcontact.plausibility.pair_gaps import pair_clearances, pair_overlaps
 from tolcontact.plausibility.seats import unsure_seats
@@ -24,6 +25,7 @@ KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
     "limits": (measure_limits,),
     "reach": (measured_reach,),
     "friction": (unsure_seats,),
+    "form": (measured_forms,),
 }
 
 

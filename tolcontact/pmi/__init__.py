@@ -50,7 +50,7 @@ have no faces, because the file states none. `tolcontact pmi FILE.stp` gives the
 
 `part.features_from_pmi()` declares what features can state (see `tolcontact.features`), and returns every annotation with its
 features, or with the reason why it has none. `tolcontact pmi FILE.stp` lists the same, and `--script` writes a model script
-with these features, to go on from.
+with these features, as a starting point.
 
 | stated in the file | declared as |
 |---|---|

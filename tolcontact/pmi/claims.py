@@ -20,11 +20,11 @@ class Claim:
     """An annotation, the faces that it claims, the features that state it, and why others do not.
 
     stated    number of faces and targets that the file states for it
-    numbers   of those of its faces that are on the part
+    numbers   of its faces on the part
     targets   points of a datum that is established by points alone, with the numbers of their faces
     places    of the features that are to state it
-    features  names of those that state it
-    refusals  names of those that do not, by the reasons; none if a reason is for all
+    features  names of the features that state it
+    refusals  names of the features that do not, by the reasons; none if a reason is for all
     """
 
     annotation: Annotation

@@ -31,7 +31,7 @@ def tolerance(stated: Tolerance, *, is_axis: bool) -> GeometricTolerance:
     """Return a tolerance of a feature, with or without an axis, as it is declared. Raises Undeclared with the reason."""
     kind = _KINDS.get(stated.kind) or DECLARED_KINDS.get(stated.kind)
     if kind is None:
-        raise Undeclared("its kind is not stated" if not stated.kind else f"its kind, {stated.kind}, is none of a feature")
+        raise Undeclared("its kind is not stated" if not stated.kind else f"features do not declare its kind, {stated.kind}")
     if stated.value is None:
         raise Undeclared("its value is not stated")
     if stated.maximum is not None:

@@ -1,4 +1,4 @@
-"""A model script with the features that the PMI of a file states, to go on from."""
+"""A model script with the features that the PMI of a file states, as a starting point."""
 
 import json
 import re

@@ -14,10 +14,10 @@ from tolcontact.declaration import TitleBlock
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.errors import ArchiveError, OptionError
 from tolcontact.replacing import replacing
+from tolcontact.report.archived_settings import archived_settings
 from tolcontact.report.contributor_shares import contributor_shares
 from tolcontact.report.model_tables import model_tables
 from tolcontact.report.results_table import STATISTICS, result_rows
-from tolcontact.report.run_settings import run_settings
 from tolcontact.statistics.verdict import VERDICT_RULE
 from tolcontact.vocabulary import units_of
 
@@ -85,7 +85,7 @@ def _document(results: xr.DataTree, summary: xr.Dataset, titles: TitleBlock) -> 
         ["simulation", summary.attrs["title"]],
         ["realizations", summary.attrs["realizations"]],
         ["verdict", VERDICT_RULE],
-        *map(list, run_settings(results).items()),
+        *map(list, archived_settings(results).items()),
     ]
     return Sheet("Document", ["entry", "value"], rows)
 

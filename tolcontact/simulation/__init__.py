@@ -2,7 +2,8 @@
 
 Realizations are simulated in blocks of 4096. Blocks are smaller if a realization takes long: 512 with curved faces in an exact
 resolution, and fewer with more than 24 coupled bodies. One thread draws, places, corrects and measures a block; there are as
-many threads as processors that the process may use. Blocks are returned in order.
+many threads as processors that the process may use. Blocks are returned in order. If the last block of a run has fewer
+realizations than the others may have, it is divided into pieces of at most 512, which several threads share.
 
 >>> import numpy as np
 >>> import tolcontact as tc
@@ -31,8 +32,8 @@ block depends only on the seed and on its position.
 >>> bool((one == np.concatenate([block.measured for block in blocks])).all())
 True
 
-The solvers `qpoases`, `osqp` and `highs` start each QP from the previous one within a block. The last digits of their results
-therefore depend on which realizations share a block, and so on the number of realizations.
+The solvers `qpoases`, `osqp` and `highs` start each QP from the previous one within a block, or a piece of the last block. The
+last digits of their results therefore depend on which realizations share a block, and so on the number of realizations.
 
 ## Many processes, many machines
 

@@ -1,13 +1,15 @@
 """Blocks of realizations on as many threads as there are processors, in order.
 
 A block does not depend on the one before it, nor on the thread that simulates it: the results of a run are the same for any
-number of threads, to the last bit.
+number of threads, to the last bit. The last block of a run is simulated in pieces if it has fewer realizations than a block may
+have: so several threads share a small run. A piece does not depend on the others, either.
 """
 
 import contextlib
+import functools
 import os
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
@@ -20,6 +22,7 @@ from tolcontact.simulation.block import Block, simulate_block
 from tolcontact.vocabulary import BLOCK_ROWS
 
 CURVED_ROWS, MIN_ROWS = 512, 16
+PIECE_ROWS = 512  # at most; a thread needs some milliseconds to begin
 MAX_BODIES = 24  # that are coupled; a whole block of more bodies would take longer than some ten seconds
 
 T = TypeVar("T")
@@ -83,34 +86,52 @@ def map_blocks(
         function = function.bound_to(program)
     threads, block = threads or processors(), block or block_rows(program)
     starts = range(start, samples, block)
-    idle = _taken([] if unused is None else unused, program, min(2 * threads, len(starts)))
-    running: deque[tuple[Future[T], Resolvers]] = deque()
+    count = len(starts[:-1]) + sum(len(_pieces(begin, samples, block)) for begin in starts[-1:])
+    idle = _taken([] if unused is None else unused, program, min(2 * threads, count))
+    running: deque[tuple[Future[Any], Resolvers, bool]] = deque()
 
-    def simulate(begin: int, resolvers: Resolvers) -> T:
-        deviations = (draws or program.draws)(seed=seed, start=begin, stop=min(begin + block, samples))
-        return function(simulate_block(program, deviations, start=begin, resolvers=resolvers))
+    def simulate(rows: range, resolvers: Resolvers) -> Block:
+        deviations = (draws or program.draws)(seed=seed, start=rows.start, stop=rows.stop)
+        return simulate_block(program, deviations, start=rows.start, resolvers=resolvers)
 
-    def finish_one() -> T:
-        future, resolvers = running.popleft()
+    def finish_block(earlier: Sequence[Future[Block]], rows: range, resolvers: Resolvers) -> T:
+        last = simulate(rows, resolvers)  # the pool has begun with all earlier pieces, so none waits for this thread
+        return function(Block.joined([*(piece.result() for piece in earlier), last]) if earlier else last)
+
+    def finish_one() -> Iterator[T]:
+        future, resolvers, ends_block = running.popleft()
         done = future.result()
         idle.append(resolvers)
-        return done
+        if ends_block:
+            yield done
 
     pool = ThreadPoolExecutor(threads)
     try:
         for begin in starts:
-            if not idle:
-                yield finish_one()
-            resolvers = idle.pop()
-            for resolver in resolvers:
-                resolver.start_over()  # here, where the threads do not wait for each other to make CasADi's objects
-            running.append((pool.submit(simulate, begin, resolvers), resolvers))
+            earlier: list[Future[Any]] = []
+            pieces = _pieces(begin, samples, block)
+            for rows in pieces:
+                if not idle:
+                    yield from finish_one()
+                resolvers = idle.pop()
+                for resolver in resolvers:
+                    resolver.start_over()  # here, where the threads do not wait for each other to make CasADi's objects
+                task = functools.partial(finish_block, tuple(earlier)) if rows is pieces[-1] else simulate
+                earlier.append(pool.submit(task, rows, resolvers))
+                running.append((earlier[-1], resolvers, rows is pieces[-1]))
         while running:
-            yield finish_one()
+            yield from finish_one()
     finally:
         pool.shutdown(wait=False, cancel_futures=True)  # if all went well none is left; a stopped run does not wait
         if unused is not None:
             unused.extend(idle)
+
+
+def _pieces(begin: int, samples: int, block: int) -> list[range]:
+    """Return the realizations of each piece of the block that begins there. A block that is not the last one is a piece."""
+    rows = range(begin, min(begin + block, samples))
+    count = 1 if len(rows) == block else -(-len(rows) // PIECE_ROWS)
+    return [rows[len(rows) * number // count : len(rows) * (number + 1) // count] for number in range(count)]
 
 
 class Threads:

@@ -5,6 +5,16 @@ pairs that touch are such contacts. Two-sided locators guide: they push and pull
 """
 
 from tolcontact.statics.critical_friction import Balance, Seat, balances
-from tolcontact.statics.touching import TOUCH_SHARE, Contact, Places, Touching, contacts_at, drawn_contacts
+from tolcontact.statics.touching import TOUCH_SHARE, Contact, Touching, TouchingPlaces, contacts_at, drawn_contacts
 
-__all__ = ["TOUCH_SHARE", "Balance", "Contact", "Places", "Seat", "Touching", "balances", "contacts_at", "drawn_contacts"]
+__all__ = [
+    "TOUCH_SHARE",
+    "Balance",
+    "Contact",
+    "Seat",
+    "Touching",
+    "TouchingPlaces",
+    "balances",
+    "contacts_at",
+    "drawn_contacts",
+]

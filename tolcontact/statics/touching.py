@@ -50,7 +50,7 @@ class Touching:
     is_located: Bool[Array, " part"]
 
 
-class Places(NamedTuple):
+class TouchingPlaces(NamedTuple):
     """Places (place, 3) [mm] at which a pair touches, and unit vectors (place, 3) there, into the moving part."""
 
     points: Float[Array, "place 3"]
@@ -75,7 +75,7 @@ def drawn_contacts(nominal: Nominal) -> Touching:
     return contacts_at(nominal, np.tile(pose.AT_REST, (len(nominal.parts), 1)), [_drawn_places(pair) for pair in pairs])
 
 
-def contacts_at(nominal: Nominal, poses: np.ndarray, places: Sequence[Places]) -> Touching:
+def contacts_at(nominal: Nominal, poses: np.ndarray, places: Sequence[TouchingPlaces]) -> Touching:
     """Return the contacts at poses (part, 12) where each declared pair touches at some places, and the loads of the parts."""
     declared = nominal.assembly.pairs
     loads = np.zeros((len(nominal.parts), 6))
@@ -111,7 +111,7 @@ def _locator_contacts(nominal: Nominal, poses: np.ndarray) -> Iterator[Contact]:
             yield Contact(label, number, parent, point[None], direction[None], not one_sided, nominal.assembly.mu)
 
 
-def _pair_contacts(nominal: Nominal, places: Sequence[Places]) -> Iterator[Contact]:
+def _pair_contacts(nominal: Nominal, places: Sequence[TouchingPlaces]) -> Iterator[Contact]:
     """Yield the pairs that touch; points that cannot carry more than others do are left out."""
     for declared, (points, normals) in zip(nominal.assembly.pairs, places, strict=True):
         sides = (nominal.part_index(face.part, declared.station) for face in (declared.moving, declared.reference))
@@ -121,14 +121,14 @@ def _pair_contacts(nominal: Nominal, places: Sequence[Places]) -> Iterator[Conta
             yield Contact(declared.name, moving, reference, points[corners], normals[corners], False, mu)
 
 
-def _drawn_places(pair: ContactPoints) -> Places:
+def _drawn_places(pair: ContactPoints) -> TouchingPlaces:
     """Return where a pair touches as drawn."""
     assert pair.moving_face is not None and pair.reference_face is not None
     size = max(pair.moving_face.mesh.scale, pair.reference_face.mesh.scale)
     touches = np.linalg.norm(pair.P_m - pair.P_r, axis=1) <= TOUCH_SHARE * size + pair.facets + pair.bulge
     if pair.round is not None:
         touches &= ~pair.round.points["is_hollow"]  # these have a place of their own at every pose
-    return Places(pair.P_r[touches], pair.n_r[touches])
+    return TouchingPlaces(pair.P_r[touches], pair.n_r[touches])
 
 
 def carrying(points: np.ndarray, normals: np.ndarray) -> np.ndarray:

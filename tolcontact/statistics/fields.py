@@ -95,7 +95,7 @@ class DisplacementFields:
         """The sums of each part, (state, number)."""
         return [np.array([sums[0].numbers, sums[-1].numbers]) for sums in self._sums]
 
-    def go_on_from(self, numbers: Sequence[np.ndarray]) -> None:
+    def resume_from(self, numbers: Sequence[np.ndarray]) -> None:
         """Continue from earlier `numbers`, or from nothing if there are none."""
         if not numbers:
             self.start_over()

@@ -31,7 +31,7 @@ def compare_runs(runs: Mapping[str, xr.DataTree]) -> xr.Dataset:
         draws        (run)                     "same", "same seed" or "other", compared with the first run
 
     Runs of the same seed are compared realization by realization, as far as both go; others as independent runs.
-    Raises OptionError if they share no measure of the same name, units and quantity, ArchiveError for a run with too few
+    Raises OptionError if they share no measurement of the same name, units and quantity, ArchiveError for a run with too few
     finished realizations.
     """
     (reference_name, reference), *_ = runs.items()
@@ -39,7 +39,7 @@ def compare_runs(runs: Mapping[str, xr.DataTree]) -> xr.Dataset:
     shared = _shared_measures(summaries)
     if not shared:
         raise OptionError(
-            f"{', '.join(runs)} share no measure of the same name, units and quantity; there is nothing to compare"
+            f"{', '.join(runs)} share no measurement of the same name, units and quantity; there is nothing to compare"
         )
     changes = {name: _Change(run, reference, summaries[name], summaries[reference_name]) for name, run in runs.items()}
     undefined = np.full((len(terms.STATES), len(shared), len(terms.CHANGES_OF_RUNS), len(terms.ESTIMATE)), np.nan)

@@ -12,7 +12,7 @@ With A and B two independent sets of draws, and A_i the set A with group i from 
 Of groups that are correlated neither says what a group's share is. Shapley effects do: each is what a group adds to the
 variance that those before it explain, or that remains without it, on average over all orders (Owen, 2014; Song, Nelson, Staum,
 2016). They add up to 1. With f_m a realization that has the groups of A at the first m places of a random order, and others
-drawn anew, given these, the group at place m has
+redrawn, given these, the group at place m has
 
     Sh = mean((f(A) - f_m)^2 - (f(A) - f_{m+1})^2) / mean((f(A) - f_0)^2)
 

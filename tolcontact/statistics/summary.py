@@ -25,13 +25,14 @@ def summary_table(results: Results) -> Table:
         raise ArchiveError(f"{count} realizations are finished, too few for statistics; continue with --resume")
     rows = results.to_dataset().isel({terms.REALIZATION: slice(count)})
     combinations, smallest, of_measures = contact.combinations(rows), _smallest_range(results, rows), measure_estimates(rows)
+    rigid = _is_rigid(results)
     values = {
         terms.STATISTIC_VALUE: of_measures.statistics,
         terms.CHANGE: of_measures.changes,
-        **_status_values(rows),
+        **_status_values(rows, rigid),
         **_contact_values(rows, combinations),
         terms.STEPS: _steps(rows),
-        terms.PENETRATION: _penetration(rows, _is_rigid(results)),
+        terms.PENETRATION: _penetration(rows, rigid),
         **surface_values(results, terms.NOTICED_SHARE * smallest),
         **_field_values(results),
     }
@@ -58,14 +59,14 @@ def estimate_of(results: Results, measure: str, statistic: str) -> Estimate:
     return STATISTICS[statistic](MeasuredValues(rows, number, terms.STATES[terms.CORRECTED], limits(rows)[number]))
 
 
-def in_conflict(rows: Rows) -> np.ndarray:
+def in_conflict(rows: Rows, rigid: np.ndarray) -> np.ndarray:
     """Return which pairs contradict each other where no pose is free of penetration, (realization, pair) bool.
 
-    These are the pairs that still penetrate at the pose of least penetration.
+    These are the `rigid` pairs (pair,) that still penetrate at the pose of least penetration.
     """
     gap = rows[terms.GAP_MIN.name].sel({terms.STATE: "corrected"}).transpose(terms.REALIZATION, terms.PAIR).values
     stuck = rows[terms.STATUS.name].values == terms.Status.NOT_ASSEMBLABLE
-    return stuck[:, None] & (gap < -rows.attrs["solver_accuracy"])
+    return stuck[:, None] & (gap < -rows.attrs["solver_accuracy"]) & rigid
 
 
 def _coordinates(rows: Rows, combinations: list[tuple[tuple[str, ...], int]]) -> dict[str, Any]:
@@ -94,15 +95,15 @@ def _coordinates(rows: Rows, combinations: list[tuple[tuple[str, ...], int]]) ->
     }
 
 
-def _status_values(rows: Rows) -> dict[ArchiveVariable, Any]:
-    """Return how many realizations have each status, and the shares and conflicts that follow."""
+def _status_values(rows: Rows, rigid: np.ndarray) -> dict[ArchiveVariable, Any]:
+    """Return how many realizations have each status, and the shares and the conflicts of `rigid` pairs that follow."""
     by_status = np.sum([np.bincount(piece, minlength=len(terms.STATUS_MEANINGS)) for piece in statuses(rows)], axis=0)
     total, not_assemblable = int(by_status.sum()), by_status[terms.Status.NOT_ASSEMBLABLE]
     return {
         terms.TOUCHED: np.array(intervals.proportion_of(total - by_status[terms.Status.UNTOUCHED], total)),
         terms.BY_STATUS: by_status,
         terms.NOT_ASSEMBLABLE_SHARE: np.array(intervals.proportion_of(not_assemblable, total)),
-        terms.CONFLICTS: np.sum([in_conflict(piece).sum(axis=0) for piece in pieces(rows)], axis=0),
+        terms.CONFLICTS: np.sum([in_conflict(piece, rigid).sum(axis=0) for piece in pieces(rows)], axis=0),
     }
 
 

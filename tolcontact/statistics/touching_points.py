@@ -10,7 +10,7 @@ def touching(results: xr.DataTree) -> xr.Dataset:
     """Return the share of realizations in which each contact point touches, corrected, with its interval, as it is archived.
 
     touching   (point, interval): gaps below 1e-4 mm, in the first 2048 realizations at most (fewer of more than 10 000 points),
-               without those that are `searched`
+               without realizations that are `searched`
     pair       (point) name of its pair
     point      (point, axis) of the moving part, nominal [mm]
 

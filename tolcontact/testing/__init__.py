@@ -57,7 +57,7 @@ def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) ->
     Faces of features are displaced in their parts first, and then moved outwards by their heights, and those of their forms.
     The two results may differ by `within` [mm].
 
-    Where faces end (pairs that the archive calls `bounded`), contact is found anew at the archived poses, between the archived
+    Where faces end (pairs that the archive calls `bounded`), contact is searched again at the archived poses, between archived
     bodies. This is the simulation's own search, so it tells poses and gaps that do not belong together, not a fault of the
     search; `studies/certificates` judges that by exact distances.
 

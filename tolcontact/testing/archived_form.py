@@ -20,8 +20,10 @@ class ArchivedForm:
         def value(variable: terms.ArchiveVariable) -> np.ndarray:
             return contact[variable.name][face]
 
-        is_own = contact[terms.FACE_OF_STATION.name] == face
-        self._stations, self._weights = (contact[variable.name][is_own] for variable in (terms.STATION, terms.STATION_WEIGHT))
+        is_own = contact[terms.FACE_OF_FORM_STATION.name] == face
+        self._stations, self._weights = (
+            contact[variable.name][is_own] for variable in (terms.FORM_STATION_PLACE, terms.FORM_STATION_WEIGHT)
+        )
         self._covariance, self._associated = str(value(terms.FORM_COVARIANCE)), str(value(terms.FORM_ASSOCIATED))
         self._across, self._along = value(terms.FORM_LENGTH), value(terms.FORM_LENGTH_ALONG)
         self._lobes, self._removed = int(value(terms.FORM_LOBES)), value(terms.FORM_REMOVED)

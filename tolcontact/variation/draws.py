@@ -19,7 +19,7 @@ from tolcontact.variation.plans import STREAM, Numbers, Plan
 from tolcontact.vocabulary import MONTE_CARLO
 
 MIN_UNIFORM = 1e-16  # smallest distance of a number from 0 and 1
-ROUNDING = 1e-12  # of a column: own deviations that are no larger are what sums leave over
+ROUNDING = 1e-12  # of a column: independent deviations that are no larger are what sums leave over
 
 
 class Draws:
@@ -145,7 +145,7 @@ class Draws:
         return [f"population {k}: {', '.join(population.columns)}" for k, population in populations]
 
     def dependent(self, *, correlated: bool = True) -> list[list[int]]:
-        """Return sets of columns that depend on each other: drawn together, or `correlated`; but for sums (see own)."""
+        """Return sets of columns that depend on each other: drawn together, or `correlated`; not those of mere sums."""
         assembly = self._assembly
         sets = [[self._column[label] for label in labels] for labels, _ in self.correlated if correlated]
         sets += [[self._column[label] for label in population.columns] for population in assembly.populations]
@@ -156,25 +156,27 @@ class Draws:
         together += [list(map(int, [*bonus.sizes, *bonus.columns])) for bonus in self.contributors.bonuses]
         # What follows from others by more than a sum also follows from the causes that drive them.
         followed = {column for columns in together for column in columns}
-        driven = [[self._column[cause.name], *(self._column[label] for label in cause.drives)] for cause in assembly.variables]
-        return sets + together + [columns for columns in driven if followed & set(columns[1:])]
+        of_causes = [
+            [self._column[cause.name], *(self._column[label] for label in cause.drives)] for cause in assembly.variables
+        ]
+        return sets + together + [columns for columns in of_causes if followed & set(columns[1:])]
 
-    def own(self, deviations: np.ndarray) -> np.ndarray:
+    def without_shared_causes(self, deviations: np.ndarray) -> np.ndarray:
         """Return deviations (..., contributor) without what shared causes add to them: independent of these."""
         matrix = self.drive_matrix
-        driven = matrix.any(axis=0)
-        own = deviations.copy()
-        own[..., driven] -= deviations @ matrix[:, driven]
-        rest = np.abs(own) <= ROUNDING * np.abs(deviations).max(axis=tuple(range(deviations.ndim - 1)), initial=0.0)
-        own[driven & rest] = 0.0
-        return own
+        is_driven = matrix.any(axis=0)
+        independent = deviations.copy()
+        independent[..., is_driven] -= deviations @ matrix[:, is_driven]
+        largest = np.abs(deviations).max(axis=tuple(range(deviations.ndim - 1)), initial=0.0)
+        independent[is_driven & (np.abs(independent) <= ROUNDING * largest)] = 0.0
+        return independent
 
-    def driven(self, own: np.ndarray) -> np.ndarray:
-        """Return deviations (..., contributor) of `own` ones, with what shared causes among them add to others."""
+    def with_shared_causes(self, independent: np.ndarray) -> np.ndarray:
+        """Return deviations (..., contributor) with what shared causes among independent ones add to others."""
         matrix = self.drive_matrix
-        columns = matrix.any(axis=0)
-        deviations = own.copy()
-        deviations[..., columns] += own @ matrix[:, columns]
+        is_driven = matrix.any(axis=0)
+        deviations = independent.copy()
+        deviations[..., is_driven] += independent @ matrix[:, is_driven]
         return deviations
 
     @property

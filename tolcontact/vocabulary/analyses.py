@@ -67,7 +67,7 @@ def _by_status(*dims: str) -> ArchiveVariable:
 _INDEX = (MEASURE, STATE, GROUP, INTERVAL)
 CONTRIBUTIONS = AnalysisRecord(
     "contributions",
-    "contributions to the measures of {assembly}",
+    "contributions to the measurements of {assembly}",
     (
         ArchiveVariable("first", _INDEX, "f8", "first-order Sobol' index: share of variance by a group alone", "1"),
         ArchiveVariable("total", _INDEX, "f8", "total Sobol' index: share of variance by a group and its interactions", "1"),
@@ -91,7 +91,7 @@ CONTRIBUTIONS = AnalysisRecord(
 )
 SENSITIVITIES = AnalysisRecord(
     "sensitivities",
-    "sensitivities of the measures of {assembly}",
+    "sensitivities of the measurements of {assembly}",
     (
         ArchiveVariable("nominal", (MEASURE, CONTRIBUTOR), "f8", "derivative of the raw measure at the nominal assembly"),
         ArchiveVariable(
@@ -117,7 +117,7 @@ SENSITIVITIES = AnalysisRecord(
 _EXTREME = (MEASURE, STATE, END)
 WORST_CASE = AnalysisRecord(
     "worst_case",
-    "worst cases of the measures of {assembly}",
+    "worst cases of the measurements of {assembly}",
     (
         ArchiveVariable("worst", _EXTREME, "f8", "worst-case minimum and maximum, found by searches"),
         ArchiveVariable("deviations", (*_EXTREME, CONTRIBUTOR), "f8", "combination of deviations that gives it"),

@@ -54,11 +54,13 @@ FORM_CONTRIBUTOR = ArchiveVariable(
     "i4",
     "number of the contributor that is the coefficient of a mode, counted from 0; -1: none",
 )
-FACE_OF_STATION = ArchiveVariable(
+FACE_OF_FORM_STATION = ArchiveVariable(
     "face_of_station", (FORM_STATION,), "i4", "number of the feature's face whose form a station is of, counted from 0"
 )
-STATION = ArchiveVariable("station", (FORM_STATION, AXIS), "f8", "place from which the covariance counts, nominal", "mm")
-STATION_WEIGHT = ArchiveVariable(
+FORM_STATION_PLACE = ArchiveVariable(
+    "station", (FORM_STATION, AXIS), "f8", "place from which the covariance counts, nominal", "mm"
+)
+FORM_STATION_WEIGHT = ArchiveVariable(
     "station_weight", (FORM_STATION, FORM_MODE), "f8", "factor of the covariance with a station in the height of a mode", "1"
 )
 FORM_REMOVED = ArchiveVariable(
@@ -70,6 +72,6 @@ FORM_REMOVED = ArchiveVariable(
 )
 FORMS = (
     FORM_COVARIANCE, FORM_LENGTH, FORM_LENGTH_ALONG, FORM_LOBES, FORM_ASSOCIATED, FORM_START, FORM_END,
-    *FORM_SURFACE.values(), FORM_SPREAD, FORM_LEFT_OUT, FORM_MEAN_ZONE, FORM_CONTRIBUTOR, FACE_OF_STATION, STATION,
-    STATION_WEIGHT, FORM_REMOVED,
+    *FORM_SURFACE.values(), FORM_SPREAD, FORM_LEFT_OUT, FORM_MEAN_ZONE, FORM_CONTRIBUTOR, FACE_OF_FORM_STATION,
+    FORM_STATION_PLACE, FORM_STATION_WEIGHT, FORM_REMOVED,
 )  # fmt: skip

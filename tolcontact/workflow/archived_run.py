@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tolcontact.archive import ArchiveWriter, Run, opened_tables, taken
+from tolcontact.archive import ArchiveWriter, Run, locked_archive, open_tables_unchecked
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
@@ -18,7 +18,7 @@ from tolcontact.workflow.run_sums import RunSums
 from tolcontact.workflow.until import Target
 
 SURFACES = 64
-Progress = Callable[[int], None]
+RunProgress = Callable[[int], None]  # is called with the number of finished realizations
 
 log = logging.getLogger(__name__)
 
@@ -34,21 +34,21 @@ def write_run(
     resume: bool = False,
     until: str | None = None,
     client: Any = None,
-    progress: Progress | None = None,
+    progress: RunProgress | None = None,
 ) -> Path:
     """Simulate into the archive `out` (see `run`), and return the path of the file, which is another if `out` is a link."""
     check_counts(samples=settings.samples, seed=settings.seed, surfaces=settings.surfaces)
     _check_choices(settings)
     check_program(model, solver, method)
     target = None if until is None else Target.of(until)
-    with taken(out, overwrite=overwrite, resume=resume) as path:
+    with locked_archive(out, overwrite=overwrite, resume=resume) as path:
         program = program_of(model, solver, method)
         program = replace(program, draws=program.draws.planned(settings.plan))
         if target:
             target.check(program)
         write_archive(path, program, settings, target, client, progress, is_resumed=resume and path.exists())
     if target:
-        with opened_tables(path) as results:
+        with open_tables_unchecked(path) as results:
             if sentence := target.shortfall(results):
                 log.warning(sentence)
     return path
@@ -71,7 +71,7 @@ def write_archive(
     settings: Run,
     target: Target | None = None,
     client: Any = None,
-    progress: Progress | None = None,
+    progress: RunProgress | None = None,
     *,
     is_resumed: bool = False,
 ) -> None:
@@ -92,7 +92,7 @@ def write_archive(
 
 
 def _simulate(
-    program: Program, writer: ArchiveWriter, sums: RunSums, seed: int, blocks: MapBlocks, progress: Progress | None
+    program: Program, writer: ArchiveWriter, sums: RunSums, seed: int, blocks: MapBlocks, progress: RunProgress | None
 ) -> None:
     """Simulate the rows that an archive lacks, write them with their sums, and check some against the surfaces."""
     sums.start_from(writer)
@@ -112,12 +112,12 @@ def _simulate(
     except KeyboardInterrupt:
         if is_summed and writer.is_between_blocks:
             writer.write_checkpoint(sums.numbers)
-        elif not is_summed:  # the interrupt may have come within a sum: only those of the last checkpoint are sure
+        elif not is_summed:  # the interrupt may have come within a sum: only sums of the last checkpoint are sure
             is_summed = sums.start_from(writer)
         if is_summed:
             sums.write_to(writer)
         raise
-    rows_to_check, at_random = writer.chosen(seed)
+    rows_to_check, at_random = writer.rows_to_check(seed)
     if rows_to_check.size:
         stored_poses = writer.poses(rows_to_check)
         deviations = program.draws.rows(rows_to_check, seed=seed)

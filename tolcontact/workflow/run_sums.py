@@ -130,8 +130,8 @@ class RunSums:
         is_known = terms.ROTATION in kept and (terms.DEVIATION in kept or not gaps_need_deviations(self._program.nominal))
         counted = counted_realizations(self._program.nominal) if is_known else 0
         self.of_blocks = _BlockReduction(tuple(row.label for row in writer.kept), self._fields, counted)
-        checkpoint = writer.take_up()
-        self._fields.go_on_from(checkpoint)
+        checkpoint = writer.load_checkpoint()
+        self._fields.resume_from(checkpoint)
         self._touching = TouchingShares(self._points)
         if end := min(writer.rows, counted):
             rows, poses = writer.first_poses(end)

@@ -6,12 +6,12 @@ from typing import Any
 
 import xarray as xr
 
-from tolcontact.archive import Run, open_archive, opened
+from tolcontact.archive import Run, open_archive, open_unchecked
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.vocabulary import MONTE_CARLO
 from tolcontact.workflow.accessor import Results
-from tolcontact.workflow.archived_run import SURFACES, Progress, write_run
+from tolcontact.workflow.archived_run import SURFACES, RunProgress, write_run
 from tolcontact.workflow.models import Choice, Model
 
 __all__ = ["open_archive", "run"]
@@ -36,7 +36,7 @@ def run(
     plan: str = MONTE_CARLO,
     until: str | None = None,
     client: Any = None,
-    progress: Progress | None = None,
+    progress: RunProgress | None = None,
 ) -> xr.DataTree:
     """Simulate `samples` realizations, raw and corrected, into the archive `out`, and open it.
 
@@ -64,7 +64,7 @@ def run(
     options = {"solver": solver, "method": method, "until": until, "client": client, "progress": progress}
     if out is None:
         return _results_in_memory(model, settings, options, overwrite=overwrite, resume=resume)
-    return opened(write_run(model, settings, Path(out), overwrite=overwrite, resume=resume, **options))
+    return open_unchecked(write_run(model, settings, Path(out), overwrite=overwrite, resume=resume, **options))
 
 
 def _results_in_memory(model: Model | Program, settings: Run, options: dict[str, Any], **archive_options: bool) -> xr.DataTree:
@@ -74,6 +74,6 @@ def _results_in_memory(model: Model | Program, settings: Run, options: dict[str,
             raise OptionError(f"{option} needs an archive, and none is named; name one: out=...")
     with (
         tempfile.TemporaryDirectory() as folder,
-        opened(write_run(model, settings, Path(folder) / "results.nc", **options)) as tree,
+        open_unchecked(write_run(model, settings, Path(folder) / "results.nc", **options)) as tree,
     ):
         return tree.load()

@@ -4,12 +4,12 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from tolcontact.archive import opened_tables
+from tolcontact.archive import open_tables_unchecked
 from tolcontact.compilation import Program
 from tolcontact.labelled import Results
 from tolcontact.simulation import block_rows
 from tolcontact.statistics import STATISTICS, estimate_of
-from tolcontact.statistics.question import HALF_WIDTH, Question
+from tolcontact.statistics.statistic_request import HALF_WIDTH, StatisticRequest
 from tolcontact.vocabulary import OUTSIDE, PPM
 
 MIN_GROWTH, MAX_GROWTH = 1.25, 16.0
@@ -26,7 +26,7 @@ class Target:
     half  in the units of the measure, or as a fraction of the estimate if `is_relative`
     """
 
-    question: Question
+    request: StatisticRequest
     measure: str
     statistic: str
     half: float
@@ -35,21 +35,21 @@ class Target:
     @classmethod
     def of(cls, text: str) -> "Target":
         """Return the target "corner height: 6 sigma +-1 %" or "gap: ppm +-20 %". Raises OptionError for other texts."""
-        question = Question.parse(text, "until", statistics=(PPM, *STATISTICS), form=HALF_WIDTH, examples=EXAMPLES)
-        is_ppm = question.statistic == PPM
-        half = question.value / 100 if question.is_percent else question.value * (1e-6 if is_ppm else 1.0)
-        return cls(question, question.measure, OUTSIDE if is_ppm else question.statistic, half, question.is_percent)
+        request = StatisticRequest.parse(text, "until", statistics=(PPM, *STATISTICS), form=HALF_WIDTH, examples=EXAMPLES)
+        is_ppm = request.statistic == PPM
+        half = request.value / 100 if request.is_percent else request.value * (1e-6 if is_ppm else 1.0)
+        return cls(request, request.measure, OUTSIDE if is_ppm else request.statistic, half, request.is_percent)
 
     def check(self, program: Program) -> None:
         """Raise OptionError if the model has no such measure."""
-        self.question.number_of([measure.name for measure in program.nominal.measures])
+        self.request.number_of([measure.name for measure in program.nominal.measures])
 
     def next(self, path: Path, program: Program) -> int | None:
         """Return the number of realizations that the archive should have next.
 
         None means that the interval is narrow enough, or cannot become narrow enough.
         """
-        with opened_tables(path) as results:
+        with open_tables_unchecked(path) as results:
             samples = int(results.attrs["samples"])
             estimate, half, target_half = self._widths(results)
         is_hopeless = math.isnan(half) and samples >= MAX_WITHOUT_INTERVAL

@@ -1,6 +1,7 @@
 """Functions for many realizations at once: interpreted by CasADi, compiled when that pays, and called by names."""
 
 import contextlib
+import functools
 import math
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -10,7 +11,7 @@ import numpy as np
 
 from tolcontact.arrays import Array, Float, Int, Real
 from tolcontact.compilation.functions.native import NativeFunction, UnknownInstructionError
-from tolcontact.compilation.functions.places import Located, Places
+from tolcontact.compilation.functions.places import ArgumentPlaces, Located
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 
 WIDTHS = (256, 16)  # realizations in a call of CasADi
@@ -27,9 +28,8 @@ class InterpretedFunction:
         # A buffer keeps the memory of the Function that it calls. Inside another Function a solver takes a free one each time.
         inputs = [ca.MX.sym(f"i{k}", function.sparsity_in(k)) for k in range(function.n_in())]
         caller = ca.Function("caller", inputs, function.call(inputs))
-        self._calls = [
-            _Buffers(caller.map(width) if width > 1 else caller, width, fixed_inputs or {}) for width in (*WIDTHS, 1)
-        ]
+        self._calls = [_Buffers(caller, width, fixed_inputs or {}) for width in (*WIDTHS, 1)]
+        self._sizes_out = [function.nnz_out(i) for i in range(function.n_out())]
         self._solvers = [function] if function.is_a("Conic") else []
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
@@ -42,7 +42,7 @@ class InterpretedFunction:
 
     def _evaluated(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
         count = len(inputs[0])
-        results = [np.empty((count, size)) for size in self._calls[-1].sizes_out]
+        results = [np.empty((count, size)) for size in self._sizes_out]
         failed = np.zeros(count, dtype=bool)
         for call, start, stop in self._turns(count):
             rows = slice(start, stop)
@@ -79,14 +79,20 @@ class InterpretedFunction:
 
 
 class _Buffers:
-    """A Function of `width` realizations at once, with arrays at fixed addresses."""
+    """A Function of `width` realizations at once, with arrays at fixed addresses, which the first call allocates."""
 
     def __init__(self, function: ca.Function, width: int, fixed_inputs: Mapping[int, np.ndarray]) -> None:
-        self._buffer, self._evaluate = function.buffer()
+        self._function, self.width, self._fixed_inputs = function, width, fixed_inputs
+        self._evaluate: Callable[[], None] | None = None
+        self.is_new = True
+
+    def _allocate(self) -> Callable[[], None]:
+        """Allocate the arrays, and return what evaluates the Function on them."""
+        width, fixed_inputs = self.width, self._fixed_inputs
+        function = self._function.map(width) if width > 1 else self._function
+        self._buffer, evaluate = function.buffer()
         inputs = [np.zeros((width, function.nnz_in(i) // width)) for i in range(function.n_in())]
         self._outputs = [np.zeros((width, function.nnz_out(i) // width)) for i in range(function.n_out())]
-        self.width = width
-        self.sizes_out = [output.shape[1] for output in self._outputs]
         for i, array in enumerate(inputs):
             if i in fixed_inputs:
                 array[:] = fixed_inputs[i]
@@ -95,11 +101,14 @@ class _Buffers:
             self._buffer.set_res(i, memoryview(array.ravel()))  # type: ignore[call-arg, arg-type]
         self._all = inputs  # the buffer does not keep them alive
         self._inputs = [array for i, array in enumerate(inputs) if i not in fixed_inputs]
-        self.is_new = True
+        return evaluate  # type: ignore[no-any-return]
 
     def __call__(self, inputs: Sequence[np.ndarray], outputs: Sequence[np.ndarray]) -> bool:
         """Evaluate for up to `width` realizations; idle places repeat the last one. Return whether it succeeded."""
         count = len(inputs[0])
+        if self._evaluate is None:
+            with CONSTRUCTION_LOCK:
+                self._evaluate = self._allocate()
         for buffer, array in zip(self._inputs, inputs, strict=True):
             buffer[:count] = array
             buffer[count:] = array[-1:]
@@ -130,7 +139,6 @@ class AdaptiveFunction:
     def __init__(self, function: ca.Function) -> None:
         self._function = function
         self.sizes_out = [function.nnz_out(i) for i in range(function.n_out())]
-        self._interpreted = InterpretedFunction(function)
         self.native: NativeFunction | None = None
         self._remaining = MIN_COMPILED_CALLS if function.n_instructions() <= MAX_INSTRUCTIONS else math.inf
         self._is_new = True
@@ -143,7 +151,12 @@ class AdaptiveFunction:
         with self._lock:
             return self._interpreted(inputs)[0]
 
-    def evaluate(self, count: int, arrays: Sequence[Located], places: Places) -> None:
+    @functools.cached_property
+    def _interpreted(self) -> InterpretedFunction:
+        with CONSTRUCTION_LOCK:
+            return InterpretedFunction(self._function)
+
+    def evaluate(self, count: int, arrays: Sequence[Located], places: ArgumentPlaces) -> None:
         """Evaluate the Function for all elements of `count` realizations; see NativeFunction."""
         if native := self._compiled(count * places.elements):
             native.evaluate(count, arrays, places)
@@ -160,23 +173,24 @@ class AdaptiveFunction:
 
     def _compiled(self, count: int) -> NativeFunction | None:
         """Return the machine code for `count` more evaluations, None while CasADi interprets."""
-        if self.native is None and (compiler := self._due_compiler(count)):
-            # CasADi interprets what LLVM cannot compile on this machine.
-            with contextlib.suppress(UnknownInstructionError, RuntimeError):
-                self.native = compiler(self._function)  # other threads interpret meanwhile
+        # CasADi interprets what LLVM cannot compile on this machine.
+        with contextlib.suppress(UnknownInstructionError, RuntimeError):
+            if self.native is None and self._is_due(count):
+                self.native = NativeFunction(self._function)  # other threads interpret meanwhile
         return self.native
 
-    def _due_compiler(self, count: int) -> Callable[[ca.Function], NativeFunction | None] | None:
-        """Return the way to get machine code before `count` evaluations, or None; each way is returned to one caller only."""
-        with self._lock:
+    def _is_due(self, count: int) -> bool:
+        """Return whether to compile before `count` evaluations, which is true once. The first call looks for stored code."""
+        with self._lock:  # other threads wait for stored code: to interpret takes longer
             self._remaining -= count
             if self._is_new and self._remaining < math.inf:
                 self._is_new = False
-                return NativeFunction.from_cache
-            if self._remaining >= 0:
-                return None
+                self.native = NativeFunction.from_cache(self._function)
+                return False
+            if self.native is not None or self._remaining >= 0:
+                return False
             self._remaining = math.inf
-            return NativeFunction
+            return True
 
 
 class NamedFunction:
@@ -194,7 +208,7 @@ class NamedFunction:
     def at(self, places: Mapping[str, Int[Array, "element _"]]) -> "IndexedFunction":
         """Return the function of several elements, whose inputs and results stand in these columns of arrays, by name."""
         names = [*self._names, *self._results]
-        return IndexedFunction(self._evaluate, names, Places([places[name] for name in names]))
+        return IndexedFunction(self._evaluate, names, ArgumentPlaces([places[name] for name in names]))
 
     @classmethod
     def dense(cls, function: ca.Function) -> "NamedFunction":
@@ -215,7 +229,7 @@ class NamedFunction:
 class IndexedFunction:
     """A Function that is evaluated for several elements of each realization, on arrays that hold the numbers of all."""
 
-    def __init__(self, function: AdaptiveFunction, names: Sequence[str], places: Places) -> None:
+    def __init__(self, function: AdaptiveFunction, names: Sequence[str], places: ArgumentPlaces) -> None:
         self._function, self._names, self._places = function, names, places
 
     def __call__(self, count: int, arrays: Mapping[str, Located]) -> None:

@@ -24,7 +24,7 @@ import numpy as np
 from llvmlite import binding, ir
 
 from tolcontact import code_cache
-from tolcontact.compilation.functions.places import Located, Places
+from tolcontact.compilation.functions.places import ArgumentPlaces, Located
 
 LANES = 4
 SEGMENT = 1000  # instructions
@@ -52,7 +52,7 @@ class NativeFunction:
         self._engine = _loaded(code) if code else _compiled(_module(function), key_of(function))
         address = self._engine.get_function_address("evaluate")
         self._evaluate = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 3)(address)
-        self._whole = Places.of_one([*self.sizes_in, *self.sizes_out])
+        self._whole = ArgumentPlaces.of_one([*self.sizes_in, *self.sizes_out])
 
     @classmethod
     def from_cache(cls, function: ca.Function) -> "NativeFunction | None":
@@ -68,7 +68,7 @@ class NativeFunction:
         self.evaluate(count, [Located.of(array) for array in (*inputs, *results)], self._whole)
         return results
 
-    def evaluate(self, count: int, arrays: Sequence[Located], places: Places) -> None:
+    def evaluate(self, count: int, arrays: Sequence[Located], places: ArgumentPlaces) -> None:
         """Read inputs from the first arrays, and write results into the others, at the `places` of all elements.
 
         Inputs of one row are the same for all realizations. Rows may be apart, as those of a slice of columns are. Raises

@@ -32,7 +32,7 @@ def located(arrays: Mapping[str, np.ndarray]) -> dict[str, Located]:
     return {name: Located.of(array) for name, array in arrays.items()}
 
 
-class Places:
+class ArgumentPlaces:
     """Where the arguments of a Function, inputs first, stand in their arrays: columns (element, entry) of each argument.
 
     elements   number of elements
@@ -47,6 +47,6 @@ class Places:
         self.addresses = (ctypes.c_void_p * len(addresses))(*addresses)
 
     @classmethod
-    def of_one(cls, sizes: Sequence[int]) -> "Places":
+    def of_one(cls, sizes: Sequence[int]) -> "ArgumentPlaces":
         """Return the places of one element, whose arguments of these sizes are whole arrays."""
         return cls([np.arange(size)[None] for size in sizes])

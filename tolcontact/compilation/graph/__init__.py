@@ -15,6 +15,6 @@ solve_kernel          a batch of QPs
 graph_solver          the solver, in place of a plugin of CasADi
 """
 
-from tolcontact.compilation.graph.graph_solver import GraphSolver
+from tolcontact.compilation.graph.graph_solver import GraphSolver, Layouts
 
-__all__ = ["GraphSolver"]
+__all__ = ["GraphSolver", "Layouts"]

@@ -6,8 +6,8 @@ Key = Callable[[int, Sequence[int], Sequence[set[int]]], tuple[int, ...]]
 
 
 def least_degree(node: int, depths: Sequence[int], neighbours: Sequence[set[int]]) -> tuple[int, ...]:
-    """Return the key of the order of minimum degree, whose factors have few entries."""
-    return len(neighbours[node]), node
+    """Return the key of the order of minimum degree, whose factors have few entries; a chain is eliminated from both ends."""
+    return len(neighbours[node]), depths[node], node
 
 
 def least_depth(node: int, depths: Sequence[int], neighbours: Sequence[set[int]]) -> tuple[int, ...]:

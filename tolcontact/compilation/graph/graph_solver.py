@@ -15,15 +15,20 @@ FEW_BODIES, ROUNDS_OF_FEW, ROUNDS = 2, 4, 40  # rounds in which rows of all join
 STEPS_PER_ROW = 4  # in which single rows enter or leave
 
 Arrays = Mapping[str, Float[Array, "_ _"]]
+Layouts = dict[bool, tuple[Layout, Storage]]  # of QPs whose H has blocks on its diagonal only, and of others
 
 
 class GraphSolver:
     """A solver of QPs with the sparsities of h, g, a and lba. Threads must not share it.
 
-    The last `equations` rows are equations, the last `slacks` variables are not negative, with unit entries in h.
+    The last `equations` rows are equations, the last `slacks` variables are not negative, with unit entries in h. Solvers of
+    equal QPs may share their `layouts`, which are made when they are needed.
     """
 
-    def __init__(self, sparsities: Mapping[str, ca.Sparsity], *, slacks: int, equations: int) -> None:
+    def __init__(
+        self, sparsities: Mapping[str, ca.Sparsity], *, slacks: int, equations: int, layouts: Layouts | None = None
+    ) -> None:
+        self._layouts = {} if layouts is None else layouts
         self._sparsities, self._slacks, self._equations = dict(sparsities), slacks, equations
         rows, columns = (np.array(indices) for indices in sparsities["h"].get_triplet())
         self._identity = (rows == columns).astype(float)
@@ -72,10 +77,10 @@ class GraphSolver:
 
     def _search(self, coupled: bool) -> "_Search":
         if coupled not in self._searches:
-            sparsities = self._sparsities["h"], self._sparsities["a"]
-            self._searches[coupled] = _Search(
-                *layout(*sparsities, slacks=self._slacks, equations=self._equations, coupled=coupled), coupled=coupled
-            )
+            if coupled not in self._layouts:
+                sparsities = self._sparsities["h"], self._sparsities["a"]
+                self._layouts[coupled] = layout(*sparsities, slacks=self._slacks, equations=self._equations, coupled=coupled)
+            self._searches[coupled] = _Search(*self._layouts[coupled], coupled=coupled)
         return self._searches[coupled]
 
 

@@ -1,7 +1,18 @@
 """Shape files: they are screened, read in another process, and split into bodies."""
 
 from tolcontact.geometry.files.product import BREP, FACE_NAMES, STATED_FACES, SURFACES
-from tolcontact.geometry.files.reader import Limits
+from tolcontact.geometry.files.reader import ReadingLimits
 from tolcontact.geometry.files.reading import Contents, Shape, key_of, read, read_files
 
-__all__ = ["BREP", "FACE_NAMES", "STATED_FACES", "SURFACES", "Contents", "Limits", "Shape", "key_of", "read", "read_files"]
+__all__ = [
+    "BREP",
+    "FACE_NAMES",
+    "STATED_FACES",
+    "SURFACES",
+    "Contents",
+    "ReadingLimits",
+    "Shape",
+    "key_of",
+    "read",
+    "read_files",
+]

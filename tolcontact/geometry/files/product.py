@@ -15,7 +15,7 @@ import trimesh
 
 from tolcontact.errors import GeometryFault, nearest_name
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface
-from tolcontact.geometry.edges import rim
+from tolcontact.geometry.edges import distinct_triangles, rim
 from tolcontact.geometry.files.bodies import Body, ShapePlace, StepShape, bodies, listed
 from tolcontact.geometry.files.stated_face import first_faces, stated_faces
 from tolcontact.geometry.files.step_surfaces import credible, onto, stated_surfaces
@@ -180,9 +180,7 @@ def _proper_triangles(path: Path, faces: np.ndarray) -> tuple[np.ndarray, np.nda
     that stands twice in its shell. Corners fall together at the ends of an edge that is shorter than coordinates resolve.
     """
     proper = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
-    lowest = np.argmin(faces[proper], axis=1)
-    turned = np.take_along_axis(faces[proper], (lowest[:, None] + np.arange(3)) % 3, axis=1)
-    unique, group = trimesh.grouping.unique_rows(turned)
+    unique, group = distinct_triangles(faces[proper])
     for count, kind in ((len(faces) - len(proper), "on edges of no length"), (len(proper) - len(unique), "that stand twice")):
         if count:
             log.info('"%s": %d triangles %s are left out', path, count, kind)

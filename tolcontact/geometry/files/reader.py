@@ -30,7 +30,7 @@ class UnfinishedRead(GeometryFault):
 
 
 @dataclass(frozen=True)
-class Limits:
+class ReadingLimits:
     """The limits for reading a file: processor time, memory [byte] and number of triangles.
 
     On an idle core a STEP file of 1 MB takes some 2 s, one of 20 MB 41 s. A million triangles take some 0.5 GiB to read, and
@@ -43,7 +43,7 @@ class Limits:
     triangles: int = 1_000_000
 
 
-DEFAULT_LIMITS = Limits()
+DEFAULT_LIMITS = ReadingLimits()
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Job:
     angle: float
 
 
-def load(jobs: Sequence[Job], limits: Limits = DEFAULT_LIMITS) -> list[dict[str, np.ndarray] | GeometryFault]:
+def load(jobs: Sequence[Job], limits: ReadingLimits = DEFAULT_LIMITS) -> list[dict[str, np.ndarray] | GeometryFault]:
     """Return the arrays of each file, as `worker` describes them, or its fault.
 
     A file with too many triangles has only the array `count`.
@@ -67,7 +67,7 @@ def load(jobs: Sequence[Job], limits: Limits = DEFAULT_LIMITS) -> list[dict[str,
     return results
 
 
-def _by_one_process(jobs: Sequence[Job], limits: Limits) -> Iterator[dict[str, np.ndarray] | GeometryFault]:
+def _by_one_process(jobs: Sequence[Job], limits: ReadingLimits) -> Iterator[dict[str, np.ndarray] | GeometryFault]:
     """Yield the results of one worker process, up to the file that it fails at."""
     seconds = [limits.seconds + limits.seconds_per_mb * job.path.stat().st_size / 1e6 for job in jobs]
     order = {

@@ -52,11 +52,11 @@ class Content:
 
 Key = tuple[Path, float | None]  # a file and its required chord
 Contents = Mapping[Key, Content | GeometryFault]
-State = tuple[str, int, int, int, float | None, reader.Limits]
+State = tuple[str, int, int, int, float | None, reader.ReadingLimits]
 _cache: dict[State | None, Content] = {}
 
 
-def read_files(geometries: Iterable[Geometry], limits: reader.Limits = reader.DEFAULT_LIMITS) -> Contents:
+def read_files(geometries: Iterable[Geometry], limits: reader.ReadingLimits = reader.DEFAULT_LIMITS) -> Contents:
     """Return the content or the fault of each file that the geometries name. Each file is read once."""
     files = [geometry for geometry in geometries if isinstance(geometry, Mesh) and isinstance(geometry.source, str | Path)]
     contents: dict[Key, Content | GeometryFault] = {}
@@ -88,7 +88,7 @@ def key_of(geometry: Mesh) -> Key:
     return Path(geometry.source), geometry.chord
 
 
-def _state(path: Path, chord: float | None, limits: reader.Limits) -> State | None:
+def _state(path: Path, chord: float | None, limits: reader.ReadingLimits) -> State | None:
     """Return a value that changes when the file does; None if there is no file."""
     try:
         status = path.stat()
@@ -105,7 +105,9 @@ def _remember(state: State | None, content: Content | GeometryFault) -> None:
         _cache[state] = content
 
 
-def _load(texts: Mapping[Key, StepText | None], limits: reader.Limits) -> dict[Key, dict[str, np.ndarray] | GeometryFault]:
+def _load(
+    texts: Mapping[Key, StepText | None], limits: reader.ReadingLimits
+) -> dict[Key, dict[str, np.ndarray] | GeometryFault]:
     """Return the arrays or the fault of each file.
 
     A STEP file without a required chord gets coarser triangles if there would be too many, or if they cannot be made.

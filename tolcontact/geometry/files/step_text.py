@@ -26,7 +26,7 @@ _POINT = re.compile(
     rb"CARTESIAN_POINT\s*\(\s*'(?:[^']|'')*+'\s*,\s*\(\s*([-+.\dEe]+)\s*,\s*([-+.\dEe]+)\s*,\s*([-+.\dEe]+)\s*\)"
 )
 _METRES = re.compile(rb"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.")
-# A number that is none, or exceeds double precision.
+# NaN, or a number that exceeds double precision.
 _ENDLESS = re.compile(
     rb"[(,]\s*+([-+]?(?:nan|inf|infinity|\d++\.?+\d*+e\+?+0*+(?:\d{4,}|[4-9]\d\d|3[1-9]\d|309)))\s*+(?=[,)])", re.IGNORECASE
 )
@@ -79,7 +79,7 @@ def step_text(content: bytes) -> StepText:
 
 
 def endless_number(content: bytes) -> str:
-    """Return the first number in a STEP file's `content` that is none, or is too large; "" if all numbers are finite."""
+    """Return the first number in a STEP file's `content` that is NaN or too large; "" if all numbers are finite."""
     if _ENDLESS.search(content) is None:  # the usual case, in which strings and comments need not be left out
         return ""
     match = _ENDLESS.search(b"".join(_STRING.sub(b"''", _COMMENT.sub(b"", record[0])) for record in _RECORD.finditer(content)))

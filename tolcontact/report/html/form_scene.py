@@ -75,7 +75,7 @@ class SingleStates:
 
     def _shown(self, face: int, vertices: np.ndarray, faces: np.ndarray) -> Iterator[ShownForm]:
         """Yield a form at the vertices of the plane that its stations lie in, if triangles show it."""
-        stations = self._contact[terms.STATION.name][self._contact[terms.FACE_OF_STATION.name] == face]
+        stations = self._contact[terms.FORM_STATION_PLACE.name][self._contact[terms.FACE_OF_FORM_STATION.name] == face]
         centre, size = stations.mean(axis=0), np.ptp(vertices, axis=0).max()
         normal = np.linalg.svd(stations - centre)[2][2]
         distance, _ = scipy.spatial.KDTree(stations).query(vertices)
@@ -95,8 +95,11 @@ class SingleStates:
 
     def _modes(self, face: int, places: np.ndarray) -> np.ndarray:
         """Return heights (place, mode) of the form of a plane at places (place, 3) [mm], for coefficients of 1."""
-        is_own, removed = self._contact[terms.FACE_OF_STATION.name] == face, self._contact[terms.FORM_REMOVED.name][face]
-        stations, weights = self._contact[terms.STATION.name][is_own], self._contact[terms.STATION_WEIGHT.name][is_own]
+        is_own, removed = self._contact[terms.FACE_OF_FORM_STATION.name] == face, self._contact[terms.FORM_REMOVED.name][face]
+        stations, weights = (
+            self._contact[terms.FORM_STATION_PLACE.name][is_own],
+            self._contact[terms.FORM_STATION_WEIGHT.name][is_own],
+        )
         distance = scipy.spatial.distance.cdist(places, stations) / self._contact[terms.FORM_LENGTH.name][face]
         covariance = COVARIANCES[str(self._contact[terms.FORM_COVARIANCE.name][face])](distance)
         normals = np.broadcast_to(self._contact[terms.FORM_SURFACE["axis"].name][face], places.shape)

@@ -16,6 +16,7 @@ from tolcontact.declaration.title_block import title_block_of
 from tolcontact.discretization import Nominal, discretize
 from tolcontact.errors import ArchiveError, ModelError
 from tolcontact.replacing import replacing
+from tolcontact.report.archived_settings import archived_settings
 from tolcontact.report.contributor_shares import ContributorShares, contributor_shares
 from tolcontact.report.figures import grouped, limits_text
 from tolcontact.report.html.analyses import contributions_of, tables_of
@@ -23,7 +24,6 @@ from tolcontact.report.html.charts import bars_of, charts_of, compared_charts, r
 from tolcontact.report.html.scene import gap_rows, scene_of, view_of
 from tolcontact.report.model_tables import model_tables
 from tolcontact.report.results_table import COLUMNS, SIDES, result_rows, share_heading
-from tolcontact.report.run_settings import run_settings
 from tolcontact.report.text.runs import CHANGES, VALUES, change_rows, runs_lines, value_rows
 from tolcontact.report.text.summary import contact_lines, measure_rows, notes, pair_columns, pair_rows
 from tolcontact.statistics.verdict import VERDICT_RULE
@@ -101,7 +101,7 @@ def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock |
         "tables": list(tables_of(results)),
         "contributions": (indices := contributions_of(results)),
         "max_rows": MAX_ROWS,
-        "run": {name: str(value) for name, value in run_settings(results).items()},
+        "run": {name: str(value) for name, value in archived_settings(results).items()},
         "missing": _missing(scene),
         "stations": scene["stations"],
     }

@@ -13,7 +13,7 @@ MIN_PER_CENTRE = 4
 MAX_FITTED = 1500  # realizations
 MIN_GAIN = 0.01  # of the mean logarithm of the likelihood: less is no reason for another centre
 ITERATIONS = 10
-FEW_DIMENSIONS, NOISE = 10, 5.0  # with more dimensions, so many standard errors of a centre are its noise
+FEW_DIMENSIONS, NOISE = 10, 5.0  # with more dimensions, this many standard errors of a centre are noise
 
 
 class Mixture(NamedTuple):

@@ -14,8 +14,8 @@ from tolcontact.statistics.rare.searches import (
     MAX_WEIGHTED,
     MIN_LEVEL,
     STRANDS,
-    Found,
     Score,
+    SearchResult,
     Walk,
     by_inflation,
     by_levels,
@@ -39,7 +39,7 @@ ROUNDS, ROUND = 2, 0.15  # of importance sampling, before the last one, and thei
 MIN_REFIT, REFIT = 40, 500  # hits from which centres are found again, and how many are drawn of them
 MAX_UNSEEN = 0.9  # of an event
 MIN_EFFECTIVE, MAX_WEIGHT = 200, 0.02  # hits that importance sampling needs, and the largest share of one of them
-SIGNIFICANT = 1.7  # times both half widths: by so much more a search says what importance sampling missed (0.25 % by chance)
+SIGNIFICANT = 1.7  # times both half widths: a search that says more shows what importance sampling missed (0.25 % by chance)
 
 
 class Tail(NamedTuple):
@@ -119,7 +119,7 @@ def _counted(score: Score, dimensions: int, count: int, rng: np.random.Generator
     return intervals.proportion(score(rng.standard_normal((count, dimensions))) > 0)
 
 
-def _searched(score: Score, dimensions: int, budget: int, rng: np.random.Generator, *, inflates: bool) -> Found:
+def _searched(score: Score, dimensions: int, budget: int, rng: np.random.Generator, *, inflates: bool) -> SearchResult:
     """Return what a search found with about `budget` realizations."""
     used, inflation = 0, 1.0
 
@@ -128,7 +128,7 @@ def _searched(score: Score, dimensions: int, budget: int, rng: np.random.Generat
         used += len(u)
         return score(u)
 
-    def search(count: int) -> Found:
+    def search(count: int) -> SearchResult:
         walk = Walk(counting, dimensions, count, rng)
         return by_inflation(walk, inflation, budget - used) if inflates else by_levels(walk)
 

@@ -38,15 +38,15 @@ MAX_REACH = 700.0  # of a logarithm
 Score = Callable[[np.ndarray], np.ndarray]  # u (n, d) -> (n,)
 
 
-class Found(NamedTuple):
-    """What a search has found: its estimate of the probability, and realizations of each strand in the event, (n, d)."""
+class SearchResult(NamedTuple):
+    """The result of a search: its estimate of the probability, and realizations of each strand in the event, (n, d)."""
 
     probability: Estimate
     points: list[np.ndarray]
 
     @classmethod
-    def nothing(cls, product: "Product") -> "Found":
-        """Return what a search says that did not find the event, or that ended where it was negligible.
+    def nothing(cls, product: "Product") -> "SearchResult":
+        """Return the result of a search that did not find the event, or that ended where it was negligible.
 
         A level contains the event. An inflated event is taken to be no less probable than the event itself.
         """
@@ -112,15 +112,15 @@ class Walk:
         self._simulated += u.shape[0] * u.shape[1]
         return self._score(u.reshape(-1, self.dimensions)).reshape(u.shape[:2])
 
-    def begun(self, deviation: float) -> tuple[np.ndarray, np.ndarray]:
+    def first_realizations(self, deviation: float) -> tuple[np.ndarray, np.ndarray]:
         """Return realizations of N(0, deviation^2) (strand, n, d), and their scores (strand, n)."""
         u = deviation * self.rng.standard_normal((STRANDS, self.count, self.dimensions))
         return u, self.scores(u)
 
-    def chosen(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def seed_places(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return where the seeds (strand, seed) of the next level lie among realizations with weights (strand, n).
 
-        A strand of which nothing is left goes on from the others.
+        A strand of which nothing is left continues from the others.
         """
         strands, places = [], []
         for strand in range(STRANDS):
@@ -132,7 +132,7 @@ class Walk:
             places.append(place)
         return np.array(strands), np.array(places)
 
-    def on(
+    def advance(
         self, u: np.ndarray, g: np.ndarray, threshold: float, deviation: float = 1.0, stretch: float = 1.0
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return realizations of N(0, deviation^2) with scores above a threshold, by walks from u (strand, seed, d), and g.
@@ -151,14 +151,14 @@ class Walk:
         return np.concatenate(walked, axis=1), np.concatenate(scores, axis=1)
 
 
-def by_levels(walk: Walk) -> Found:
+def by_levels(walk: Walk) -> SearchResult:
     """Search by levels of the score."""
     product = Product()
     u = _levels(walk, 1.0, product)
-    return Found.nothing(product) if u is None else Found(product.estimate, u)
+    return SearchResult.nothing(product) if u is None else SearchResult(product.estimate, u)
 
 
-def by_inflation(walk: Walk, inflation: float, budget: int) -> Found:
+def by_inflation(walk: Walk, inflation: float, budget: int) -> SearchResult:
     """Search from an inflation back to none, where inflations are nested with about `budget` realizations in all."""
     return _weighted(walk, inflation) if walk.dimensions <= MAX_WEIGHTED else _nested(walk, inflation, budget)
 
@@ -190,7 +190,7 @@ def first_inflation(score: Score, dimensions: int, count: int, rng: np.random.Ge
 
 def _levels(walk: Walk, inflation: float, product: Product) -> list[np.ndarray] | None:
     """Return realizations of N(0, inflation^2) of each strand in the event; none if it is not found, or negligible."""
-    u, g = walk.begun(inflation)
+    u, g = walk.first_realizations(inflation)
     for _ in range(MAX_LEVELS):
         threshold = _threshold(g)
         inside = g > threshold
@@ -201,28 +201,28 @@ def _levels(walk: Walk, inflation: float, product: Product) -> list[np.ndarray] 
             return None
         if threshold == 0.0:
             return [points[hits] for points, hits in zip(u, inside, strict=True)]
-        seeds = walk.chosen(inside)
-        u, g = walk.on(u[seeds], g[seeds], threshold, inflation)
+        seeds = walk.seed_places(inside)
+        u, g = walk.advance(u[seeds], g[seeds], threshold, inflation)
     return None
 
 
 def _inflated(walk: Walk, inflation: float, product: Product) -> np.ndarray | None:
     """Return realizations of N(0, inflation^2) in the event (strand, n, d); none if it is not found, or negligible."""
-    found = _levels(walk, inflation, product)
-    if found is None:
+    points = _levels(walk, inflation, product)
+    if points is None:
         return None
-    points = np.concatenate(found)
-    sources = [own if len(own) else points for own in found]
-    seeds = np.stack([own[_resampled(np.ones(len(own)), walk.seeds, walk.rng)] for own in sources])
-    return walk.on(seeds, np.ones(seeds.shape[:2]), 0.0, inflation)[0]
+    of_all = np.concatenate(points)
+    sources = [of_strand if len(of_strand) else of_all for of_strand in points]
+    seeds = np.stack([source[_resampled(np.ones(len(source)), walk.seeds, walk.rng)] for source in sources])
+    return walk.advance(seeds, np.ones(seeds.shape[:2]), 0.0, inflation)[0]
 
 
-def _weighted(walk: Walk, inflation: float) -> Found:
+def _weighted(walk: Walk, inflation: float) -> SearchResult:
     """Bring an inflated event back by weights: P_t(F) = P_s(F) E_s[w | F], w the ratio of densities of N(0, t^2), N(0, s^2)."""
     product, s = Product(), inflation
     u = _inflated(walk, inflation, product)
     if u is None:
-        return Found.nothing(product)
+        return SearchResult.nothing(product)
     while s > 1.0:
         squares = 0.5 * (u**2).sum(axis=-1)
 
@@ -235,14 +235,14 @@ def _weighted(walk: Walk, inflation: float) -> Found:
         weights = np.exp(weights - largest)
         product.times(weights.mean(axis=1), log_scale=largest)
         if product.is_negligible:
-            return Found.nothing(product)
-        seeds = u[walk.chosen(weights)]
-        u, _ = walk.on(seeds, np.ones(seeds.shape[:2]), 0.0, t)
+            return SearchResult.nothing(product)
+        seeds = u[walk.seed_places(weights)]
+        u, _ = walk.advance(seeds, np.ones(seeds.shape[:2]), 0.0, t)
         s = t
-    return Found(product.estimate, list(u))
+    return SearchResult(product.estimate, list(u))
 
 
-def _nested(walk: Walk, inflation: float, budget: int) -> Found:
+def _nested(walk: Walk, inflation: float, budget: int) -> SearchResult:
     """Bring an inflated event back by nested ones, F_s = {z: g(s z) > 0} with z standard normal.
 
     P(F_t) / P(F_s) = P(z in F_t | F_s) / P(z in F_s | F_t) holds for any event.
@@ -250,7 +250,7 @@ def _nested(walk: Walk, inflation: float, budget: int) -> Found:
     product, s, pace = Product(), inflation, FIRST_PACE
     u = _inflated(walk, inflation, product)
     if u is None:
-        return Found.nothing(product)
+        return SearchResult.nothing(product)
     z, looks = u / inflation, u[:, :0]  # u (strand, n, d) to be looked at, whether it is in the event before
     while s > 1.0:
         for _ in range(TRIES):
@@ -259,7 +259,7 @@ def _nested(walk: Walk, inflation: float, budget: int) -> Found:
             hits_before, hits = np.split(scores > 0, [looks.shape[1]], axis=1)
             product.over(hits_before)
             if product.is_negligible:
-                return Found.nothing(product)
+                return SearchResult.nothing(product)
             looks = looks[:, :0]
             share = float(hits.mean())
             change = math.log(GOAL) / math.log(min(max(share, 1 / hits.size), 1 - 1 / hits.size))
@@ -267,15 +267,15 @@ def _nested(walk: Walk, inflation: float, budget: int) -> Found:
             if share >= MIN_GOAL:
                 break
         if not share:
-            return Found.nothing(product)
+            return SearchResult.nothing(product)
         product.times(hits.mean(axis=1))
         walk.spread(budget, nested_levels(t, math.exp(product.log)))
-        seeds = z[walk.chosen(hits)]
-        z, _ = walk.on(seeds, np.ones(seeds.shape[:2]), 0.0, stretch=t)
+        seeds = z[walk.seed_places(hits)]
+        z, _ = walk.advance(seeds, np.ones(seeds.shape[:2]), 0.0, stretch=t)
         looks = s * z[:, walk.rng.choice(z.shape[1], max(int(LOOKS_BACK * z.shape[1]), 1), replace=False)]
         s = t
     product.over(walk.scores(looks) > 0)
-    return Found(product.estimate, list(z))
+    return SearchResult(product.estimate, list(z))
 
 
 def _least(is_enough: Callable[[float], bool], s: float) -> float:

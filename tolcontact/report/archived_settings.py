@@ -10,6 +10,6 @@ SETTINGS = (
 )  # fmt: skip
 
 
-def run_settings(results: xr.DataTree) -> dict[str, Any]:
+def archived_settings(results: xr.DataTree) -> dict[str, Any]:
     """Return the settings that an archive states, by the names of its attributes."""
     return {name: results.attrs[name] for name in SETTINGS if name in results.attrs}

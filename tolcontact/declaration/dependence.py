@@ -4,7 +4,7 @@ Contributors are named by labels: "part.locator", "part.feature.freedom" ("cover
 """
 
 import importlib  # pandas takes longer to import than all the rest: only if it is needed
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from tolcontact.declaration.values import is_length, is_line
 from tolcontact.errors import shown
 from tolcontact.readable import Readable
 
+SEPARATORS = {";": "semicolons", "\t": "tabs"}
 MIN_EIGENVALUE = 1e-12  # of a correlation matrix
 
 
@@ -124,10 +125,7 @@ def population(source: Any, columns: Mapping[str, str] | None, declared_at: str)
     pd = importlib.import_module("pandas")
     if isinstance(source, str | Path):
         title = shown(Path(source).name)
-        try:
-            table = pd.read_csv(source)
-        except (OSError, ValueError) as error:
-            raise ValueError(f'population "{title}" cannot be read as CSV: {str(error).splitlines()[0]}') from error
+        table = _table_of(source, title, set(columns.values()) if columns is not None else set())
     else:
         try:
             table = source.to_dataframe() if hasattr(source, "to_dataframe") else pd.DataFrame(source)
@@ -146,6 +144,33 @@ def population(source: Any, columns: Mapping[str, str] | None, declared_at: str)
     numbers = [pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=float) for name in names.values()]
     values = np.column_stack(numbers) if numbers else np.empty((len(table), 0))
     return Population(tuple(names), values, title, declared_at)
+
+
+def _table_of(source: str | Path, title: str, names: Set[str]) -> Any:
+    """Return the DataFrame of a CSV file. Raises ValueError if it cannot be read, or if its entries do not match its heading.
+
+    names   the columns that are stated, in which there may be any characters
+    """
+    pd = importlib.import_module("pandas")
+    try:
+        table = pd.read_csv(source)
+    except (OSError, ValueError) as error:
+        raise ValueError(f'population "{title}" cannot be read as CSV: {str(error).splitlines()[0]}') from error
+    has_more_entries = not isinstance(table.index, pd.RangeIndex)  # pandas takes the first ones for names of rows
+    heading = "".join(map(str, table.columns[:1])) if len(table.columns) == 1 else ""
+    separator = next((mark for mark in ";\t" if mark in heading and heading not in names), None)
+    if separator is not None:
+        options = f"sep={separator!r}" + (', decimal=","' if has_more_entries else "")
+        raise ValueError(
+            f'population "{title}": expected commas between columns, got {SEPARATORS[separator]}; '
+            f'read it with pandas: population(pandas.read_csv("{title}", {options}))'
+        )
+    if has_more_entries:
+        raise ValueError(
+            f'population "{title}": its rows have more entries than its heading has columns; expected one for each, '
+            "separated by commas, and points in decimals"
+        )
+    return table
 
 
 def correlation(labels: Sequence[str], matrix: Any, declared_at: str) -> Correlation:

@@ -11,7 +11,7 @@ NO_VALUE, VALUE, HALF_WIDTH = "", rf" *{NUMBER}", rf" *(?:\+-|±) *{NUMBER} *(?P
 
 
 @dataclass(frozen=True)
-class Question:
+class StatisticRequest:
     """A statistic of a measure, with the value above 0 that is required of it, if there is one.
 
     option      the name of the option, for messages
@@ -27,8 +27,8 @@ class Question:
     @classmethod
     def parse(
         cls, text: str, option: str, *, statistics: Sequence[str], form: str = NO_VALUE, examples: tuple[str, str]
-    ) -> "Question":
-        """Return the question that a text asks. Raises OptionError for other texts, and other statistics than `statistics`."""
+    ) -> "StatisticRequest":
+        """Return the request that a text states. Raises OptionError for other texts, and other statistics than `statistics`."""
         match = re.fullmatch(rf"(?P<measure>.+): *(?P<statistic>.+?){form}", text.strip()) if isinstance(text, str) else None
         fields = match.groupdict() if match else {}
         value = float(fields.get("value", "nan"))
@@ -42,5 +42,5 @@ class Question:
     def number_of(self, measures: Sequence[str]) -> int:
         """Return the position of the measure among the names of a model's measures. Raises OptionError if it has none."""
         if self.measure not in measures:
-            raise OptionError(f'{self.option} has the measure "{self.measure}"; expected one of: {", ".join(measures)}')
+            raise OptionError(f'{self.option} has the measurement "{self.measure}"; expected one of: {", ".join(measures)}')
         return list(measures).index(self.measure)

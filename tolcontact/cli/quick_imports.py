@@ -1,0 +1,58 @@
+"""Imports of commands, which take longer than a small run: without the collector, and without what few commands need."""
+
+import contextlib
+import gc
+import importlib.util
+import sys
+from collections.abc import Iterator, Sequence
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+
+# Modules that libraries import, and whose attributes hardly a command needs: each is loaded when one of them is asked for.
+DEFERRED = frozenset(
+    {
+        "PIL.Image",  # by trimesh, for textures
+        "numpy.f2py",  # by SciPy, which lists what NumPy has
+        "trimesh.bounds",  # which imports scipy.optimize
+        "trimesh.nsphere",  # which imports scipy.optimize, too
+        "trimesh.path.raster",  # which imports PIL
+        "trimesh.path.simplify",  # which imports trimesh.nsphere
+        "trimesh.smoothing",  # which imports scipy.sparse.linalg
+        "trimesh.voxel",  # which imports scipy.ndimage
+        "yaml",  # by Numba, for a file of settings
+    }
+)
+
+
+@contextlib.contextmanager
+def quick_imports() -> Iterator[None]:
+    """Import modules quickly.
+
+    The collector of cycles finds nothing in modules, but takes a fifth of the time of all imports, and again as long at the end
+    of the process. So it is off, and leaves what was imported alone afterwards.
+    """
+    was_collecting, finder = gc.isenabled(), _DeferringFinder()
+    gc.disable()
+    sys.meta_path.insert(0, finder)
+    try:
+        yield
+    finally:
+        sys.meta_path.remove(finder)
+        if was_collecting:
+            gc.freeze()
+            gc.enable()
+
+
+class _DeferringFinder(MetaPathFinder):
+    """The finder of modules that are loaded when an attribute of them is first asked for."""
+
+    def find_spec(self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None) -> ModuleSpec | None:
+        """Return the specification that the other finders give, with a loader that defers."""
+        if fullname not in DEFERRED:
+            return None
+        finders = (finder for finder in sys.meta_path if finder is not self)
+        spec = next((spec for finder in finders if (spec := finder.find_spec(fullname, path, target))), None)
+        if spec is not None and spec.loader is not None:
+            spec.loader = importlib.util.LazyLoader(spec.loader)
+        return spec
