@@ -90,7 +90,7 @@ The ends of the faces are those of the nominal assembly. A shaft that is pushed 
 its wall, is detected only afterwards (see the checks of surfaces in `tolcontact.contact`).
 """
 
-from tolcontact.discretization.counted_points import CountedPoints, counted_points
+from tolcontact.discretization.counted_points import counted_points
 from tolcontact.discretization.discretizing import discretize
 from tolcontact.discretization.form_places import FIRST_POINT, raised_places, rim_points
 from tolcontact.discretization.locators import Locators
@@ -99,6 +99,6 @@ from tolcontact.discretization.nominal_part import NominalPart
 from tolcontact.discretization.round_points import RoundPoint, RoundPoints
 
 __all__ = [
-    "FIRST_POINT", "ContactPoints", "CountedPoints", "Locators", "Nominal", "NominalPart", "Offsets", "RoundPoint",
+    "FIRST_POINT", "ContactPoints", "Locators", "Nominal", "NominalPart", "Offsets", "RoundPoint",
     "RoundPoints", "counted_points", "discretize", "raised_places", "rim_points",
 ]  # fmt: skip

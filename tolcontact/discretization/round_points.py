@@ -180,11 +180,9 @@ class RoundPoint:
     def centres(self) -> tuple["Ball", "Ball"]:
         """Return balls around the centres of curvature of the moving and the reference face, where they touch nominally.
 
-        That of a plane is around the point of contact, and as large as the ball or shaft. The place on a shaft's axis has no
-        radius: the other end holds the shaft.
+        That of a plane is around the point of contact, and as large as the ball or shaft.
         """
-        body = Ball(self.centre, 0.0 if self.axis.any() else self.radius)
-        on_moving, on_reference, _ = self.nominal()
+        body, (on_moving, on_reference, _) = Ball(self.centre, self.radius), self.nominal()
         on_wall = on_reference if self.on_moving else on_moving
         if isinstance(self.wall, Plane):
             wall = Ball(on_wall, self.radius)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.declaration.locator import FIRST_ORDER
-from tolcontact.discretization import CountedPoints, Nominal, counted_points
+from tolcontact.discretization import ContactPoints, Nominal, counted_points
 from tolcontact.mechanics.correction import Mobility
 from tolcontact.mechanics.displacement import moment_table
 from tolcontact.mechanics.pose import Number, Vector
@@ -164,11 +164,9 @@ def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int,
     length = spread or float(nominal.parts[members[0][1].moving].mesh.scale)
     ball = BALL_SHARE * length
     sides = [
-        _side(
-            position, parts.index(part), counted, pair.weights if weighs_areas else np.ones(len(pair.P_m)), centre[part], ball
-        )
+        _side(position, pair, parts.index(part), of_moving, weighs_areas, centre[part], ball)
         for position, (_, pair) in enumerate(members)
-        for part, counted in zip((pair.moving, pair.reference), counted_points(pair), strict=True)
+        for part, of_moving in ((pair.moving, True), (pair.reference, False))
         if part is not None and chains[part]
     ]
     holds = [_hold(nominal, part, parts) for part in free if nominal.parts[part].locators.exact.any()]
@@ -219,8 +217,12 @@ def _points_near(
     return points[part] or points[mover] or [P for other in points if chains[other] == chains[mover] for P in points[other]]
 
 
-def _side(pair: int, part: int, counted: CountedPoints, weights: np.ndarray, centre: np.ndarray, radius: float) -> Side:
-    """Return a side whose points are balls of a radius [mm] in the regularization."""
-    all_moments = (moment_table(counted.points, centre, counted.radii) * weights).sum(axis=1)
+def _side(
+    number: int, pair: ContactPoints, part: int, of_moving: bool, weighs_areas: bool, centre: np.ndarray, radius: float
+) -> Side:
+    """Return one side of a pair; in the regularization its contact points are balls of a radius [mm]."""
+    counted, points = counted_points(pair)[0 if of_moving else 1], pair.P_m if of_moving else pair.P_r
+    weights = pair.weights if weighs_areas else np.ones(len(points))
+    all_moments = (moment_table(points, centre) * weights).sum(axis=1)
     all_moments[[4, 7, 9]] += weights.sum() * radius**2
-    return Side(pair, part, *counted, weights, centre, all_moments)
+    return Side(number, part, *counted, weights, centre, all_moments)
