@@ -11,7 +11,7 @@ from scipy.stats import norm
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import PAPER, call
+from tests.helpers import PAPER, call, nightly
 
 
 def pile(*ranges, tolerance=1.0):
@@ -201,7 +201,7 @@ def supported(shift):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shift", [0.0, -0.4])
+@pytest.mark.parametrize("shift", [0.0, *nightly(-0.4)])
 def test_a_tolerance_that_decides_nothing_before_it_is_wider_gets_the_range_of_least_cost(shift):
     """P(x <= 0.2) is the product of two normal distributions; with a shift of -0.4, X2 decides above twice its range alone."""
     found = tc.allocate(supported(shift), "x: ppm 2000", samples=5000, solver="daqp")
