@@ -1,5 +1,6 @@
 """What objectives count of round faces: contact pushes a ball or shaft along the normal, and lets nothing roll aside."""
 
+import netCDF4
 import numpy as np
 import pytest
 import trimesh
@@ -59,6 +60,21 @@ def test_a_spherical_foot_lifts_its_lever_without_turning_it(resolution):
     assert (lift > 0).sum() > 60
     expected = raw + np.stack([0 * lift, 0 * lift, lift, lift], axis=1)
     assert corrected == pytest.approx(expected, abs=1e-4 if resolution == "exact" else 2e-3)
+
+
+def test_an_archive_says_that_centres_count(tmp_path):
+    """So a run that was begun when points on faces counted is not resumed."""
+    a = tc.Assembly("foot")
+    floor, foot = a.part("floor", tc.Box(60, 60, 5), at=(-30, -30, -5), fixed=True), a.part("foot", sphere(10), at=(0, 0, 10))
+    held(a, foot, is_turned=False)
+    a.contact("foot on floor", moving=foot.face(), reference=floor.face("+z"))
+    path = tmp_path / "foot.nc"
+    tc.run(a, samples=20, seed=1, surfaces=0, out=path).close()
+    with netCDF4.Dataset(path, "r+") as file:
+        assert file.weighting == "all points, by area, balls and shafts by their centres"
+        file.weighting = "all points, by area"
+    with pytest.raises(tc.TolcontactError, match="was run with weighting = all points, by area, now it is"):
+        tc.run(a, samples=30, seed=1, surfaces=0, out=path, resume=True)
 
 
 def test_a_shaft_does_not_move_along_a_floor_beside_a_wall_that_it_does_not_touch():

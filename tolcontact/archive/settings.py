@@ -46,7 +46,7 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
         "solver_accuracy": ACCURACY,
         "resolution": method.resolution,
         "objective": method.objective,
-        "weighting": _weighting(method),
+        "weighting": _weighting(program),
         "regularization": method.regularization,
         "eta": method.eta,
         "active_set": method.active_set,
@@ -64,11 +64,14 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
     }
 
 
-def _weighting(method: Method) -> str:
+def _weighting(program: Program) -> str:
     """Return which contact points count in the objective, and how."""
+    method = program.method
     if not method.minimizes.counts_points:
         return "none"
-    return f"{method.objective}, by area" if method.is_exact else method.objective
+    by_area = ", by area" if method.is_exact else ""
+    are_centres = any(pair.round is not None and pair.round.are_beside for pair in program.nominal.pairs)
+    return f"{method.objective}{by_area}{', balls and shafts by their centres' if are_centres else ''}"
 
 
 def _method_origin(program: Program) -> str:
