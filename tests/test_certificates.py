@@ -13,7 +13,7 @@ from tests import cases
 from tests.helpers import ALL_POINTS, EXACT, PAPER, SEATED, SEATED_ON_POINTS, R_t, joined, nightly, recompiled, simulate
 from tolcontact import poses as pose
 from tolcontact.compilation import usable_plugins
-from tolcontact.compilation.contact_solver import polished
+from tolcontact.compilation.active_set import ActiveSet
 from tolcontact.compilation.plugins import Plugin
 from tolcontact.discretization import discretize
 from tolcontact.errors import ContactWarning, OptionError
@@ -192,7 +192,8 @@ def test_polishing_finds_the_solution_from_the_rows_that_carry():
     known = {"x": x, "lam_a": -lam, "lam_x": -bound}
     blurred = {name: values * (1 + 1e-5 * rng.normal(size=values.shape)) for name, values in known.items()}
     order = rng.permutation(size - slacks + rows)
-    y, lam_a, lam_x = polished(problem, blurred, equal, slacks, order).values()
+    active = ActiveSet.of_answer(problem, blurred, equal, slacks)
+    y, lam_a, lam_x = active.answer(problem, order).values()
     assert np.abs(y - x).max() < 1e-9
     assert np.abs(np.einsum("kij,kj->ki", H, y) + g + np.einsum("kij,ki->kj", A, lam_a) + lam_x).max() < 1e-10
     assert np.abs((np.einsum("kij,kj->ki", A, y) - lower)[carries]).max() < 1e-10

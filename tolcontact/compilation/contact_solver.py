@@ -1,11 +1,11 @@
-"""The contact QP of one group, solved for many realizations: assemble, solve, polish, finish."""
+"""The contact QP of one group, solved for many realizations: assemble, foresee, solve, polish, finish."""
 
 import copy
-from collections.abc import Mapping
 
 import numpy as np
 
-from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.arrays import Array, Bool, Float
+from tolcontact.compilation.active_set import ActiveSet
 from tolcontact.compilation.band_order import band_order
 from tolcontact.compilation.contact_qp import ContactQP
 from tolcontact.compilation.elements import ElementQP
@@ -13,46 +13,11 @@ from tolcontact.compilation.functions import InterpretedFunction, flat
 from tolcontact.compilation.graph import GraphSolver, Layouts
 from tolcontact.compilation.outcome import SOLUTION
 from tolcontact.compilation.plugins import ACCURACY, PLUGINS, Plugin, solver
-from tolcontact.compilation.polish_kernel import solve_conditions
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 
-COMPLIANCE = 1e-9  # of the rows, so that dependent rows have a solution; refinement removes its effect
-REFINEMENTS = 4
-
-
-def polished(
-    problem: Mapping[str, np.ndarray],
-    answer: Mapping[str, np.ndarray],
-    equations: int,
-    slacks: int,
-    order: Int[Array, " unknown"],
-) -> dict[str, np.ndarray]:
-    """Return x, lam_a and lam_x (QP, entry) of min x'Hx/2 + g'x, a x >= lba; the last rows are equations, the last x >= 0.
-
-    problem     h (QP, n, n), g (QP, n), a (QP, m, n), lba (QP, m)
-    answer      x (QP, n), lam_a (QP, m), lam_x (QP, n) of a solver; multipliers are below 0 if a row carries
-    order       of the unknowns, see solve_conditions
-
-    They are NaN if the conditions have no solution.
-    """
-    H, g, A, lower = (problem[name] for name in ("h", "g", "a", "lba"))
-    x, lam_a, lam_x = (answer[name] for name in ("x", "lam_a", "lam_x"))
-    count, rows, size = A.shape
-    # Of a row and its multiplier the smaller one is rounding, for every solver.
-    carries = -lam_a > np.einsum("kij,kj->ki", A, x) - lower
-    carries[:, rows - equations :] = True
-    is_open = (-lam_x <= x)[:, size - slacks :]
-    solution = np.empty((count, size + rows + slacks))
-    solve_conditions((H, g, A, lower), carries, is_open, order, COMPLIANCE, REFINEMENTS, solution)
-    x, multipliers = solution[:, :size], solution[:, size:]
-    lam_x = np.zeros_like(x)
-    lam_x[:, size - slacks :] = -multipliers[:, rows:]
-    return {"x": x, "lam_a": -multipliers[:, :rows], "lam_x": lam_x}
-
-
 QP = ("h", "g", "a", "lba", "uba")  # outputs of `assemble` that a solver needs
-MAX_POLISHED_ENTRIES = 4_000_000  # of the linear systems that polish some answers together
-POLISHED_RESIDUAL = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is polished
+MAX_DENSE_ENTRIES = 4_000_000  # of the linear systems that are solved together
+POLISHED_RESIDUAL = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is rough
 SMALL_STEP, SMALL_STEP_RESIDUAL = 1e-3, 1e-2 * ACCURACY  # mm: limits for small steps, which show noise
 CONFLICT_SHARE = 1e-3  # of the slack, which parts that contradict each other leave: a smaller residual needs no other plugin
 
@@ -68,7 +33,7 @@ class ContactSolver:
         self._plugin = qp.plugin
         self._order = band_order(qp.sparsity("h"), qp.sparsity("a"), slacks=qp.slacks)
         self._layouts: Layouts = {}
-        self._max_polished = max(MAX_POLISHED_ENTRIES // (sum(qp.sparsity("a").shape) + qp.slacks) ** 2, 1)
+        self._max_dense = max(MAX_DENSE_ENTRIES // (sum(qp.sparsity("a").shape) + qp.slacks) ** 2, 1)
         self._renew()
 
     def twin(self) -> "ContactSolver":
@@ -142,17 +107,48 @@ class ContactSolver:
         problem = self._assemble(**inputs)
         slacks = np.ones((len(inputs["guess"]), self._qp.slacks))  # what gives way opens whenever it carries
         slacks[:, : inputs["guessed_slack"].shape[1]] = inputs["guessed_slack"]
-        solution, failed = solver(problem, inputs["guess"], slacks)
+        if not solver.remembers:
+            return self._polished(inputs, problem, *solver(problem, inputs["guess"], slacks))
+        outputs, foreseen = self._foreseen(inputs, problem, slacks)
+        if foreseen.all():
+            return outputs
+        rest = np.flatnonzero(~foreseen)
+        inputs, problem = _of(inputs, rest), _of(problem, rest)
+        answer = self._polished(inputs, problem, *solver(problem, inputs["guess"], slacks[rest]))
+        if not foreseen.any():
+            return answer
+        _replace(outputs, rest, answer)
+        return outputs
+
+    def _foreseen(self, inputs: Arrays, problem: Arrays, slacks: np.ndarray) -> tuple[Arrays, Bool[Array, " realization"]]:
+        """Return the outputs with the rows and slacks of the guess as the active set, and of which problems it is.
+
+        Small steps seldom change the active set. Outputs of other problems are arbitrary.
+        """
+        carries = np.zeros((len(slacks), self._qp.sparsity("a").size1()), dtype=np.bool_)
+        carries[:, : inputs["guess"].shape[1]] = inputs["guess"] > 0
+        carries[:, carries.shape[1] - self._qp.equations :] = True
+        outputs: Arrays = {}
+        foreseen = np.zeros(len(slacks), dtype=np.bool_)
+        for rows in self._parts(np.flatnonzero(inputs["guess"].any(axis=1))):
+            systems = self._dense_problem(problem, rows)
+            solution = ActiveSet(carries[rows], slacks[rows] > 0).answer(systems, self._order)
+            answer = self._finished(_of(inputs, rows) | _of(problem, rows) | solution)
+            outputs = outputs or {name: np.empty((len(slacks), values.shape[1])) for name, values in answer.items()}
+            _replace(outputs, rows, answer)
+            foreseen[rows] = ~_is_rough(answer)
+        return outputs, foreseen
+
+    def _polished(self, inputs: Arrays, problem: Arrays, solution: Arrays, failed: Bool[Array, " realization"]) -> Arrays:
+        """Return the outputs for a solver's solutions; those that are rough are polished."""
         outputs = self._finished(inputs | problem | solution)
         outputs["residual"][failed] = np.inf
-        residual = outputs["residual"][:, 0]
-        is_rough = residual > np.where(outputs["step"][:, 0] < SMALL_STEP, SMALL_STEP_RESIDUAL, POLISHED_RESIDUAL)
-        rough = np.flatnonzero(is_rough & np.isfinite(residual))
-        for rows in np.split(rough, range(self._max_polished, len(rough), self._max_polished)) if rough.size else ():
-            systems = _of(problem, rows)
-            polished_outputs = self._finished(_of(inputs, rows) | systems | self._polished(systems, _of(solution, rows)))
-            better = polished_outputs["residual"][:, 0] < residual[rows]
-            _replace(outputs, rows[better], _of(polished_outputs, better))
+        for rows in self._parts(np.flatnonzero(_is_rough(outputs) & np.isfinite(outputs["residual"][:, 0]))):
+            systems = self._dense_problem(problem, rows)
+            active = ActiveSet.of_answer(systems, _of(solution, rows), self._qp.equations, self._qp.slacks)
+            answer = self._finished(_of(inputs, rows) | _of(problem, rows) | active.answer(systems, self._order))
+            better = answer["residual"][:, 0] < outputs["residual"][rows, 0]
+            _replace(outputs, rows[better], _of(answer, better))
         return outputs
 
     def _finished(self, arrays: Arrays) -> Arrays:
@@ -162,9 +158,12 @@ class ContactSolver:
         residual[~(usable & np.isfinite(residual[:, 0]))] = np.inf
         return outputs
 
-    def _polished(self, problem: Arrays, solution: Arrays) -> Arrays:
-        dense = {name: self._dense(name, problem[name]) for name in ("h", "g", "a", "lba")}
-        return polished(dense, solution, self._qp.equations, self._qp.slacks, self._order)
+    def _parts(self, rows: np.ndarray) -> list[np.ndarray]:
+        """Return the rows in parts whose dense matrices take little memory."""
+        return np.split(rows, range(self._max_dense, len(rows), self._max_dense)) if rows.size else []
+
+    def _dense_problem(self, problem: Arrays, rows: np.ndarray) -> dict[str, np.ndarray]:
+        return {name: self._dense(name, problem[name][rows]) for name in ("h", "g", "a", "lba")}
 
     def _dense(self, name: str, stored: np.ndarray) -> np.ndarray:
         """Return all entries of an output of `assemble`: (realization, row, column), or (realization, row) of a vector."""
@@ -180,7 +179,7 @@ class _PluginSolver:
     """A plugin's solver with its own memory."""
 
     def __init__(self, qp: ContactQP | ElementQP, plugin: Plugin) -> None:
-        self._remembers = plugin.remembers
+        self.remembers = plugin.remembers
         with CONSTRUCTION_LOCK, quiet():
             conic = solver(plugin, qp.sparsity("h"), qp.sparsity("a"), springs=qp.has_springs)
         self._inputs = [name for name in conic.name_in() if name in QP]
@@ -200,7 +199,7 @@ class _PluginSolver:
         the rows that probably carry: rows with `reactions` (realization, row), or in a first step violated rows.
         """
         inputs = [problem[name] for name in self._inputs]
-        if not self._remembers:
+        if not self.remembers:
             solved, failed = self._solve(inputs)
             return {name: solved[i] for name, i in zip(SOLUTION, self._results, strict=True)}, failed
         violated = problem["lba"][:, : reactions.shape[1]]
@@ -219,6 +218,12 @@ def _new_solver(qp: ContactQP | ElementQP, plugin: Plugin, layouts: Layouts) -> 
         return _PluginSolver(qp, plugin)
     sparsities = {name: qp.sparsity(name) for name in ("h", "g", "a", "lba")}
     return GraphSolver(sparsities, slacks=qp.slacks, equations=qp.equations, layouts=layouts)
+
+
+def _is_rough(answer: Arrays) -> Bool[Array, " realization"]:
+    """Return which answers are polished."""
+    small = answer["step"][:, 0] < SMALL_STEP
+    return ~(answer["residual"][:, 0] <= np.where(small, SMALL_STEP_RESIDUAL, POLISHED_RESIDUAL))
 
 
 def _is_lost(answer: Arrays) -> Bool[Array, " realization"]:

@@ -23,7 +23,11 @@ class GraphSolver:
 
     The last `equations` rows are equations, the last `slacks` variables are not negative, with unit entries in h. Solvers of
     equal QPs may share their `layouts`, which are made when they are needed.
+
+    remembers   whether it starts each problem from the answer to the previous one: never
     """
+
+    remembers = False
 
     def __init__(
         self, sparsities: Mapping[str, ca.Sparsity], *, slacks: int, equations: int, layouts: Layouts | None = None
