@@ -11,32 +11,41 @@ from tests.cases import round_contact as round_cases
 from tolcontact import vocabulary as terms
 from tolcontact.discretization import RoundPoint, RoundPoints, discretize
 from tolcontact.geometry.analytic_surfaces import ANALYTIC_SURFACES, Cone, Cylinder, Plane
+from tolcontact.mechanics.pose import ENTRIES
 from tolcontact.mechanics.round_gap import round_gaps
 
 NONE = np.zeros(3)
+AS_IT_IS, NO_MOVES = np.eye(ENTRIES), np.zeros((ENTRIES, 0))  # X_RM itself as z, and no z at all
 
 
 def check_gaps(points, rng, turn):
     """Gaps computed another way, and their derivatives by differences, at some poses."""
-    evaluate, count = round_gaps(points), len(points)
+    evaluate, count = round_gaps(points, ENTRIES), len(points)
     again = as_archived(points)
     step, heights = 1e-6, np.random.default_rng(2)
     for _ in range(3):
         R, t = Rotation.from_rotvec(rng.normal(scale=turn, size=3)).as_matrix(), rng.normal(scale=0.2, size=3)
         X, grown, reactions = np.concatenate([R.ravel(), t]), heights.normal(scale=0.01, size=2), rng.uniform(size=count)
-        gaps, slopes, bow, wrap, _ = (each.full() for each in evaluate(X, grown, reactions))
+        gaps, slopes, bends, bow, wrap, _ = (each.full() for each in evaluate(X, grown, reactions, AS_IT_IS))
         archived = np.array([point.gaps(R, t, *grown) for point in again])
         # A fixed tangent of a hollow wall is the nearest one where the two are in one direction.
         replaced = (gaps.ravel()[:, None] == gaps.ravel()).sum(axis=1) > 1
         assert np.abs(gaps.ravel() - archived)[~replaced].max(initial=0) < 1e-11
         assert (gaps.ravel() < archived + 1e-11).all() and abs(gaps.min() - archived.min()) < 1e-11
         moved = [
-            [[part.full() for part in evaluate(X + sign * step * e, grown, reactions)] for sign in (1, -1)] for e in np.eye(12)
+            [[part.full() for part in evaluate(X + sign * step * e, grown, reactions, AS_IT_IS)] for sign in (1, -1)]
+            for e in AS_IT_IS
         ]
         rates = np.hstack([(up[0] - down[0]) / (2 * step) for up, down in moved])
-        bends = np.column_stack([(up[1] - down[1]).T @ reactions / (2 * step) for up, down in moved])
+        turns = np.column_stack([(up[1] - down[1]).T @ reactions / (2 * step) for up, down in moved])
+        by_z = rng.normal(size=(ENTRIES, 3))
+        by_three = [each.full() for each in round_gaps(points, 3)(X, grown, reactions, by_z)]
         assert np.abs(rates - slopes).max() < 1e-6 * max(1, np.abs(slopes).max())
-        assert np.abs(bends - bow + wrap).max() < 1e-6 * max(1, np.abs(bow - wrap).max())
+        assert np.abs(slopes.T @ reactions - bends.ravel()).max() < 1e-9 * max(1, np.abs(bends).max())
+        assert np.abs(turns - bow + wrap).max() < 1e-6 * max(1, np.abs(bow - wrap).max())
+        for found, expected in zip(by_three[3:5], (bow, wrap), strict=True):
+            assert np.abs(found - by_z.T @ expected @ by_z).max() < 1e-9 * max(1, np.abs(found).max())
+        assert np.abs(by_three[1] - slopes @ by_z).max() < 1e-9 * max(1, np.abs(slopes).max())
         assert np.linalg.eigvalsh(wrap).min() > -1e-9 * max(1, np.abs(wrap).max())
 
 
@@ -83,7 +92,7 @@ def test_a_wall_beside_a_hollow_has_gaps_of_its_own():
             RoundPoint(beside, False, np.array([18.0, 9, 0]), NONE, NONE, 2.0, True, x, np.pi),
         ]
     )
-    gaps = round_gaps(points)(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), np.zeros(2), np.zeros(3))[0]
+    gaps = round_gaps(points)(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), np.zeros(2), np.zeros(3), NO_MOVES)[0]
     assert gaps.full().ravel() == pytest.approx([0, 8, 2], abs=1e-9)
 
 
@@ -108,7 +117,7 @@ def test_a_ball_in_a_hollow_that_is_open_is_free_to_leave():
     check_gaps(RoundPoints.of(ends), rng, turn=3e-3)
     for k, far in enumerate(out):
         evaluate = round_gaps(RoundPoints.of([points[k]]))
-        assert float(evaluate(np.concatenate([np.eye(3).ravel(), far]), np.zeros(2), 0)[0]) > 40
+        assert float(evaluate(np.concatenate([np.eye(3).ravel(), far]), np.zeros(2), 0, NO_MOVES)[0]) > 40
 
 
 def test_curvature_on_an_axis_is_that_of_some_room_beside_it():
@@ -118,9 +127,8 @@ def test_curvature_on_an_axis_is_that_of_some_room_beside_it():
         (Cone(np.zeros(3), axis, angle=0.6), np.array([0, 0, 20.0]), np.cos(0.6)),
         (Cylinder(np.zeros(3), axis, radius=2.0), np.zeros(3), 1.0),  # as large as the ball: it has no room at all
     ):
-        evaluate = round_gaps(RoundPoints.of([RoundPoint(wall, True, centre, NONE, NONE, 2.0, True, x, np.pi)]))
-        _, _, bow, wrap, _ = (
-            each.full() for each in evaluate(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), np.zeros(2), [1])
-        )
+        evaluate = round_gaps(RoundPoints.of([RoundPoint(wall, True, centre, NONE, NONE, 2.0, True, x, np.pi)]), ENTRIES)
+        at_rest = np.concatenate([np.eye(3).ravel(), np.zeros(3)])
+        *_, bow, wrap, _ = (each.full() for each in evaluate(at_rest, np.zeros(2), [1], AS_IT_IS))
         assert np.isfinite(bow).all()
         assert np.abs(wrap)[9:, 9:].max() == pytest.approx(expected / (1e-3 * 2.0), rel=1e-6)

@@ -109,16 +109,18 @@ def contact_rows(
         compliance.append(gives)
         if pair.round is not None:
             of_pair = reactions[len(pairs) : len(pairs) + len(pair.round)]
-            point_gaps, by_entries, second_derivative, closing, _ = round_gaps(pair.round)(
-                start.vector(), setting.heights[k], of_pair
+            z = sorted(set(by_z.sparsity().get_triplet()[1]))  # of the two parts of the pair
+            point_gaps, point_slopes, bend_of_pair, bow_of_pair, wrap_of_pair, _ = round_gaps(pair.round, len(z))(
+                start.vector(), setting.heights[k], of_pair, by_z[:, z]
             )
-            slopes.append(by_entries @ by_z)
+            slopes.append(ca.SX(len(pair.round), setting.z.numel()))
+            slopes[-1][:, z] = point_slopes
             gaps.append(point_gaps)
             filled.append(ca.SX.ones(len(pair.round)))
             pairs += [k] * len(pair.round)
-            bends.append(by_entries.T @ of_pair)
-            bow += by_z.T @ second_derivative @ by_z
-            wrap += by_z.T @ closing @ by_z
+            bends.append(bend_of_pair)
+            bow[z, z] += bow_of_pair
+            wrap[z, z] += wrap_of_pair
             continue
         total = ca.SX.zeros(ENTRIES) if bend is None else bend
         for P_m, P_r, n_r, is_filled in points:

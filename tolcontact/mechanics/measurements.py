@@ -25,7 +25,7 @@ from tolcontact.features import FaceDeviation
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere, Torus
 from tolcontact.mechanics.mesh_clearance import mesh_clearance
 from tolcontact.mechanics.plane_clearance import plane_clearance
-from tolcontact.mechanics.pose import Pose, relative
+from tolcontact.mechanics.pose import ENTRIES, Pose, relative
 from tolcontact.mechanics.round_gap import round_gaps
 from tolcontact.mechanics.segments import least, segment_distance
 from tolcontact.mechanics.setting import face_height, face_pose
@@ -113,7 +113,7 @@ def _round_clearance(clearance: RoundClearance, observed: Observed) -> ca.SX:
     moving, reference = clearance.moving, clearance.reference
     X_RM = _relative(moving, reference, observed)
     grown = ca.vertcat(*(face_height(face.deviation, observed.deviations) for face in (moving, reference)))
-    gaps, *_ = round_gaps(clearance.points)(X_RM.vector(), grown, ca.SX.zeros(len(clearance.points)))
+    gaps, *_ = round_gaps(clearance.points)(X_RM.vector(), grown, 0, ca.SX(ENTRIES, 0))
     return least(ca.vertsplit(gaps))
 
 

@@ -8,6 +8,7 @@ hollow cylinder the nearest one counts.
 """
 
 import functools
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -23,88 +24,155 @@ MIN_FREEDOM = 1e-3  # of the ball's or shaft's radius: smallest freedom for whic
 TOLERANCE = 1e-9
 TANGENT_TOLERANCE = 0.05  # rad: tangents within this angle count as one
 
-Terms = tuple[ca.SX, ca.SX, ca.SX, ca.SX]  # of a point: gap, slope, second derivative, and how its wall closes in
+
+class Terms(NamedTuple):
+    """The gap [mm] of a point, and its derivatives by the `n` symbols of the ball or the shaft's end.
+
+    slope     (1, n)
+    bend      (n, n): the second derivative
+    closing   (n, n): what a closing wall subtracts from it
+    """
+
+    gap: ca.SX
+    slope: ca.SX
+    bend: ca.SX
+    closing: ca.SX
 
 
 @functools.lru_cache(64)  # rows of the QP and gaps of all points are made of the same expressions
-def round_gaps(points: RoundPoints) -> ca.Function:
+def round_gaps(points: RoundPoints, freedoms: int = 0) -> ca.Function:
     """Return the gaps of round points as a Function.
 
-    Its inputs are X_RM (12), heights (2) by which the moving and the reference face have grown, and reactions (point). Results:
+    Its inputs are X_RM (12), heights (2) by which the moving and the reference face have grown, reactions (point), and by_z
+    (12, freedoms): the derivatives of X_RM by z, which moves the parts. Results:
 
-    gaps     (point) [mm]; where two tangents nearly agree, both have the gap of the nearer one
-    slopes   (point, 12): their derivatives by X_RM
-    bow      (12, 12): the sum of reactions times their second derivatives, without `wrap`
-    wrap     (12, 12): the sum of reactions times the second derivatives that are due to bodies sliding along hollow walls;
-                       positive semidefinite, and to be subtracted from `bow`
+    gaps       (point) [mm]; where two tangents nearly agree, both have the gap of the nearer one
+    slopes     (point, freedoms): their derivatives by z
+    bends      (12): the sum of reactions times their derivatives by X_RM
+    bow        (freedoms, freedoms): the sum of reactions times their second derivatives for X_RM linear in z, without `wrap`
+    wrap       (freedoms, freedoms): the sum of reactions times the second derivatives that are due to bodies sliding along
+               hollow walls; positive semidefinite, and to be subtracted from `bow`
     distances  (point) [mm]: the gap of each point itself
     """
-    X, grown, reactions = (
-        ca.SX.sym(name, size) for name, size in (("X_RM", ENTRIES), ("heights", 2), ("reactions", len(points)))
-    )
+    X, grown, reactions, by_z = (
+        ca.SX.sym(name, *shape)
+        for name, shape in {
+            "X_RM": (ENTRIES, 1), "heights": (2, 1), "reactions": (len(points), 1), "by_z": (ENTRIES, freedoms)
+        }.items()
+    )  # fmt: skip
+    ends: dict[tuple[bool, bytes, bytes], _End] = {}
     gaps, slopes, distances = [], [], []
-    nearest: tuple[RoundPoint, Terms] | None = None  # the last tangent that turns along a hollow wall
-    bow, wrap = ca.SX.zeros(ENTRIES, ENTRIES), ca.SX.zeros(ENTRIES, ENTRIES)
-    for point, reaction in zip(points, ca.vertsplit(reactions), strict=True):
+    loads, terms_of_points = ca.vertsplit(reactions), []
+    nearest: int | None = None  # the last tangent that turns along a hollow wall
+    known = list(points)
+    for k, point in enumerate(known):
+        key = (bool(point.on_moving), point.centre.tobytes(), point.axis.tobytes())
+        end = ends[key] = ends.get(key) or _End(point, X, by_z)
         body_height, wall_height = (grown[0], grown[1]) if point.on_moving else (grown[1], grown[0])
-        gap_terms = (_tangent_terms if _has_tangents(point) else _ball_terms)(point, X, body_height, wall_height)
-        distances.append(gap_terms[0])
+        of_point = (_tangent_terms if _has_tangents(point) else _ball_terms)(point, end, body_height, wall_height)
+        terms_of_points.append((end, of_point))
+        gap, slope = of_point.gap, of_point.slope
+        distances.append(gap)
         if point.is_hollow:
-            nearest = (point, gap_terms)
-        elif nearest is not None and _touches(point, nearest[0]):
-            gap_terms = _tangent_or_nearest(gap_terms, nearest[1])
-        gap, slope, bend, closing = gap_terms
+            nearest = k
+        elif nearest is not None and end is terms_of_points[nearest][0] and _touches(point, known[nearest]):
+            # Otherwise either could carry, to a solver's accuracy, and the steps would not converge.
+            nearer = terms_of_points[nearest][1]
+            is_alike = _are_alike(of_point, nearer, end)
+            gap, slope = ca.if_else(is_alike, nearer.gap, gap), ca.if_else(is_alike, nearer.slope, slope)
+            loads[nearest] += ca.if_else(is_alike, loads[k], 0)
+            loads[k] = ca.if_else(is_alike, 0, loads[k])
         gaps.append(gap)
-        slopes.append(slope)
-        bow += reaction * bend
-        wrap += reaction * closing
-    outputs = {"gaps": ca.vertcat(*gaps), "slopes": ca.vertcat(*slopes), "bow": bow, "wrap": wrap}
-    outputs["distances"] = ca.vertcat(*distances)
-    inputs = {"X_RM": X, "heights": grown, "reactions": reactions}
-    return ca.Function("round_gaps", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs])
+        slopes.append(slope @ end.by_z)
+    for (end, of_point), load in zip(terms_of_points, loads, strict=True):
+        end.add(of_point, load)
+    outputs = {
+        "gaps": ca.vertcat(*gaps),
+        "slopes": ca.vertcat(*slopes),
+        "bends": sum((end.bends() for end in ends.values()), ca.SX.zeros(ENTRIES)),
+        "bow": sum((end.bow() for end in ends.values()), ca.SX.zeros(freedoms, freedoms)),
+        "wrap": sum((end.wrap() for end in ends.values()), ca.SX.zeros(freedoms, freedoms)),
+        "distances": ca.vertcat(*distances),
+    }
+    symbols, values = [end.symbols for end in ends.values()], [end.place for end in ends.values()]
+    inputs = {"X_RM": X, "heights": grown, "reactions": reactions, "by_z": by_z}
+    return ca.Function("round_gaps", [*inputs.values()], _put([*outputs.values()], symbols, values), [*inputs], [*outputs])
+
+
+class _End:
+    """A ball, or the end of a shaft, in the frame of the part that has the wall.
+
+    centre, axis   (3, 1) symbols of the ball's centre or the point on the shaft's axis, and of the axis; a ball's axis is 0
+    symbols        (n, 1): those of them that vary
+    place          (n, 1): their values
+    by_X, by_z     (n, 12), (n, z): the derivatives of `place`
+    """
+
+    def __init__(self, point: RoundPoint, X: ca.SX, by_z: ca.SX) -> None:
+        pose = pose_of(X)
+        if not point.on_moving:
+            pose = Pose(pose.R.T, -(pose.R.T @ pose.t))
+        self.centre, self.axis = ca.SX.sym("centre", 3), ca.SX(3, 1)
+        self.symbols, self.place = self.centre, pose.apply(ca.DM(point.centre))
+        if point.axis.any():
+            self.axis = ca.SX.sym("axis", 3)
+            self.symbols = ca.vertcat(self.centre, self.axis)
+            self.place = ca.vertcat(self.place, pose.R @ ca.DM(point.axis))
+        self.by_X = ca.jacobian(self.place, X)
+        self.by_z = self.by_X @ by_z
+        self._X, self._X_by_z, size = X, by_z, self.symbols.numel()
+        self._slope, self._bend, self._closing = ca.SX(1, size), ca.SX(size, size), ca.SX(size, size)
+
+    def add(self, of_point: "Terms", load: ca.SX) -> None:
+        """Add the terms of a point that pushes with a load."""
+        self._slope += load * of_point.slope
+        self._bend += load * of_point.bend
+        self._closing += load * of_point.closing
+
+    def bends(self) -> ca.SX:
+        """Return the derivative (12, 1) by X_RM of the sum of loads times gaps."""
+        return self.by_X.T @ self._slope.T
+
+    def bow(self) -> ca.SX:
+        """Return its second derivative (z, z), without closing walls."""
+        weights = ca.SX.sym("weights", self.symbols.numel())
+        turning, _ = ca.hessian(ca.dot(weights, self.place), self._X)  # 0 if the place is linear in X_RM
+        turning = ca.substitute(turning, weights, self._slope.T)
+        return self._X_by_z.T @ turning @ self._X_by_z + self.by_z.T @ self._bend @ self.by_z
+
+    def wrap(self) -> ca.SX:
+        """Return the part (z, z) of it that closing walls subtract."""
+        return self.by_z.T @ self._closing @ self.by_z
 
 
 def _touches(plane: RoundPoint, hollow: RoundPoint) -> bool:
-    """Return whether a plane is a fixed tangent of a hollow wall, for the same ball or the same end of a shaft."""
+    """Return whether a plane is a fixed tangent of a hollow wall."""
     wall, n = hollow.wall, plane.wall.axis
-    if plane.wall.kind != "plane" or not (plane.centre == hollow.centre).all():
+    if plane.wall.kind != "plane":
         return False
     offset = float(n @ (plane.wall.origin - wall.origin)) + wall.radius  # n looks inward
     lean = 0.0 if wall.kind == "sphere" else float(n @ wall.axis) - np.sin(wall.angle)
     return abs(offset) < TOLERANCE * plane.radius and abs(lean) < TOLERANCE
 
 
-def _tangent_or_nearest(fixed: Terms, nearest: Terms) -> Terms:
-    """Return a fixed tangent, or the nearest one if both have nearly the same direction.
-
-    Otherwise either could carry, to a solver's accuracy, and the steps would not converge.
-    """
-    is_alike = ca.sumsqr(fixed[1] - nearest[1]) < TANGENT_TOLERANCE**2 * ca.sumsqr(fixed[1])
-    gap, slope, bend, closing = (ca.if_else(is_alike, b, a) for a, b in zip(fixed, nearest, strict=True))
-    return gap, slope, bend, closing
+def _are_alike(fixed: Terms, nearest: Terms, end: _End) -> ca.SX:
+    """Return whether a fixed tangent and the nearest one have nearly the same direction."""
+    apart, length = (ca.sumsqr(slope @ end.by_X) for slope in (fixed.slope - nearest.slope, fixed.slope))
+    return apart < TANGENT_TOLERANCE**2 * length
 
 
 def _has_tangents(point: RoundPoint) -> bool:
     return point.wall.kind == "plane" or bool(point.axis.any())
 
 
-def _in_wall_frame(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Return centre and axis (3, 1) of the ball or shaft in the frame of the part that has the wall."""
-    pose = pose_of(X)
-    if not point.on_moving:
-        pose = Pose(pose.R.T, -(pose.R.T @ pose.t))
-    return pose.apply(ca.DM(point.centre)), pose.R @ ca.DM(point.axis)
-
-
-def _tangent_terms(point: RoundPoint, X: ca.SX, body_height: ca.SX, wall_height: ca.SX) -> Terms:
+def _tangent_terms(point: RoundPoint, end: _End, body_height: ca.SX, wall_height: ca.SX) -> Terms:
     """Return the terms of a point beside a plane, or of a shaft in a hollow cylinder; the heights are their growth [mm].
 
-    Terms are the gap [mm], its slope (1, 12) and second derivative (12, 12) by X_RM, and the part (12, 12) that a closing wall
-    subtracts from it. The gap is written for a tangent plane with normal e, turned by `delta` towards t. A plane is its own
-    tangent plane. Of a hollow wall the nearest one counts: e* with d gap / d delta = 0. As X_RM moves, e* turns, which lowers
-    the second derivative by (d2 gap / dX d delta)^2 / (d2 gap / d delta2), unless e* stops where the wall ends.
+    The gap is written for a tangent plane with normal e, turned by `delta` towards t. A plane is its own tangent plane. Of a
+    hollow wall the nearest one counts: e* with d gap / d delta = 0. As the shaft's end s moves, e* turns, which lowers the
+    second derivative by (d2 gap / ds d delta)^2 / (d2 gap / d delta2), unless e* stops where the wall ends.
     """
-    c, a = _in_wall_frame(point, X)
+    c, a, s = end.centre, end.axis, end.symbols
     o, w, r = ca.DM(point.wall.origin), point.wall.axis, float(point.radius)
     tilt = ca.SX(0)
     if point.cut.any():
@@ -118,18 +186,17 @@ def _tangent_terms(point: RoundPoint, X: ca.SX, body_height: ca.SX, wall_height:
     across = e * ca.cos(delta) + t * ca.sin(delta)
     radius = float(point.wall.radius) - wall_height
     gap = radius - ca.dot(across, c - o) - (r + body_height) * ca.sqrt(1 + tilt * ca.dot(across, a) ** 2)
-    slope, slide = ca.jacobian(gap, X), ca.jacobian(gap, delta)
-    second_derivative, sliding, stiffness = ca.hessian(gap, X)[0], ca.jacobian(slide, X), ca.jacobian(slide, delta)
+    slope, slide = ca.jacobian(gap, s), ca.jacobian(gap, delta)
+    bend, sliding, stiffness = ca.hessian(gap, s)[0], ca.jacobian(slide, s), ca.jacobian(slide, delta)
     symbols = [e, t, delta]
     if point.wall.kind == "plane":
-        flat = _put([gap, slope, second_derivative], symbols, [ca.SX(-ca.DM(w)), ca.SX.zeros(3), ca.SX(0)])
-        return flat[0], flat[1], flat[2], ca.SX.zeros(ENTRIES, ENTRIES)
-    turning = ca.Function("turning", [X, both_heights, e, t], _put([slide, stiffness], [delta], [ca.SX(0)]))
-    nearest, is_free = _nearest_tangent(point, turning, X, both_heights, c - o)
+        flat = _put([gap, slope, bend], symbols, [ca.SX(-ca.DM(w)), ca.SX.zeros(3), ca.SX(0)])
+        return Terms(flat[0], flat[1], flat[2], ca.SX(*bend.shape))
+    turning = ca.Function("turning", [s, both_heights, e, t], _put([slide, stiffness], [delta], [ca.SX(0)]))
+    nearest, is_free = _nearest_tangent(point, turning, s, both_heights, c - o)
     min_stiffness = ca.fmax(ca.fabs(float(point.wall.radius) - r - wall_height - body_height), MIN_FREEDOM * r)
     closing = is_free * sliding.T @ sliding / ca.fmax(stiffness, min_stiffness)
-    gap_terms = _put([gap, slope, second_derivative, closing], symbols, [nearest, ca.cross(ca.DM(w), nearest), ca.SX(0)])
-    return gap_terms[0], gap_terms[1], gap_terms[2], gap_terms[3]
+    return Terms(*_put([gap, slope, bend, closing], symbols, [nearest, ca.cross(ca.DM(w), nearest), ca.SX(0)]))
 
 
 def _put(expressions: list[ca.SX], symbols: list[ca.SX], values: list[ca.SX]) -> list[ca.SX]:
@@ -137,10 +204,10 @@ def _put(expressions: list[ca.SX], symbols: list[ca.SX], values: list[ca.SX]) ->
     return list(ca.substitute(expressions, symbols, values))  # type: ignore[arg-type]
 
 
-def _nearest_tangent(point: RoundPoint, turning: ca.Function, X: ca.SX, grown: ca.SX, q: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _nearest_tangent(point: RoundPoint, turning: ca.Function, s: ca.SX, grown: ca.SX, q: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Return the outward unit vector (3, 1) of the wall's nearest tangent plane, and 0 if the wall ends there, else 1.
 
-    turning  Function of X_RM, growth of shaft and wall, e and t: first and second derivative of the gap as e turns towards t
+    turning  Function of the shaft's end s, growth of shaft and wall, e and t: the gap's derivatives as e turns towards t
     q        (3, 1) from the wall's axis to the shaft's
     """
     w, x = ca.DM(point.wall.axis), ca.DM(point.towards)
@@ -150,7 +217,7 @@ def _nearest_tangent(point: RoundPoint, turning: ca.Function, X: ca.SX, grown: c
     min_stiffness = MIN_FREEDOM * float(point.radius) * 1e-3
     for _ in range(NEWTON_STEPS):
         t = ca.cross(w, e)
-        slope_along, stiffness = turning(X, grown, e, t)
+        slope_along, stiffness = turning(s, grown, e, t)
         newton = ca.fmin(ca.fmax(-slope_along / ca.fmax(stiffness, min_stiffness), -MAX_TURN), MAX_TURN)
         step = ca.if_else(
             stiffness > min_stiffness, newton, ca.if_else(slope_along > 0, -MAX_TURN, MAX_TURN)
@@ -175,19 +242,13 @@ def _within(point: RoundPoint, e: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.if_else(is_free, e, np.cos(opening) * x + np.sin(opening) * aside), ca.if_else(is_free, 1, 0)
 
 
-def _ball_terms(point: RoundPoint, X: ca.SX, body_height: ca.SX, wall_height: ca.SX) -> Terms:
-    """Return the terms of a ball beside a curved wall (see _tangent_terms)."""
-    c, _ = _in_wall_frame(point, X)
+def _ball_terms(point: RoundPoint, end: _End, body_height: ca.SX, wall_height: ca.SX) -> Terms:
+    """Return the terms of a ball beside a curved wall."""
     side = -1.0 if point.is_hollow else 1.0
-    distance, normal, around, fixed_part = _distance(point, c, body_height + wall_height)
-    n = ca.SX.sym("n", 3)
-    along, J = ca.dot(n, c), ca.jacobian(c, X)
-    slope, bend = (
-        ca.substitute(expression, n, side * normal) for expression in (ca.jacobian(along, X), ca.hessian(along, X)[0])
-    )
-    bend += J.T @ fixed_part @ J if point.is_hollow else J.T @ (around + fixed_part) @ J
-    closing = J.T @ around @ J if point.is_hollow else ca.SX.zeros(ENTRIES, ENTRIES)
-    return side * distance - float(point.radius) - body_height - wall_height, slope, bend, closing
+    distance, normal, around, fixed_part = _distance(point, end.centre, body_height + wall_height)
+    bend, closing = (fixed_part, around) if point.is_hollow else (around + fixed_part, ca.SX(3, 3))
+    gap = side * distance - float(point.radius) - body_height - wall_height
+    return Terms(gap, side * normal.T, bend, closing)
 
 
 def _distance(point: RoundPoint, c: ca.SX, grown: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
