@@ -47,6 +47,18 @@ def test_another_function_finds_the_code_and_gives_the_same_bits(folder):
     assert [file.stat().st_ino for file in folder.iterdir()] == [stored]
 
 
+def test_evaluations_of_earlier_processes_count():
+    function, calls = AdaptiveFunction(wave()), MIN_COMPILED_CALLS // 1001
+    expected = [results(function) for _ in range(calls)]
+    assert function.native is None
+    del function  # as the end of a process would
+    other, again = AdaptiveFunction(wave(1.5)), AdaptiveFunction(wave())
+    results(other)
+    assert other.native is None
+    assert np.array_equal(results(again), expected[0])
+    assert again.native is not None
+
+
 def test_a_function_is_compiled_once_when_it_was_evaluated_often(folder):
     function, files = AdaptiveFunction(wave()), set()
     calls = 1 + MIN_COMPILED_CALLS // 1001

@@ -4,13 +4,15 @@ import contextlib
 import functools
 import math
 import threading
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import casadi as ca
 import numpy as np
 
+from tolcontact import code_cache
 from tolcontact.arrays import Array, Float, Int, Real
-from tolcontact.compilation.functions.native import NativeFunction, UnknownInstructionError
+from tolcontact.compilation.functions.native import NativeFunction, UnknownInstructionError, key_of
 from tolcontact.compilation.functions.places import ArgumentPlaces, Located
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 
@@ -124,14 +126,29 @@ class _Buffers:
         return bool(self._buffer.ret() == 0)
 
 
-MIN_COMPILED_CALLS = 10_000  # evaluations after which compiling a Function pays: it takes as long as interpreting it that often
+# Evaluations, in all processes, after which a Function is compiled. Compiling takes as long as interpreting it once or twice as
+# often, so that all together takes at most some three times as long as if the number of evaluations had been known.
+MIN_COMPILED_CALLS = 10_000
 MAX_INSTRUCTIONS = 300_000  # that are compiled; more are interpreted, since compiling them takes more than a gigabyte
+
+
+class Evaluations:
+    """The number of evaluations of a Function by this process and by those that stored theirs before."""
+
+    def __init__(self, key: str) -> None:
+        self._key = f"{key}-evaluations"
+        stored = code_cache.load(self._key) or b""
+        self.number = int(stored) if stored.isdigit() else 0
+
+    def store(self) -> None:
+        """Keep the number for later processes."""
+        code_cache.store(self._key, str(self.number).encode())
 
 
 class AdaptiveFunction:
     """A Function of scalar expressions that is interpreted, and compiled once it was evaluated often. Threads may share it.
 
-    Both ways give the same results to the last bit.
+    Both ways give the same results to the last bit. Evaluations of earlier processes count, too.
 
     native   the machine code, or None while CasADi interprets
     """
@@ -140,8 +157,8 @@ class AdaptiveFunction:
         self._function = function
         self.sizes_out = [function.nnz_out(i) for i in range(function.n_out())]
         self.native: NativeFunction | None = None
-        self._remaining = MIN_COMPILED_CALLS if function.n_instructions() <= MAX_INSTRUCTIONS else math.inf
-        self._is_new = True
+        self._may_be_compiled = function.n_instructions() <= MAX_INSTRUCTIONS
+        self._evaluations: Evaluations | None = None
         self._lock = threading.Lock()
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -182,15 +199,18 @@ class AdaptiveFunction:
     def _is_due(self, count: int) -> bool:
         """Return whether to compile before `count` evaluations, which is true once. The first call looks for stored code."""
         with self._lock:  # other threads wait for stored code: to interpret takes longer
-            self._remaining -= count
-            if self._is_new and self._remaining < math.inf:
-                self._is_new = False
-                self.native = NativeFunction.from_cache(self._function)
+            if not self._may_be_compiled or self.native is not None:
                 return False
-            if self.native is not None or self._remaining >= 0:
-                return False
-            self._remaining = math.inf
-            return True
+            if self._evaluations is None:
+                key = key_of(self._function)
+                self.native = NativeFunction.from_cache(self._function, key)
+                if self.native is not None:
+                    return False
+                self._evaluations = Evaluations(key)
+                weakref.finalize(self, self._evaluations.store)
+            self._evaluations.number += count
+            self._may_be_compiled = self._evaluations.number <= MIN_COMPILED_CALLS
+            return not self._may_be_compiled
 
 
 class NamedFunction:

@@ -55,9 +55,9 @@ class NativeFunction:
         self._whole = ArgumentPlaces.of_one([*self.sizes_in, *self.sizes_out])
 
     @classmethod
-    def from_cache(cls, function: ca.Function) -> "NativeFunction | None":
-        """Return the compiled Function from the code of an earlier process; None if there is none."""
-        code = code_cache.load(key_of(function))
+    def from_cache(cls, function: ca.Function, key: str | None = None) -> "NativeFunction | None":
+        """Return the compiled Function from the code of an earlier process, stored under its key; None if there is none."""
+        code = code_cache.load(key or key_of(function))
         return None if code is None else cls(function, code)
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> list[np.ndarray]:
