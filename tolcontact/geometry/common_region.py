@@ -5,23 +5,23 @@ import trimesh
 
 from tolcontact.geometry.surface import Surface
 
-MAX_PAIRS = 20_000_000  # of triangles that are compared
-BLOCK_PAIRS = 1_000_000
-TIE = 1e-12  # of the face's size: a corner that is no farther from an edge lies on it
+MAX_PAIRS = 1_000_000  # of triangles that may overlap
+BLOCK_TRIANGLES = 64
+TIE = 1e-10  # of the face's size: a corner that is no farther from an edge lies on it
 MIN_AREA = 1e-14  # of the face's area: smaller triangles are rounding
 
 
 def common_region(face: Surface, target: Surface) -> np.ndarray | None:
     """Return triangles (triangle, 3, 3) [mm] that cover what of a flat face lies over a flat target, along the target's normal.
 
-    None if the faces have too many triangles to compare them all.
+    None if too many triangles overlap to cut them all.
     """
     corners, target_corners = np.asarray(face.mesh.triangles), np.asarray(target.mesh.triangles)
-    if len(corners) * len(target_corners) > MAX_PAIRS:
-        return None
     n = target.corner_normals.reshape(-1, 3).mean(axis=0)
     n /= np.linalg.norm(n)
     rows, columns = _overlapping(*(points - (points @ n)[..., None] * n for points in (corners, target_corners)))
+    if len(rows) > MAX_PAIRS:
+        return None
     pieces, edges = corners[rows], target_corners[columns]
     tolerance = TIE * float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
     for k in range(3):
@@ -35,16 +35,19 @@ def common_region(face: Surface, target: Surface) -> np.ndarray | None:
 
 
 def _overlapping(corners: np.ndarray, target_corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the numbers of the pairs of triangles (triangle, 3, 3) whose boxes overlap."""
-    rows, columns = [], []
-    step = max(1, BLOCK_PAIRS // len(target_corners))
+    """Return the numbers of the pairs of triangles (triangle, 3, 3) whose boxes overlap; it stops beyond MAX_PAIRS of them."""
     lower, upper = target_corners.min(axis=1), target_corners.max(axis=1)
-    for k in range(0, len(corners), step):
-        block = corners[k : k + step]
-        meet = (block.min(axis=1)[:, None] <= upper).all(axis=2) & (block.max(axis=1)[:, None] >= lower).all(axis=2)
-        row, column = np.nonzero(meet)
-        rows.append(row + k)
-        columns.append(column)
+    rows, columns, count = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)], 0
+    for first in range(0, len(corners), BLOCK_TRIANGLES):
+        block = corners[first : first + BLOCK_TRIANGLES]
+        near = np.flatnonzero(((lower <= block.max(axis=(0, 1))) & (upper >= block.min(axis=(0, 1)))).all(axis=1))
+        is_below, is_above = block.min(axis=1)[:, None] <= upper[near], block.max(axis=1)[:, None] >= lower[near]
+        row, column = np.nonzero((is_below & is_above).all(axis=2))
+        rows.append(row + first)
+        columns.append(near[column])
+        count += len(row)
+        if count > MAX_PAIRS:
+            break
     return np.concatenate(rows), np.concatenate(columns)
 
 

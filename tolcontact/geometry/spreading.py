@@ -83,10 +83,10 @@ def _separated(points: np.ndarray, min_distance: float) -> list[int]:
 
 
 def _are_corners(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return a mask (vertex,) of the vertices (vertex, 3) at which the rim of open faces turns by more than CORNER_ANGLE."""
+    """Return a mask (vertex,) of the vertices (vertex, 3) [cell] at which a rim turns by more than CORNER_ANGLE."""
     start, end = rim(faces).T
     along = vertices[end] - vertices[start]
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1)  # edges shorter than a cell have no direction
     # Where the rim goes straight on, the unit vectors to both neighbours cancel.
     turn, rims = np.zeros_like(vertices), np.zeros(len(vertices))
     np.add.at(turn, start, along)
