@@ -38,8 +38,7 @@ def test_between_planes_they_are_those_of_the_corners_and_of_the_middle_of_the_o
     for k, heights in enumerate((over_table, over_block)):
         largest, mean = np.moveaxis(run["measured"][..., 2 * k : 2 * k + 2], -1, 0)
         np.testing.assert_allclose(largest, heights.max(axis=2), atol=1e-9 * frame.scale)
-        # Areas at the end of the table are those of small triangles, inside or outside as a whole.
-        assert np.abs(mean - heights.mean(axis=2)).max() < 4e-3 * np.ptp(heights, axis=2).max()
+        assert np.abs(mean - heights.mean(axis=2)).max() < 1e-9 * np.ptp(heights, axis=2).max()
     assert run["measured"][:, CORRECTED].min() > -1e-9 and run["measured"][:, RAW].min() < -0.01 * frame.scale
 
 
@@ -88,6 +87,8 @@ def test_between_a_shaft_and_its_bore_the_mean_is_the_clearance_and_the_largest_
     a.measure("mean", tc.MeanGap(bore, pin.face(tc.Cylinder())))
     _, run = simulate(a, samples=20, solver="daqp")
     R, t = R_t(run["poses"][:, RAW, 1])
-    ends = np.hypot(*np.moveaxis([(R @ (0, 0, z) + t)[:, :2] for z in (-6, 6)], 2, 0)).max(axis=0)
+    # The axis of the shaft at both ends of the bore: from its wall there no way to the axis is longer than the level one.
+    axes = [t + ((z - t[:, 2]) / R[:, 2, 2])[:, None] * R[:, :, 2] for z in (-6, 6)]
+    ends = np.hypot(*np.moveaxis(axes, 2, 0)[:2]).max(axis=0)
     assert np.abs(run["measured"][:, RAW, 1] - 0.2).max() < 1e-4
     assert 0 <= (0.2 + ends - run["measured"][:, RAW, 0]).min() and (0.2 + ends - run["measured"][:, RAW, 0]).max() < 2e-3

@@ -164,9 +164,10 @@ class LargestGap(_OfTwoFaces):
 class MeanGap(_OfTwoFaces):
     """The mean by area of the gap left between two faces of different parts, at the places of a LargestGap.
 
-    Each place counts by the area of the first face that is nearest to it: of triangles, each over the second face or not. Where
-    the second face ends over the first one, the mean is off by up to some 0.4 % of the range of gaps. The mean times the area
-    of the region is the volume between both faces.
+    Each place counts by the area of the first face that is nearest to it, so that flat faces have the mean of the region where
+    they lie over each other. On curved faces the area is that of triangles, each over the second face or not: where the second
+    face ends over the first one, the mean is off by up to some 0.4 % of the range of gaps. The mean times the area of the
+    region is the volume between both faces.
     """
 
     kind = "mean gap"

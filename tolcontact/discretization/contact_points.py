@@ -20,7 +20,6 @@ from tolcontact.discretization.form_points import (
 )
 from tolcontact.discretization.nominal import ContactPoints, Offsets
 from tolcontact.discretization.nominal_part import NominalPart
-from tolcontact.discretization.point_weights import spring_shares
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.scenes import Scene
@@ -93,8 +92,7 @@ def _spring_shares(points: ContactPoints) -> np.ndarray:
         return np.where(points.round.points["axis"].any(axis=1), 0.5, 1.0)  # a shaft has two ends
     if not (is_flat(points.moving_face) and is_flat(points.reference_face)):
         raise GeometryFault("it has a stiffness, which needs flat faces, or a ball or shaft against walls; leave stiffness out")
-    distance = float(np.linalg.norm(points.P_m - points.P_r, axis=1).max())
-    return spring_shares(points.P_m, distance, points.moving_face, points.reference_face)
+    return points.weights / len(points.P_m)
 
 
 def _is_open(pair: ContactPair) -> bool:

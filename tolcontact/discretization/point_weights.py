@@ -1,12 +1,14 @@
-"""Weights of contact points: the areas that they stand for, and the shares of springs that these areas have."""
+"""Weights of contact points: the areas that they stand for, with the moments of the face."""
 
 from typing import NamedTuple
 
 import numpy as np
-import trimesh
 from scipy.spatial import KDTree
 
 from tolcontact.arrays import Array, Float
+from tolcontact.geometry.common_region import common_region
+from tolcontact.geometry.curvature import is_flat
+from tolcontact.geometry.face_frame import face_frame
 from tolcontact.geometry.surface import Surface
 
 ELEMENTS_PER_POINT = 16
@@ -14,41 +16,67 @@ MAX_ELEMENTS = 200_000
 EDGE = 2.0137  # of the largest edge of an element, in its size: no edge of a model is just as long as that
 NEIGHBOURS = 8  # at most, which share an element that is equally near to them
 TIE = 1e-6  # of the size of an element
+LEAST_FACTOR = 0.1  # by which moments may change the weight of a point
+MOMENT_TOLERANCE = 1e-11  # of the moments of weights of mean 1, in the size of the face
+MAX_STEPS = 60
+CONDITIONS = (10, 4)  # moments of the orders 0 to 2, or of 0 and 1
 
 
 def point_weights(P_m: Float[Array, "point 3"], distance: float, moving: Surface, reference: Surface) -> Float[Array, " point"]:
     """Return weights (point,) in proportion to the area of the moving face that is nearest to each point; their mean is 1.
 
-    Only that part of the face counts that lies over the reference face, no farther away than `distance` [mm]. The weights are
-    adjusted, linearly along the face, so that the weighted centroid of the points is that of this part.
+    Only that part of the face counts that lies over the reference face, no farther away than `distance` [mm]. Weights have the
+    moments of this part: its area, its centre, and its second moments. They are as close as possible to the areas that are
+    nearest, by the sum of (w - a)^2 / a, and none is less than a tenth of that. Few points may not allow all of this: then
+    they have area and centre, or the area alone.
     """
     elements = _elements(P_m, distance, moving, reference)
     if elements is None:
         return np.ones(len(P_m))
-    return _balanced(_nearest_areas(P_m, elements), P_m, elements.areas @ elements.middles / elements.areas.sum())
-
-
-def spring_shares(P_m: Float[Array, "point 3"], distance: float, moving: Surface, reference: Surface) -> Float[Array, " point"]:
-    """Return the share (point,) of each point in a layer of springs under the same part of a flat moving face.
-
-    Sum, centroid and second moments of the shares are those of the area, so that the layer has the stiffness of a continuous
-    one, also against tilts, as long as all of it is compressed; unless that takes shares below 0.
-    """
-    elements = _elements(P_m, distance, moving, reference)
-    if elements is None:
-        return np.full(len(P_m), 1 / len(P_m))
-    shares = _nearest_areas(P_m, elements) / len(P_m)
+    areas = _nearest_areas(P_m, elements)
     # The middles of the edges of triangles integrate quadratic functions exactly.
     places = (elements.corners + np.roll(elements.corners, 1, axis=1)).reshape(-1, 3) / 2
-    areas = np.repeat(elements.areas / 3, 3) / elements.areas.sum()
-    centre = areas @ places
-    along = np.linalg.svd((places - centre) * np.sqrt(areas)[:, None], full_matrices=False)[2][:2]
-    of_points, of_area = (_quadratics((positions - centre) @ along.T) for positions in (P_m, places))
-    moments = areas @ of_area - shares @ of_points
-    scale = np.abs(of_area).max(axis=0)
-    of_points, moments = of_points / scale, moments / scale
-    factors = 1 + of_points @ np.linalg.lstsq((of_points * shares[:, None]).T @ of_points, moments, rcond=1e-9)[0]
-    return shares * factors if (factors > 0).all() else shares
+    if moving.surfaces:
+        places = moving.project(places)[0]
+    shares = np.repeat(elements.areas / 3, 3)
+    centre = shares @ places / shares.sum()
+    size = np.sqrt(shares @ ((places - centre) ** 2).sum(axis=1) / shares.sum())
+    of_points, of_places = (_quadratics((positions - centre) / size) for positions in (P_m, places))
+    moments = shares @ of_places
+    for count in CONDITIONS:
+        weights = _with_moments(areas, of_points[:, :count], moments[:count])
+        if weights is not None:
+            return weights
+    return areas
+
+
+def _with_moments(areas: np.ndarray, functions: np.ndarray, moments: np.ndarray) -> np.ndarray | None:
+    """Return the weights (point,) nearest to areas for which functions (point, k) have the sums `moments` (k,), None if none.
+
+    They are w = a max(f, 1 + functions y), with the multipliers y at the least value of the dual problem, which is convex and
+    piecewise quadratic: Newton's method finds it in a few steps.
+    """
+
+    def dual(y: np.ndarray) -> float:
+        factors = 1 + functions @ y
+        bounded = np.maximum(factors, LEAST_FACTOR)
+        return float(areas @ (bounded * (factors - bounded / 2)) - moments @ y)
+
+    y, value = np.zeros(len(moments)), dual(np.zeros(len(moments)))
+    for _ in range(MAX_STEPS):
+        factors = 1 + functions @ y
+        weights = areas * np.maximum(factors, LEAST_FACTOR)
+        missing = moments - weights @ functions
+        if np.abs(missing).max() <= MOMENT_TOLERANCE * len(areas):
+            return weights
+        free = functions * np.sqrt(np.where(factors > LEAST_FACTOR, areas, 0))[:, None]
+        step = np.linalg.lstsq(free.T @ free, missing, rcond=1e-12)[0]
+        length, slope = 1.0, float(missing @ step)
+        while length > 1e-6 and dual(y + length * step) > value - 1e-4 * length * slope + 1e-12 * len(areas):
+            length /= 2
+        y = y + length * step
+        value = dual(y)
+    return None
 
 
 class _Elements(NamedTuple):
@@ -63,14 +91,18 @@ class _Elements(NamedTuple):
 def _elements(P_m: np.ndarray, distance: float, moving: Surface, reference: Surface) -> _Elements | None:
     """Return the elements of the part of the moving face that counts, in areas of 1 for each point; None without any."""
     size = max(moving.mesh.area / min(ELEMENTS_PER_POINT * len(P_m), MAX_ELEMENTS), 0.0) ** 0.5
-    vertices, faces = trimesh.remesh.subdivide_to_size(
-        moving.mesh.vertices, moving.mesh.faces, max_edge=EDGE * size, max_iter=30
-    )
-    corners = np.asarray(vertices)[np.asarray(faces)]
+    region = common_region(moving, reference) if is_flat(moving) and is_flat(reference) else None
+    vertices, faces = np.asarray(moving.mesh.vertices), np.asarray(moving.mesh.faces)
+    if region is not None:
+        vertices, faces = region.reshape(-1, 3), np.arange(3 * len(region)).reshape(-1, 3)
+    if not len(faces):
+        return None
+    vertices, faces, _ = face_frame(moving.mesh).subdivided(vertices, faces, EDGE * size)
+    corners = vertices[faces]
     middles = corners.mean(axis=1)
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
     feet, _, is_over = reference.project(middles)
-    counts = is_over & (np.linalg.norm(middles - feet, axis=1) <= distance + size)
+    counts = (is_over | (region is not None)) & (np.linalg.norm(middles - feet, axis=1) <= distance + size)
     if not areas[counts].sum() > 0:
         return None
     return _Elements(corners[counts], middles[counts], areas[counts] / areas[counts].sum() * len(P_m), size)
@@ -86,15 +118,6 @@ def _nearest_areas(P_m: np.ndarray, elements: _Elements) -> np.ndarray:
 
 
 def _quadratics(x: np.ndarray) -> np.ndarray:
-    """Return 1, the coordinates x (n, 2) [mm], and their products (n, 6)."""
-    u, v = x.T
-    return np.column_stack([np.ones(len(x)), u, v, u * u, u * v, v * v])
-
-
-def _balanced(weights: np.ndarray, points: np.ndarray, centroid: np.ndarray) -> np.ndarray:
-    """Return weights (point,) with the same sum and a given centroid (3,); the same ones if some would be negative."""
-    offsets = points - centroid
-    first, second = weights @ offsets, (offsets * weights[:, None]).T @ offsets
-    slope = np.linalg.lstsq(second - np.outer(first, first) / weights.sum(), first, rcond=1e-9)[0]
-    factors = 1 - (offsets - first / weights.sum()) @ slope
-    return weights * factors if (factors > 0).all() else weights
+    """Return 1, the coordinates x (n, 3), and their products (n, 10)."""
+    u, v, w = x.T
+    return np.column_stack([np.ones(len(x)), u, v, w, u * u, u * v, u * w, v * v, v * w, w * w])

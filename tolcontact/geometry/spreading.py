@@ -5,6 +5,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from tolcontact.geometry.edges import rim
+from tolcontact.geometry.face_frame import face_frame
 
 CANDIDATES_PER_SPACING = 2.0
 MAX_CANDIDATES_PER_POINT = 50  # above which they are thinned out
@@ -16,21 +17,32 @@ def spread(surface: trimesh.Trimesh, count: int | None, spacing: float | None) -
     """Return points (point, 3) [mm] on `surface`, each as far as possible from the points before it.
 
     There are `count` points, or as many as bring every place within `spacing` [mm] of one. They begin with the corners of the
-    rim, where contact comes first, and follow in farthest-point order over a fine subdivision of the triangles: they do not
-    depend on the tessellation, and the same surface always has the same points.
+    rim, where contact comes first, and follow in farthest-point order over a fine subdivision of the triangles. Distances are
+    compared in the surface's own frame, so that a surface that is turned keeps its points.
     """
     step = spacing if spacing is not None else float(np.sqrt(surface.area / count))  # type: ignore[operator]
-    vertices, faces = trimesh.remesh.subdivide_to_size(
-        surface.vertices, surface.faces, max_edge=step / CANDIDATES_PER_SPACING, max_iter=30
-    )
-    candidates = np.asarray(vertices)
+    frame = face_frame(surface)
+    vertices, faces, candidates = frame.subdivided(surface.vertices, surface.faces, step / CANDIDATES_PER_SPACING)
     if len(candidates) > MAX_CANDIDATES_PER_POINT * max(surface.area / step**2, 1):
-        candidates = _thinned(candidates, np.asarray(faces), step / (2 * CANDIDATES_PER_SPACING))
-    centre = (candidates.min(axis=0) + candidates.max(axis=0)) / 2
-    points = _separated(_rim_corners(surface), step / CANDIDATES_PER_SPACING)
-    if not points or (count is not None and len(points) > count):
-        points = [candidates[np.argmax(((candidates - centre) ** 2).sum(axis=1))]]
-    distance2 = np.min([((candidates - point) ** 2).sum(axis=1) for point in points], axis=0)
+        thinned = _thinned(candidates, faces, step / (2 * CANDIDATES_PER_SPACING) / frame.cell)
+        vertices, candidates = vertices[thinned], candidates[thinned]
+    coordinates = frame.coordinates(surface.vertices)
+    corners = np.flatnonzero(_are_corners(coordinates, np.asarray(surface.faces)))
+    corners = corners[_separated(coordinates[corners], step / CANDIDATES_PER_SPACING / frame.cell)]
+    if not len(corners) or (count is not None and len(corners) > count):
+        centre = (candidates.min(axis=0) + candidates.max(axis=0)) / 2
+        numbers = [int(np.argmax(((candidates - centre) ** 2).sum(axis=1)))]
+    else:
+        vertices, candidates = np.vstack([surface.vertices[corners], vertices]), np.vstack([coordinates[corners], candidates])
+        numbers = list(range(len(corners)))
+    numbers = _farthest(candidates, numbers, count, None if spacing is None else spacing / frame.cell)
+    return np.asarray(vertices)[numbers]
+
+
+def _farthest(candidates: np.ndarray, numbers: list[int], count: int | None, spacing: float | None) -> list[int]:
+    """Return the numbers of candidates (candidate, 3), the given ones first, each as far as possible from those before it."""
+    numbers = list(numbers)
+    distance2 = np.min([((candidates - candidates[number]) ** 2).sum(axis=1) for number in numbers], axis=0)
     tree = cKDTree(candidates)
     # The farthest of many candidates is the farthest of the farthest of each block: a point changes few blocks.
     blocks = np.full((-(-len(candidates) // BLOCK_CANDIDATES), BLOCK_CANDIDATES), -1.0)
@@ -40,9 +52,9 @@ def spread(surface: trimesh.Trimesh, count: int | None, spacing: float | None) -
     while True:
         block = int(np.argmax(largest))
         farthest = BLOCK_CANDIDATES * block + int(np.argmax(blocks[block]))
-        if (len(points) == count) if spacing is None else (distances[farthest] <= spacing**2):
-            return np.array(points)
-        points.append(candidates[farthest])
+        if (len(numbers) == count) if spacing is None else (distances[farthest] <= spacing**2):
+            return numbers
+        numbers.append(farthest)
         # No candidate is farther than this one from the points, so that it changes nothing beyond that distance.
         reach = np.sqrt(distances[farthest]) * (1 + 1e-9)
         neighbours = np.asarray(tree.query_ball_point(candidates[farthest], reach, return_sorted=False))
@@ -53,35 +65,34 @@ def spread(surface: trimesh.Trimesh, count: int | None, spacing: float | None) -
 
 
 def _thinned(points: np.ndarray, faces: np.ndarray, cell: float) -> np.ndarray:
-    """Return one of the points (point, 3) in each cube of side `cell` [mm], one on the rim if possible."""
+    """Return the numbers of one of the points (point, 3) in each cube of side `cell`, one on the rim if possible."""
     inner = np.ones(len(points), dtype=bool)
     inner[rim(faces).ravel()] = False
-    points = points[np.argsort(inner, kind="stable")]
-    unique, _ = trimesh.grouping.unique_rows(np.floor(points / cell).astype(np.int64))
-    return points[np.sort(unique)]
+    order = np.argsort(inner, kind="stable")
+    unique, _ = trimesh.grouping.unique_rows(np.floor(points[order] / cell).astype(np.int64))
+    return np.asarray(order[np.sort(unique)])
 
 
-def _separated(points: np.ndarray, min_distance: float) -> list[np.ndarray]:
-    """Return the points (point, 3) at least `min_distance` [mm] from those before: corners of a jagged rim are one."""
-    separated: list[np.ndarray] = []
-    for point in points:
-        if all(((point - earlier) ** 2).sum() >= min_distance**2 for earlier in separated):
-            separated.append(point)
+def _separated(points: np.ndarray, min_distance: float) -> list[int]:
+    """Return the numbers of points (point, 3) at least `min_distance` from those before: corners of a jagged rim are one."""
+    separated: list[int] = []
+    for number, point in enumerate(points):
+        if all(((point - points[earlier]) ** 2).sum() >= min_distance**2 for earlier in separated):
+            separated.append(number)
     return separated
 
 
-def _rim_corners(surface: trimesh.Trimesh) -> np.ndarray:
-    """Return the vertices (corner, 3) at which the rim of an open surface turns by more than CORNER_ANGLE."""
-    start, end = rim(surface.faces).T
-    along = surface.vertices[end] - surface.vertices[start]
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
+def _are_corners(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return a mask (vertex,) of the vertices (vertex, 3) [cell] at which a rim turns by more than CORNER_ANGLE."""
+    start, end = rim(faces).T
+    along = vertices[end] - vertices[start]
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1)  # edges shorter than a cell have no direction
     # Where the rim goes straight on, the unit vectors to both neighbours cancel.
-    turn, rims = np.zeros_like(surface.vertices), np.zeros(len(surface.vertices))
+    turn, rims = np.zeros_like(vertices), np.zeros(len(vertices))
     np.add.at(turn, start, along)
     np.add.at(turn, end, -along)
     np.add.at(rims, np.concatenate([start, end]), 1)
-    corner = (rims == 2) & (np.linalg.norm(turn, axis=1) > 2 * np.sin(CORNER_ANGLE / 2))
-    return np.asarray(surface.vertices[corner])
+    return np.asarray((rims == 2) & (np.linalg.norm(turn, axis=1) > 2 * np.sin(CORNER_ANGLE / 2)))
 
 
 def distinct_vertices(surface: trimesh.Trimesh) -> np.ndarray:

@@ -80,8 +80,9 @@ measured from the raw state.
 A ball beside a wall counts by its centre, as a sphere with its radius, and a shaft by the ends of its axis: a point on the face
 would let it roll aside at no cost. So does a round wall by its own centre, and a flat one by the point of contact.
 
-In the exact resolution points count by the areas of the moving face that they stand for, with its centroid, so that results
-hardly depend on their number; in a linearized one each counts once, as in the paper (`weighting` in the archive).
+In the exact resolution points count by the areas of the moving face that they stand for, with its centre and its second
+moments. All points together then count as the face itself does, whatever their number. In a linearized one each counts once,
+as in the paper (`weighting` in the archive).
 
 The objective determines the result, so every archive states it. For "seating" a small multiple (1e-3) of the displacement of
 all contact points keeps the problem convex. This term takes over part of the load: about 0.1 % times (travel / size of the

@@ -1,0 +1,189 @@
+"""An assembly that is turned has the same results: points and weights are those of a face, not of a frame."""
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+import tolcontact as tc
+from tests.helpers import simulate
+from tolcontact.discretization import discretize
+from tolcontact.geometry.common_region import common_region
+from tolcontact.geometry.spreading import spread
+from tolcontact.geometry.surface import Surface
+
+THICKNESS = 4.0
+SIDES = 96  # of the polygons that stand for circles
+TURNS = [Rotation.from_rotvec(turn) for turn in ((0.3, -1.1, 0.7), (np.pi / 2, 0, 0), (2.0, 0.4, -1.3))]
+SHIFT = np.array((31.0, -17.0, 90.0))  # mm
+POINTS = [(8, 5, 0), (-9, 6, 0), (0, -9, 0), (8, 0, 2), (-8, 0, 2), (0, 3, 2)]
+DIRECTIONS = [(0, 0, 1)] * 3 + [(0, 1, 0)] * 2 + [(1, 0, 0)]
+
+
+def circle(radius):
+    """The corners (SIDES, 2) of a regular polygon."""
+    angles = np.arange(SIDES) * 2 * np.pi / SIDES
+    return radius * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def polygon_moments(corners):
+    """Area, centre (2,) and second moments (2, 2) about it of a polygon (corner, 2), by Green's theorem along its edges."""
+    (x, y), (u, v) = corners.T, np.roll(corners, -1, axis=0).T
+    cross = x * v - u * y
+    area, first = cross.sum() / 2, np.array([((x + u) * cross).sum(), ((y + v) * cross).sum()]) / 6
+    xx, yy = ((x * x + x * u + u * u) * cross).sum() / 12, ((y * y + y * v + v * v) * cross).sum() / 12
+    xy = ((x * v + 2 * x * y + 2 * u * v + u * y) * cross).sum() / 24
+    return area, first / area, np.array([(xx, xy), (xy, yy)]) / area - np.outer(first, first) / area**2
+
+
+RECTANGLE = np.array([(-25, -12.5), (25, -12.5), (25, 12.5), (-25, 12.5)])
+TRIANGLE = np.array([(-20.0, -14), (25, -14), (3, 22)])
+ELL = np.array([(-15.0, -10), (25, -10), (25, 0), (-3, 0), (-3, 20), (-15, 20)])
+OUTLINES = {
+    "rectangle": [RECTANGLE],
+    "square": [np.array([(-20.0, -20), (20, -20), (20, 20), (-20, 20)])],
+    "triangle": [TRIANGLE],
+    "L": [ELL],
+    "disc": [circle(20)],
+    "ring": [circle(20), circle(10)],
+}
+
+
+def plate(name):
+    """A plate of an outline, its lower face at z = 0."""
+    outer, *holes = OUTLINES[name]
+    if name == "L":
+        faces = [(0, 1, 2), (0, 2, 3), (0, 3, 5), (3, 4, 5)]
+    elif holes:
+        k = np.arange(SIDES)
+        faces = np.r_[np.c_[k, (k + 1) % SIDES, k + SIDES], np.c_[(k + 1) % SIDES, (k + 1) % SIDES + SIDES, k + SIDES]]
+    else:
+        faces = [(0, k, k + 1) for k in range(1, len(outer) - 1)]
+    return trimesh.creation.extrude_triangulation(np.vstack([outer, *holes]), np.asarray(faces), THICKNESS)
+
+
+def plates(name, turn=None, overhang=False, **choice):
+    """A plate on a larger one, all of it turned and shifted: meshes, locators, directions."""
+    R, t = (Rotation.identity(), np.zeros(3)) if turn is None else (turn, SHIFT)
+    x = 2.0 if overhang else -60.0
+    lower, upper = trimesh.creation.box(bounds=[(x, -50, -5), (x + 120, 50, 0)]), plate(name)
+    for mesh in (lower, upper):
+        mesh.vertices = R.apply(mesh.vertices) + t
+    a = tc.Assembly(name)
+    base, top = a.part("base", tc.Mesh(lower), fixed=True), a.part("plate", tc.Mesh(upper))
+    six = zip("ABCDEF", R.apply(POINTS) + t, R.apply(DIRECTIONS), strict=True)
+    a.locate(top, [tc.Locator(label, tuple(p), tuple(n)) for label, p, n in six], tolerance=1)
+    down, up = (tc.Facing(tuple(R.apply((0, 0, z)))) for z in (-1, 1))
+    a.contact("seat", moving=top.face(down), reference=base.face(up), **choice)
+    a.measure("height", top.point(*(R.apply((8, 5, 0)) + t)), along=tuple(R.apply((0, 0, 1))), tolerance=1)
+    return a
+
+
+def seat(*arguments, **choice):
+    (pair,) = discretize(plates(*arguments, **choice)).pairs
+    return pair
+
+
+def moments(points, weights):
+    """Centre and second moments of weighted points (point, k)."""
+    centre = weights @ points / weights.sum()
+    return centre, (points - centre).T @ ((points - centre) * weights[:, None]) / weights.sum()
+
+
+@pytest.mark.parametrize("points", [None, 40, 1000])
+@pytest.mark.parametrize("name", OUTLINES)
+def test_weighted_points_have_the_area_centre_and_second_moments_of_the_face(name, points):
+    pair = seat(name, points=points)
+    outer, *holes = [polygon_moments(corners) for corners in OUTLINES[name]]
+    area = outer[0] - sum(hole[0] for hole in holes)
+    second = (outer[2] * outer[0] - sum(hole[2] * hole[0] for hole in holes)) / area
+    if name in ("rectangle", "square"):
+        np.testing.assert_allclose(second, np.diag(np.ptp(OUTLINES[name][0], axis=0) ** 2 / 12), atol=1e-12)
+    elif name in ("disc", "ring"):  # circles, but for their polygons
+        square = 20**2 if name == "disc" else 20**2 + 10**2
+        np.testing.assert_allclose(second, np.eye(2) * square / 4, atol=square * 2 * np.pi**2 / (3 * SIDES**2))
+    centre, weighted = moments(pair.P_m[:, :2], pair.weights)
+    size = np.sqrt(np.trace(second))
+    assert pair.weights.sum() == pytest.approx(len(pair.P_m), rel=1e-9) and pair.weights.min() > 0
+    assert np.abs(centre - outer[1]).max() < 1e-9 * size and np.abs(weighted - second).max() < 1e-9 * size**2
+
+
+@pytest.mark.parametrize("points", [None, 1000])
+def test_they_have_those_of_the_region_where_the_other_face_ends(points):
+    pair = seat("rectangle", overhang=True, points=points)
+    centre, weighted = moments(pair.P_m[:, :2], pair.weights)
+    np.testing.assert_allclose(centre, (13.5, 0), atol=1e-9)
+    np.testing.assert_allclose(weighted, np.diag([23**2 / 12, 25**2 / 12]), atol=1e-7)
+
+
+def test_points_that_cannot_have_second_moments_have_the_centre():
+    corners = seat("triangle", points=3)
+    np.testing.assert_allclose(moments(corners.P_m, corners.weights)[0][:2], polygon_moments(TRIANGLE)[1], atol=1e-9)
+    (one,) = seat("triangle", points=1).weights
+    assert one == pytest.approx(1)
+
+
+@pytest.mark.parametrize("name", OUTLINES)
+@pytest.mark.parametrize("overhang", [False, True])
+def test_turned_faces_keep_their_points_and_weights(name, overhang):
+    pair = seat(name, overhang=overhang)
+    for turn in TURNS:
+        turned = seat(name, turn, overhang)
+        np.testing.assert_allclose(turn.inv().apply(turned.P_m - SHIFT), pair.P_m, atol=1e-12)
+        np.testing.assert_allclose(turned.weights, pair.weights, atol=1e-11)
+
+
+@pytest.mark.parametrize("resolution", ["exact", "linearized"])
+@pytest.mark.parametrize(("name", "overhang"), [("rectangle", True), ("disc", False), ("ring", True), ("L", False)])
+def test_realizations_of_turned_assemblies_are_the_same(name, overhang, resolution):
+    method = tc.Method(resolution=resolution)
+    _, run = simulate(plates(name, overhang=overhang), samples=100, solver="daqp", method=method)
+    poses = run["poses"][:, 1, 1]
+    for turn in TURNS:
+        _, turned = simulate(plates(name, turn, overhang), samples=100, solver="daqp", method=method)
+        Q, R = turn.as_matrix(), turned["poses"][:, 1, 1, :9].reshape(-1, 3, 3)
+        R_back = Q.T @ R @ Q
+        t_back = (turned["poses"][:, 1, 1, 9:] + R @ SHIFT - SHIFT) @ Q
+        assert np.abs(R_back.reshape(-1, 9) - poses[:, :9]).max() * 25 < 1e-9
+        assert np.abs(t_back - poses[:, 9:]).max() < 1e-9
+        assert np.abs(turned["measured"] - run["measured"]).max() < 1e-9
+        assert (turned["status"] == run["status"]).all()
+
+
+def test_exact_answers_do_not_depend_on_the_number_of_points():
+    """All points count as the face does, so that any number comes to the same least motion."""
+    runs = [simulate(plates("L", points=points), samples=100, solver="daqp")[1] for points in (40, 200, 1000)]
+    heights = [run["measured"][:, 1, 0] for run in runs]
+    assert max(np.abs(height - heights[-1]).max() for height in heights) < 1e-7
+
+
+def lattice(n, width, height, turn):
+    """A rectangle with a corner at the origin, in 2 n^2 triangles, turned about z."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(0, width, n + 1), np.linspace(0, height, n + 1), indexing="ij"))
+    corner = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    faces = np.r_[np.c_[corner, corner + n + 1, corner + n + 2], np.c_[corner, corner + n + 2, corner + 1]]
+    vertices = Rotation.from_euler("z", turn).apply(np.column_stack([x, y, 0 * x]))
+    return trimesh.Trimesh(vertices, faces, process=False)
+
+
+@pytest.mark.parametrize("n", [1, 3, 40])
+@pytest.mark.parametrize("m", [1, 7, 40])
+def test_the_region_of_two_planes_does_not_depend_on_their_triangles(n, m):
+    """Between the x axis, the line x = 50 and the turned axis there is a triangle: the rectangles reach beyond it."""
+    upper, lower = lattice(n, 50, 25, 0.0), lattice(m, 80, 60, -np.pi / 2 + 0.4)
+    upper.invert()
+    region = common_region(Surface(upper), Surface(lower))
+    corners = np.array([(0, 0), (50, 0), (50, 50 * np.tan(0.4))])
+    area, centre, second = polygon_moments(corners)
+    middles, areas = region.mean(axis=1), trimesh.triangles.area(region)
+    places = (region + np.roll(region, 1, axis=1)).reshape(-1, 3)[:, :2] / 2
+    assert areas.sum() == pytest.approx(area, rel=1e-9) and np.abs(areas @ middles[:, :2] / area - centre).max() < 1e-8
+    np.testing.assert_allclose(moments(places, np.repeat(areas, 3))[1], second, rtol=1e-9)
+
+
+def test_dense_meshes_are_thinned_in_their_own_frame():
+    mesh = lattice(100, 50, 25, 0.0)
+    points = spread(mesh, 60, None)
+    for turn in TURNS:
+        turned = trimesh.Trimesh(turn.apply(mesh.vertices) + SHIFT, mesh.faces, process=False)
+        np.testing.assert_allclose(turn.inv().apply(spread(turned, 60, None) - SHIFT), points, atol=1e-11)

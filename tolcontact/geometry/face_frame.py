@@ -1,0 +1,60 @@
+"""The frame of a face: it turns with the face, so that what is compared in it comes out the same in every other frame."""
+
+from typing import NamedTuple
+
+import numpy as np
+import trimesh
+
+from tolcontact.geometry.edges import rim
+
+TIE = 1e-6  # of lengths that are equal but for rounding
+CELLS = 2.0**30  # in a length of about the face's size: coordinates are whole numbers of cells
+OFF_POWER = 1.1  # keeps the sizes of usual faces off powers of 2, between which the size of cells doubles
+
+
+class FaceFrame(NamedTuple):
+    """A centre (3,) [mm], unit vectors (3, 3) in columns, and the size [mm] of the cells to which coordinates are rounded."""
+
+    centre: np.ndarray
+    axes: np.ndarray
+    cell: float
+
+    def coordinates(self, points: np.ndarray) -> np.ndarray:
+        """Return the coordinates (point, 3) [cell] of points (point, 3) [mm], rounded so that no earlier rounding shows."""
+        return np.round((points - self.centre) @ self.axes / self.cell)
+
+    def subdivided(self, vertices: np.ndarray, faces: np.ndarray, max_edge: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return vertices (vertex, 3) [mm], faces (face, 3) with edges of at most `max_edge` [mm], and coordinates (vertex, 3).
+
+        The coordinates [cell] alone decide which edges are halved.
+        """
+        rows = np.hstack([self.coordinates(vertices), vertices])
+        rows, faces = trimesh.remesh.subdivide_to_size(rows, faces, max_edge=max_edge / self.cell, max_iter=30)[:2]
+        return np.ascontiguousarray(rows[:, 3:]), np.asarray(faces), np.ascontiguousarray(rows[:, :3])
+
+
+def face_frame(mesh: trimesh.Trimesh) -> FaceFrame:
+    """Return the frame of the triangles of a face.
+
+    Its origin is the centre of the area. The first axis is along the longest edge of the rim, or of the triangles of a closed
+    face; the second points towards the corner that is farthest from the first. Where several are equal, as on symmetric
+    faces, the first in the order of the triangles is taken.
+    """
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    triangles = vertices[faces]
+    areas = trimesh.triangles.area(triangles)
+    centre = areas @ triangles.mean(axis=1) / areas.sum()
+    ends = vertices[rim(faces)] if len(rim(faces)) else triangles[:, :2]
+    u = _longest(ends[:, 1] - ends[:, 0])
+    u /= np.linalg.norm(u)
+    offsets = triangles.reshape(-1, 3) - centre
+    v = _longest(offsets - (offsets @ u)[:, None] * u)
+    v /= np.linalg.norm(v)
+    size = 2.0 ** np.floor(np.log2(OFF_POWER * np.linalg.norm(offsets, axis=1).max()))
+    return FaceFrame(centre, np.stack([u, v, np.cross(u, v)], axis=1), size / CELLS)
+
+
+def _longest(vectors: np.ndarray) -> np.ndarray:
+    """Return the first (3,) of the longest vectors (vector, 3)."""
+    lengths = np.linalg.norm(vectors, axis=1)
+    return np.array(vectors[np.argmax(lengths >= (1 - TIE) * lengths.max())])
