@@ -58,12 +58,13 @@ def allocate(
     keep their ranges. If `costs` is left out, all groups may change with c = 1. `by` is as in `contributions`: "contributor",
     "feature" or "part".
 
-    Ranges stay between a tenth and three times the present ones. Groups keep theirs if no required measure
-    changes in any of the realizations with all these groups together at either end of their ranges. Each step replaces the margins of the requirements by functions of squared ranges with the same
-    values and slopes, on the same draws; slopes follow from realizations near the limits alone. SLSQP minimizes the cost within
-    a region that shrinks when a step fails (a sequential separable approximation; Svanberg, 1987). If the fresh run misses a
-    requirement, the search continues with a larger margin. Effects follow from samples / 4 realizations, or 4 samples / groups
-    if that is less, but at least 512. `progress` is called with the number of realizations simulated, and about that of all.
+    Ranges stay between a tenth and three times the present ones. Groups keep theirs if no required measure changes in any of
+    the realizations with all these groups together at either end of their ranges. Each step replaces the margins of the
+    requirements by functions of squared ranges with the same values and slopes, on the same draws; slopes follow from
+    realizations near the limits alone. SLSQP minimizes the cost within a region that shrinks when a step fails (a sequential
+    separable approximation; Svanberg, 1987). If the fresh run misses a requirement, the search continues with a larger margin.
+    Effects follow from samples / 4 realizations, or 4 samples / groups if that is less, but at least 512. `progress` is called
+    with the number of realizations simulated, and about that of all.
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses. Raises OptionError also for a
     model in which no range varies.
     """
