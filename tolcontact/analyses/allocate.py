@@ -58,15 +58,14 @@ def allocate(
     keep their ranges. If `costs` is left out, all groups may change with c = 1. `by` is as in `contributions`: "contributor",
     "feature" or "part".
 
-    Ranges stay between a tenth and three times the present ones. Groups keep theirs if no required measure changes in any of
-    the realizations with all these groups together at either end of their ranges. Each step replaces the margins of the
-    requirements by functions of squared ranges with the same values and slopes, on the same draws; slopes follow from
-    realizations near the limits alone. SLSQP minimizes the cost within a region that shrinks when a step fails (a sequential
-    separable approximation; Svanberg, 1987). If the fresh run misses a requirement, the search continues with a larger margin.
-    Effects follow from samples / 4 realizations, or 4 samples / groups if that is less, but at least 512. `progress` is called
-    with the number of realizations simulated, and about that of all.
-    Arguments that all analyses share, and what they raise, are described in tolcontact.analyses. Raises OptionError also for a
-    model in which no range varies.
+    Ranges stay between a tenth and three times the present ones. Groups keep theirs if no required measure changes in any
+    realization with all of them at either end. Each step replaces the margins of the requirements by functions of squared
+    ranges with the same values and slopes, on the same draws; slopes follow from realizations near the limits alone. SLSQP
+    minimizes the cost within a region that shrinks when a step fails (a sequential separable approximation; Svanberg, 1987).
+    If the fresh run misses a requirement, the search continues with a larger margin. Effects follow from samples / 4
+    realizations, or 4 samples / groups if that is less, but at least 512. `progress` is called with the number of realizations
+    simulated, and about that of all. Arguments that all analyses share, and what they raise, are described in
+    tolcontact.analyses. Raises OptionError also for a model in which no range varies.
     """
     check_grouping(by)
     analysis = Analysis(
@@ -93,8 +92,8 @@ def allocate(
         "effect": narrowing_effects(trials, program),
     }
     labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
-    limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR, "idle_tried": samples}
-    return analysis.dataset(values, labels, samples=samples, fresh=VERIFICATION_FACTOR * samples, by=by, **limits)
+    tried = {"samples": samples, "fresh": VERIFICATION_FACTOR * samples, "idle_tried": samples}
+    return analysis.dataset(values, labels, by=by, floor=MIN_FACTOR, ceiling=MAX_FACTOR, **tried)
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,18 +276,16 @@ class Search:
         """Return derivatives (requirement, group) of the margins, by central differences; 0 for groups that do not change.
 
         A margin follows from the realizations beyond it and near it (Hong, 2009): only these are simulated again, and
-        measures of the others (n, measure) stay. A realization that a wider range does not change, a narrower one does not
-        change either.
+        measures of the others (n, measure) stay.
         """
         slopes = np.zeros((len(self.requirements), len(logs)))
         rows = np.unique(np.concatenate([r.decisive(corrected[:, r.measure]) for r in self.requirements]))
         groups = np.flatnonzero(self.is_free)
-        hits = self._changes(logs, corrected).of_groups(groups, logs + STEP, rows)
-        factors = list(np.exp(logs - STEP * np.eye(len(logs))[groups]))
-        narrowed = self.trials.corrected_rows(factors, [hit.rows for hit in hits])
-        for group, hit, corrected_rows in zip(groups, hits, narrowed, strict=True):
+        changes = self._changes(logs, corrected)
+        of_signs = [changes.of_groups(groups, logs + step, rows) for step in (STEP, -STEP)]
+        for group, wider, narrower in zip(groups, *of_signs, strict=True):
             wide, narrow = corrected.copy(), corrected.copy()
-            wide[hit.rows], narrow[hit.rows] = hit.corrected, corrected_rows
+            wide[wider.rows], narrow[narrower.rows] = wider.corrected, narrower.corrected
             slopes[:, group] = (_margins(self.requirements, wide) - _margins(self.requirements, narrow)) / (2 * STEP)
         return slopes
 
