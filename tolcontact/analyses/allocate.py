@@ -92,7 +92,7 @@ def allocate(
         "effect": narrowing_effects(trials, program),
     }
     labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
-    tried = {"samples": samples, "fresh": VERIFICATION_FACTOR * samples, "idle_tried": samples}
+    tried: dict[str, Any] = {"samples": samples, "fresh": VERIFICATION_FACTOR * samples, "idle_tried": samples}
     return analysis.dataset(values, labels, by=by, floor=MIN_FACTOR, ceiling=MAX_FACTOR, **tried)
 
 

@@ -4,6 +4,7 @@ import functools
 import inspect
 import re
 import sys
+from typing import Any
 
 from tolcontact.errors import nearest_name
 
@@ -20,7 +21,7 @@ def unknown_argument(error: Exception) -> str:
         return ""
     path, argument = match[1].split("."), match[2]
     modules = [module for name, module in sorted(sys.modules.items()) if name.startswith(PACKAGES)]
-    functions = [function for module in modules if callable(function := functools.reduce(_attribute, path, module))]
+    functions = [function for module in modules if callable(function := _resolved(module, path))]
     if not functions:
         return ""
     names = [name for name in inspect.signature(functions[0]).parameters if name != "self"]
@@ -28,5 +29,6 @@ def unknown_argument(error: Exception) -> str:
     return f'{call}() has no argument "{argument}"{nearest_name(argument, names)}; expected some of: {", ".join(names)}'
 
 
-def _attribute(owner: object, name: str) -> object:
-    return getattr(owner, name, None)
+def _resolved(module: Any, path: list[str]) -> Any:
+    """Return what a path of names leads to in a module; None if there is none."""
+    return functools.reduce(lambda owner, name: getattr(owner, name, None), path, module)
