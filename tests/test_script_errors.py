@@ -23,6 +23,15 @@ LINES = {
     "model that is built too early": ("tc.build(a)", "measures nothing"),
     "wrong kind of argument": ('a.part("other", 5)', "expected tc.Box"),
     "face that cannot be chosen": ("part.face(5)", "cannot be chosen by 5"),
+    "argument that a call does not have": (
+        "a.locate(part, [], tolerence=1)",
+        'locate() has no argument "tolerence"; the nearest name is "tolerance"; expected some of: part, scheme, tolerance, on,',
+    ),
+    "argument that a class does not have": (
+        'tc.Locator("A1", (0, 0, 0), "z", stifness=1)',
+        'Locator() has no argument "stifness"; the nearest name is "stiffness"',
+    ),
+    "argument that a function of the script does not have": ("(lambda x: x)(y=1)", "TypeError: "),
     "archive that is missing": ('tc.open_archive("nowhere.nc")', "does not exist"),
 }
 

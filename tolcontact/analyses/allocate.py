@@ -12,23 +12,21 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis
+from tolcontact.analyses.changed_rows import ChangedRows
 from tolcontact.analyses.engine import VERIFICATION_FACTOR, Progress
 from tolcontact.analyses.grouping import check_grouping, owners
-from tolcontact.analyses.idle_groups import NEGLIGIBLE, IdleSearch
+from tolcontact.analyses.idle_groups import IdleSearch
+from tolcontact.analyses.narrowing_effects import effect_samples, narrowing_effects
 from tolcontact.analyses.requirement import MIN_DECISIVE, Requirement
-from tolcontact.analyses.scaled_trials import ScaledTrials
+from tolcontact.analyses.scaled_trials import STEP, ScaledTrials
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
-from tolcontact.statistics.intervals import Estimate, mean
+from tolcontact.statistics.intervals import Estimate
 from tolcontact.workflow.models import Choice, Model
 
 MIN_FACTOR, MAX_FACTOR = 0.1, 3.0  # times the present range
-STEP = 0.1  # of ranges, for differences
-BATCHES = 32  # of realizations, for intervals of effects
 MAX_STEPS, USUAL_STEPS = 24, 8  # of one search: at most, and for the forecast
 FIRST_RADIUS, LAST_RADIUS = 0.5, 0.004  # of the region that a step stays in, in logarithms of the factors
-# Realizations for the effect of a group: at least; at most samples / 4, and 4 samples / groups.
-MIN_EFFECT_SAMPLES, EFFECT_SHARE = 512, 4
 COMMON_FACTORS = np.geomspace(MIN_FACTOR, MAX_FACTOR, 13)  # of all ranges, where requirements cannot be met
 PENALTY = 10.0  # for missed margins, in the costs that the same margins save to first order
 MIN_GAIN = 1e-4  # of the cost
@@ -60,14 +58,14 @@ def allocate(
     keep their ranges. If `costs` is left out, all groups may change with c = 1. `by` is as in `contributions`: "contributor",
     "feature" or "part".
 
-    Ranges stay between a tenth and three times the present ones. Groups at whose ends of range no required measure changes in
-    any realization keep theirs. Each step replaces the margins of the requirements by functions of squared ranges with the same
-    values and slopes, on the same draws; slopes follow from realizations near the limits alone. SLSQP minimizes the cost within
-    a region that shrinks when a step fails (a sequential separable approximation; Svanberg, 1987). If the fresh run misses a
-    requirement, the search continues with a larger margin. Effects follow from samples / 4 realizations, or 4 samples / groups
-    if that is less, but at least 512. `progress` is called with the number of realizations simulated, and about that of all.
-    Arguments that all analyses share, and what they raise, are described in tolcontact.analyses. Raises OptionError also for a
-    model in which no range varies.
+    Ranges stay between a tenth and three times the present ones. Groups keep theirs if no required measure changes in any
+    realization with all of them at either end. Each step replaces the margins of the requirements by functions of squared
+    ranges with the same values and slopes, on the same draws; slopes follow from realizations near the limits alone. SLSQP
+    minimizes the cost within a region that shrinks when a step fails (a sequential separable approximation; Svanberg, 1987).
+    If the fresh run misses a requirement, the search continues with a larger margin. Effects follow from samples / 4
+    realizations, or 4 samples / groups if that is less, but at least 512. `progress` is called with the number of realizations
+    simulated, and about that of all. Arguments that all analyses share, and what they raise, are described in
+    tolcontact.analyses. Raises OptionError also for a model in which no range varies.
     """
     check_grouping(by)
     analysis = Analysis(
@@ -91,11 +89,11 @@ def allocate(
         "met": np.array(is_met, dtype=np.int8),
         "required": [requirement.value for requirement in requirements],
         "idle": search.idle.astype(np.int8),
-        "effect": _effects(trials, program),
+        "effect": narrowing_effects(trials, program),
     }
     labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
-    limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR}
-    return analysis.dataset(values, labels, samples=samples, fresh=VERIFICATION_FACTOR * samples, by=by, **limits)
+    tried: dict[str, Any] = {"samples": samples, "fresh": VERIFICATION_FACTOR * samples, "idle_tried": samples}
+    return analysis.dataset(values, labels, by=by, floor=MIN_FACTOR, ceiling=MAX_FACTOR, **tried)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,14 +160,8 @@ def _cost(curve: Cost, factor: float) -> float:
 
 def _expected(samples: int, groups: int) -> int:
     """Return the approximate number of realizations of a search and its verification, with slopes and effects of groups."""
-    of_groups = USUAL_STEPS * MIN_DECISIVE + _effect_samples(samples, groups)
+    of_groups = USUAL_STEPS * MIN_DECISIVE + effect_samples(samples, groups)
     return (VERIFICATION_FACTOR + USUAL_STEPS) * samples + groups * of_groups
-
-
-def _effect_samples(samples: int, groups: int) -> int:
-    """Return how many of `samples` realizations the effect of each group is estimated from."""
-    count = min(samples // EFFECT_SHARE, EFFECT_SHARE * samples // max(groups, 1))
-    return min(max(count, MIN_EFFECT_SAMPLES), samples)
 
 
 def _allocated(search: "Search", expected: int) -> tuple[np.ndarray, list[list[Estimate]], np.ndarray]:
@@ -226,8 +218,7 @@ class Search:
         Return whether there are any.
         """
         before = self.idle.copy()
-        measures = sorted({requirement.measure for requirement in self.requirements})
-        self.idle[:] = IdleSearch(self.trials, measures, (MIN_FACTOR, MAX_FACTOR)).idle(logs, corrected, before)
+        self.idle[:] = IdleSearch(self._changes(logs, corrected), (MIN_FACTOR, MAX_FACTOR)).idle(before)
         return bool((before & ~self.idle).any())
 
     def least_cost(self, logs: np.ndarray, corrected: np.ndarray, aims: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -289,13 +280,18 @@ class Search:
         """
         slopes = np.zeros((len(self.requirements), len(logs)))
         rows = np.unique(np.concatenate([r.decisive(corrected[:, r.measure]) for r in self.requirements]))
-        for group in np.flatnonzero(self.is_free):
-            step = STEP * np.eye(len(logs))[group]
+        groups = np.flatnonzero(self.is_free)
+        changes = self._changes(logs, corrected)
+        of_signs = [changes.of_groups(groups, logs + step, rows) for step in (STEP, -STEP)]
+        for group, wider, narrower in zip(groups, *of_signs, strict=True):
             wide, narrow = corrected.copy(), corrected.copy()
-            wide[rows] = self.trials.corrected_rows(np.exp(logs + step), rows)
-            narrow[rows] = self.trials.corrected_rows(np.exp(logs - step), rows)
+            wide[wider.rows], narrow[narrower.rows] = wider.corrected, narrower.corrected
             slopes[:, group] = (_margins(self.requirements, wide) - _margins(self.requirements, narrow)) / (2 * STEP)
         return slopes
+
+    def _changes(self, logs: np.ndarray, corrected: np.ndarray) -> ChangedRows:
+        measures = sorted({requirement.measure for requirement in self.requirements})
+        return ChangedRows(self.trials, measures, logs, corrected)
 
     def _step(self, margins: np.ndarray, slopes: np.ndarray, logs: np.ndarray, radius: float) -> np.ndarray:
         """Return the point of least cost with margins approximated by functions of squared ranges.
@@ -319,29 +315,3 @@ class Search:
         if not solution.success:
             solution = scipy.optimize.minimize(missed, logs, method="SLSQP", bounds=bounds)
         return np.asarray(np.clip(solution.x, lower, upper))
-
-
-def _effects(trials: ScaledTrials, program: Program) -> np.ndarray:
-    """Return changes (measure, of_effect, group, interval) if a group's zones were a tenth narrower.
-
-    Intervals are those of means over batches of the same draws. A group that changes none of the first batches has no effect.
-    """
-    limits = [program.limits(number) for number in range(len(program.nominal.measures))]
-    ones = np.ones(len(trials))
-    rows = np.arange(_effect_samples(trials.samples, len(trials)))
-    present = trials.corrected_rows(ones, rows)
-    effects = np.zeros((len(limits), len(terms.EFFECTS), len(trials), len(terms.ESTIMATE)))
-    for group in range(len(trials)):
-        factors, first = ones - STEP * np.eye(len(trials))[group], rows[:MIN_DECISIVE]
-        narrowed = trials.corrected_rows(factors, first)
-        if (np.abs(narrowed - present[: len(first)]).max(axis=0) <= NEGLIGIBLE * present.std(axis=0)).all():
-            continue
-        if len(rows) > len(first):
-            narrowed = np.concatenate([narrowed, trials.corrected_rows(factors, rows[len(first) :])])
-        for measure, limits_of_measure in enumerate(limits):
-            batches = [np.array_split(values[:, measure], BATCHES) for values in (narrowed, present)]
-            spreads = [np.array([6 * x.std(ddof=1) for x in values]) for values in batches]
-            shares = [np.array([limits_of_measure.outside(x).mean() for x in values]) for values in batches]
-            effects[measure, 0, group] = mean(spreads[0] - spreads[1])
-            effects[measure, 1, group] = mean(shares[0] - shares[1])
-    return effects

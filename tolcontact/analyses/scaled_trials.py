@@ -1,13 +1,16 @@
 """Simulations of a model whose tolerance ranges are scaled."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.engine import VERIFICATION_FACTOR, Engine
 from tolcontact.variation import Draws
+
+STEP = 0.1  # of ranges, for differences
+MAX_ROWS = 1 << 16  # realizations that are simulated at once, for several factors
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +24,7 @@ class ScaledTrials:
     groups: Sequence[np.ndarray]
     seed: int
     samples: int
+    _known: dict[str, np.ndarray] = field(default_factory=dict, init=False)
 
     def corrected(self, factors: np.ndarray, *, verification: int = 0) -> np.ndarray:
         """Return corrected measures (n, measure) with the groups' ranges times factors (group,).
@@ -31,10 +35,34 @@ class ScaledTrials:
         measured, _ = self.engine.simulate(count, start=verification << 32, seed=self.seed, draws=self._draws(factors))
         return np.ascontiguousarray(measured[:, terms.CORRECTED])
 
-    def corrected_rows(self, factors: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Return corrected measures (row, measure) of some realizations alone, by their numbers (row,)."""
-        deviations = self._draws(factors)(seed=self.seed, start=0, stop=self.samples)[rows]
+    def corrected_rows(self, factors: Sequence[np.ndarray], rows: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return corrected measures (row, measure) of some realizations, for each of several factors (group,).
+
+        rows  numbers (row,) of the realizations for each of the factors
+        """
+        corrected: list[np.ndarray] = []
+        while len(corrected) < len(rows):
+            start, counts = len(corrected), np.cumsum([len(numbers) for numbers in rows[len(corrected) :]])
+            stop = start + max(int(np.searchsorted(counts, MAX_ROWS, side="right")), 1)
+            deviations = [self._deviations(*trial) for trial in zip(factors[start:stop], rows[start:stop], strict=True)]
+            corrected += np.split(self._corrected(np.concatenate(deviations)), counts[: stop - start - 1])
+        return corrected
+
+    def _corrected(self, deviations: np.ndarray) -> np.ndarray:
+        """Return corrected measures (n, measure) of deviations (n, contributor); there may be none."""
+        if not len(deviations):
+            return np.empty((0, len(self.engine.program.nominal.measures)))
         return self.engine.simulate_deviations(deviations)[0][:, terms.CORRECTED]
+
+    def _deviations(self, factors: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Return the deviations (row, contributor) of some realizations, by their numbers (row,)."""
+        return self._draws(factors).from_numbers(lambda label: self._numbers(label)[rows], len(rows))
+
+    def _numbers(self, label: str) -> np.ndarray:
+        """Return the numbers (n,) between 0 and 1 that a label's deviations depend on, in all realizations."""
+        if label not in self._known:
+            self._known[label] = self.engine.program.draws.numbers(seed=self.seed, start=0, stop=self.samples)(label)
+        return self._known[label]
 
     def _draws(self, factors: np.ndarray) -> Draws:
         program = self.engine.program

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.json_model import read_json
+from tolcontact.declaration.unknown_arguments import unknown_argument
 from tolcontact.errors import ScriptError, TolcontactError
 
 _PACKAGE = Path(__file__).resolve().parent
@@ -49,7 +50,8 @@ def load_model(path: Path) -> Assembly:
         reason = error.msg if isinstance(error, SyntaxError) else error
         if isinstance(error, FrozenInstanceError):
             reason = f"{error}, since declarations do not change; state it in the call that declares it"
-        raise ScriptError(f'model script "{path}" failed{_where(error, path)}: {type(error).__name__}: {reason}') from error
+        text = unknown_argument(error) or f"{type(error).__name__}: {reason}"
+        raise ScriptError(f'model script "{path}" failed{_where(error, path)}: {text}') from error
     finally:
         with contextlib.suppress(ValueError):  # a script may do anything to it
             sys.path.remove(folder)

@@ -255,6 +255,15 @@ def _allocation(dataset: xr.Dataset) -> AnalysisReport:
     if "floor" in dataset.attrs:
         least, most = (f"{dataset.attrs[name]:g} times" for name in ("floor", "ceiling"))
         notes.append(f"Tolerances may be {least} (smallest allowed) to {most} (largest allowed) those before.\n")
+    if "idle_tried" in dataset.attrs and dataset["idle"].values.any():
+        count, ends = (
+            dataset.attrs["idle_tried"],
+            " or ".join(f"{dataset.attrs[name]:g} times" for name in ("floor", "ceiling")),
+        )
+        notes.append(
+            f"No influence: with all of these tolerances together at {ends} those before, none of {grouped(count)} "
+            f"realizations changed. So at most {3 / count:.2g} of all realizations do, with 95 % confidence.\n"
+        )
     met = dataset["met"].values if "met" in dataset else np.ones(len(requirements))  # older archives do not state it
     for name, values in zip(dataset["requirement"].values[met == 0], dataset["kept"].values[met == 0], strict=True):
         text = share if f": {terms.PPM}" in str(name) else number

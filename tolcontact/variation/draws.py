@@ -83,7 +83,11 @@ class Draws:
 
         Raises ModelError for a distribution that yields non-finite deviations.
         """
-        return self.from_numbers(self._plan.numbers(seed, start, stop), stop - start)
+        return self.from_numbers(self.numbers(seed=seed, start=start, stop=stop), stop - start)
+
+    def numbers(self, *, seed: int, start: int, stop: int) -> Numbers:
+        """Return the numbers between 0 and 1 of realizations `start` to `stop`, by label."""
+        return self._plan.numbers(seed, start, stop)
 
     @property
     def varying(self) -> list[str]:

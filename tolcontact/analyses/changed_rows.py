@@ -1,0 +1,87 @@
+"""Realizations in which required measures change if tolerance ranges change, by group of tolerances.
+
+Most groups change few realizations. Such groups change their ranges all together, and only where something changes, halves of
+them do: so most of them cost next to nothing.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tolcontact.analyses.scaled_trials import ScaledTrials
+
+NEGLIGIBLE = 1e-6  # of a measure's spread: smaller changes are none
+FEW = 32  # realizations that show which groups change many
+
+
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """Realizations that change: their numbers (row,), and corrected measures (row, measure) then."""
+
+    rows: np.ndarray
+    corrected: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ChangedRows:
+    """The search for realizations that change.
+
+    measures   numbers of the measures that are required
+    logs       (group,) logarithms of the factors of the ranges before the change
+    corrected  (n, measure) corrected measures there
+    """
+
+    trials: ScaledTrials
+    measures: Sequence[int]
+    logs: np.ndarray
+    corrected: np.ndarray
+
+    def of_sets(self, sets: Sequence[tuple[np.ndarray, np.ndarray]], changed_logs: np.ndarray) -> list[Hits]:
+        """Return which of its rows each set of groups changes, if the logarithms of its factors are `changed_logs` (group,).
+
+        sets  groups (k,) that change together, and rows (row,) to look at
+        """
+        factors = [np.exp(np.where(np.isin(np.arange(len(self.logs)), groups), changed_logs, self.logs)) for groups, _ in sets]
+        rows_of_sets = [rows for _, rows in sets]
+        spreads = self.corrected.std(axis=0)[self.measures]
+        hits = []
+        for rows, corrected in zip(rows_of_sets, self.trials.corrected_rows(factors, rows_of_sets), strict=True):
+            changes = np.abs(corrected - self.corrected[rows])[:, self.measures]
+            is_hit = ~(changes <= NEGLIGIBLE * spreads).all(axis=1)
+            hits.append(Hits(rows[is_hit], corrected[is_hit]))
+        return hits
+
+    def of_groups(self, groups: np.ndarray, changed_logs: np.ndarray, rows: np.ndarray) -> list[Hits]:
+        """Return which of the rows each of the groups (k,) changes by itself.
+
+        Groups that change none of the first rows share the search in the other ones.
+        """
+        singles = [np.array([group]) for group in groups]
+        first, others = np.split(rows, [FEW])
+        first_hits = self.of_sets([(single, first) for single in singles], changed_logs)
+        is_frequent = np.array([len(hits.rows) > 0 for hits in first_hits], dtype=bool)
+        further = dict(self.shared(groups[~is_frequent], changed_logs, others)) if len(others) else {}
+        frequent = [(single, others) for single, frequent in zip(singles, is_frequent, strict=True) if frequent]
+        if len(others):
+            further |= zip(groups[is_frequent].tolist(), self.of_sets(frequent, changed_logs), strict=True)
+        return [_joined(hits, further.get(group)) for group, hits in zip(groups.tolist(), first_hits, strict=True)]
+
+    def shared(self, groups: np.ndarray, changed_logs: np.ndarray, rows: np.ndarray) -> list[tuple[int, Hits]]:
+        """Return the groups that change some of the rows by themselves, and which ones, by halves of the groups."""
+        sets, found = [(groups, rows)] if len(groups) else [], []
+        while sets:
+            halves = []
+            for (members, _), hits in zip(sets, self.of_sets(sets, changed_logs), strict=True):
+                if len(hits.rows) and len(members) == 1:
+                    found.append((int(members[0]), hits))
+                elif len(hits.rows):
+                    halves += [(half, hits.rows) for half in np.array_split(members, 2)]
+            sets = halves
+        return found
+
+
+def _joined(first: Hits, further: Hits | None) -> Hits:
+    if further is None:
+        return first
+    return Hits(np.concatenate([first.rows, further.rows]), np.concatenate([first.corrected, further.corrected]))
