@@ -92,8 +92,8 @@ def allocate(
         "effect": narrowing_effects(trials, program),
     }
     labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
-    tried: dict[str, Any] = {"samples": samples, "fresh": VERIFICATION_FACTOR * samples, "idle_tried": samples}
-    return analysis.dataset(values, labels, by=by, floor=MIN_FACTOR, ceiling=MAX_FACTOR, **tried)
+    limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR, "idle_tried": samples}
+    return analysis.dataset(values, labels, samples=samples, fresh=VERIFICATION_FACTOR * samples, by=by, **limits)
 
 
 @dataclass(frozen=True, eq=False)
