@@ -28,9 +28,10 @@ def width_by_programme(places, heights):
     return linprog([0, 0, 0, 1], A_ub=rows, b_ub=limits, bounds=[(None, None)] * 3 + [(0, None)], method="highs").fun
 
 
-def test_the_least_zone_is_that_of_a_linear_programme():
+@pytest.mark.parametrize("faces", [200, *nightly(1000)])
+def test_the_least_zone_is_that_of_a_linear_programme(faces):
     field = field_of(tc.Form())
-    heights = np.random.default_rng(1).normal(size=(1000, field.modes)) @ field.heights(field.places).T
+    heights = np.random.default_rng(1).normal(size=(faces, field.modes)) @ field.heights(field.places).T
     widths = least_widths(field.zone, heights)
     expected = [width_by_programme(field.places[:, :2], of_one) for of_one in heights]
     np.testing.assert_allclose(widths, expected, rtol=1e-6)
