@@ -10,7 +10,7 @@ import tolcontact as tc
 from studies.certificates.judge import contradictions
 from studies.certificates.scenes import scene
 from tests import cases
-from tests.helpers import ALL_POINTS, EXACT, PAPER, SEATED, SEATED_ON_POINTS, R_t, joined, nightly, recompiled, simulate
+from tests.helpers import ALL_POINTS, EXACT, PAPER, SEATED, SEATED_ON_POINTS, joined, nightly, recompiled, simulate
 from tolcontact import poses as pose
 from tolcontact.compilation import usable_plugins
 from tolcontact.compilation.active_set import ActiveSet
@@ -145,15 +145,15 @@ def test_surfaces_are_checked_between_contact_points(tmp_path):
     """A shaft on few points sinks into the walls; the archive says how deep, and the true answer agrees."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ContactWarning)
-        model = cases.shaft_in_a_v(720, points=200)
-        with tc.run(model, samples=60, solver="daqp", method=SEATED_ON_POINTS, out=tmp_path / "v.nc", surfaces=20) as results:
+        program = tc.build(cases.shaft_in_a_v(720, points=200), solver="daqp", method=SEATED_ON_POINTS)
+        with tc.run(program, samples=60, out=tmp_path / "v.nc", surfaces=20) as results:
             surface, summary = results["surface"].to_dataset().load(), tc.summarize(results)
-        _, run = simulate(model, samples=60, solver="daqp", method=SEATED_ON_POINTS)
-        again = tc.run(model, samples=60, solver="daqp", method=SEATED_ON_POINTS, keep="measures", surfaces=20)
+            corrected = results.to_dataset().sel(state="corrected")[["rotation", "translation"]].load()
+        again = tc.run(program, samples=60, keep="measures", surfaces=20)
     rows = surface["realization_checked"].values
     assert len(set(rows)) == 20 and (np.diff(rows) > 0).all() and rows.min() >= 0 and rows.max() < 60
     # The round shaft, from the poses: how deep its ends lie under the planes of the walls.
-    R, t = R_t(run["poses"][rows, CORRECTED])
+    R, t = corrected["rotation"].values[rows], corrected["translation"].values[rows]
     walls = surface["surface_penetration"].values[:, :2]
     for k, sign in enumerate((-1, 1)):
         n = R[:, k] @ [sign * np.sqrt(0.5), 0, np.sqrt(0.5)]

@@ -200,7 +200,7 @@ def test_shapley_effects_divide_what_is_correlated():
     assert of_normal([first, second], [[1, rho], [rho, 1]]) == pytest.approx([own, 1 - own])
     a = cases.stack()
     a.correlate(CORRELATED, MATRIX)
-    program = tc.build(a, solver="daqp")
+    program = tc.build(a, solver="daqp", method=PAPER)
     found = tc.contributions(program, samples=4096).sel(measure="top")
     columns = [list(program.nominal.contributors).index(label) for label in (*CORRELATED, "upper.A2")]
     slopes = linear_model(program).by_deviations[0, columns]
@@ -277,7 +277,7 @@ def test_what_only_contact_moves_has_no_linear_percentages(tmp_path):
     """The clutch's roller floats: without contact its angle does not vary."""
     done = call(tmp_path, "contributions", cases.MODELS / "clutch.py", "--samples", "64", "--solver", "daqp")
     assert done.returncode == 0 and "nan" not in done.stdout and "without contact -, with contact" in done.stdout
-    shares = tc.contributions(cases.MODELS / "clutch.py", samples=2048, solver="daqp").isel(measure=0).sel(state="corrected")
+    shares = tc.contributions(cases.MODELS / "clutch.py", samples=1024, solver="daqp").isel(measure=0).sel(state="corrected")
     # Root sum square of CASES C7, which is nearly linear: sensitivities times a sixth of the tolerances.
     parts = np.array([11.910 * 0.1, 23.732 * 0.02, 11.821 * 0.025]) ** 2
     for label, part in zip(("hub.flat.offset", "roller.barrel.size", "ring.bore.size"), parts / parts.sum(), strict=True):

@@ -88,7 +88,6 @@ def test_a_shared_cause_drives_all_that_it_names():
     assert_same_run(results, tc.run(tc.model_of(results), samples=300))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["frame", "dataset", "csv", "mapping"])
 def test_rows_of_a_population_stay_together(kind, tmp_path):
     rng = np.random.default_rng(0)
@@ -108,6 +107,13 @@ def test_rows_of_a_population_stay_together(kind, tmp_path):
     assert set(np.round(drawn["top.A1"], 12)) == set(np.round(first, 12))
     counts = np.unique(drawn["top.A1"], return_counts=True)[1]
     assert stats.chisquare(counts).pvalue > 1e-3
+
+
+@pytest.mark.slow
+def test_a_population_is_in_the_archive():
+    first = np.random.default_rng(0).normal(size=50) * 0.1
+    a = cases.ra1()
+    a.population({"one": first, "two": -2 * first + 0.01}, {"top.A1": "one", "top.A2": "two"})
     results = tc.run(a, samples=100, surfaces=0)
     assert_same_run(results, tc.run(tc.model_of(results), samples=100, surfaces=0))
 

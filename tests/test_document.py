@@ -8,6 +8,7 @@ from rich.console import Console
 
 import tolcontact as tc
 from tests import cases
+from tests.helpers import nightly
 from tests.test_report import browser, needs_browser, open_page  # noqa: F401
 from tolcontact.report import summary_text, write_page
 from tolcontact.report.html import page_of
@@ -31,7 +32,7 @@ def page(archive):
 
 @pytest.mark.slow
 @needs_browser
-@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("width", [390, *nightly(1280)])
 def test_nothing_is_cut_off_and_words_are_those_of_designers(page, width, open_page):  # noqa: F811
     opened = open_page(page, width)
     assert opened.evaluate("document.documentElement.scrollWidth") <= width

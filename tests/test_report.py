@@ -136,8 +136,9 @@ def test_formats_of_before_have_a_page(tmp_path):
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def browser():
+    """A browser for all tests of a file: it takes a second to start."""
     with sync_playwright() as driver:
         options = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
         options += ["--disable-background-networking", "--disable-component-update", "--disable-sync", "--no-first-run"]
@@ -149,10 +150,11 @@ def browser():
 @pytest.fixture
 def open_page(browser):
     """Opens a page, of a width; what it complains of, or asks the network for, fails the test."""
-    wrong = []
+    wrong, pages = [], []
 
     def open_(path, width=1280, drawn="#scene"):
         opened = browser.new_page(viewport={"width": width, "height": 900})
+        pages.append(opened)
         opened.on("console", lambda message: wrong.append(message.text))
         opened.on("pageerror", lambda error: wrong.append(str(error)))
         opened.on("dialog", lambda dialog: wrong.append(dialog.message))
@@ -165,6 +167,8 @@ def open_page(browser):
         return opened
 
     yield open_
+    for opened in pages:
+        opened.close()
     assert not wrong
 
 

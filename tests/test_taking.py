@@ -11,7 +11,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import COMMAND, SCRIPTS, contents, finish, nightly, run, start
+from tests.helpers import COMMAND, PAPER, SCRIPTS, contents, finish, nightly, run, start
 from tolcontact import vocabulary
 from tolcontact.errors import ArchiveError
 
@@ -88,12 +88,13 @@ def test_more_than_the_disk_holds_is_refused_before_the_first_byte(tmp_path):
 def test_a_long_run_stands_under_its_own_name_from_its_first_block_on(tmp_path):
     path, sizes, samples = tmp_path / "long.nc", [], vocabulary.FIRST_ROWS + 9000
     tc.run(
-        cases.stack(), samples=samples, solver="daqp", out=path, keep="measures",
+        cases.stack(), samples=samples, solver="daqp", method=PAPER, out=path, keep="measures",
         progress=lambda rows: sizes.append((rows, path.stat().st_size)),
     ).close()  # fmt: skip
     whole = path.stat().st_size
     assert sizes[0][0] == 4096 and sizes[0][1] < 0.9 * whole
-    with tc.open_archive(path) as grown, tc.run(cases.stack(), samples=samples, solver="daqp", keep="measures") as other:
+    other = tc.run(cases.stack(), samples=samples, solver="daqp", method=PAPER, keep="measures")
+    with tc.open_archive(path) as grown, other:
         assert (grown["measured"].values == other["measured"].values).all()
         assert tc.summarize(grown).attrs["realizations"] == samples
 
@@ -105,15 +106,16 @@ def test_an_interrupted_run_says_how_far_it_is_has_its_fields_and_goes_on(tmp_pa
             raise KeyboardInterrupt
 
     paths = [tmp_path / "stopped.nc", tmp_path / "whole.nc", tmp_path / "short.nc"]
+    options = {"seed": 3, "solver": "daqp", "method": PAPER}
     with pytest.raises(KeyboardInterrupt):
-        tc.run(cases.stack(), samples=60_000, seed=3, solver="daqp", out=paths[0], progress=interrupt)
-    tc.run(cases.stack(), samples=8192, seed=3, solver="daqp", out=paths[2]).close()
+        tc.run(cases.stack(), samples=60_000, out=paths[0], progress=interrupt, **options)
+    tc.run(cases.stack(), samples=8192, out=paths[2], **options).close()
     found = tc.summarize(paths[0])
     assert found.attrs["realizations"] == 8192 and found.attrs["samples"] == 60_000
     assert found["field_realizations"] == 8192
     assert found["field_extreme"].identical(tc.summarize(paths[2])["field_extreme"])
-    tc.run(cases.stack(), samples=1000, seed=3, solver="daqp", out=paths[0], resume=True).close()
-    tc.run(cases.stack(), samples=60_000, seed=3, solver="daqp", out=paths[1]).close()
+    tc.run(cases.stack(), samples=1000, out=paths[0], resume=True, **options).close()
+    tc.run(cases.stack(), samples=60_000, out=paths[1], **options).close()
     for group in (None, "sample", "field/middle"):
         one, other = (contents(path, group) for path in paths[:2])
         assert one.identical(other), group

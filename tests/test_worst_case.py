@@ -277,7 +277,7 @@ def test_measured_parts_are_one_of_their_rows():
 
 @pytest.mark.slow
 def test_what_cannot_be_assembled_does_not_count():
-    a = cases.square_pins()
+    a = cases.square_pins("rotations")
     found = few_searches(a, 32, tc.Method(resolution="exact", objective="seating"))
     assert int(found.by_status.sel(status_meaning="not_assemblable")) > 0
     assert np.isfinite(found.worst.values).all()
