@@ -238,4 +238,4 @@ def test_groups_without_influence_keep_their_ranges_and_those_at_a_limit_are_nam
     lines = [line for line in printed.splitlines() if "allowed" in line or "no influence" in line]
     assert any(line.startswith("aside.Z") and "no influence" in line for line in lines)
     assert any(line.startswith("p0.Z") and "largest allowed" in line for line in lines)
-    assert "at 0.1 times or 3 times those before, none of 8 192 realizations changed" in " ".join(printed.split())
+    assert "at 0.1 times or 3 times those before, none of 8 192 resolved realizations changed" in " ".join(printed.split())

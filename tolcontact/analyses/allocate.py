@@ -18,7 +18,7 @@ from tolcontact.analyses.grouping import check_grouping, owners
 from tolcontact.analyses.idle_groups import IdleSearch
 from tolcontact.analyses.narrowing_effects import effect_samples, narrowing_effects
 from tolcontact.analyses.requirement import MIN_DECISIVE, Requirement
-from tolcontact.analyses.scaled_trials import STEP, ScaledTrials
+from tolcontact.analyses.scaled_trials import STEP, ScaledTrials, Trial
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.statistics.intervals import Estimate
@@ -59,9 +59,10 @@ def allocate(
     "feature" or "part".
 
     Ranges stay between a tenth and three times the present ones. Groups keep theirs if no required measure changes in any
-    realization with all of them at either end. Each step replaces the margins of the requirements by functions of squared
-    ranges with the same values and slopes, on the same draws; slopes follow from realizations near the limits alone. SLSQP
-    minimizes the cost within a region that shrinks when a step fails (a sequential separable approximation; Svanberg, 1987).
+    resolved realization with all of them at either end. Each step replaces the margins of the requirements by functions of
+    squared ranges with the same values and slopes, on the same draws; slopes follow from resolved realizations near the limits
+    alone. SLSQP minimizes the cost within a region that shrinks when a step fails (a sequential separable approximation;
+    Svanberg, 1987).
     If the fresh run misses a requirement, the search continues with a larger margin. Effects follow from samples / 4
     realizations, or 4 samples / groups if that is less, but at least 512. `progress` is called with the number of realizations
     simulated, and about that of all. Arguments that all analyses share, and what they raise, are described in
@@ -92,7 +93,7 @@ def allocate(
         "effect": narrowing_effects(trials, program),
     }
     labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
-    limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR, "idle_tried": samples}
+    limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR, "idle_tried": search.tried}
     return analysis.dataset(values, labels, samples=samples, fresh=VERIFICATION_FACTOR * samples, by=by, **limits)
 
 
@@ -170,32 +171,34 @@ def _allocated(search: "Search", expected: int) -> tuple[np.ndarray, list[list[E
     The last one is whether each requirement is kept after (requirement,).
     """
     trials, requirements, logs = search.trials, search.requirements, np.zeros(len(search.trials))
-    corrected = trials.corrected(np.ones(len(trials)), verification=1)
-    before = [requirement.estimate(corrected[:, requirement.measure]) for requirement in requirements]
+    before = _estimates(requirements, trials.trial(np.ones(len(trials)), verification=1))
     aims = np.zeros(len(requirements))
-    searched = trials.corrected(np.exp(logs))
+    searched = trials.trial(np.exp(logs))
     search.release(logs, searched)
     for number in range(VERIFICATIONS):
         logs, searched = search.least_cost(logs, searched, aims)
-        corrected = trials.corrected(np.exp(logs), verification=2 + number)
-        margins = _margins(requirements, corrected)
+        fresh = trials.trial(np.exp(logs), verification=2 + number)
+        margins = _margins(requirements, fresh.corrected)
         if (margins >= 0).all():
             break
         aims += np.maximum(-margins, 0.0)
         trials.engine.total += expected
     else:
         logs = search.least_missing(logs)
-        search.release(logs, trials.corrected(np.exp(logs)))
-        corrected = trials.corrected(np.exp(logs), verification=2 + VERIFICATIONS)
-    after = [requirement.estimate(corrected[:, requirement.measure]) for requirement in requirements]
-    return logs, [before, after], _margins(requirements, corrected) >= 0
+        search.release(logs, trials.trial(np.exp(logs)))
+        fresh = trials.trial(np.exp(logs), verification=2 + VERIFICATIONS)
+    return logs, [before, _estimates(requirements, fresh)], _margins(requirements, fresh.corrected) >= 0
+
+
+def _estimates(requirements: Sequence[Requirement], trial: Trial) -> list[Estimate]:
+    return [requirement.estimate(trial.corrected[:, requirement.measure]) for requirement in requirements]
 
 
 def _margins(requirements: Sequence[Requirement], corrected: np.ndarray) -> np.ndarray:
     return np.array([requirement.margin(corrected[:, requirement.measure]) for requirement in requirements])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Search:
     """The search for the least cost with margins that are large enough, in logarithms of the factors (group,)."""
 
@@ -203,59 +206,60 @@ class Search:
     requirements: Sequence[Requirement]
     prices: Prices
     idle: np.ndarray = field(init=False)  # (group,) whether a group has no influence on any requirement, as far as is known
+    tried: int = field(init=False, default=0)  # realizations that showed it last
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "idle", self.prices.is_free.copy())
+        self.idle = self.prices.is_free.copy()
 
     @property
     def is_free(self) -> np.ndarray:
         """Whether the range of a group may change, (group,)."""
         return self.prices.is_free & ~self.idle
 
-    def release(self, logs: np.ndarray, corrected: np.ndarray) -> bool:
-        """Free the ranges of idle groups that have an influence at `logs`, where measures are `corrected` (n, measure).
+    def release(self, logs: np.ndarray, trial: Trial) -> bool:
+        """Free the ranges of idle groups that have an influence at `logs`, of which there is a trial.
 
         Return whether there are any.
         """
-        before = self.idle.copy()
-        self.idle[:] = IdleSearch(self._changes(logs, corrected), (MIN_FACTOR, MAX_FACTOR)).idle(before)
+        before, search = self.idle, IdleSearch(self._changes(logs, trial), (MIN_FACTOR, MAX_FACTOR))
+        self.idle, self.tried = search.idle(before), len(search.rows)
         return bool((before & ~self.idle).any())
 
-    def least_cost(self, logs: np.ndarray, corrected: np.ndarray, aims: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the logarithms of least cost with margins of at least `aims` (requirement,), and measures there.
+    def least_cost(self, logs: np.ndarray, trial: Trial, aims: np.ndarray) -> tuple[np.ndarray, Trial]:
+        """Return the logarithms of least cost with margins of at least `aims` (requirement,), and the trial there.
 
-        The search begins at `logs`, where measures are `corrected` (n, measure). Groups that turn out to have an influence at
-        the ranges found join it.
+        The search begins at `logs`, of which there is a trial. Groups that turn out to have an influence at the ranges found
+        join it.
         """
-        logs, corrected = self._descend(logs, corrected, aims)
-        while self.release(logs, corrected):
-            logs, corrected = self._descend(logs, corrected, aims)
-        return logs, corrected
+        logs, trial = self._descend(logs, trial, aims)
+        while self.release(logs, trial):
+            logs, trial = self._descend(logs, trial, aims)
+        return logs, trial
 
-    def _descend(self, logs: np.ndarray, corrected: np.ndarray, aims: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the logarithms of least cost that steps from `logs` on lead to, and measures there (n, measure).
+    def _descend(self, logs: np.ndarray, trial: Trial, aims: np.ndarray) -> tuple[np.ndarray, Trial]:
+        """Return the logarithms of least cost that steps from `logs` on lead to, and the trial there.
 
         The merit of a point is its cost plus a penalty for missed margins. A step that improves the merit is taken, and the
         region of the next one doubles; after any other step the region halves.
         """
         radius = FIRST_RADIUS
-        margins, slopes = _margins(self.requirements, corrected) - aims, None
+        margins, slopes = _margins(self.requirements, trial.corrected) - aims, None
         for _ in range(MAX_STEPS):
             if radius < LAST_RADIUS:
                 break
             if slopes is None:
-                slopes = self._slopes(logs, corrected)
+                slopes = self._slopes(logs, trial)
                 penalty = PENALTY * self.prices.total(logs) / max(float(np.abs(slopes).sum()), 1e-300)
             candidate = self._step(margins, slopes, logs, radius)
-            candidate_corrected = self.trials.corrected(np.exp(candidate))
-            candidate_margins = _margins(self.requirements, candidate_corrected) - aims
+            candidate_trial = self.trials.trial(np.exp(candidate))
+            candidate_margins = _margins(self.requirements, candidate_trial.corrected) - aims
             merit = self._merit(logs, margins, penalty)
             if self._merit(candidate, candidate_margins, penalty) < merit - MIN_GAIN * abs(merit):
-                logs, corrected, margins, slopes = candidate, candidate_corrected, candidate_margins, None
+                logs, trial, margins, slopes = candidate, candidate_trial, candidate_margins, None
                 radius = min(2 * radius, FIRST_RADIUS)
             else:
                 radius /= 2
-        return logs, corrected
+        return logs, trial
 
     def least_missing(self, logs: np.ndarray) -> np.ndarray:
         """Return the point that misses the requirements least: `logs`, or all ranges that may change times one factor.
@@ -266,22 +270,22 @@ class Search:
         return min([logs, *common], key=self._missing)
 
     def _missing(self, logs: np.ndarray) -> float:
-        corrected = self.trials.corrected(np.exp(logs))
+        corrected = self.trials.trial(np.exp(logs)).corrected
         return math.fsum(requirement.shortfall(corrected[:, requirement.measure]) for requirement in self.requirements)
 
     def _merit(self, logs: np.ndarray, margins: np.ndarray, penalty: float) -> float:
         return self.prices.total(logs) + penalty * float(np.maximum(-margins, 0).sum())
 
-    def _slopes(self, logs: np.ndarray, corrected: np.ndarray) -> np.ndarray:
+    def _slopes(self, logs: np.ndarray, trial: Trial) -> np.ndarray:
         """Return derivatives (requirement, group) of the margins, by central differences; 0 for groups that do not change.
 
-        A margin follows from the realizations beyond it and near it (Hong, 2009): only these are simulated again, and
-        measures of the others (n, measure) stay.
+        A margin follows from the realizations beyond it and near it (Hong, 2009): only these are simulated again if they are
+        resolved, and measures of the others stay.
         """
-        slopes = np.zeros((len(self.requirements), len(logs)))
+        corrected, slopes = trial.corrected, np.zeros((len(self.requirements), len(logs)))
         rows = np.unique(np.concatenate([r.decisive(corrected[:, r.measure]) for r in self.requirements]))
-        groups = np.flatnonzero(self.is_free)
-        changes = self._changes(logs, corrected)
+        rows, groups = rows[trial.is_resolved[rows]], np.flatnonzero(self.is_free)
+        changes = self._changes(logs, trial)
         of_signs = [changes.of_groups(groups, logs + step, rows) for step in (STEP, -STEP)]
         for group, wider, narrower in zip(groups, *of_signs, strict=True):
             wide, narrow = corrected.copy(), corrected.copy()
@@ -289,9 +293,9 @@ class Search:
             slopes[:, group] = (_margins(self.requirements, wide) - _margins(self.requirements, narrow)) / (2 * STEP)
         return slopes
 
-    def _changes(self, logs: np.ndarray, corrected: np.ndarray) -> ChangedRows:
+    def _changes(self, logs: np.ndarray, trial: Trial) -> ChangedRows:
         measures = sorted({requirement.measure for requirement in self.requirements})
-        return ChangedRows(self.trials, measures, logs, corrected)
+        return ChangedRows(self.trials, measures, logs, trial)
 
     def _step(self, margins: np.ndarray, slopes: np.ndarray, logs: np.ndarray, radius: float) -> np.ndarray:
         """Return the point of least cost with margins approximated by functions of squared ranges.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tolcontact.analyses.scaled_trials import ScaledTrials
+from tolcontact.analyses.scaled_trials import ScaledTrials, Trial
 
 NEGLIGIBLE = 1e-6  # of a measure's spread: smaller changes are none
 FEW = 32  # realizations that show which groups change many
@@ -27,15 +27,15 @@ class Hits:
 class ChangedRows:
     """The search for realizations that change.
 
-    measures   numbers of the measures that are required
-    logs       (group,) logarithms of the factors of the ranges before the change
-    corrected  (n, measure) corrected measures there
+    measures  numbers of the measures that are required
+    logs      (group,) logarithms of the factors of the ranges before the change
+    before    the trial there; only its resolved realizations may be asked for
     """
 
     trials: ScaledTrials
     measures: Sequence[int]
     logs: np.ndarray
-    corrected: np.ndarray
+    before: Trial
 
     def of_sets(self, sets: Sequence[tuple[np.ndarray, np.ndarray]], changed_logs: np.ndarray) -> list[Hits]:
         """Return which of its rows each set of groups changes, if the logarithms of its factors are `changed_logs` (group,).
@@ -44,10 +44,10 @@ class ChangedRows:
         """
         factors = [np.exp(np.where(np.isin(np.arange(len(self.logs)), groups), changed_logs, self.logs)) for groups, _ in sets]
         rows_of_sets = [rows for _, rows in sets]
-        spreads = self.corrected.std(axis=0)[self.measures]
+        spreads = self.before.corrected.std(axis=0)[self.measures]
         hits = []
         for rows, corrected in zip(rows_of_sets, self.trials.corrected_rows(factors, rows_of_sets), strict=True):
-            changes = np.abs(corrected - self.corrected[rows])[:, self.measures]
+            changes = np.abs(corrected - self.before.corrected[rows])[:, self.measures]
             is_hit = ~(changes <= NEGLIGIBLE * spreads).all(axis=1)
             hits.append(Hits(rows[is_hit], corrected[is_hit]))
         return hits

@@ -1,13 +1,14 @@
 """Groups of tolerances without influence on required measures, at any range that an allocation may choose.
 
 A group that changes nothing near its present range may still decide once it is wider, or once others are narrower. So it counts
-as idle only if no realization of a whole run changes at its smallest and at its largest range. All groups that may be idle are
-scaled together: while nothing changes, all of them are idle, and the run costs as much as that of one group. At the largest
+as idle only if no resolved realization of a run changes at its smallest and at its largest range. All groups that may be idle
+are scaled together: while nothing changes, all of them are idle, and the run costs as much as that of one group. At the largest
 ranges of groups with influence many realizations are slow; so blocks of realizations grow, and each of them is searched for
 such groups before the next.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -27,6 +28,11 @@ class IdleSearch:
     changes: ChangedRows
     ends: tuple[float, float]
 
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """The numbers of the realizations that are tried (row,): those that are resolved before."""
+        return np.flatnonzero(self.changes.before.is_resolved)
+
     def idle(self, candidates: np.ndarray) -> np.ndarray:
         """Return which of the candidates (group,) bool change no realization together, at either end of their ranges.
 
@@ -36,7 +42,7 @@ class IdleSearch:
         idle = candidates.copy()
         for end in reversed(self.ends):
             logs = np.full(len(candidates), np.log(end))
-            few = np.arange(min(FIRST_BLOCK, len(self.changes.corrected)))
+            few = self.rows[:FIRST_BLOCK]
             groups = np.flatnonzero(idle)
             hits = self.changes.of_groups(groups, logs, few)
             idle[[group for group, hit in zip(groups, hits, strict=True) if len(hit.rows)]] = False
@@ -46,10 +52,10 @@ class IdleSearch:
 
     def _release(self, idle: np.ndarray, logs: np.ndarray) -> bool:
         """Mark idle groups (group,) that change a realization as not idle; return whether there are any."""
-        before, start, count = idle.sum(), 0, len(self.changes.corrected)
+        before, start, count = idle.sum(), 0, len(self.rows)
         while start < count and idle.any():
             stop = min(max(2 * start, FIRST_BLOCK), count)
-            rows = np.arange(start, stop)
+            rows = self.rows[start:stop]
             while idle.any() and len(rows := self.changes.of_sets([(np.flatnonzero(idle), rows)], logs)[0].rows):
                 groups = np.flatnonzero(idle)
                 influential = [group for group, _ in self.changes.shared(groups, logs, rows[:MAX_HITS])]

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,16 @@ from tolcontact.variation import Draws
 
 STEP = 0.1  # of ranges, for differences
 MAX_ROWS = 1 << 16  # realizations that are simulated at once, for several factors
+
+
+class Trial(NamedTuple):
+    """Corrected measures (n, measure) of realizations, and which of these are resolved (n,).
+
+    Poses of other realizations are arbitrary, and so are their measures.
+    """
+
+    corrected: np.ndarray
+    is_resolved: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,14 +37,14 @@ class ScaledTrials:
     samples: int
     _known: dict[str, np.ndarray] = field(default_factory=dict, init=False)
 
-    def corrected(self, factors: np.ndarray, *, verification: int = 0) -> np.ndarray:
-        """Return corrected measures (n, measure) with the groups' ranges times factors (group,).
+    def trial(self, factors: np.ndarray, *, verification: int = 0) -> Trial:
+        """Return the trial with the groups' ranges times factors (group,).
 
         A `verification` with a number above 0 has draws of its own, and more of them.
         """
         count = VERIFICATION_FACTOR * self.samples if verification else self.samples
-        measured, _ = self.engine.simulate(count, start=verification << 32, seed=self.seed, draws=self._draws(factors))
-        return np.ascontiguousarray(measured[:, terms.CORRECTED])
+        measured, status = self.engine.simulate(count, start=verification << 32, seed=self.seed, draws=self._draws(factors))
+        return Trial(np.ascontiguousarray(measured[:, terms.CORRECTED]), ~np.isin(status, terms.UNRESOLVED))
 
     def corrected_rows(self, factors: Sequence[np.ndarray], rows: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Return corrected measures (row, measure) of some realizations, for each of several factors (group,).

@@ -65,7 +65,8 @@ def sensitivities(
     slopes = (ahead + behind) / 2
     nominal = total_derivatives(program)[:, columns]
     carries_otherwise = (carrying[:, up] != carrying[:, :1]).any(axis=2) | (carrying[:, down] != carrying[:, :1]).any(axis=2)
-    changes = carries_otherwise | _has_kink(ahead, behind, np.nan_to_num(np.abs(nominal)))
+    rounding = program.accuracies / steps[:, None]
+    changes = carries_otherwise | _has_kink(ahead, behind, np.nan_to_num(np.abs(nominal)), rounding)
     smooth = np.where(changes[:, :, None], np.nan, slopes[:, :, terms.CORRECTED])
     is_touched = status != terms.Status.UNTOUCHED
     values = {
@@ -86,16 +87,16 @@ def _observed(block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return block.measured.copy(), block.carrying.copy(), block.status.copy()
 
 
-def _has_kink(ahead: np.ndarray, behind: np.ndarray, nominal: np.ndarray) -> np.ndarray:
+def _has_kink(ahead: np.ndarray, behind: np.ndarray, nominal: np.ndarray, rounding: np.ndarray) -> np.ndarray:
     """Return whether any measure has a kink or jump within the step, (n, contributor).
 
-    Differences `ahead` and `behind` are (n, contributor, state, measure), nominal derivatives (measure, contributor). A
-    contributor with next to no effect has no kink: its differences are the rounding of the solver.
+    Differences `ahead` and `behind` are (n, contributor, state, measure), nominal derivatives (measure, contributor), and what
+    rounding of the solver makes of differences is (contributor, measure). A contributor with next to no effect has no kink.
     """
     size = np.maximum(np.abs(ahead), np.abs(behind))
     typical = np.median(size.max(axis=2), axis=0).T  # (measure, contributor); a jump does not enlarge a median
-    floor = NEGLIGIBLE * np.maximum(nominal, typical).max(axis=1, initial=0)
-    return np.asarray((np.abs(ahead - behind) > MAX_DIFFERENCE * np.maximum(size, floor)).any(axis=(2, 3)))
+    floor = np.maximum(NEGLIGIBLE * np.maximum(nominal, typical).max(axis=1, initial=0), rounding / MAX_DIFFERENCE)
+    return np.asarray((np.abs(ahead - behind) > MAX_DIFFERENCE * np.maximum(size, floor[:, None])).any(axis=(2, 3)))
 
 
 def _means(slopes: np.ndarray) -> np.ndarray:

@@ -262,7 +262,7 @@ def _allocation(dataset: xr.Dataset) -> AnalysisReport:
         )
         notes.append(
             f"No influence: with all of these tolerances together at {ends} those before, none of {grouped(count)} "
-            f"realizations changed. So at most {3 / count:.2g} of all realizations do, with 95 % confidence.\n"
+            f"resolved realizations changed. So at most {3 / count:.2g} of them do, with 95 % confidence.\n"
         )
     met = dataset["met"].values if "met" in dataset else np.ones(len(requirements))  # older archives do not state it
     for name, values in zip(dataset["requirement"].values[met == 0], dataset["kept"].values[met == 0], strict=True):
