@@ -62,7 +62,7 @@ def allocate(
     resolved realization with all of them at either end. Each step replaces the margins of the requirements by functions of
     squared ranges with the same values and slopes, on the same draws; slopes follow from resolved realizations near the limits
     alone. SLSQP minimizes the cost within a region that shrinks when a step fails (a sequential separable approximation;
-    Svanberg, 1987).
+    Svanberg, 1987). Steps to ranges with which more realizations do not assemble than may be outside fail, too.
     If the fresh run misses a requirement, the search continues with a larger margin. Effects follow from samples / 4
     realizations, or 4 samples / groups if that is less, but at least 512. `progress` is called with the number of realizations
     simulated, and about that of all. Arguments that all analyses share, and what they raise, are described in
@@ -240,10 +240,13 @@ class Search:
         """Return the logarithms of least cost that steps from `logs` on lead to, and the trial there.
 
         The merit of a point is its cost plus a penalty for missed margins. A step that improves the merit is taken, and the
-        region of the next one doubles; after any other step the region halves.
+        region of the next one doubles; after any other step the region halves. No step is taken to where more realizations are
+        not resolved than a requirement allows outside, unless there were as many before.
         """
         radius = FIRST_RADIUS
         margins, slopes = _margins(self.requirements, trial.corrected) - aims, None
+        allowed = min(requirement.share for requirement in self.requirements) * len(trial.is_resolved)
+        most_unresolved = max(int(allowed), int((~trial.is_resolved).sum()))
         for _ in range(MAX_STEPS):
             if radius < LAST_RADIUS:
                 break
@@ -251,7 +254,10 @@ class Search:
                 slopes = self._slopes(logs, trial)
                 penalty = PENALTY * self.prices.total(logs) / max(float(np.abs(slopes).sum()), 1e-300)
             candidate = self._step(margins, slopes, logs, radius)
-            candidate_trial = self.trials.trial(np.exp(candidate))
+            candidate_trial = self.trials.trial_within(np.exp(candidate), most_unresolved)
+            if candidate_trial is None:
+                radius /= 2
+                continue
             candidate_margins = _margins(self.requirements, candidate_trial.corrected) - aims
             merit = self._merit(logs, margins, penalty)
             if self._merit(candidate, candidate_margins, penalty) < merit - MIN_GAIN * abs(merit):

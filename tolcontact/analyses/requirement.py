@@ -48,9 +48,14 @@ class Requirement:
         is_share = request.statistic == PPM
         return cls(text.strip(), number, limits, is_share, request.value * (1e-6 if is_share else 1))
 
+    @property
+    def share(self) -> float:
+        """The share of values that it allows beyond the limits; of a Ppk, that beyond its percentiles."""
+        return self.value if self.is_share else TAIL
+
     def check(self, samples: int) -> None:
         """Raise OptionError if `samples` are too few to estimate the share or the Ppk."""
-        minimum = int(np.ceil(MIN_HITS / (self.value if self.is_share else TAIL) * (1 - ROUNDING)))
+        minimum = int(np.ceil(MIN_HITS / self.share * (1 - ROUNDING)))
         if samples < minimum:
             raise OptionError(f'{samples} realizations are too few for "{self.name}"; expected samples={minimum} or more')
 
@@ -74,7 +79,7 @@ class Requirement:
 
         The median of a Ppk is regarded as if it stayed.
         """
-        count = max(math.ceil(DECISIVE * (self.value if self.is_share else TAIL) * len(x)), MIN_DECISIVE)
+        count = max(math.ceil(DECISIVE * self.share * len(x)), MIN_DECISIVE)
         orders = [np.argsort(-self.limits.excess(x))] if self.is_share else [np.argsort(x), np.argsort(-x)]
         return np.concatenate([order[:count] for order in orders])
 

@@ -11,6 +11,7 @@ from tolcontact.analyses.engine import VERIFICATION_FACTOR, Engine
 from tolcontact.variation import Draws
 
 STEP = 0.1  # of ranges, for differences
+TRIAL_BLOCK = 1024  # realizations
 MAX_ROWS = 1 << 16  # realizations that are simulated at once, for several factors
 
 
@@ -45,6 +46,21 @@ class ScaledTrials:
         count = VERIFICATION_FACTOR * self.samples if verification else self.samples
         measured, status = self.engine.simulate(count, start=verification << 32, seed=self.seed, draws=self._draws(factors))
         return Trial(np.ascontiguousarray(measured[:, terms.CORRECTED]), ~np.isin(status, terms.UNRESOLVED))
+
+    def trial_within(self, factors: np.ndarray, most_unresolved: int) -> Trial | None:
+        """Return the trial with the groups' ranges times factors (group,), None once more realizations are not resolved.
+
+        These take a hundred times as long as others.
+        """
+        draws, parts, unresolved = self._draws(factors), [], 0
+        for start in range(0, self.samples, TRIAL_BLOCK):
+            count = min(TRIAL_BLOCK, self.samples - start)
+            measured, status = self.engine.simulate(count, start=start, seed=self.seed, draws=draws)
+            parts.append(Trial(measured[:, terms.CORRECTED], ~np.isin(status, terms.UNRESOLVED)))
+            unresolved += int((~parts[-1].is_resolved).sum())
+            if unresolved > most_unresolved:
+                return None
+        return Trial(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
     def corrected_rows(self, factors: Sequence[np.ndarray], rows: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Return corrected measures (row, measure) of some realizations, for each of several factors (group,).
