@@ -33,8 +33,7 @@ class Draws:
         self._check_correlations()
         self._plan = Plan(MONTE_CARLO, [])
         self._scale = np.ones(len(self.contributors))
-        tolerances = [contributor.tolerance for contributor in self.contributors]
-        self._middle = np.array([tolerance.shift if tolerance else 0.0 for tolerance in tolerances])
+        self._middle = np.array([each.tolerance.shift if each.tolerance else each.middle for each in self.contributors])
         self._factors = [np.linalg.cholesky(np.array(correlation.matrix)) for correlation in self._assembly.correlations]
 
     def _check_correlations(self) -> None:
