@@ -61,7 +61,7 @@ def test_the_middle_of_a_zone_has_no_effect_if_datums_leave_its_place_free():
 
 def test_widened_zones_keep_their_middle():
     draws = Draws(discretize(toleranced.block_with("top", tc.Profile(0.3, "A", outside=UPPER))))
-    usual, wide = (each(seed=1, start=0, stop=50) for each in (draws, draws.scaled(np.full(len(draws.labels), 3.0))))
+    usual, wide = (d(seed=1, start=0, stop=50) for d in (draws, draws.scaled(np.full(len(draws.labels), 3.0))))
     middle = np.array([0.1 if "offset" in label else 0.0 for label in draws.labels])
     assert wide - middle == pytest.approx(3 * (usual - middle), abs=1e-12)
 
@@ -69,6 +69,20 @@ def test_widened_zones_keep_their_middle():
 def test_the_worst_case_is_an_end_of_an_uneven_zone():
     worst = tc.worst_case(toleranced.block_with("top", tc.Profile(0.3, "A", outside=UPPER, rule="truncated")))
     assert worst.worst.sel(state="raw").values == pytest.approx(np.tile([LOWER, UPPER], (3, 1)), abs=1e-6)
+
+
+def test_a_worst_case_lies_in_an_uneven_zone_and_in_the_narrower_one_within_it():
+    """Datum A locates the top within -0.05 to 0.05, and all datums locate both faces within 0 to 0.3."""
+    a = tc.Assembly("block")
+    block = a.part("block", tc.Box(100, 50, 30), fixed=True)
+    for letter, face in {"A": "-z", "B": "-y", "C": "-x"}.items():
+        block.feature(letter, block.face(face), datum=letter)
+    profiles = tc.Profile(0.3, "A|B|C", outside=0.3), tc.Profile(0.1, "A")
+    top, end = block.pattern("faces", block.face("+z"), block.face("+x"), *profiles).members
+    a.measure("top", top.point(50, 25, 30), along="z")
+    a.measure("end", end.point(100, 25, 15), along="x")
+    worst = tc.worst_case(a, samples=64).worst.sel(state="raw").values
+    assert worst == pytest.approx(np.array([[0.0, 0.05], [0.0, 0.3]]), abs=1e-6)
 
 
 def test_an_archive_says_how_much_of_a_zone_is_outside(tmp_path):
