@@ -6,15 +6,18 @@ import json
 import numpy as np
 import pytest
 from scipy import stats
+from scipy.optimize import brentq
 
 import tolcontact as tc
 from tests import cases
 from tests.helpers import call, nightly, simulate
+from tolcontact import statistics
 from tolcontact.limits import Limits
 from tolcontact.simulation import simulate_blocks
 from tolcontact.statistics import capability, intervals
 from tolcontact.statistics.sample import Sample
 
+GUIDE = " ".join(statistics.__doc__.split())
 PERCENTS = (0.00135, 0.5, 0.99865)
 DISTRIBUTIONS = {
     "normal": (stats.norm(0, 1), -3.0, 4.0),
@@ -96,7 +99,22 @@ def test_places_of_percentiles_are_those_of_order_statistics():
 
 def test_a_small_sample_bounds_no_tail():
     pp, ppk = capability.by_percentiles(Sample.of(np.arange(20.0)), Limits(-5.0, 30.0))
-    assert pp.lower == ppk.lower == 0 and ppk.value > 1
+    assert pp.lower == ppk.lower == -np.inf and ppk.value > 1
+
+
+def test_the_realizations_that_a_finite_bound_of_ppk_needs_are_those_of_the_guide():
+    """In 2.5 % of samples of n no value is beyond the outer percentile of the one side, or of one of the two."""
+    p = PERCENTS[0]
+    one = np.log(0.025) / np.log(1 - p)
+    two = brentq(lambda n: 2 * (1 - p) ** n - (1 - 2 * p) ** n - 0.025, 2000, 5000)
+    stated = f"with one limit from some {round(one, -1):.0f} realizations on, with two limits from some {round(two, -1):.0f} on"
+    assert stated in GUIDE
+    for limits, needed in ((Limits(-np.inf, 4.0), one), (Limits(-4.0, 4.0), two)):
+        for factor, is_bounded in ((0.98, False), (1.02, True)):
+            normal = stats.norm.ppf((np.arange(int(factor * needed)) + 0.5) / int(factor * needed))
+            pp, ppk = capability.by_percentiles(Sample.of(normal), limits)
+            assert np.isfinite(ppk.lower) == is_bounded and (is_bounded or ppk.lower == -np.inf)
+            assert np.isnan(pp.value) or np.isfinite(pp.lower) == is_bounded
 
 
 def test_two_values_equally_often_have_an_index_without_spread():
@@ -265,3 +283,14 @@ def test_a_lower_limit_is_the_upper_one_of_the_mirrored_values():
     other = estimates(values, -np.inf, 2 * values.mean() - 0.5)  # as far from the mean, on the other side
     index, of_other = (side["Ppk as normal"] for side in (lower, other))
     assert index.value == pytest.approx(of_other.value) and np.diff(index[1:]) != pytest.approx(np.diff(of_other[1:]), rel=0.05)
+
+
+@pytest.mark.slow
+def test_intervals_of_skewed_measures_in_few_realizations_cover_as_often_as_the_guide_says():
+    rng = np.random.default_rng(5)
+    for name, distribution, stated in (("exponential", stats.expon(), 90), ("lognormal", stats.lognorm(0.5), 89)):
+        assert f"{stated} % ({name})" in GUIDE
+        samples = distribution.ppf(rng.random((4000, 30)))
+        found = [intervals.root(intervals.variance(Sample.of(sample)), times=6) for sample in samples]
+        covered = np.mean([low <= 6 * distribution.std() <= high for _, low, high in found])
+        assert covered == pytest.approx(stated / 100, abs=0.02)  # four standard errors

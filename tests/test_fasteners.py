@@ -1,5 +1,6 @@
 """Fasteners in holes: the formulas of fixed and floating fasteners at their limits, and how far assemblies shift."""
 
+import re
 import warnings
 from pathlib import Path
 
@@ -319,6 +320,38 @@ def test_a_bolt_that_stands_in_the_wall_of_a_hole_moves_to_its_side():
     assert (distance > 0.61)[is_simple].sum() > 10 and is_simple.mean() > 0.9
     assert np.abs(corrected - nearest)[is_simple].max() < 2e-3
     assert results.gap_min.sel(state="corrected").min() > -1e-6
+
+
+def nominal_warnings(a: tc.Assembly) -> list[str]:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        tc.build(a)
+    return [str(warning.message) for warning in caught if issubclass(warning.category, tc.NominalWarning)]
+
+
+@pytest.mark.parametrize("frame", [STILL, MOVED], ids=["still", "moved"])
+def test_a_screw_may_be_thicker_than_its_thread_and_nowhere_else(frame):
+    a = bolted([(-45.0, 0.0), (45.0, 0.0)], into=True, frame=frame)
+    assert nominal_warnings(a) == []
+    a.part("block", tc.Box(4, 4, 4), **frame.place(-47, -2, 2 * THICKNESS - 4), fixed=True)  # in a screw
+    (text,) = nominal_warnings(a)
+    assert re.match(r'\[overlap\] part "b.*it overlaps part "b.* by about', text)
+
+
+@pytest.mark.parametrize("turn", [(0, 0, 0), (0, 0, 1.57079632679), (1.57079632679, 0, 0), (0, 1.57079632679, 1e-13)])
+def test_locators_of_a_fastener_are_not_taken_for_mistakes(turn):
+    """Nor do they depend on rounding in the axis of its hole."""
+    frame = Frame(turn=turn, shift=(300, -50, 20))
+    a = tc.Assembly("drifting")
+    parts = {
+        "base": plate(a, "base", 0, {(0, 0): 11.0}, frame, fixed=True),
+        "cover": plate(a, "cover", 1, {(0, 0): 11.2}, frame),
+    }
+    a.locate(parts["cover"], held())
+    holes = [hole(parts[name], "H", (0, 0), placed(0.4)) for name in ("cover", "base")]
+    bolt = a.fasten("bolt", 10, through=holes, seat=parts["cover"].face("+z"), drift=True)
+    a.measure("x", bolt.point(0, 0, 0), along=frame.along(1, 0, 0))
+    assert nominal_warnings(a) == []
 
 
 def test_a_drifting_bolt_keeps_in_archives_and_json(tmp_path):

@@ -59,10 +59,14 @@ class Effort:
 
 
 class Evaluation:
-    """Measures at points of the region (see AllowedRegion). No point is simulated twice."""
+    """Measures at points of the region (see AllowedRegion). No point is simulated twice.
+
+    is_undefined  (measure,): whether a measure was not a finite number somewhere, raw or certified
+    """
 
     def __init__(self, engine: Engine, region: AllowedRegion) -> None:
         self._engine, self._region = engine, region
+        self.is_undefined = np.zeros(len(engine.program.nominal.measures), dtype=bool)
         self._known: dict[bytes, np.ndarray] = {}
 
     @property
@@ -77,7 +81,10 @@ class Evaluation:
         rows = {key: row for row, key in enumerate(keys) if key not in self._known}
         if rows:
             measured, status = self._engine.simulate_deviations(deviations[list(rows.values())])
-            measured[np.isin(status, terms.UNRESOLVED), terms.CORRECTED] = np.nan
+            unresolved = np.isin(status, terms.UNRESOLVED)
+            self._look_at(measured[:, terms.RAW])
+            self._look_at(measured[~unresolved, terms.CORRECTED])
+            measured[unresolved, terms.CORRECTED] = np.nan
             self._known.update(zip(rows, measured, strict=True))
         return np.array([self._known[key] for key in keys]).reshape(*points.shape[:-1], len(terms.STATES), -1)
 
@@ -85,7 +92,12 @@ class Evaluation:
         """Return the same with raw measures alone, which takes no time; the corrected ones are NaN."""
         program, deviations = self._engine.program, self._deviations(points)
         measured = program.observe(poses=program.place(deviations=deviations)["poses"], deviations=deviations)["measured"]
+        self._look_at(measured)
         return np.stack([measured, np.full_like(measured, np.nan)], axis=1).reshape(*points.shape[:-1], len(terms.STATES), -1)
+
+    def _look_at(self, measured: np.ndarray) -> None:
+        """Remember which measures (n, measure) are not finite numbers."""
+        self.is_undefined |= ~np.isfinite(measured).all(axis=0)
 
     def _deviations(self, points: np.ndarray) -> np.ndarray:
         return self._region.deviations(points.reshape(-1, points.shape[-1]))

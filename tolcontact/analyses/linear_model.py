@@ -52,10 +52,11 @@ def linear_model(program: Program) -> LinearModel:
         _observed(program, poses, np.zeros((len(poses), count))) for poses in (_motions(program, 1), _motions(program, -1))
     ]
     (measures,), (gaps,) = _observed(program, _at_rest(program, 1), np.zeros((1, count)))
-    by_deviations, by_motion = (
-        [(ahead - behind).T / (2 * STEP) for ahead, behind in zip(*sides, strict=True)] for sides in (varied, moved)
-    )
-    kinked = np.array([_kinks(*(ends[0] - measures for ends in sides)) for sides in (varied, moved)])
+    with np.errstate(invalid="ignore"):  # of measures that are infinite
+        by_deviations, by_motion = (
+            [(ahead - behind).T / (2 * STEP) for ahead, behind in zip(*sides, strict=True)] for sides in (varied, moved)
+        )
+        kinked = np.array([_kinks(*(ends[0] - measures for ends in sides)) for sides in (varied, moved)])
     return LinearModel(
         measures, by_deviations[0], by_motion[0], kinked, gaps, by_deviations[1], by_motion[1], _held(program),
         _displacements(program), sum(gaps is None for gaps in program.gaps),

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from scipy.special import ndtr
+from scipy.special import gammaincc, ndtr
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis
@@ -16,13 +16,15 @@ from tolcontact.analyses.engine import Engine, Progress
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
-from tolcontact.statistics.rare import Score, Tail, either, sufficient_tail
+from tolcontact.statistics.intervals import UNDEFINED
+from tolcontact.statistics.rare import NEGLIGIBLE, Score, Tail, either, sufficient_tail
 from tolcontact.variation.draws import MIN_UNIFORM
 from tolcontact.workflow.models import Choice, Model
 
 MIN_SAMPLES = 4000  # for an event
 BUDGET, DEFAULT_RANGE = 60_000, (10_000, 40_000)  # realizations for all events, and for one
 MIN_AT_STOP = 50  # values at a limit that nothing exceeds
+UNDEFINED_TAIL = Tail(UNDEFINED, 1.0)
 
 
 def tails(
@@ -45,7 +47,7 @@ def tails(
     for each. A quarter of the samples suffices where the upper bound of the interval is at most 1.5 times the lower one,
     or at most 1e-7; otherwise the other three quarters answer. A probability of 0 with an upper bound stands for an event whose
     search ended below 1e-9. Where two searches disagree, the interval covers what both say, and more
-    realizations are needed.
+    realizations are needed. A measure that is not a number in some realization has the probability NaN, as `run` says of it.
     Probabilities include realizations that are not resolved, with their last poses. `progress` is called with the number of
     realizations simulated, and with the approximate number of all.
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses. Raises OptionError also for a
@@ -73,7 +75,8 @@ def tails(
         sides = [answer for search, answer in zip(searches, answers, strict=True) if search.number == number]
         # Beside another side, one at which values stop would only add how seldom a run of this size can see it.
         kept = [side.tail for side in sides if not side.is_stop]
-        event_tails.append(either(kept or [side.tail for side in sides]))
+        is_undefined = any(side.is_undefined for side in sides)
+        event_tails.append(UNDEFINED_TAIL if is_undefined else either(kept or [side.tail for side in sides]))
         stops.append(any(side.is_stop for side in sides))
         statuses.append(np.sum([side.statuses for side in sides], axis=0))
     values = {
@@ -124,14 +127,20 @@ class _Search(NamedTuple):
         score, rng = self.event.sides[self.side](engine), np.random.default_rng([seed, self.number, self.side])
         dimensions = len(engine.program.draws.varying)
         tail = sufficient_tail(score, dimensions, samples=self.samples, rng=rng, leads=self.event.leads)
-        return _Answer(tail, isinstance(score, _Beyond) and score.is_stop, engine.statuses)
+        is_stop, is_undefined = (score.is_stop, score.is_undefined) if isinstance(score, _Beyond) else (False, False)
+        return _Answer(tail, is_stop, is_undefined, engine.statuses)
 
 
 class _Answer(NamedTuple):
-    """The answer of a search, whether values stop at the limit, and the number of realizations by their status."""
+    """The answer of a search, and the number of realizations by their status.
+
+    is_stop       values stop at the limit
+    is_undefined  the measure is not a number in realizations that are not negligible
+    """
 
     tail: Tail
     is_stop: bool
+    is_undefined: bool
     statuses: np.ndarray
 
 
@@ -171,9 +180,12 @@ class _Beyond:
     def __init__(self, engine: Engine, measure: int, limits: Limits) -> None:
         self._engine, self._measure, self._limits = engine, measure, limits
         self._beyond = self._at_limit = 0
+        self.is_undefined = False
 
     def __call__(self, u: np.ndarray) -> np.ndarray:
         measured, _ = simulated_scores(self._engine, u)
+        is_likely = gammaincc(u.shape[1] / 2, (u**2).sum(axis=1) / 2) > NEGLIGIBLE  # else inflation alone leads there
+        self.is_undefined |= bool(np.isnan(measured[is_likely, terms.CORRECTED, self._measure]).any())
         excess = np.nan_to_num(self._limits.excess(measured[:, terms.CORRECTED, self._measure]), nan=-np.inf, posinf=np.inf)
         self._beyond += int((excess > 0).sum())
         self._at_limit += int(((excess >= -2 * self._limits.accuracy) & (excess <= 0)).sum())

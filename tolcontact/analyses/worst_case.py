@@ -84,7 +84,11 @@ def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
     analysis.check_varies(region.varies.size)
     linear, evaluation, rng = linear_model(program), Evaluation(engine, region), np.random.default_rng(analysis.seed)
     engine.total += _expected(np.full(len(program.nominal.measures), region.moves.size), effort)
+    _check_defined(
+        program, ~np.isfinite(np.column_stack([linear.measures, linear.by_deviations, linear.by_motion])).all(axis=1)
+    )
     starts, measured = _starts(region, linear, rng, analysis.samples, evaluation)
+    _check_defined(program, evaluation.is_undefined)
     if not np.isfinite(measured[:, terms.CORRECTED]).any():
         raise OptionError(f'"{analysis.assembly}" cannot be resolved for any of {len(starts)} combinations tried')
     spread = np.nanmax(measured, axis=(0, 1)) - np.nanmin(measured, axis=(0, 1))
@@ -95,6 +99,7 @@ def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
     best = _searched(
         searcher, searches, influences, effort, Forecast(engine, influences, effort), region.scattered(rng, EXCHANGES)
     )
+    _check_defined(program, evaluation.is_undefined)
     values = searches.value.reshape(-1, effort.searches)
     tolerances = END_TOLERANCE * spread[best.measure]
     ends = np.array([_count_ends(row[effort.best :], tolerance) for row, tolerance in zip(values, tolerances, strict=True)])
@@ -113,6 +118,17 @@ def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
     }
     cases = [f"{end} {measure.name}" for measure in program.nominal.measures for end in terms.ENDS]
     return analysis.dataset(arrays, {terms.CASE: cases}, random_combinations=analysis.samples, searches=effort.searches)
+
+
+def _check_defined(program: Program, is_undefined: np.ndarray) -> None:
+    """Raise OptionError if measures (measure,) are not finite numbers somewhere in the region, or near the nominal assembly."""
+    names = [f'"{program.nominal.measures[number].name}"' for number in np.flatnonzero(is_undefined)]
+    if names:
+        raise OptionError(
+            f'"{program.nominal.assembly.name}": {"measurement" if len(names) == 1 else "measurements"} {" and ".join(names)}: '
+            "not a finite number for some combinations that the tolerances allow, so there is no worst case; define it for all "
+            "of them, or leave it out"
+        )
 
 
 def _searched(

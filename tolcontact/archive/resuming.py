@@ -24,6 +24,7 @@ def check_same_run(file: netCDF4.Dataset, path: Path, program: Program, settings
     if not file.dimensions[terms.REALIZATION].isunlimited():
         raise ArchiveError(f'"{path}" is a copy that cannot grow; resume the archive that tolcontact wrote')
     check_same_model(file, path, program)
+    _check_same_distributions(file, path, program)
     for name, value in settings.items():
         was = getattr(file, name, None)
         if name != "samples" and was != value:
@@ -48,6 +49,16 @@ def check_same_model(file: netCDF4.Dataset, path: Path, program: Program) -> Non
         stored = file["contact"].variables.get(variable.name)
         if stored is None or not (variable.kind is str or _is_equal(stored, values)):  # texts are in the declaration
             raise ArchiveError(f'"{path}": its contact points differ (it was written by {file.versions}); write to a new file')
+
+
+def _check_same_distributions(file: netCDF4.Dataset, path: Path, program: Program) -> None:
+    """Raise ArchiveError if the archive `file`, in the file `path`, describes a distribution otherwise than this version."""
+    for contributor, was in zip(program.draws.contributors, file["sample"][terms.DISTRIBUTION.name][...], strict=True):
+        if str(was) != contributor.description:
+            raise ArchiveError(
+                f'"{path}": contributor "{contributor.label}" was drawn as "{was}", now as "{contributor.description}"; '
+                "write to a new file"
+            )
 
 
 def _comparable(declared: str) -> Any:

@@ -105,6 +105,11 @@ class GeometricTolerance(Readable):
         """Whether it limits no displacement of a feature by itself: a tolerance of form, or a profile without datums."""
         return self.is_form or not (self.needs_datums or self.datums)
 
+    @property
+    def uneven_shift(self) -> float:
+        """The distance [mm], out of the material, of the middle of the zone from the nominal surface."""
+        return 0.0 if self.outside is None else self.outside - self.width / 2
+
     def faults(self) -> Iterator[str]:
         if not (is_length(self.width) and (self.width > 0 or (self.width == 0 and self.material))):
             bound = "0 or above" if self.material else "above 0"
@@ -188,7 +193,8 @@ class GeometricTolerance(Readable):
         round_ = "diameter " if self.zone == "round" else ""
         unit = f" per {' x '.join(f'{length:g}' for length in self._unit_lengths)} mm" if self._unit_lengths else ""
         tangent, datums = " of the tangent plane" if self.tangent else "", f" to {self.datums}" if self.datums else ""
-        return f"{self.kind} {round_}{self.width:g}{self.material} mm{unit}{tangent}{datums}"
+        uneven = "" if self.outside is None else f", {self.outside:g} mm of it outside,"
+        return f"{self.kind} {round_}{self.width:g}{self.material} mm{unit}{uneven}{tangent}{datums}"
 
 
 class Position(GeometricTolerance):

@@ -64,7 +64,8 @@ def _hole_locators(part: Part, fit: Fit, hole: PlacedCylinder) -> Iterator[Locat
         for letter, direction in (("x", x), ("y", y)):
             yield _locator(part, f"{letter}{number}", fit.axis.at(station), direction)
     yield _locator(part, "end", fit.axis.at(low), fit.axis.head)
-    yield _locator(part, "turn", fit.axis.at((low + high) / 2) + fit.radius * x, y)
+    # Within the material: on its surface, along which it points, it would look like a mistake (see tolcontact.plausibility).
+    yield _locator(part, "turn", fit.axis.at((low + high) / 2) + fit.radius / 2 * x, y)
 
 
 def _seat_locators(part: Part, fit: Fit, seat: PlacedPlane) -> Iterator[Locator]:

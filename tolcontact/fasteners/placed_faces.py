@@ -16,6 +16,7 @@ from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.files import Shape
 from tolcontact.geometry.shapes import shape
 
+DIRECTION_DIGITS = 9  # of the parts of a direction: what is beyond is rounding
 SHAPES = 16  # that stay in memory while a script declares its fasteners
 
 
@@ -29,7 +30,7 @@ class Axis:
     @cached_property
     def across(self) -> tuple[np.ndarray, np.ndarray]:
         """Two unit vectors (3,) that are right-handed with it."""
-        x = np.cross(np.eye(3)[int(np.abs(self.head).argmin())], self.head)
+        x = np.cross(np.eye(3)[int(np.abs(np.round(self.head, DIRECTION_DIGITS)).argmin())], self.head)
         x /= np.linalg.norm(x)
         return x, np.cross(self.head, x)
 

@@ -77,8 +77,6 @@ class SurfaceZone(Zone):
         return self.feature.surface_probes
 
     def needed_width(self, residuals: np.ndarray) -> np.ndarray:
-        if self.tolerance.outside is not None:
-            residuals = residuals - (self.tolerance.outside - self.tolerance.width / 2)
         return 2 * np.max([np.linalg.norm(residuals[:, k], axis=1) for k in range(residuals.shape[1])], axis=0)
 
 

@@ -38,7 +38,8 @@ The faces of a pair overlap if their deepest point stays inside in nearly every 
 gap is more than three sigma below 0. They are too far apart if the smallest gap exceeds 30 sigma and the distance by which
 other contact may push them. Both come from 128 draws without contact. With the objective "seating" forces close gaps, so none
 is too large. The overlap of two bodies is the diameter of the largest ball that lies in both; it counts from a fiftieth of the
-thinner body on, and beyond the height of round faces over their triangles. Bodies that are not closed are left out.
+thinner body on, and beyond the height of round faces over their triangles. Bodies that are not closed are left out, and so is
+an overlap at the wall of a hole in which one of the bodies is located: screws are thicker than their threads.
 
 ## Silence
 

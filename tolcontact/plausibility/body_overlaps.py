@@ -5,7 +5,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.errors import designation
+from tolcontact.features.feature_geometry import CylinderFeature
 from tolcontact.geometry.body_overlap import SolidBody, common_ball
 from tolcontact.plausibility.trial_draws import TrialDraws
 
@@ -32,10 +34,34 @@ def body_overlaps(draws: TrialDraws) -> Iterator[str]:
         known.add(frozenset((parts[i], parts[j])))
         facets = FACET_FACTOR * (bodies[i].facet_height + bodies[j].facet_height)
         ball = common_ball(bodies[i], bodies[j], max(float(min_overlap[i, j]), facets))
-        if ball is not None:
+        if ball is not None and not _is_press_fit(nominal, nominal.parts[i], nominal.parts[j], *ball):
             diameter, place = ball
             yield (
                 f'{designation("part", nominal.parts[i].part)}: it overlaps part "{nominal.parts[j].name}" by about '
                 f"{diameter:.2g} mm near ({', '.join(f'{c:.4g}' for c in place)}) in the nominal assembly, and they are no "
                 "contact pair; check their places, or declare their contact"
             )
+
+
+def _is_press_fit(nominal: Nominal, left: NominalPart, right: NominalPart, diameter: float, place: np.ndarray) -> bool:
+    """Return whether the ball in which two parts overlap lies at the wall of a hole of one that the other is located in.
+
+    A screw is thicker than its thread, and a dowel than its hole.
+    """
+    grounds = [
+        (location.on, ground)
+        for location in nominal.assembly.locations
+        for located, ground in ((left, right), (right, left))
+        if location.part is located.part and location.station == located.station and location.parent is ground.part
+    ]
+    for feature in nominal.features:
+        for ground_feature, ground in grounds:
+            hole = feature.geometry
+            if feature.feature is ground_feature and isinstance(hole, CylinderFeature) and hole.is_inner:
+                R_WP, t_WP = ground.placement
+                arm = (place - t_WP) @ R_WP - hole.centre
+                station = float(arm @ hole.axis)
+                distance = float(np.linalg.norm(arm - station * hole.axis))
+                if abs(distance - hole.size / 2) <= diameter and abs(station) <= hole.half + diameter:
+                    return True
+    return False

@@ -221,7 +221,7 @@ def _tails(dataset: xr.Dataset) -> AnalysisReport:
     for event in dataset["event"].values:
         ppm = [1e6 * float(value) for value in dataset["probability"].sel(event=event).values]
         estimate, lower, upper = (grouped(round(value)) if value >= 1000 else f"{value:.3g}" for value in ppm)
-        rows.append([str(event), f"{estimate} [{lower}, {upper}]"])
+        rows.append([str(event), "-" if math.isnan(ppm[0]) else f"{estimate} [{lower}, {upper}]"])
     count = f"{grouped(int(dataset['simulated'].sum()))} realizations"
     notes = ["Probabilities in ppm, with contact, by searches and importance sampling; 95 % intervals."]
     disagreement = dataset["disagreement"].values if "disagreement" in dataset else np.ones(len(rows))  # of older archives
@@ -232,6 +232,8 @@ def _tails(dataset: xr.Dataset) -> AnalysisReport:
     stops = dataset["stop"].values if "stop" in dataset else np.zeros(len(rows))
     for event in dataset["event"].values[stops == 1]:
         notes.append(f"{event}: values stop at a limit; none was found beyond it.")
+    for event in dataset["event"].values[np.isnan(dataset["probability"].values[:, 0])]:
+        notes.append(f"{event}: the measurement is not a number in some realizations, so its probability is not defined.")
     return AnalysisReport("Rare events", count, notes, [AnalysisTable("", ["", "ppm"], rows)])
 
 

@@ -118,11 +118,12 @@ def member_groups(pattern: NominalPattern, layer: Layer, zones: Sequence[MemberZ
         )
 
 
-def component_zone(pattern: NominalPattern, layer: Layer, group: MemberGroup) -> ComponentZone:
-    """Return the zone that a layer's tolerance is for the components of a group, of this layer and the narrower ones."""
-    tolerance, size = layer.tolerance, pattern.declared.size
-    middle = np.zeros(len(group.components))
-    middle[len(group.components) - len(group.added) :] = uneven_shifts(pattern, layer)[group.added]
+def component_zone(pattern: NominalPattern, layer: Layer, group: MemberGroup, middle: np.ndarray) -> ComponentZone:
+    """Return the zone that a layer's tolerance is for the components of a group, of this layer and the narrower ones.
+
+    `middle` (component,) [mm] is that of the zone in all components of these layers (see uneven_shifts).
+    """
+    tolerance, size, middle = layer.tolerance, pattern.declared.size, middle[group.components]
     columns, rows = pattern.first_column + group.components, np.concatenate(group.rows)
     if size is None or not tolerance.material or tolerance.bonus == "none":
         return ComponentZone(columns, rows, middle, tolerance.width)
@@ -132,11 +133,12 @@ def component_zone(pattern: NominalPattern, layer: Layer, group: MemberGroup) ->
     return ComponentZone(columns, rows, middle, tolerance.width, sizes, limit, growth)
 
 
-def uneven_shifts(pattern: NominalPattern, layer: Layer) -> np.ndarray:
-    """Return how far [mm] the middle of a zone lies from nominal in the directions (component,) that a layer adds."""
-    tolerance = layer.tolerance
-    shift = 0.0 if tolerance.outside is None else tolerance.outside - tolerance.width / 2
-    return np.asarray(shift * (pattern.geometry.offsets @ layer.added))
+def uneven_shifts(pattern: NominalPattern, layer: Layer, basis: np.ndarray) -> np.ndarray:
+    """Return the distance [mm] of the middle of a layer's zone from nominal in each direction of a `basis`, (component,).
+
+    The basis (coordinate, component) holds the directions that the layer and the narrower ones add.
+    """
+    return np.asarray(layer.tolerance.uneven_shift * (pattern.geometry.offsets @ layer.controlled @ layer.controlled.T @ basis))
 
 
 def bonus(feature: NominalFeature, tolerance: GeometricTolerance, size: np.ndarray) -> np.ndarray:

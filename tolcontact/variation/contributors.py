@@ -50,6 +50,7 @@ class Contributor(NamedTuple):
     layer      of a freedom or a form of a feature: the tolerance that controls it
     spread     [mm] standard deviation of a freedom of a feature, or of a coefficient of its form
     mean       [mm] of a freedom of a feature
+    middle     [mm] of a freedom of a feature: where its zone has its middle, if that is disposed unevenly
     rule       of a datum: what its shift follows from
     """
 
@@ -60,6 +61,7 @@ class Contributor(NamedTuple):
     layer: Layer | None = None
     spread: float = 0.0
     mean: float = 0.0
+    middle: float = 0.0
     rule: str = ""
 
     @property
@@ -185,15 +187,19 @@ class Contributors:
             self._check_inner_share(pattern, layer, [member.take(len(spreads)) for member in members], spreads, width)
             is_innermost = not len(spreads)
             spreads = np.concatenate([spreads, np.full(count, spread / tolerance.cp)])
-            mean = uneven_shifts(pattern, layer)
+            middles = uneven_shifts(pattern, layer, basis)
+            middle = middles[-count:]
+            mean = middle.copy()
             for group in member_groups(pattern, layer, members):
                 self._check_rule(pattern, layer, group, is_innermost=is_innermost)
-                self.zones.append(component_zone(pattern, layer, group))
-                self._add_joint_draws(layer, group, column + group.added, spread, width)
+                self.zones.append(component_zone(pattern, layer, group, middles))
+                self._add_joint_draws(layer, group, column, middle, spread, width)
                 if tolerance.cpk is not None:
                     mean[group.added[:1]] += 3 * spread * (1 - tolerance.cpk / tolerance.cp)
             for k in range(count):
-                yield Contributor(next(labels), FEATURE, "mm", None, layer, spread / tolerance.cp, float(mean[k]))
+                yield Contributor(
+                    next(labels), FEATURE, "mm", None, layer, spread / tolerance.cp, float(mean[k]), float(middle[k])
+                )
             column += count
         for lean in pattern.leans.values():
             for _ in lean.coordinates:
@@ -217,11 +223,16 @@ class Contributors:
                 self.mean_zones[member.label] = form.mean_width(spreads[-1])
         return spreads
 
-    def _add_joint_draws(self, layer: Layer, group: MemberGroup, columns: np.ndarray, spread: float, width: float) -> None:
-        """Add how the components of a group that a layer adds, `columns` of the deviations, are drawn together."""
-        tolerance, member = layer.tolerance, group.members[0]
+    def _add_joint_draws(
+        self, layer: Layer, group: MemberGroup, first_column: int, middle: np.ndarray, spread: float, width: float
+    ) -> None:
+        """Add how the components of a group that a layer adds are drawn together, about the `middle` (added,) of its zone.
+
+        `first_column` of the deviations is that of the first component that the layer adds.
+        """
+        tolerance, member, columns = layer.tolerance, group.members[0], first_column + group.added
         if tolerance.rule in JOINT_RULES:
-            draw = _joint_draw(tolerance.rule, np.concatenate(group.rows), spread, width)
+            draw = _joint_draw(tolerance.rule, np.concatenate(group.rows), middle[group.added], spread, width)
             self.joint_draws.append(JointDraw(tolerance.rule, columns, draw))
         if tolerance.material and tolerance.bonus == "fills" and len(group.sizes):
 
@@ -282,10 +293,12 @@ class Contributors:
         return ModelError(self._assembly.name, [f"{place}: {fault}"])
 
 
-def _joint_draw(rule: str, rows: np.ndarray, spread: float, width: float) -> Callable[[Uniforms], np.ndarray]:
-    """Return the function that draws components (n, component) together by a rule."""
+def _joint_draw(
+    rule: str, rows: np.ndarray, middle: np.ndarray, spread: float, width: float
+) -> Callable[[Uniforms], np.ndarray]:
+    """Return the function that draws components (n, component) together by a rule, about the middle (component,) of a zone."""
     if rule == "polar":
-        return lambda uniforms: _polar(uniforms(0), spread)
+        return lambda uniforms: middle + _polar(uniforms(0), spread)
     bounds = zones.component_bounds(rows, width)
 
     def attempt(u: np.ndarray) -> np.ndarray:
@@ -299,7 +312,7 @@ def _joint_draw(rule: str, rows: np.ndarray, spread: float, width: float) -> Cal
             number += 1
             components[outside] = attempt(uniforms(number)[outside])
             outside = outside[~zones.is_inside(rows, components[outside], width)]
-        return components
+        return middle + components
 
     return draw
 

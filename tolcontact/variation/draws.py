@@ -33,8 +33,9 @@ class Draws:
         self._check_correlations()
         self._plan = Plan(MONTE_CARLO, [])
         self._scale = np.ones(len(self.contributors))
-        tolerances = [contributor.tolerance for contributor in self.contributors]
-        self._middle = np.array([tolerance.shift if tolerance else 0.0 for tolerance in tolerances])
+        self._middle = np.array([
+            contributor.tolerance.shift if contributor.tolerance else contributor.middle for contributor in self.contributors
+        ])  # fmt: skip
         self._factors = [np.linalg.cholesky(np.array(correlation.matrix)) for correlation in self._assembly.correlations]
 
     def _check_correlations(self) -> None:

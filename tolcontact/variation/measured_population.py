@@ -106,7 +106,7 @@ def _measured_tolerance(
         ]
     rows = np.vstack([measurement.rows for measurement in measurements])
     motion, free = _fitted_frame(pattern, system, deviations, tolerance.orientation_only)
-    residuals = np.hstack([measurement.values for measurement in measurements]) - motion @ rows.T
+    residuals = np.hstack([measurement.values for measurement in measurements]) - motion @ rows.T - tolerance.uneven_shift
     # The zones follow the members together in the motions that the datums leave free.
     U, S, _ = np.linalg.svd(rows @ free, full_matrices=False)
     following = U[:, MIN_NOTICED < S]

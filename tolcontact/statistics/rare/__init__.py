@@ -29,6 +29,6 @@ smaller than five standard errors in a centre is taken for 0.
 """
 
 from tolcontact.statistics.rare.probability import Tail, either, sufficient_tail, tail_probability
-from tolcontact.statistics.rare.searches import Score
+from tolcontact.statistics.rare.searches import NEGLIGIBLE, Score
 
-__all__ = ["Score", "Tail", "either", "sufficient_tail", "tail_probability"]
+__all__ = ["NEGLIGIBLE", "Score", "Tail", "either", "sufficient_tail", "tail_probability"]

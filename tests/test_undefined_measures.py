@@ -1,0 +1,73 @@
+"""Measures that are not numbers for some deviations: no answer counts these realizations as good or bad without a word."""
+
+import casadi
+import numpy as np
+import pytest
+from scipy import stats
+
+import tolcontact as tc
+from tests.helpers import call
+
+SCRIPT = """import tolcontact as tc, casadi as ca
+def assembly():
+    m = tc.Assembly("x"); p = m.part("p", tc.Box(50, 25, 10))
+    m.locate(p, tc.three_two_one(p.face("-z"), p.face("-y"), p.face("-x")), tolerance=0.6)
+    m.measure("lg", lambda poses: ca.log(poses.position(p.point(0, 0, 0))[0]), limits=(None, -2)); return m
+"""
+
+
+def block_with(function, **limits):
+    """A block on locators of which that in x varies by 0.6 (sigma 0.1), and a measure that is a function of its x [mm]."""
+    a = tc.Assembly("block")
+    block = a.part("block", tc.Box(50, 25, 10))
+    below = [tc.Locator(f"Z{k}", (x, y, 0), "z", 0) for k, (x, y) in enumerate([(5, 5), (45, 5), (25, 20)])]
+    beside = [tc.Locator(f"Y{k}", (x, 0, 5), "y", 0) for k, x in enumerate((5, 45))]
+    a.locate(block, [*below, *beside, tc.Locator("X", (0, 12, 5), "x", 0.6)])
+    place = block.point(0, 12, 5)
+    a.measure("place", place, along="x", limits=(-0.45, None))
+    a.measure("function", lambda poses: function(poses.position(place)[0]), **limits)
+    return a
+
+
+@pytest.mark.parametrize(
+    "function",
+    [casadi.log, lambda x: casadi.sqrt(0.2 + x), lambda x: casadi.sqrt(x - 1)],
+    ids=["nominally", "at an end", "all"],
+)
+def test_what_is_no_number_for_some_combinations_has_no_worst_case(function):
+    with pytest.raises(tc.OptionError, match='"block": measurement "function": not a finite number for some combinations'):
+        tc.worst_case(block_with(function), samples=16)
+
+
+def test_a_measure_of_any_combination_has_its_worst_case():
+    worst = tc.worst_case(block_with(lambda x: casadi.sqrt(0.4 + x)), samples=16).worst.sel(measure="function", state="raw")
+    assert worst.values == pytest.approx(np.sqrt([0.1, 0.7]), rel=1e-6)
+
+
+def test_the_probability_of_what_is_no_number_is_not_stated():
+    """As the statistics of a run, where a value that is not a number is neither inside nor outside."""
+    model = block_with(casadi.log, limits=(None, -2.0))
+    found = tc.tails(model, seed=2)
+    assert np.isnan(found.probability.sel(event="function outside limits").values).all()
+    exact = stats.norm.sf(4.5)
+    lower, upper = found.probability.sel(event="place outside limits").values[1:]
+    assert lower <= exact <= upper
+    statistics = tc.summarize(tc.run(model, samples=200, surfaces=0, fields="none")).statistic_value
+    assert np.isnan(statistics.sel(measure="function", statistic="outside limits").values).all()
+
+
+def test_a_measure_that_is_a_number_but_for_negligible_deviations_has_its_probability():
+    """Inflated deviations lead to where it is none: 9 standard deviations from nominal."""
+    found = tc.tails(block_with(lambda x: casadi.sqrt(0.9 + x), limits=(None, np.sqrt(1.35))), seed=2)
+    estimate, lower, upper = found.probability.sel(event="function outside limits").values
+    assert lower <= stats.norm.sf(4.5) <= upper < 2 * estimate
+
+
+def test_the_table_of_tails_says_what_is_not_defined(tmp_path):
+    script = tmp_path / "block.py"
+    script.write_text(SCRIPT)
+    done = call(tmp_path, "tails", script, "--samples", "4000")
+    assert done.returncode == 0 and "lg outside limits    -" in done.stdout, done.stderr
+    assert "lg outside limits: the measurement is not a number in some realizations" in done.stdout
+    assert "Traceback" not in (failed := call(tmp_path, "worst", script)).stderr and failed.returncode == 2
+    assert failed.stderr.startswith('error: "x": measurement "lg": not a finite number')
