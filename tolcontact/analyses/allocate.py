@@ -26,10 +26,10 @@ from tolcontact.workflow.models import Choice, Model
 
 MIN_FACTOR, MAX_FACTOR = 0.1, 3.0  # times the present range
 MAX_STEPS, USUAL_STEPS = 24, 8  # of one search: at most, and for the forecast
-FIRST_RADIUS, LAST_RADIUS = 0.5, 0.004  # of the region that a step stays in, in logarithms of the factors
+FIRST_RADIUS, LAST_RADIUS = 0.5, 0.015  # of the region that a step stays in, in logarithms of the factors
 COMMON_FACTORS = np.geomspace(MIN_FACTOR, MAX_FACTOR, 13)  # of all ranges, where requirements cannot be met
 PENALTY = 10.0  # for missed margins, in the costs that the same margins save to first order
-MIN_GAIN = 1e-4  # of the cost
+MIN_GAIN, LAST_GAIN = 1e-4, 1e-3  # of the cost: of a step that is taken, and of one after which others follow
 VERIFICATIONS = 4
 Cost = float | Callable[[float], float]
 
@@ -260,9 +260,12 @@ class Search:
                 continue
             candidate_margins = _margins(self.requirements, candidate_trial.corrected) - aims
             merit = self._merit(logs, margins, penalty)
-            if self._merit(candidate, candidate_margins, penalty) < merit - MIN_GAIN * abs(merit):
+            gain = merit - self._merit(candidate, candidate_margins, penalty)
+            if gain > MIN_GAIN * abs(merit):
                 logs, trial, margins, slopes = candidate, candidate_trial, candidate_margins, None
                 radius = min(2 * radius, FIRST_RADIUS)
+                if gain < LAST_GAIN * abs(merit):
+                    break
             else:
                 radius /= 2
         return logs, trial

@@ -11,7 +11,7 @@ from tolcontact.analyses.engine import VERIFICATION_FACTOR, Engine
 from tolcontact.variation import Draws
 
 STEP = 0.1  # of ranges, for differences
-TRIAL_BLOCK = 1024  # realizations
+FIRST_TRIALS = 64  # realizations, which show whether most are unresolved
 MAX_ROWS = 1 << 16  # realizations that are simulated at once, for several factors
 
 
@@ -52,14 +52,15 @@ class ScaledTrials:
 
         These take a hundred times as long as others.
         """
-        draws, parts, unresolved = self._draws(factors), [], 0
-        for start in range(0, self.samples, TRIAL_BLOCK):
-            count = min(TRIAL_BLOCK, self.samples - start)
-            measured, status = self.engine.simulate(count, start=start, seed=self.seed, draws=draws)
+        draws, parts, unresolved, start = self._draws(factors), [], 0, 0
+        while start < self.samples:
+            stop = min(max(2 * start, FIRST_TRIALS), self.samples)
+            measured, status = self.engine.simulate(stop - start, start=start, seed=self.seed, draws=draws)
             parts.append(Trial(measured[:, terms.CORRECTED], ~np.isin(status, terms.UNRESOLVED)))
             unresolved += int((~parts[-1].is_resolved).sum())
             if unresolved > most_unresolved:
                 return None
+            start = stop
         return Trial(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
     def corrected_rows(self, factors: Sequence[np.ndarray], rows: Sequence[np.ndarray]) -> list[np.ndarray]:
