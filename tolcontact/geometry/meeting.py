@@ -118,6 +118,11 @@ class Meeting:
         return _meeting(self.moving, self.reference, self.reach._replace(travel=travel, tilt=tilt), self.size)
 
     @property
+    def passed(self) -> float:
+        """The nominal depth [mm] from which on a place is beyond a facet or an edge, as the body has come in elsewhere."""
+        return _passed(self.reach, self.size)
+
+    @property
     def turn(self) -> float:
         """The turn [rad] that moves the ends of the moving face about its middle as far as the body may travel."""
         return 2 * self.reach.travel / float(np.ptp(self.moving.vertices, axis=0).max())
@@ -194,7 +199,7 @@ class Meeting:
         )
         places_kernel.find(
             *self._bodies, self.candidates,
-            np.array([self.reach.depth, self.reach.height]), kernel.MARGIN * self.size,
+            np.array([self.reach.depth, self.reach.height, self.passed]), kernel.MARGIN * self.size,
             np.array([error, self.reach.depth, nearness]),
             np.ascontiguousarray(X_RM), retained, DIRECTIONS, *places,
         )  # fmt: skip
@@ -203,8 +208,8 @@ class Meeting:
 
 def _touching_parts(body: Polyhedron) -> kernel.Body:
     return kernel.Body(
-        body.vertices, body.cones, body.directions, body.facets, body.normals, body.inward, body.edges, body.into,
-        body.edge_normals, body.body,
+        body.vertices, body.cones, body.directions, body.facets, body.normals, body.inward, body.edges, body.ends,
+        body.into, body.edge_normals, body.body,
     )  # fmt: skip
 
 
@@ -222,7 +227,7 @@ def _meeting(A: Polyhedron, B: Polyhedron, reach: Reach, size: float) -> Meeting
     if comparisons > MAX_COMPARISONS:
         return None
     travel, leaning = reach.depth, reach.leaning
-    facing, facets = _facing_planes(A, B, travel, reach.clearance)
+    facing, facets = _facing_planes(A, B, reach, size)
     parts = [
         _on_facets(A, B, facing, travel, leaning, CORNER_ON_FACET),
         _on_facets(B, A, facing.T, travel, leaning, FACET_ON_CORNER),
@@ -235,18 +240,23 @@ def _meeting(A: Polyhedron, B: Polyhedron, reach: Reach, size: float) -> Meeting
     return Meeting(A, B, candidates, reach, size)
 
 
-def _facing_planes(A: Polyhedron, B: Polyhedron, travel: float, height: float) -> tuple[np.ndarray, np.ndarray]:
+def _passed(reach: Reach, size: float) -> float:
+    return reach.overlap + kernel.MARGIN * size
+
+
+def _facing_planes(A: Polyhedron, B: Polyhedron, reach: Reach, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the numbers of facing planes in a table (plane of A + 1, plane of B + 1), -1 for others, and their facets (n, 2).
 
     The last row and column stand for no plane. Only planes count that are nominally near each other.
     """
+    passed = _passed(reach, size)
     table, facets = np.full((_plane_count(A) + 1, _plane_count(B) + 1), -1), list[tuple[int, int]]()
     planes_A, firsts_A = np.unique(A.facet_planes, return_index=True)
     planes_B, firsts_B = np.unique(B.facet_planes, return_index=True)
     cosines = A.normals[firsts_A] @ B.normals[firsts_B].T
     for i, j in np.argwhere(cosines < FACING):
         heights = (A.facets[A.facet_planes == planes_A[i]] - B.facets[firsts_B[j], 0]) @ B.normals[firsts_B[j]]
-        if (heights >= -travel).any() and (heights <= height + travel).any():
+        if heights.max() >= -passed and heights.min() <= reach.height:
             table[planes_A[i], planes_B[j]] = len(facets)
             facets.append((int(firsts_A[i]), int(firsts_B[j])))
     return table, np.array(facets, dtype=np.int64).reshape(-1, 2)
