@@ -6,6 +6,10 @@ the facet or on both edges, and while its normal fits between the facets around 
 
 Planes that face each other touch at the corners of their overlap. There the gap is measured along the normal of the reference
 plane, since the common normal of two rims leans without limit as they become parallel.
+
+A body that lies on another one with its end alone is nominally beyond that one's side, by as much as it overlaps. When it
+sinks in, its corners are behind that side, too, but have not come in through it: such places do not count where a corner
+beside them is held by another facet.
 """
 
 import itertools
@@ -118,11 +122,6 @@ class Meeting:
         return _meeting(self.moving, self.reference, self.reach._replace(travel=travel, tilt=tilt), self.size)
 
     @property
-    def passed(self) -> float:
-        """The nominal depth [mm] from which on a place is beyond a facet or an edge, as the body has come in elsewhere."""
-        return _passed(self.reach, self.size)
-
-    @property
     def turn(self) -> float:
         """The turn [rad] that moves the ends of the moving face about its middle as far as the body may travel."""
         return 2 * self.reach.travel / float(np.ptp(self.moving.vertices, axis=0).max())
@@ -199,7 +198,7 @@ class Meeting:
         )
         places_kernel.find(
             *self._bodies, self.candidates,
-            np.array([self.reach.depth, self.reach.height, self.passed]), kernel.MARGIN * self.size,
+            np.array([self.reach.depth, self.reach.height, _passed(self.reach, self.size)]), kernel.MARGIN * self.size,
             np.array([error, self.reach.depth, nearness]),
             np.ascontiguousarray(X_RM), retained, DIRECTIONS, *places,
         )  # fmt: skip
@@ -241,13 +240,15 @@ def _meeting(A: Polyhedron, B: Polyhedron, reach: Reach, size: float) -> Meeting
 
 
 def _passed(reach: Reach, size: float) -> float:
+    """Return the nominal depth [mm] beyond which a body has not come in through a facet, or across an edge."""
     return reach.overlap + kernel.MARGIN * size
 
 
 def _facing_planes(A: Polyhedron, B: Polyhedron, reach: Reach, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the numbers of facing planes in a table (plane of A + 1, plane of B + 1), -1 for others, and their facets (n, 2).
 
-    The last row and column stand for no plane. Only planes count that are nominally near each other.
+    The last row and column stand for no plane. Only planes count that are nominally near each other, and through which the
+    bodies may have come into each other: those of a short overlap's ends are beyond each other already.
     """
     passed = _passed(reach, size)
     table, facets = np.full((_plane_count(A) + 1, _plane_count(B) + 1), -1), list[tuple[int, int]]()
