@@ -92,8 +92,8 @@ def located(assembly, part, on=None):
     assembly.locate(part, [tc.Locator(f"L{k}", p, along, RANGE) for k, (p, along) in enumerate(feet)], on=on)
 
 
-def scene(seed):
-    """Return an assembly of two or three random bodies, and the pieces of each."""
+def scene(seed, whole=False):
+    """Return an assembly of two or three random bodies, whose faces, or whole surfaces, may touch; and the pieces of each."""
     rng = np.random.default_rng(seed)
     is_convex, count = seed % 2 == 0, 3 if seed % 5 == 0 else 2
     assembly = tc.Assembly(f"scene {seed}", method=METHOD)
@@ -104,8 +104,8 @@ def scene(seed):
         shift = np.array([0.0, 0.0, 0.0]) if k == 1 else np.array([6.0, -5.0, 0.0])
         part = assembly.part(f"body {k}", tc.Mesh(mesh), at=tuple(shift))
         located(assembly, part)
-        down = part.face(lambda c, n: n[:, 2] < -0.05)
-        assembly.contact(f"joint {k}", moving=down, reference=base.face(lambda c, n: n[:, 2] > 0.05), within=50)
+        down, up = () if whole else (lambda c, n: n[:, 2] < -0.05,), () if whole else (lambda c, n: n[:, 2] > 0.05,)
+        assembly.contact(f"joint {k}", moving=part.face(*down), reference=base.face(*up), within=50)
         assembly.measure(f"height {k}", part.point(0, 0, 0), along="z", tolerance=1)
         bodies.append([points + shift for points in pieces])
     return assembly, bodies
@@ -142,11 +142,12 @@ def main():
     parser.add_argument("--scenes", type=int, default=2000)
     parser.add_argument("--samples", type=int, default=10)
     parser.add_argument("--solver", default="daqp")
+    parser.add_argument("--whole", action="store_true", help="whole surfaces may touch")
     options = parser.parse_args()
     total: collections.Counter = collections.Counter()
     deepest, refused, start = 0.0, 0, time.perf_counter()
     for seed in range(options.first, options.first + options.scenes):
-        assembly, bodies = scene(seed)
+        assembly, bodies = scene(seed, options.whole)
         try:
             counts, depth = judged(assembly, bodies, options.samples, seed, options.solver)
         except tc.ModelError as error:

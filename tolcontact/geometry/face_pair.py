@@ -21,6 +21,7 @@ MAX_POINTS = 20_000
 MAX_HALVED = 20  # times the desired number of points: if halving long triangles gives more, points are drawn
 POSES_PER_BLOCK = 16
 MORE_POINTS = 8  # times as many points of a row are looked at next
+MIN_MEAN = 0.5  # length of the mean of normals: it is 1 of a plane, and 0 of a closed body
 THINNED = 32  # every 32nd point tells nearly always that faces penetrate each other
 
 
@@ -200,7 +201,10 @@ def body_face(face: Surface, body: trimesh.Trimesh, contacts: int) -> BodyFace:
 def _plane_of(face: Surface) -> tuple[np.ndarray, float] | None:
     normals = face.corner_normals.reshape(-1, 3)
     n = normals.mean(axis=0)
-    n /= np.linalg.norm(n)
+    length = np.linalg.norm(n)
+    if length < MIN_MEAN:
+        return None
+    n /= length
     return (n, float((face.mesh.vertices @ n).max())) if (normals @ n).min() > 1 - 1e-12 else None
 
 

@@ -43,6 +43,7 @@ class Body(NamedTuple):
     normals: np.ndarray
     inward: np.ndarray
     edges: np.ndarray
+    ends: np.ndarray
     into: np.ndarray
     edge_normals: np.ndarray
     triangles: np.ndarray

@@ -6,6 +6,10 @@ the facet or on both edges, and while its normal fits between the facets around 
 
 Planes that face each other touch at the corners of their overlap. There the gap is measured along the normal of the reference
 plane, since the common normal of two rims leans without limit as they become parallel.
+
+A body that lies on another one with its end alone is nominally beyond that one's side, by as much as it overlaps. When it
+sinks in, its corners are behind that side, too, but have not come in through it: such places do not count where a corner
+beside them is held by another facet.
 """
 
 import itertools
@@ -194,7 +198,7 @@ class Meeting:
         )
         places_kernel.find(
             *self._bodies, self.candidates,
-            np.array([self.reach.depth, self.reach.height]), kernel.MARGIN * self.size,
+            np.array([self.reach.depth, self.reach.height, _passed(self.reach, self.size)]), kernel.MARGIN * self.size,
             np.array([error, self.reach.depth, nearness]),
             np.ascontiguousarray(X_RM), retained, DIRECTIONS, *places,
         )  # fmt: skip
@@ -203,8 +207,8 @@ class Meeting:
 
 def _touching_parts(body: Polyhedron) -> kernel.Body:
     return kernel.Body(
-        body.vertices, body.cones, body.directions, body.facets, body.normals, body.inward, body.edges, body.into,
-        body.edge_normals, body.body,
+        body.vertices, body.cones, body.directions, body.facets, body.normals, body.inward, body.edges, body.ends,
+        body.into, body.edge_normals, body.body,
     )  # fmt: skip
 
 
@@ -222,7 +226,7 @@ def _meeting(A: Polyhedron, B: Polyhedron, reach: Reach, size: float) -> Meeting
     if comparisons > MAX_COMPARISONS:
         return None
     travel, leaning = reach.depth, reach.leaning
-    facing, facets = _facing_planes(A, B, travel, reach.clearance)
+    facing, facets = _facing_planes(A, B, reach, size)
     parts = [
         _on_facets(A, B, facing, travel, leaning, CORNER_ON_FACET),
         _on_facets(B, A, facing.T, travel, leaning, FACET_ON_CORNER),
@@ -235,18 +239,25 @@ def _meeting(A: Polyhedron, B: Polyhedron, reach: Reach, size: float) -> Meeting
     return Meeting(A, B, candidates, reach, size)
 
 
-def _facing_planes(A: Polyhedron, B: Polyhedron, travel: float, height: float) -> tuple[np.ndarray, np.ndarray]:
+def _passed(reach: Reach, size: float) -> float:
+    """Return the nominal depth [mm] beyond which a body has not come in through a facet, or across an edge."""
+    return reach.overlap + kernel.MARGIN * size
+
+
+def _facing_planes(A: Polyhedron, B: Polyhedron, reach: Reach, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the numbers of facing planes in a table (plane of A + 1, plane of B + 1), -1 for others, and their facets (n, 2).
 
-    The last row and column stand for no plane. Only planes count that are nominally near each other.
+    The last row and column stand for no plane. Only planes count that are nominally near each other, and through which the
+    bodies may have come into each other: those of a short overlap's ends are beyond each other already.
     """
+    passed = _passed(reach, size)
     table, facets = np.full((_plane_count(A) + 1, _plane_count(B) + 1), -1), list[tuple[int, int]]()
     planes_A, firsts_A = np.unique(A.facet_planes, return_index=True)
     planes_B, firsts_B = np.unique(B.facet_planes, return_index=True)
     cosines = A.normals[firsts_A] @ B.normals[firsts_B].T
     for i, j in np.argwhere(cosines < FACING):
         heights = (A.facets[A.facet_planes == planes_A[i]] - B.facets[firsts_B[j], 0]) @ B.normals[firsts_B[j]]
-        if (heights >= -travel).any() and (heights <= height + travel).any():
+        if heights.max() >= -passed and heights.min() <= reach.height:
             table[planes_A[i], planes_B[j]] = len(facets)
             facets.append((int(firsts_A[i]), int(firsts_B[j])))
     return table, np.array(facets, dtype=np.int64).reshape(-1, 2)

@@ -17,7 +17,19 @@ from tolcontact.geometry.kernel import (
     edge_on_edge,
     facet_on_corner,
 )
-from tolcontact.geometry.vector_kernel import cross, dot, first_from, is_within, minus, move, move_back, row, row_of, turn
+from tolcontact.geometry.vector_kernel import (
+    cross,
+    dot,
+    first_from,
+    is_within,
+    minus,
+    move,
+    move_back,
+    row,
+    row_of,
+    turn,
+    turn_back,
+)
 
 MAX_SHEAR = 1.8  # by which a corner's place beside a facet changes with its height, where planes face each other
 EVERYWHERE = (-np.inf, -np.inf, np.inf, np.inf)
@@ -84,6 +96,34 @@ def _keep_shallowest(candidates, touching, gaps):  # type: ignore[no-untyped-def
             if candidates.planes[best] < 0:
                 gaps[best] = np.inf
             best = s
+
+
+@uncounted
+def _drop_passed(A, B, candidates, passed, X, touching, gaps, all_places, is_held):  # type: ignore[no-untyped-def]
+    """Drop places that lie nominally deeper than `passed` [mm], where a corner beside them is held: there the body came in.
+
+    Beside a place are the corner itself, and the ends of both edges. `is_held` (corner,) is false before and after, of the
+    corners of the moving and then of the reference body.
+    """
+    places, feet, normals = all_places
+    count = A.vertices.shape[0]
+    for is_first in (True, False):
+        for s in touching:
+            is_edge = candidates.kinds[s] == EDGE_ON_EDGE
+            owner = candidates.firsts[s] if candidates.kinds[s] == CORNER_ON_FACET else count + candidates.seconds[s]
+            n, nominal = row(normals, s), minus(row(places, s), row(feet, s))
+            has_passed = max(dot(n, nominal), dot(turn_back(X, n), nominal)) < -passed  # whichever body the normal belongs to
+            if is_first and not is_edge and not has_passed and gaps[s] <= INSIDE:
+                is_held[owner] = True
+            elif not is_first and has_passed and candidates.planes[s] < 0 and gaps[s] < -INSIDE:
+                if is_edge:
+                    for end in range(2):
+                        is_at_A = is_held[A.ends[candidates.firsts[s], end]]
+                        if is_at_A or is_held[count + B.ends[candidates.seconds[s], end]]:
+                            gaps[s] = np.inf
+                elif is_held[owner]:
+                    gaps[s] = np.inf
+    is_held[:] = False
 
 
 @inlined_uncounted
@@ -159,7 +199,7 @@ def _range(A, candidates, s, moved, spare):  # type: ignore[no-untyped-def]
 
 
 @uncounted
-def _find_at(A, B, candidates, reach, margins, nearness, retained, X, moved, touching, gaps, all_places):  # type: ignore
+def _find_at(A, B, candidates, reach, margins, nearness, retained, X, moved, touching, is_held, gaps, all_places):  # type: ignore
     """Write gap, places and normal of the candidates that touch at one pose X_RM (12,); return how many there are.
 
     Of facing planes, candidates that are kept count a little beside their edges: there, near a corner of the overlap, the
@@ -171,6 +211,7 @@ def _find_at(A, B, candidates, reach, margins, nearness, retained, X, moved, tou
     moved         corners (v, 3), and starts and vectors of edges (e, 2, 3), of the moving body in the reference frame, and
                   corners of the reference body in the moving frame
     touching      (c,): numbers of the candidates that touch
+    is_held       (corner,), false: see _drop_passed
     gaps          (c,) [mm], infinite before
     all_places    places, feet, normals (3, c, 3): P^m, P^r, n^r of the paper
     """
@@ -190,6 +231,7 @@ def _find_at(A, B, candidates, reach, margins, nearness, retained, X, moved, tou
                 if gaps[s] < np.inf:
                     touching[count], count = s, count + 1
             s += 1
+    _drop_passed(A, B, candidates, reach[2], X, touching[:count], gaps, all_places, is_held)
     _keep_shallowest(candidates, touching[:count], gaps)
     strict = count
     for s in retained:
@@ -250,7 +292,7 @@ def _move(A, B, facing, X, corners, lines, back, sines):  # type: ignore[no-unty
 @uncounted
 def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, directions, results, scratch):  # type: ignore
     """Write what `find` writes, found = (labels, gaps, places, feet, normals)."""
-    corners, lines, back, margins, touching, is_chosen, all_gaps, all_places = scratch
+    corners, lines, back, margins, touching, is_held, is_chosen, all_gaps, all_places = scratch
     labels, gaps, places, feet, normals = results
     places_at, feet_at, normals_at = all_places
     count, room, facing = candidates.kinds.size, labels.shape[1], candidates.facing
@@ -261,7 +303,9 @@ def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, direc
         for j in range(facing.shape[0]):
             margins[j] = max(margin, min(error[0] / max(margins[j], TINY), error[1]))
         moved = (corners, lines, back)
-        number = _find_at(A, B, candidates, reach, margins, error[2], retained[k], X, moved, touching, all_gaps, all_places)
+        number = _find_at(
+            A, B, candidates, reach, margins, error[2], retained[k], X, moved, touching, is_held, all_gaps, all_places
+        )
         if count <= room:
             for p in range(room):
                 labels[k, p] = p if p < count else -1
@@ -286,7 +330,8 @@ def find(A, B, candidates, reach, margin, error, poses, retained, directions, la
 
     A, B          Body, the moving and the reference one
     candidates    Candidates
-    reach         (2,) [mm]: the largest depth, and the largest gap, that a place may have
+    reach         (3,) [mm]: the largest depth, and the largest gap, that a place may have; from which nominal depth on a body
+                  has come in elsewhere
     margin        [mm] by which places may lie beside edges
     error         (3,) [mm] that facing planes may make beside their edges, the margin in which they may make it, and how many
                   margins away from a place where they touch
@@ -297,7 +342,8 @@ def find(A, B, candidates, reach, margin, error, poses, retained, directions, la
     count = candidates.kinds.size
     scratch = (
         np.empty(A.vertices.shape), np.empty(A.edges.shape), np.empty(B.vertices.shape),
-        np.empty(candidates.facing.shape[0] + 1), np.empty(count, dtype=np.int64), np.zeros(count, dtype=np.bool_),
+        np.empty(candidates.facing.shape[0] + 1), np.empty(count, dtype=np.int64),
+        np.zeros(A.vertices.shape[0] + B.vertices.shape[0], dtype=np.bool_), np.zeros(count, dtype=np.bool_),
         np.full(count, np.inf), np.empty((3, count, 3)),
     )  # fmt: skip
     results = (labels, gaps, places, feet, normals)

@@ -26,6 +26,7 @@ class Polyhedron:
     normals      (t, 3): their outward unit normals
     inward       (t, 3, 3): unit vectors across each edge of a triangle, into it; edge j starts at corner j
     edges        (e, 2, 3): the edges of the face, between planes or at its rim
+    ends         (e, 2): the corners at which each edge starts and ends
     into         (e, 2, 3): unit vectors across each edge into the two facets of the body that meet there
     edge_normals (e, 2, 3): outward unit normals of these two facets
     convex       (e,): whether the body is convex there
@@ -41,6 +42,7 @@ class Polyhedron:
     normals: Float[Array, "t 3"]
     inward: Float[Array, "t 3 3"]
     edges: Float[Array, "e 2 3"]
+    ends: Int[Array, "e 2"]
     into: Float[Array, "e 2 3"]
     edge_normals: Float[Array, "e 2 3"]
     convex: Int[Array, " e"]
@@ -93,6 +95,7 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
         normals=facet_normals[chosen],
         inward=np.cross(facet_normals[chosen][:, None], sides),
         edges=np.stack([start, end], axis=1)[is_ours],
+        ends=np.searchsorted(corners, ends[is_ours]),
         into=into[is_ours],
         edge_normals=facet_normals[neighbours][is_ours],
         convex=is_convex[is_ours].astype(np.int64),
