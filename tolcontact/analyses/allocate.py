@@ -62,11 +62,10 @@ def allocate(
     resolved realization with all of them at either end. Each step replaces the margins of the requirements by functions of
     squared ranges with the same values and slopes, on the same draws; slopes follow from resolved realizations near the limits
     alone. SLSQP minimizes the cost within a region that shrinks when a step fails (a sequential separable approximation;
-    Svanberg, 1987). Steps to ranges with which more realizations do not assemble than may be outside fail, too.
-    If the fresh run misses a requirement, the search continues with a larger margin. Effects follow from samples / 4
-    realizations, or 4 samples / groups if that is less, but at least 512. `progress` is called with the number of realizations
-    simulated, and about that of all. Arguments that all analyses share, and what they raise, are described in
-    tolcontact.analyses. Raises OptionError also for a model in which no range varies.
+    Svanberg, 1987), also if more realizations then do not assemble than may be outside. If the fresh run misses a requirement,
+    the search continues with a larger margin. Effects follow from samples / 4 realizations, or 4 samples / groups if that is
+    less, but at least 512. `progress` is called with the number of realizations simulated, and about that of all. Arguments
+    that all analyses share, and what they raise, are in tolcontact.analyses. Raises OptionError also if no range varies.
     """
     check_grouping(by)
     analysis = Analysis(
