@@ -48,7 +48,8 @@ stop: capability leaves this side out, and the table says so. What varies by les
 Some estimates have no interval, "[-]" in tables: spreads of fewer than 10 realizations; skewness and kurtosis, unless there
 are 1000 realizations with a kurtosis below 3.5, since heavy tails show in few realizations; and Sobol' indices if fewer than
 100 realizations carry the variance, as of a measure that contact holds at a stop. A bound that is infinite needs more
-realizations. The lower bound of Ppk is finite with one limit from some 2730 realizations on, with two limits from some 3240 on.
+realizations. Fewer than some 2730 realizations with one limit, or 3240 with two limits, do not bound a tail, which may then be
+of any length: the lower bound of Ppk is 0, or below.
 
 `studies/verification` shows how often each interval covers the truth, for eight distributions and 100 to 10 000 realizations.
 Below 92.5 % are only these. A measure is at its stop in 93 % of realizations: the mean (86 % at 100 realizations, 91 % at

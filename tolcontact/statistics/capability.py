@@ -31,8 +31,6 @@ from tolcontact.statistics.sample import Sample
 from tolcontact.variation.sobol_points import scrambled_points
 
 PERCENTS = 0.135, 50.0, 99.865
-UNKNOWN_WORST = -math.inf  # an index of which the worst is sought, where nothing bounds a tail
-Percentile = np.ndarray | float
 TRIALS = 1 << 11  # simulated triples of percentiles, of which an interval covers 95 %
 
 
@@ -73,7 +71,7 @@ def by_percentiles(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
 
     The numbers of values below the three percentiles are multinomial for any distribution. Each percentile lies between the
     two order statistics next to its simulated number; the interval takes the one that is on the safe side, and leaves out
-    2.5 % of the simulated indices on either side. A sample that is too small to bound a tail has an infinite lower bound.
+    2.5 % of the simulated indices on either side. A sample that is too small to bound a tail has 0 as the lower bound.
     """
     if is_constant(x, limits.accuracy) or not np.isfinite(x.mean):
         return UNDEFINED, UNDEFINED
@@ -82,11 +80,11 @@ def by_percentiles(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
     lows, highs = _simulated_percentiles(x)
     pp, ppk = UNDEFINED, UNDEFINED
     if np.isfinite(limits.lower) and np.isfinite(limits.upper):
-        worst, best = _pp(lows[0], highs[2], limits, UNKNOWN_WORST), _pp(highs[0], lows[2], limits)
+        worst, best = _pp(lows[0], highs[2], limits), _pp(highs[0], lows[2], limits)
         pp = _with_interval(_pp(low, high, limits), worst, [best])
     if not limits.are_open:
         # Sides that are equally near must not make the least of them look worse: of the upper bounds of all, it is the least.
-        worst = np.stack([_sides(lows[0], middle, highs[2], limits, UNKNOWN_WORST) for middle in (lows[1], highs[1])])
+        worst = np.stack([_sides(lows[0], middle, highs[2], limits) for middle in (lows[1], highs[1])])
         best = np.stack([_sides(highs[0], middle, lows[2], limits) for middle in (lows[1], highs[1])])
         worst_of_all = np.fmin.reduce(worst, axis=(0, 1))
         ppk = _with_interval(np.min(_sides(low, median, high, limits)), worst_of_all, list(np.fmax.reduce(best, axis=0)))
@@ -116,26 +114,21 @@ def _side(x: Sample, index: float, sign: float) -> Estimate:
     return from_standardized_influence(x, index, [index / 2, -sign / 3, -index / 2])
 
 
-def _pp(low: Percentile, high: Percentile, limits: Limits, unknown: float = math.inf) -> np.ndarray:
-    """Return the index of both sides, which is `unknown` where a percentile is infinite."""
-    return _index(limits.upper - limits.lower, np.subtract(high, low), unknown)
-
-
-def _sides(
-    low: Percentile, median: Percentile, high: Percentile, limits: Limits, unknown: float = math.inf
-) -> list[np.ndarray]:
-    """Return the index of each side that has a limit, which is `unknown` where a percentile is infinite."""
-    lower, upper, _ = limits
-    sides = [
-        (lower, _index(np.subtract(median, lower), np.subtract(median, low), unknown)),
-        (upper, _index(np.subtract(upper, median), np.subtract(high, median), unknown)),
-    ]
-    return [index for limit, index in sides if np.isfinite(limit)]
-
-
-def _index(room: Percentile, width: Percentile, unknown: float) -> np.ndarray:
+def _pp(low: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(np.isfinite(width), np.divide(room, np.maximum(width, 0.0)), unknown)
+        return np.divide(limits.upper - limits.lower, np.maximum(np.subtract(high, low), 0.0))
+
+
+def _sides(low: np.ndarray | float, median: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> list[np.ndarray]:
+    """Return the index of each side that has a limit."""
+    lower, upper, _ = limits
+    upper_width, lower_width = np.maximum(np.subtract(high, median), 0.0), np.maximum(np.subtract(median, low), 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sides = [
+            (lower, np.divide(np.subtract(median, lower), lower_width)),
+            (upper, np.divide(np.subtract(upper, median), upper_width)),
+        ]
+    return [index for limit, index in sides if np.isfinite(limit)]
 
 
 def _with_interval(estimate: np.ndarray, worst: np.ndarray, best: Sequence[np.ndarray]) -> Estimate:
