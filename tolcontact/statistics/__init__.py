@@ -14,7 +14,7 @@
 >>> summary = tc.summarize(results)
 >>> spread = summary.statistic_value.sel(measure="height", state="corrected", statistic="6 sigma")
 >>> dict(zip(spread.interval.values.tolist(), spread.values.round(2).tolist()))
-{'estimate': 0.45, 'lower': 0.42, 'upper': 0.49}
+{'estimate': 0.45, 'lower': 0.42, 'upper': 0.48}
 
 ## Estimates
 
