@@ -30,10 +30,13 @@ def point_weights(P_m: Float[Array, "point 3"], distance: float, moving: Surface
     nearest, by the sum of (w - a)^2 / a, and none is less than a tenth of that. Few points may not allow all of this: then
     they have area and centre, or the area alone.
     """
-    elements = _elements(P_m, distance, moving, reference)
+    nearest = _elements(P_m, distance, moving, reference, None)
+    region = common_region(moving, reference) if is_flat(moving) and is_flat(reference) else None
+    # Areas of triangles that are cut along the reference face would depend on its tessellation; their moments do not.
+    elements = nearest if region is None else _elements(P_m, distance, moving, reference, region)
     if elements is None:
         return np.ones(len(P_m))
-    areas = _nearest_areas(P_m, elements)
+    areas = _nearest_areas(P_m, nearest or elements)
     # The middles of the edges of triangles integrate quadratic functions exactly.
     places = (elements.corners + np.roll(elements.corners, 1, axis=1)).reshape(-1, 3) / 2
     if moving.surfaces:
@@ -88,10 +91,14 @@ class _Elements(NamedTuple):
     size: float
 
 
-def _elements(P_m: np.ndarray, distance: float, moving: Surface, reference: Surface) -> _Elements | None:
-    """Return the elements of the part of the moving face that counts, in areas of 1 for each point; None without any."""
+def _elements(
+    P_m: np.ndarray, distance: float, moving: Surface, reference: Surface, region: np.ndarray | None
+) -> _Elements | None:
+    """Return the elements of the part of the moving face that counts, in areas of 1 for each point; None without any.
+
+    region   triangles (triangle, 3, 3) of the face over the reference face; without them each element is over it or not
+    """
     size = max(moving.mesh.area / min(ELEMENTS_PER_POINT * len(P_m), MAX_ELEMENTS), 0.0) ** 0.5
-    region = common_region(moving, reference) if is_flat(moving) and is_flat(reference) else None
     vertices, faces = np.asarray(moving.mesh.vertices), np.asarray(moving.mesh.faces)
     if region is not None:
         vertices, faces = region.reshape(-1, 3), np.arange(3 * len(region)).reshape(-1, 3)

@@ -13,15 +13,17 @@ OFF_POWER = 1.1  # keeps the sizes of usual faces off powers of 2, between which
 
 
 class FaceFrame(NamedTuple):
-    """A centre (3,) [mm], unit vectors (3, 3) in columns, and the size [mm] of the cells to which coordinates are rounded."""
+    """A centre (3,) [mm], unit vectors (3, 3) in columns, and the size [mm] of cells, to which coordinates may be rounded."""
 
     centre: np.ndarray
     axes: np.ndarray
     cell: float
+    rounds: bool = True
 
     def coordinates(self, points: np.ndarray) -> np.ndarray:
-        """Return the coordinates (point, 3) [cell] of points (point, 3) [mm], rounded so that no earlier rounding shows."""
-        return np.round((points - self.centre) @ self.axes / self.cell)
+        """Return the coordinates (point, 3) [cell] of points (point, 3) [mm], if rounded so that no earlier rounding shows."""
+        coordinates = (points - self.centre) @ self.axes / self.cell
+        return np.round(coordinates) if self.rounds else coordinates
 
     def subdivided(self, vertices: np.ndarray, faces: np.ndarray, max_edge: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return vertices (vertex, 3) [mm], faces (face, 3) with edges of at most `max_edge` [mm], and coordinates (vertex, 3).

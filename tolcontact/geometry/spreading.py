@@ -5,8 +5,10 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from tolcontact.geometry.edges import rim
-from tolcontact.geometry.face_frame import face_frame
+from tolcontact.geometry.face_frame import FaceFrame, face_frame
 
+PART_FRAME = FaceFrame(np.zeros(3), np.eye(3), 1.0, rounds=False)
+FLAT = 1e-6  # of unit normals, which differ by less
 CANDIDATES_PER_SPACING = 2.0
 MAX_CANDIDATES_PER_POINT = 50  # above which they are thinned out
 BLOCK_CANDIDATES = 512
@@ -17,11 +19,12 @@ def spread(surface: trimesh.Trimesh, count: int | None, spacing: float | None) -
     """Return points (point, 3) [mm] on `surface`, each as far as possible from the points before it.
 
     There are `count` points, or as many as bring every place within `spacing` [mm] of one. They begin with the corners of the
-    rim, where contact comes first, and follow in farthest-point order over a fine subdivision of the triangles. Distances are
-    compared in the surface's own frame, so that a surface that is turned keeps its points.
+    rim, where contact comes first, and follow in farthest-point order over a fine subdivision of the triangles. On a flat face
+    distances are compared in its own frame, so that a face that is turned keeps its points. On a curved one equal distances
+    differ by rounding: points in straight rows would let a shaft roll between them.
     """
     step = spacing if spacing is not None else float(np.sqrt(surface.area / count))  # type: ignore[operator]
-    frame = face_frame(surface)
+    frame = face_frame(surface) if _is_flat(surface) else PART_FRAME
     vertices, faces, candidates = frame.subdivided(surface.vertices, surface.faces, step / CANDIDATES_PER_SPACING)
     if len(candidates) > MAX_CANDIDATES_PER_POINT * max(surface.area / step**2, 1):
         thinned = _thinned(candidates, faces, step / (2 * CANDIDATES_PER_SPACING) / frame.cell)
@@ -37,6 +40,10 @@ def spread(surface: trimesh.Trimesh, count: int | None, spacing: float | None) -
         numbers = list(range(len(corners)))
     numbers = _farthest(candidates, numbers, count, None if spacing is None else spacing / frame.cell)
     return np.asarray(vertices)[numbers]
+
+
+def _is_flat(surface: trimesh.Trimesh) -> bool:
+    return bool(np.ptp(np.asarray(surface.face_normals), axis=0).max() < FLAT)
 
 
 def _farthest(candidates: np.ndarray, numbers: list[int], count: int | None, spacing: float | None) -> list[int]:

@@ -122,8 +122,8 @@ def _pp(low: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> np
 def _sides(low: np.ndarray | float, median: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> list[np.ndarray]:
     """Return the index of each side that has a limit."""
     lower, upper, _ = limits
-    upper_width, lower_width = np.maximum(np.subtract(high, median), 0.0), np.maximum(np.subtract(median, low), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
+        upper_width, lower_width = np.maximum(np.subtract(high, median), 0.0), np.maximum(np.subtract(median, low), 0.0)
         sides = [
             (lower, np.divide(np.subtract(median, lower), lower_width)),
             (upper, np.divide(np.subtract(upper, median), upper_width)),
