@@ -44,7 +44,8 @@ class ChangedRows:
         """
         factors = [np.exp(np.where(np.isin(np.arange(len(self.logs)), groups), changed_logs, self.logs)) for groups, _ in sets]
         rows_of_sets = [rows for _, rows in sets]
-        spreads = self.before.corrected.std(axis=0)[self.measures]
+        resolved = self.before.corrected[self.before.is_resolved][:, self.measures]
+        spreads = resolved.std(axis=0) if len(resolved) else np.zeros(len(self.measures))
         hits = []
         for rows, corrected in zip(rows_of_sets, self.trials.corrected_rows(factors, rows_of_sets), strict=True):
             changes = np.abs(corrected - self.before.corrected[rows])[:, self.measures]

@@ -59,8 +59,7 @@ class IdleSearch:
             while idle.any() and len(rows := self.changes.of_sets([(np.flatnonzero(idle), rows)], logs)[0].rows):
                 groups = np.flatnonzero(idle)
                 influential = [group for group, _ in self.changes.shared(groups, logs, rows[:MAX_HITS])]
-                idle[influential or groups] = (
-                    False  # groups that change realizations only together are influential, all of them
-                )
+                # Groups that change realizations only together are influential, all of them.
+                idle[influential or groups] = False
             start = stop
         return bool(idle.sum() < before)
