@@ -159,7 +159,7 @@ def test_surfaces_are_checked_between_contact_points(tmp_path):
         n = R[:, k] @ [sign * np.sqrt(0.5), 0, np.sqrt(0.5)]
         ends = [R[:, 2] @ [0, y, 10 * np.sqrt(2)] + t[:, 2] - t[:, k] for y in (-30, 30)]
         deep = 10 - np.min([(n * end).sum(axis=1) for end in ends], axis=0)
-        assert deep.min() > 0.004  # twenty times what triangles err by
+        assert deep.min() > 0.01
         assert np.abs(walls[:, k] - deep).max() < 2e-4  # of triangles, which lie 1e-4 mm inside the round shaft
     assert float(summary["surface_penetration"]) == walls.max() and int(summary["surfaces_checked"]) == 20
     assert np.abs(again["surface/surface_penetration"].values[:, :2] - walls).max() < 1e-6
