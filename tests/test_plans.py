@@ -59,6 +59,22 @@ THIRD = 2 / np.sqrt(2 * np.pi)  # E max(0, z)^3
 SKEW = (THIRD - 3 * MEAN * SECOND + 2 * MEAN**3) / SIGMA**3
 
 
+@pytest.mark.parametrize("name", STRATIFIED)
+@pytest.mark.parametrize("rest", [204, *nightly(1)])
+def test_intervals_with_an_incomplete_replicate_cover(name, rest):
+    """300 runs: errors over standard errors have Student's t distribution, whose spread is known to 15 % (99.9 %)."""
+    truths = {"mean": MEAN, "share": stats.norm.sf(1), "6 sigma": 6 * SIGMA}
+    errors = {word: [] for word in truths}
+    for seed in range(300):
+        values = clipped(name, seed, 16 * REPLICATE + rest)
+        x = Sample(lambda values=values: [values[:3000], values[3000:]], REPLICATE)
+        share = intervals.proportion(x.map(lambda piece: piece > 1))
+        for word, own in zip(truths, (intervals.mean(x), share, intervals.standard_deviation(x, times=6)), strict=True):
+            errors[word].append((own.value - truths[word]) / (own.upper - own.lower) * 2 * intervals.student(15))
+    for word, of_runs in errors.items():
+        assert np.sqrt(np.mean(np.square(of_runs))) == pytest.approx(np.sqrt(15 / 13), rel=0.15), word
+
+
 @pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [STRATIFIED[0], *nightly(*STRATIFIED[1:])])

@@ -16,6 +16,7 @@ DIGIT = 16  # bits
 COUNTED_DIGITS = 2
 MAX_PREFIXES = 16  # that are counted in one pass, in 25 MB
 MIN_REPLICATES = 16
+ROUNDING = 1e-20  # of the variance of realizations: less between replicates is none
 STANDARDIZED_MOMENTS = 17  # the fourth powers of influences on the fourth moment, and the zeroth
 
 
@@ -47,22 +48,26 @@ class Sample:
         """The factor by which the interval of a mean of independent realizations must be widened; below 1 it is narrowed.
 
         The factor is the root of the design effect (Kish, 1965), the variance of the means of replicates over the variance of
-        means of independent realizations, with Student's t for the number of replicates. It is 1 with fewer than
+        means of independent realizations, with Student's t for the number of replicates. The last replicate may be incomplete.
+        Its sum varies as that of equally many realizations at the start of the others. The factor is 1 with fewer than
         MIN_REPLICATES replicates, whose spread is too uncertain.
         """
         if self.replicate == 1:
             return 1.0
-        replicates = self.count // self.replicate
+        replicates, rest = divmod(self.count, self.replicate)
         if replicates < MIN_REPLICATES or not self.moments[0] > 0:
             return 1.0
-        sums, start = np.zeros(replicates), 0
+        sums, start = np.zeros((2, replicates)), 0  # of all realizations of a replicate, and of as many as the last one has
         for piece in self.pieces():
-            numbers = (start + np.arange(len(piece))) // self.replicate
-            sums += np.bincount(numbers, piece - self.mean, minlength=replicates)[:replicates]
+            numbers, places = np.divmod(start + np.arange(len(piece)), self.replicate)
+            for k, counts in enumerate((places >= 0, places < rest)):
+                sums[k] += np.bincount(numbers, (piece - self.mean) * counts, minlength=replicates)[:replicates]
             start += len(piece)
-        variance = (sums / self.replicate).var(ddof=1)
+        variance = float(np.dot((replicates, 1), sums.var(axis=1, ddof=1))) / self.count
+        if variance < ROUNDING * self.moments[0]:
+            return 0.0
         student_over_normal = float(special.stdtrit(replicates - 1, 0.975) / special.ndtri(0.975))
-        return float(student_over_normal * np.sqrt(variance * self.replicate / self.moments[0]))
+        return student_over_normal * float(np.sqrt(variance / self.moments[0]))
 
     @cached_property
     def count(self) -> int:

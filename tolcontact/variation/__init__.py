@@ -102,8 +102,9 @@ True
 "latin hypercube", or "sobol". The latter two draw replicates of 256 realizations that fill the ranges of all contributors
 evenly. A measure that is nearly a sum of contributors then has a mean and a spread with less error for the same number of
 realizations. Replicates are independent of each other, so from 16 replicates on (4096 realizations) intervals follow from the
-differences between them. The intervals of Ppk by percentiles, of displacement fields and of contact statistics remain those of
-independent realizations, which are wider. No plan improves estimates of tails much.
+differences between them. They are narrowest for multiples of 256: a last, incomplete replicate fills no range evenly, and may
+vary more than all others together. The intervals of Ppk by percentiles, of displacement fields and of contact statistics remain
+those of independent realizations, which are wider. No plan improves estimates of tails much.
 
 >>> plain, even = (tc.summarize(tc.run(model, samples=4096, plan=plan)) for plan in ("monte-carlo", "sobol"))
 >>> means = [run.statistic_value.sel(state="raw", statistic="mean", measure="height") for run in (plain, even)]

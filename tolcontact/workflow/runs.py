@@ -48,7 +48,8 @@ def run(
     `fields` is the number of realizations that the magnitudes of displacement fields cover, starting from the first: a number,
     "all", "none", or "some" (16 384, or fewer where a part has many vertices). The components x, y, z are always exact.
     `plan` is the sampling plan: "monte-carlo", "latin hypercube" or "sobol" (see tolcontact.variation). The latter two draw
-    replicates of 256 realizations; from 16 replicates on, intervals come from the replicates and are narrower.
+    replicates of 256 realizations; from 16 replicates on, intervals come from the replicates and are narrower, most of all
+    with a multiple of 256 `samples`.
     `until` states how narrow the 95 % interval of a corrected measure must become, for example "corner height: 6 sigma +-1 %",
     "gap: mean +-0.001" or "gap: ppm +-20 %". The run then starts with `samples` realizations and adds more until it is. If that
     takes too many, it stops, and a warning is logged.
