@@ -100,6 +100,7 @@ def test_the_share_that_does_not_fit_is_that_of_the_closed_form(into, width):
     room = 0.5 if into else 1.0
     a = bolted([(0, 0)], into=into, position=(width, width), is_cover_fixed=not into)
     if into:
+        a = a.replaced(locations=[location for location in a.locations if location.part is not a.parts[1]])
         a.locate(a.parts[1], held())
     results = run(a, samples=1500)
     off = np.linalg.norm(shifts(results, "base", 1) - shifts(results, "cover", 1), axis=2)[:, 0]
@@ -150,7 +151,7 @@ def test_two_bolts_let_a_cover_turn_and_shift(into, room):
 def test_four_fasteners_go_in_if_a_linear_program_finds_a_place_for_the_cover(into):
     """Shift and turn of the cover, to first order, so that each pair of holes is off by no more than its clearances."""
     shank = 10.0 if into else tc.Size(10, 0.0, -0.1)
-    a = bolted(FOUR, into=into, position=(1.3, 1.3) if into else (2.6, 2.6), size=0.1, shank=shank)
+    a = bolted(FOUR, into=into, position=(1.3, 1.3) if into else (3.0, 3.0), size=0.1, shank=shank)
     results = run(a, samples=200 if into else 40)
     off = shifts(results, "cover", 4) - shifts(results, "base", 4)
     room = 0.5 + grown(results, "cover", 4) / 2

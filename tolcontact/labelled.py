@@ -11,11 +11,8 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar, Union
 import numpy as np
 
 if TYPE_CHECKING:
-    import xarray as xr
+    import xarray
 
-Rows = Union["Table", "xr.Dataset"]
-Results = Union["Group", "xr.DataTree"]
-RowsOf = TypeVar("RowsOf", "Table", "xr.Dataset", "Table | xr.Dataset")
 Index = int | range | list[int]  # of one dimension
 
 
@@ -208,3 +205,9 @@ def _key(index: int | range) -> int | slice:
     if isinstance(index, int):
         return index
     return slice(index.start, index.stop, index.step)
+
+
+# Documentation resolves these names wherever they are used: they are classes, or begin with a module.
+Rows = Union[Table, "xarray.Dataset"]
+Results = Union[Group, "xarray.DataTree"]
+RowsOf = TypeVar("RowsOf", Table, "xarray.Dataset", "Table | xarray.Dataset")

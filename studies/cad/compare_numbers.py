@@ -58,7 +58,7 @@ def main() -> None:
                 own = np.array([*surface.axis, surface.axis @ surface.origin])
                 off = min(np.abs((stated - sign * own) * [FAR, FAR, FAR, 1]).max(axis=1).min() for sign in (1, -1))
                 planes, worst[0] = planes + 1, max(worst[0], (off, name))
-            elif surface.kind == "cylinder":
+            elif surface.kind == "cylinder" and radii.size:  # of splines no radius is stated
                 cylinders, worst[1] = cylinders + 1, max(worst[1], (np.abs(radii - surface.radius).min(), name))
     print(f"{files} files")
     print(f"{planes} planes: within {worst[0][0]:.2g} mm (normals at {FAR:g} mm) of the text; {worst[0][1]}")
