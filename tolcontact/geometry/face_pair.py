@@ -219,8 +219,13 @@ def _spread(mesh: trimesh.Trimesh, step: float, count: int) -> np.ndarray:
     if (4.0 ** np.ceil(np.log2(np.maximum(longest / step, 1)))).sum() <= MAX_HALVED * count:
         return subdivided(vertices, mesh.faces, step)[0]
     inside, _ = trimesh.sample.sample_surface(mesh, count, seed=0)
-    along_rim = [
-        np.linspace(start, end, int(np.ceil(np.linalg.norm(end - start) / step)) + 1)
-        for start, end in vertices[rim(mesh.faces)]
-    ]
-    return np.concatenate([vertices, inside, *along_rim])
+    return np.concatenate([vertices, inside, _along(vertices[rim(mesh.faces)], step)])
+
+
+def _along(edges: np.ndarray, step: float) -> np.ndarray:
+    """Return points (point, 3) at most a `step` [mm] apart on edges (edge, end, 3), their ends among them."""
+    vectors = edges[:, 1] - edges[:, 0]
+    parts = np.ceil(np.linalg.norm(vectors, axis=1) / step).astype(int)
+    edge = np.repeat(np.arange(len(edges)), parts)
+    share = (np.arange(len(edge)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[edge]
+    return np.concatenate([edges[edge, 0] + share[:, None] * vectors[edge], edges[:, 1]])
