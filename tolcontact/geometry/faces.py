@@ -260,9 +260,9 @@ def _near_pieces(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return where the pieces of a mesh come close to a target: their triangle, and the nearest triangle of the target.
 
-    Pieces are parts of triangles whose centres lie `within` [mm] of the target. Triangles are cut step by step, and what lies
-    too far away is left out after each step; so are pieces that none of the triangles of the target that `is_open` (triangle,)
-    marks is near and faces.
+    Pieces are parts of triangles whose centres lie `within` [mm] of the target. Triangles are cut step by step. Before each
+    step, pieces are left out that lie too far away, or face no near triangle of the target among those that `is_open`
+    (triangle,) marks.
     """
     finest, surface = max(within, sampled.scale / NEAR_DIVISIONS), Surface(target)
     # What lies outside of this box is too far away.

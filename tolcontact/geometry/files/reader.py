@@ -21,7 +21,7 @@ from tolcontact.child import STALL_FACTOR, processor_time
 from tolcontact.errors import GeometryFault, clipped
 
 MAX_START_SECONDS = 30.0  # until the worker has loaded its libraries
-POLL_SECONDS = 0.02  # between two looks for a file of the worker
+POLL_SECONDS = 0.005  # between two looks for a file of the worker
 
 
 class UnfinishedRead(GeometryFault):
