@@ -17,6 +17,7 @@ import tolcontact as tc
 from tests.helpers import finish, run, script, start
 from tests.shapes import BLOCK, refusal
 from tests.step_files import Step, step_block
+from tolcontact import shape_worker
 from tolcontact.discretization import discretize
 from tolcontact.geometry.files import ReadingLimits, read_files
 from tolcontact.geometry.shapes import shape
@@ -125,6 +126,44 @@ def test_the_reader_ends_with_an_interrupted_process(tmp_path):
     finally:
         process.kill()
         process.wait()
+
+
+@pytest.fixture
+def early_process(tmp_path):
+    """A process that was started before its files are known, by a model that names one of them."""
+    (tmp_path / "model.py").write_text('part = tc.Mesh("block.step")')
+    process = shape_worker.start_early(["--samples", "20", str(tmp_path / "model.py")])
+    yield process
+    shape_worker.end_unused()
+    process.wait()
+
+
+def test_the_process_that_was_started_early_reads_the_files(tmp_path, early_process, monkeypatch):
+    monkeypatch.setattr(subprocess, "Popen", None)
+    (tmp_path / "block.step").write_text(step_block())
+    (tmp_path / "rotten.step").write_text(step_block().replace("VERTEX_POINT", "VERTEX_PINT"))
+    block, rotten = read_files([tc.Mesh(tmp_path / name) for name in ("block.step", "rotten.step")]).values()
+    assert len(block.arrays["faces"]) == 12 and "rotten.step" in str(rotten)
+    assert early_process.poll() is not None
+
+
+def test_a_new_process_reads_the_files_if_the_early_one_is_gone(tmp_path, early_process):
+    early_process.kill()
+    early_process.wait()
+    (tmp_path / "block.step").write_text(step_block())
+    assert shape(tc.Mesh(tmp_path / "block.step")).mesh.is_watertight
+
+
+def test_a_process_that_nobody_needs_ends_with_its_parent(early_process):
+    with early_process.stdin:
+        pass
+    assert early_process.wait(timeout=60) == 0
+
+
+@pytest.mark.parametrize("text", ["tc.Box(1, 1, 1)", "step = 1; step.stp", "# see block.step for its shape"])
+def test_no_process_is_started_for_models_without_step_files(tmp_path, text):
+    (tmp_path / "model.py").write_text(text)
+    assert shape_worker.start_early([str(tmp_path / "model.py"), str(tmp_path / "none.step"), "run.nc", "\0"]) is None
 
 
 def children(pid):

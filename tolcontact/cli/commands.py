@@ -5,7 +5,7 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from tolcontact import cli, interrupts
+from tolcontact import cli, interrupts, shape_worker
 from tolcontact.cli.quick_imports import quick_imports
 
 # The module of each command in this folder, and the line that describes the command in the list of commands.
@@ -72,6 +72,7 @@ class Commands(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         name, command, rest = super().resolve_command(ctx, args)
+        shape_worker.start_early(rest)
         return name, command and declared_command(str(name)), rest
 
     def invoke(self, ctx: Any) -> Any:
@@ -80,6 +81,8 @@ class Commands(TyperGroup):
                 return super().invoke(ctx)
         except KeyboardInterrupt:
             interrupts.end("stopped")
+        finally:
+            shape_worker.end_unused()
 
 
 def declared_command(name: str) -> Any:

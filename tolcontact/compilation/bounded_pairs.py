@@ -1,6 +1,7 @@
 """Which pairs need contact of bodies as they end: a trial at raw poses, pair by pair, when the model is compiled."""
 
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ FACET_FACTOR = 4  # times the distance of triangles from the analytic surfaces f
 COARSE_SHARE = 1 / 20  # of the smallest tolerance range: where triangles are off by more, they are the body
 TRAVEL_FACTOR = 2  # times the largest travel of the trial: how far places are looked for
 POSES_AT_ONCE = 64
+THREADS = 2  # that compare poses: the search for places releases the interpreter
 MIN_TRAVEL_SHARE = 1e-6  # of the size of the face
 
 
@@ -118,15 +120,17 @@ def _error_of_planes(
     """Return the largest error [mm] of the fixed planes of a pair in the depth of contact, and the largest number of places."""
     fixed = pair.least_gap(X_RM, deviations)
     room = max(room, float(np.ptp(fixed)))  # rarer poses than those of the trial may be as much deeper
-    error, most = 0.0, 0
-    for k in range(0, len(X_RM), POSES_AT_ONCE):
-        rows = slice(k, k + POSES_AT_ONCE)
+
+    def judged(rows: slice) -> tuple[float, int]:
         gaps = raised_places(pair, places, X_RM[rows], deviations[rows]).gaps
-        most = max(most, int(np.isfinite(gaps).sum(axis=1).max()))
         bounded = gaps.min(axis=1, initial=np.inf)
         differences = np.minimum(bounded, room) - np.minimum(fixed[rows], room)
-        error = max(error, float(np.abs(differences).max(initial=0)))
-    return error, most
+        return float(np.abs(differences).max(initial=0)), int(np.isfinite(gaps).sum(axis=1).max())
+
+    blocks = [slice(k, k + POSES_AT_ONCE) for k in range(0, len(X_RM), POSES_AT_ONCE)]
+    with ThreadPoolExecutor(THREADS) as pool:
+        errors, counts = zip((0.0, 0), *pool.map(judged, blocks), strict=True)
+    return max(errors), max(counts)
 
 
 def _travel(pair: ContactPoints, X_RM: np.ndarray) -> float:

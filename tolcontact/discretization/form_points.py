@@ -11,6 +11,7 @@ from tolcontact.features import FaceDeviation
 from tolcontact.geometry.analytic_surfaces import Cylinder
 from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.overlap import rim_points
+from tolcontact.geometry.subdivision import subdivided
 from tolcontact.geometry.surface import RIM_TOLERANCE, Surface
 
 FACING = -0.99999  # cosine of the angle between the normals of planes that face each other
@@ -75,7 +76,7 @@ def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[Face
 def check_resolved(points: np.ndarray, face: trimesh.Trimesh, lengths: Sequence[float]) -> None:
     """Raise GeometryFault if points (point, 3) of a face are too far apart for the form of a pair."""
     length = min(lengths)
-    places = trimesh.remesh.subdivide_to_size(face.vertices, face.faces, max_edge=length / EDGES, max_iter=30)[0]
+    places = subdivided(face.vertices, face.faces, length / EDGES)[0]
     spacing = float(KDTree(points).query(places)[0].max()) / COVER_SHARE
     if spacing > MAX_SPACING_SHARE * length:
         raise GeometryFault(

@@ -30,17 +30,17 @@ def point_weights(P_m: Float[Array, "point 3"], distance: float, moving: Surface
     nearest, by the sum of (w - a)^2 / a, and none is less than a tenth of that. Few points may not allow all of this: then
     they have area and centre, or the area alone.
     """
-    nearest = _elements(P_m, distance, moving, reference, None)
+    nearest = _elements(P_m, distance, moving, reference)
     region = common_region(moving, reference) if is_flat(moving) and is_flat(reference) else None
     # Areas of triangles that are cut along the reference face would depend on its tessellation; their moments do not.
-    elements = nearest if region is None else _elements(P_m, distance, moving, reference, region)
+    elements = nearest if region is None else _elements(P_m, distance, moving, reference, region, is_fine=nearest is None)
     if elements is None:
         return np.ones(len(P_m))
     areas = _nearest_areas(P_m, nearest or elements)
     # The middles of the edges of triangles integrate quadratic functions exactly.
     places = (elements.corners + np.roll(elements.corners, 1, axis=1)).reshape(-1, 3) / 2
     if moving.surfaces:
-        places = moving.project(places)[0]
+        places, _ = moving.feet(places)
     shares = np.repeat(elements.areas / 3, 3)
     centre = shares @ places / shares.sum()
     size = np.sqrt(shares @ ((places - centre) ** 2).sum(axis=1) / shares.sum())
@@ -83,20 +83,26 @@ def _with_moments(areas: np.ndarray, functions: np.ndarray, moments: np.ndarray)
 
 
 class _Elements(NamedTuple):
-    """Small triangles of a face: corners (element, 3, 3), middles (element, 3), and areas (element,), whose sum is given."""
+    """Triangles of a face: corners (element, 3, 3), and areas (element,), whose sum is given."""
 
     corners: np.ndarray
-    middles: np.ndarray
     areas: np.ndarray
     size: float
 
 
 def _elements(
-    P_m: np.ndarray, distance: float, moving: Surface, reference: Surface, region: np.ndarray | None
+    P_m: np.ndarray,
+    distance: float,
+    moving: Surface,
+    reference: Surface,
+    region: np.ndarray | None = None,
+    *,
+    is_fine: bool = True,
 ) -> _Elements | None:
     """Return the elements of the part of the moving face that counts, in areas of 1 for each point; None without any.
 
-    region   triangles (triangle, 3, 3) of the face over the reference face; without them each element is over it or not
+    region    triangles (triangle, 3, 3) of the face over the reference face; without them each element is over it or not
+    is_fine   whether elements are small also where all of a region counts
     """
     size = max(moving.mesh.area / min(ELEMENTS_PER_POINT * len(P_m), MAX_ELEMENTS), 0.0) ** 0.5
     vertices, faces = np.asarray(moving.mesh.vertices), np.asarray(moving.mesh.faces)
@@ -104,20 +110,29 @@ def _elements(
         vertices, faces = region.reshape(-1, 3), np.arange(3 * len(region)).reshape(-1, 3)
     if not len(faces):
         return None
-    vertices, faces, _ = face_frame(moving.mesh).subdivided(vertices, faces, EDGE * size)
     corners = vertices[faces]
-    middles = corners.mean(axis=1)
+    if is_fine or not _is_within(corners.reshape(-1, 3), reference, distance + size):
+        vertices, faces, _ = face_frame(moving.mesh).subdivided(vertices, faces, EDGE * size)
+        corners = vertices[faces]
+        middles = corners.mean(axis=1)
+        feet, is_over = reference.feet(middles)
+        corners = corners[(is_over | (region is not None)) & (np.linalg.norm(middles - feet, axis=1) <= distance + size)]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    feet, _, is_over = reference.project(middles)
-    counts = (is_over | (region is not None)) & (np.linalg.norm(middles - feet, axis=1) <= distance + size)
-    if not areas[counts].sum() > 0:
+    if not areas.sum() > 0:
         return None
-    return _Elements(corners[counts], middles[counts], areas[counts] / areas[counts].sum() * len(P_m), size)
+    return _Elements(corners, areas / areas.sum() * len(P_m), size)
+
+
+def _is_within(points: np.ndarray, reference: Surface, distance: float) -> bool:
+    """Return whether all places between points (point, 3) over a flat reference face are within a distance [mm] of it."""
+    n = reference.corner_normals.reshape(-1, 3).mean(axis=0)
+    heights, levels = points @ n, np.asarray(reference.mesh.vertices) @ n
+    return bool(max(heights.max() - levels.min(), levels.max() - heights.min()) <= distance * np.linalg.norm(n))
 
 
 def _nearest_areas(P_m: np.ndarray, elements: _Elements) -> np.ndarray:
     """Return the area (point,) that is nearest to each point."""
-    distances, nearest = KDTree(P_m).query(elements.middles, k=np.arange(1, min(len(P_m), NEIGHBOURS) + 1))
+    distances, nearest = KDTree(P_m).query(elements.corners.mean(axis=1), k=np.arange(1, min(len(P_m), NEIGHBOURS) + 1))
     # What is equally near to several points is shared, so that rounding in another frame changes nothing.
     ties = distances <= distances[:, :1] + TIE * elements.size
     shares = ties * (elements.areas / ties.sum(axis=1))[:, None]

@@ -3,6 +3,7 @@
 import numpy as np
 import trimesh
 
+from tolcontact.geometry.boxes import overlaps
 from tolcontact.geometry.surface import Surface
 
 MAX_PAIRS = 1_000_000  # of triangles that may overlap
@@ -41,8 +42,7 @@ def _overlapping(corners: np.ndarray, target_corners: np.ndarray) -> tuple[np.nd
     for first in range(0, len(corners), BLOCK_TRIANGLES):
         block = corners[first : first + BLOCK_TRIANGLES]
         near = np.flatnonzero(((lower <= block.max(axis=(0, 1))) & (upper >= block.min(axis=(0, 1)))).all(axis=1))
-        is_below, is_above = block.min(axis=1)[:, None] <= upper[near], block.max(axis=1)[:, None] >= lower[near]
-        row, column = np.nonzero((is_below & is_above).all(axis=2))
+        row, column = np.nonzero(overlaps(block.min(axis=1), block.max(axis=1), lower[near], upper[near]))
         rows.append(row + first)
         columns.append(near[column])
         count += len(row)

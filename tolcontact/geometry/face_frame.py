@@ -6,6 +6,7 @@ import numpy as np
 import trimesh
 
 from tolcontact.geometry.edges import rim
+from tolcontact.geometry.subdivision import subdivided
 
 TIE = 1e-6  # of lengths that are equal but for rounding
 CELLS = 2.0**30  # in a length of about the face's size: coordinates are whole numbers of cells
@@ -31,8 +32,8 @@ class FaceFrame(NamedTuple):
         The coordinates [cell] alone decide which edges are halved.
         """
         rows = np.hstack([self.coordinates(vertices), vertices])
-        rows, faces = trimesh.remesh.subdivide_to_size(rows, faces, max_edge=max_edge / self.cell, max_iter=30)[:2]
-        return np.ascontiguousarray(rows[:, 3:]), np.asarray(faces), np.ascontiguousarray(rows[:, :3])
+        rows, faces, _ = subdivided(rows, faces, max_edge / self.cell)
+        return np.ascontiguousarray(rows[:, 3:]), faces, np.ascontiguousarray(rows[:, :3])
 
 
 def face_frame(mesh: trimesh.Trimesh) -> FaceFrame:

@@ -12,6 +12,7 @@ from tolcontact import poses as pose
 from tolcontact.geometry.curvature import chord_height
 from tolcontact.geometry.edges import rim
 from tolcontact.geometry.spreading import distinct
+from tolcontact.geometry.subdivision import subdivided
 from tolcontact.geometry.surface import Piece, Surface
 from tolcontact.vocabulary import ROUNDED
 
@@ -216,10 +217,15 @@ def _spread(mesh: trimesh.Trimesh, step: float, count: int) -> np.ndarray:
     vertices, corners = np.asarray(mesh.vertices), np.asarray(mesh.triangles)
     longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
     if (4.0 ** np.ceil(np.log2(np.maximum(longest / step, 1)))).sum() <= MAX_HALVED * count:
-        return trimesh.remesh.subdivide_to_size(vertices, mesh.faces, max_edge=step, max_iter=30)[0]
+        return subdivided(vertices, mesh.faces, step)[0]
     inside, _ = trimesh.sample.sample_surface(mesh, count, seed=0)
-    along_rim = [
-        np.linspace(start, end, int(np.ceil(np.linalg.norm(end - start) / step)) + 1)
-        for start, end in vertices[rim(mesh.faces)]
-    ]
-    return np.concatenate([vertices, inside, *along_rim])
+    return np.concatenate([vertices, inside, _along(vertices[rim(mesh.faces)], step)])
+
+
+def _along(edges: np.ndarray, step: float) -> np.ndarray:
+    """Return points (point, 3) at most a `step` [mm] apart on edges (edge, end, 3), their ends among them."""
+    vectors = edges[:, 1] - edges[:, 0]
+    parts = np.ceil(np.linalg.norm(vectors, axis=1) / step).astype(int)
+    edge = np.repeat(np.arange(len(edges)), parts)
+    share = (np.arange(len(edge)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[edge]
+    return np.concatenate([edges[edge, 0] + share[:, None] * vectors[edge], edges[:, 1]])

@@ -13,10 +13,12 @@ from tolcontact.declaration import Brep, Cylinder, Face, Facing, Inside, Largest
 from tolcontact.declaration.selection import FACE_ANGLE
 from tolcontact.declaration.values import Vector
 from tolcontact.errors import GeometryFault, shown
+from tolcontact.geometry.boxes import overlaps
 from tolcontact.geometry.brep_face import describe_faces, faces_at, number_faces
 from tolcontact.geometry.face_groups import group_lines
 from tolcontact.geometry.face_in_file import FaceInFile
 from tolcontact.geometry.files import BREP, FACE_NAMES, SURFACES
+from tolcontact.geometry.subdivision import subdivided
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.surface_recognition import analytic_surfaces
 
@@ -27,6 +29,7 @@ FLAT_ANGLE = 2e-4  # rad: between neighbouring triangles of one flat face, after
 RADIUS_TOLERANCE = 1e-6  # of a radius: radii that differ by less are equal
 MAX_LISTED = 12  # faces in a message
 OPPOSING_COSINE = -0.5  # between the outward normals of two surfaces that face each other
+MAX_COMPARISONS = 4_000_000  # of pieces with triangles: looking for the nearest ones takes less time than more
 CUT_MARGIN = 1e-9  # of the part's size: what lies in a side of a box is inside
 
 Meshes = Mapping[Part, trimesh.Trimesh]
@@ -235,23 +238,31 @@ def _by_nearness(face: Face, meshes: Meshes, selection: Near) -> np.ndarray:
 
 def _near_mask(mesh: trimesh.Trimesh, neighbour: trimesh.Trimesh, within: float) -> np.ndarray:
     mask = np.zeros(len(mesh.faces), dtype=bool)
-    # Both are sampled, since either part may be small beside the other.
-    for sampled, target in ((mesh, neighbour), (neighbour, mesh)):
-        origin, hit = _near_pieces(sampled, target, within)
-        normals, target_normals = np.asarray(sampled.face_normals)[origin], np.asarray(target.face_normals)[hit]
-        is_opposing = (normals * target_normals).sum(axis=1) < OPPOSING_COSINE
-        mask[(origin if sampled is mesh else hit)[is_opposing]] = True
     # A flat face is chosen as a whole, however it is cut into triangles.
     flat = np.asarray(mesh.face_adjacency)[np.asarray(mesh.face_adjacency_angles) < FLAT_ANGLE]
     face_of = trimesh.graph.connected_component_labels(flat, node_count=len(mesh.faces))
-    return np.isin(face_of, face_of[mask])
+    # Both are sampled, since either part may be small beside the other.
+    for sampled, target in ((mesh, neighbour), (neighbour, mesh)):
+        origin, hit = _near_pieces(sampled, target, within, ~mask if target is mesh else np.ones(len(target.faces), dtype=bool))
+        mask[(origin if sampled is mesh else hit)[_are_opposing(sampled, origin, target, hit)]] = True
+        mask = np.isin(face_of, face_of[mask])
+    return mask
 
 
-def _near_pieces(sampled: trimesh.Trimesh, target: trimesh.Trimesh, within: float) -> tuple[np.ndarray, np.ndarray]:
+def _are_opposing(mesh: trimesh.Trimesh, triangles: np.ndarray, target: trimesh.Trimesh, facing: np.ndarray) -> np.ndarray:
+    """Return a mask (pair,) of triangles (pair,) of a mesh, and of a target, whose outward normals are opposite."""
+    normals, target_normals = np.asarray(mesh.face_normals)[triangles], np.asarray(target.face_normals)[facing]
+    return np.asarray((normals * target_normals).sum(axis=1) < OPPOSING_COSINE)
+
+
+def _near_pieces(
+    sampled: trimesh.Trimesh, target: trimesh.Trimesh, within: float, is_open: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return where the pieces of a mesh come close to a target: their triangle, and the nearest triangle of the target.
 
-    Pieces are parts of triangles whose centres lie `within` [mm] of the target. Triangles are cut step by step, and what lies
-    too far away is left out after each step.
+    Pieces are parts of triangles whose centres lie `within` [mm] of the target. Triangles are cut step by step. Before each
+    step, pieces are left out that lie too far away, or face no near triangle of the target among those that `is_open`
+    (triangle,) marks.
     """
     finest, surface = max(within, sampled.scale / NEAR_DIVISIONS), Surface(target)
     # What lies outside of this box is too far away.
@@ -259,10 +270,13 @@ def _near_pieces(sampled: trimesh.Trimesh, target: trimesh.Trimesh, within: floa
     corners = np.asarray(sampled.triangles)
     origin = np.flatnonzero(((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1))
     step, pieces = finest * CUT ** max(math.ceil(math.log(sampled.scale / finest, CUT)), 0), corners[origin]
+    facing, reach = np.flatnonzero(is_open), within + CUT_MARGIN * sampled.scale
     while True:
-        vertices, faces, piece_of = trimesh.remesh.subdivide_to_size(
-            pieces.reshape(-1, 3), np.arange(3 * len(pieces)).reshape(-1, 3), max_edge=step, max_iter=30, return_index=True
+        promising = _facing_pieces(
+            pieces, sampled.face_normals[origin], target.triangles[facing], target.face_normals[facing], reach
         )
+        pieces, origin = pieces[promising], origin[promising]
+        vertices, faces, piece_of = subdivided(pieces.reshape(-1, 3), np.arange(3 * len(pieces)).reshape(-1, 3), step)
         pieces, origin = vertices[faces], origin[piece_of]
         centres = pieces.mean(axis=1)
         hit, nearest = surface.nearest(centres)
@@ -273,6 +287,24 @@ def _near_pieces(sampled: trimesh.Trimesh, target: trimesh.Trimesh, within: floa
         radius = np.linalg.norm(pieces - centres[:, None], axis=2).max(axis=1)
         is_near = distance <= within + radius * (1 + CUT_MARGIN)
         pieces, origin, step = pieces[is_near], origin[is_near], step / CUT
+
+
+def _facing_pieces(
+    pieces: np.ndarray, normals: np.ndarray, targets: np.ndarray, target_normals: np.ndarray, reach: float
+) -> np.ndarray:
+    """Return the numbers of pieces (piece, 3, 3) with opposite triangles (triangle, 3, 3) whose boxes are within `reach` [mm].
+
+    All pieces are returned if there are too many to compare.
+    """
+    lower, upper = pieces.min(axis=1), pieces.max(axis=1)
+    low, high = targets.min(axis=1) - reach, targets.max(axis=1) + reach
+    nearby = np.flatnonzero(
+        ((low <= upper.max(axis=0, initial=-np.inf)) & (high >= lower.min(axis=0, initial=np.inf))).all(axis=1)
+    )
+    if len(pieces) * len(nearby) > MAX_COMPARISONS:
+        return np.arange(len(pieces))
+    are_opposing = normals @ target_normals[nearby].T < OPPOSING_COSINE + CUT_MARGIN
+    return np.flatnonzero((are_opposing & overlaps(lower, upper, low[nearby], high[nearby])).any(axis=1))
 
 
 def _in_place(part: Part, mesh: trimesh.Trimesh) -> trimesh.Trimesh:

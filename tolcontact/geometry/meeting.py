@@ -21,6 +21,7 @@ import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.geometry import kernel, places_kernel
+from tolcontact.geometry.boxes import blocks, overlaps
 from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER
 from tolcontact.geometry.polyhedron import Polyhedron, polyhedron
 from tolcontact.geometry.sorted_candidates import sorted_candidates
@@ -38,6 +39,7 @@ DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) 
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 ARC = np.linspace(0, 1, 17)  # shares at which the normals between two facets are compared
 ARC_SPACING = np.pi / 16  # rad: the largest angle between two of them
+BLOCK_ARCS = 4096  # pairs of edges whose arcs are compared together
 TINY = 1e-300
 
 
@@ -274,38 +276,40 @@ def _on_facets(
 
     `facing` is the table of facing planes, its rows those of `corners`.
     """
-    low, high = facets.facets.min(axis=1) - travel, facets.facets.max(axis=1) + travel
-    candidates = []
-    for corner in range(len(corners.vertices)):
-        nearby = np.flatnonzero(((corners.vertices[corner] >= low) & (corners.vertices[corner] <= high)).all(axis=1))
-        directions = corners.directions[corners.cones[corner] : corners.cones[corner + 1]]
-        nearby = nearby[(directions @ facets.normals[nearby].T).min(axis=0, initial=0) >= -leaning]
-        plane = facing[corners.vertex_planes[corner]][:, facets.facet_planes[nearby]].max(axis=0, initial=-1)
+    candidates = [np.zeros((0, 3), dtype=int)]
+    boxes = facets.facets.min(axis=1) - travel, facets.facets.max(axis=1) + travel
+    for block in blocks(len(corners.vertices), len(facets.facets)):
+        starts = corners.cones[block.start : block.stop + 1]
+        slopes = corners.directions[starts[0] : starts[-1]] @ facets.normals.T
+        fits = np.minimum.reduceat(slopes, starts[:-1] - starts[0], axis=0) >= -leaning
+        corner, facet = np.nonzero(fits & overlaps(corners.vertices[block], corners.vertices[block], *boxes))
+        corner += block.start
+        plane = facing[corners.vertex_planes[corner], facets.facet_planes[facet][:, None]].max(axis=1, initial=-1)
         # Facets of facing planes count together.
-        _, distinct = np.unique(np.where(plane >= 0, plane, -1 - nearby), return_index=True)
-        nearby, plane = nearby[distinct], plane[distinct]
-        pair = (np.full(len(nearby), corner), nearby)
-        first, second = pair if kind == CORNER_ON_FACET else pair[::-1]
-        candidates.append(np.stack([first, second, plane], axis=1))
-    return np.concatenate([np.zeros((0, 3), dtype=int), *candidates])
+        keys = corner * (len(facets.facets) + facing.size) + np.where(plane >= 0, plane, -1 - facet)
+        _, distinct = np.unique(keys, return_index=True)
+        first, second = (corner, facet) if kind == CORNER_ON_FACET else (facet, corner)
+        candidates.append(np.stack([first, second, plane], axis=1)[distinct])
+    return np.concatenate(candidates)
 
 
 def _across_edges(A: Polyhedron, B: Polyhedron, facing: np.ndarray, travel: float, leaning: float) -> np.ndarray:
     """Return candidates (candidate, 3), first, second and plane, of edges of the moving body across edges of the reference."""
-    low, high = B.edges.min(axis=1) - travel, B.edges.max(axis=1) + travel
+    candidates = [np.zeros((0, 3), dtype=int)]
+    boxes = B.edges.min(axis=1) - travel, B.edges.max(axis=1) + travel
     arcs_A, arcs_B = _arcs(A), _arcs(B)
-    candidates = []
-    for edge in range(len(A.edges)):
-        nearby = np.flatnonzero(((A.edges[edge].max(axis=0) >= low) & (A.edges[edge].min(axis=0) <= high)).all(axis=1))
-        plane = np.full(len(nearby), -1)
-        for plane_A in A.edge_planes[edge]:
-            for side in range(2):
-                plane = np.maximum(plane, facing[plane_A, B.edge_planes[nearby, side]])
-        cosine = -np.einsum("ai,eki->eak", arcs_A[edge], arcs_B[nearby]).min(axis=(1, 2))
-        meets = (cosine >= np.cos(min(np.arcsin(leaning) + ARC_SPACING, np.pi))) & B.convex[nearby].astype(bool)
-        retained = (plane >= 0) | (meets & bool(A.convex[edge]))
-        candidates.append(np.stack([np.full(retained.sum(), edge), nearby[retained], plane[retained]], axis=1))
-    return np.concatenate([np.zeros((0, 3), dtype=int), *candidates])
+    for block in blocks(len(A.edges), len(B.edges)):
+        first, second = np.nonzero(overlaps(A.edges[block].min(axis=1), A.edges[block].max(axis=1), *boxes))
+        first += block.start
+        planes = facing[A.edge_planes[first][:, :, None], B.edge_planes[second][:, None]]
+        plane = planes.max(axis=(1, 2), initial=-1)
+        meets = np.flatnonzero((plane < 0) & A.convex[first].astype(bool) & B.convex[second].astype(bool))
+        retained = plane >= 0
+        for some in np.array_split(meets, len(meets) // BLOCK_ARCS + 1):
+            cosine = -np.einsum("pai,pki->pak", arcs_A[first[some]], arcs_B[second[some]]).min(axis=(1, 2))
+            retained[some] = cosine >= np.cos(min(np.arcsin(leaning) + ARC_SPACING, np.pi))
+        candidates.append(np.stack([first, second, plane], axis=1)[retained])
+    return np.concatenate(candidates)
 
 
 def _arcs(body: Polyhedron) -> np.ndarray:

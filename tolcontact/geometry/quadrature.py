@@ -3,10 +3,12 @@
 import numpy as np
 import trimesh
 
+from tolcontact.geometry.subdivision import subdivided
+
 
 def quadrature(mesh: trimesh.Trimesh, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Return places (place, 3) [mm] of a face about `step` [mm] apart, and the areas (place,) [mm^2] that they stand for."""
-    vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, max_edge=2 * step, max_iter=30)[:2]
+    vertices, faces, _ = subdivided(mesh.vertices, mesh.faces, 2 * step)
     places, numbers = np.unique(np.round(vertices, 9), axis=0, return_inverse=True)
     faces = numbers.reshape(-1)[faces]
     areas = trimesh.triangles.area(places[faces])

@@ -11,6 +11,7 @@ from tolcontact.errors import GeometryFault
 from tolcontact.geometry.edges import distinct_triangles, edges
 from tolcontact.geometry.files.reading import Contents, Shape, read, read_files
 from tolcontact.geometry.pin_shape import pin_shape
+from tolcontact.geometry.subdivision import subdivided
 
 log = logging.getLogger(__name__)
 
@@ -100,6 +101,6 @@ def _per_body(limit: np.ufunc, corners: np.ndarray, body: np.ndarray, count: int
 def field_surface(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
     """Return vertices (vertex, 3) and faces (face, 3) fine enough to show how displacement varies over a part."""
     step = mesh.scale / FIELD_DIVISIONS
-    vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, max_edge=step, max_iter=20)
+    vertices, faces, _ = subdivided(mesh.vertices, mesh.faces, step)
     merged = trimesh.Trimesh(vertices, faces, process=True)
     return np.asarray(merged.vertices), np.asarray(merged.faces)

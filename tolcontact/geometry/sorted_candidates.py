@@ -62,8 +62,10 @@ def _sorted(lows: Float[Array, " n"], highs: Float[Array, " n"], keys: Int[Array
     """Return intervals in runs that have the same keys, the first key first."""
     if not len(lows):
         return Sorted(*(np.zeros(0, dtype=int), np.zeros(1, dtype=int)), np.zeros(0, dtype=int), np.zeros(0))
-    _, run = np.unique(keys, axis=1, return_inverse=True)
-    run = run.reshape(-1)
+    codes = np.zeros(len(lows), dtype=np.int64)
+    for key in keys:
+        codes = codes * (np.ptp(key) + 1) + key - key.min()
+    _, run = np.unique(codes, return_inverse=True)
     count = int(run.max()) + 1
     lowest, last = np.full(count, np.inf), np.full(count, -np.inf)
     np.minimum.at(lowest, run, lows)

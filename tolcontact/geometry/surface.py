@@ -176,6 +176,16 @@ class Surface:
         for an analytic surface, nearest points and normals are those of that surface. On other curved faces normals are
         interpolated between the corners of a facet: they change steadily as a point moves.
         """
+        triangle, feet, is_over = self._feet(points, margin)
+        return feet, self.normals(triangle, feet), is_over
+
+    def feet(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the nearest points and the mask that `project` returns, without the normals."""
+        _, feet, is_over = self._feet(points, 0.0)
+        return feet, is_over
+
+    def _feet(self, points: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the nearest triangles (point,), and the nearest points and the mask that `project` returns."""
         triangle, nearest = self.nearest(points)
         sideways, at_rim = self._sideways(points, triangle, nearest)
         is_over = ~at_rim | (sideways <= max(margin, RIM_TOLERANCE * self.mesh.scale))
@@ -187,7 +197,7 @@ class Surface:
             # For points near its axis, and beyond, a surface has feet elsewhere.
             is_direct = ~at_rim[rows] & (shift <= MAX_TURN * height + MAX_BULGE * self.mesh.scale)
             feet[rows] = np.where(is_direct[:, None], direct, nearby)
-        return feet, self.normals(triangle, feet), is_over
+        return triangle, feet, is_over
 
     def depth(self, points: np.ndarray) -> np.ndarray:
         """Return the depth (point,) [mm] of `points` (point, 3) [mm] behind the surface; 0 in front of it and beside it."""

@@ -8,7 +8,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -17,12 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from tolcontact.child import STALL_FACTOR, environment, processor_time
+from tolcontact import shape_worker
+from tolcontact.child import STALL_FACTOR, processor_time
 from tolcontact.errors import GeometryFault, clipped
 
 MAX_START_SECONDS = 30.0  # until the worker has loaded its libraries
-POLL_SECONDS = 0.02  # between two looks for a file of the worker
-PROGRAM = Path(__file__).with_name("worker.py")
+POLL_SECONDS = 0.005  # between two looks for a file of the worker
 
 
 class UnfinishedRead(GeometryFault):
@@ -79,19 +78,11 @@ def _by_one_process(jobs: Sequence[Job], limits: ReadingLimits) -> Iterator[dict
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
         folder = Path(name)
         (folder / "jobs.json").write_text(json.dumps(order))
-        with (folder / "errors").open("wb") as errors:
-            try:
-                process = subprocess.Popen(
-                    [sys.executable, "-P", str(PROGRAM), name],
-                    stdin=subprocess.DEVNULL,
-                    stdout=errors,
-                    stderr=errors,
-                    # The memory that is set aside for idle threads would count against the limit.
-                    env={**environment(), "MALLOC_ARENA_MAX": "4"},
-                )
-            except OSError as error:
-                yield from [GeometryFault(f'"{job.path}": its reader process cannot be started ({error})') for job in jobs]
-                return
+        try:
+            process = shape_worker.started(folder)
+        except OSError as error:
+            yield from [GeometryFault(f'"{job.path}": its reader process cannot be started ({error})') for job in jobs]
+            return
         try:
             _wait_for(process, MAX_START_SECONDS, folder / "ready")
             for k, path in enumerate(job.path for job in jobs):

@@ -2,9 +2,11 @@
 
 `python -P worker.py FOLDER` writes FOLDER/ready once it has started, and works through the list in FOLDER/jobs.json. For job
 k it writes FOLDER/k.npz with the arrays it read, or FOLDER/k.txt with the fault of the file. Of tolcontact it imports only
-`child`, and `kernel` when a STEP file comes, so that it starts quickly.
+`child`, and `kernel` when a STEP file comes, so that it starts quickly. Without FOLDER it loads the kernel first, and then
+waits for a line with the folder on its standard input.
 """
 
+import contextlib
 import gc
 import io
 import json
@@ -171,6 +173,23 @@ def write_fault(folder: Path, k: int, message: str) -> None:
     (folder / "part").replace(folder / f"{k}.txt")
 
 
+def awaited_folder() -> Path:
+    """Load the CAD kernel, and return the folder that a line of standard input names; its file `errors` gets all output.
+
+    The process ends if there is no such line: nobody needs it.
+    """
+    with contextlib.suppress(Refusal):  # the fault of a STEP file, if one comes
+        step_bodies()
+    name = sys.stdin.readline().rstrip("\n")
+    if not name:
+        os._exit(0)
+    folder = Path(name)
+    with (folder / "errors").open("wb") as errors:
+        for stream in (sys.stdout, sys.stderr):
+            os.dup2(errors.fileno(), stream.fileno())
+    return folder
+
+
 if __name__ == "__main__":
-    work(Path(sys.argv[1]))
+    work(Path(sys.argv[1]) if len(sys.argv) > 1 else awaited_folder())
     os._exit(0)  # compiled libraries may crash when they tidy up after a damaged file
