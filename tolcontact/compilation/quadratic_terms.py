@@ -10,6 +10,7 @@ from tolcontact.mechanics.correction import FREEDOMS, Motion, linear, quadratic
 from tolcontact.mechanics.objective import energy, proximity
 from tolcontact.mechanics.pose import Pose
 from tolcontact.mechanics.setting import Setting
+from tolcontact.mechanics.symmetric_products import congruent
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +62,7 @@ def quadratic_terms(
     curvature += (rows.wrap - rows.bow) / goal.scale - Q
     # A penalty holds the rows that carry. It does not change the answer, and restores convexity in most cases.
     hold = (1 + 2 * load / goal.scale / setting.group.length) * ca.if_else(reactions > 0, rows.filled, 0)
-    curvature += rows.slopes.T @ ca.diag(hold) @ rows.slopes
+    curvature += congruent(ca.diag(hold), rows.slopes)
     give = rows.gaps + rows.compliance * reactions
     nearness = setting.curvature(proximity(setting, motion.poses, moved)) / setting.group.length if projects else nothing
     return QuadraticTerms(Q, pull, curvature, rows.slopes.T @ (hold * give), nearness, goal.scale)

@@ -10,6 +10,7 @@ import numpy as np
 from tolcontact.discretization import RoundPoint, RoundPoints
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
 from tolcontact.mechanics.round_terms import Terms, round_terms
+from tolcontact.mechanics.symmetric_products import congruent
 
 TOLERANCE = 1e-9
 ROUNDING = 1e-14  # of the distance from the origin: error of a point that is computed on an axis
@@ -96,6 +97,9 @@ class _Body:
         self._function = _place(bool(point.on_moving), bool(point.axis.any()))
         self.place, self.by_X, _ = self._placed(ca.SX(self._function.size1_in("weights"), 1))
         self.by_z = self.by_X @ by_z
+        # In by_X by_X' the blocks of centre and axis are multiples of the identity, since no direction in space differs.
+        of_centre, of_axis = self.by_X[0, :], self.by_X[3, :] if point.axis.any() else ca.SX(1, ENTRIES)
+        self._squares = ca.sumsqr(of_centre), ca.sumsqr(of_axis), 2 * ca.dot(of_centre, of_axis)
         size, freedoms = self.place.numel(), by_z.size2()
         self._slope, self._bend, self.wrap = ca.SX(1, size), ca.SX(size, size), ca.SX(freedoms, freedoms)
 
@@ -116,12 +120,19 @@ class _Body:
         """Return the place [mm] of a point on the axis of a shaft, from that of its first point."""
         return float((point.centre - self._point.centre) @ point.axis)
 
+    def square(self, slope: ca.SX) -> ca.SX:
+        """Return the square of the derivative by X_RM that belongs to a `slope` (1, n) by the place."""
+        by_centre, by_axis = slope[:3], slope[3:]
+        of_centre, of_axis, of_both = self._squares
+        length = of_centre * ca.sumsqr(by_centre)
+        return length + of_axis * ca.sumsqr(by_axis) + of_both * ca.dot(by_centre, by_axis) if by_axis.numel() else length
+
     def add(self, of_point: Terms, load: ca.SX) -> None:
         """Add the terms of a point that pushes with a load."""
         self._slope += load * of_point.slope
         self._bend += load * of_point.bend
         sliding = of_point.sliding @ self.by_z
-        self.wrap += sliding.T @ (load * of_point.closing * sliding)
+        self.wrap += congruent(load * of_point.closing * ca.SX.eye(sliding.size1()), sliding)
 
     def bends(self) -> ca.SX:
         """Return the derivative (12, 1) by X_RM of the sum of loads times gaps."""
@@ -131,7 +142,7 @@ class _Body:
         """Return its second derivative (z, z), without closing walls."""
         *_, turning = self._placed(self._slope.T)
         one_sided = self._X_by_z.T @ ca.triu(turning) @ self._X_by_z  # each entry of X_RM enters linearly
-        return one_sided + one_sided.T + self.by_z.T @ self._bend @ self.by_z
+        return one_sided + one_sided.T + congruent(self._bend, self.by_z)
 
 
 @functools.cache
@@ -167,5 +178,4 @@ def _touches(plane: RoundPoint, hollow: RoundPoint) -> bool:
 
 def _are_alike(fixed: Terms, nearest: Terms, body: _Body) -> ca.SX:
     """Return whether a fixed tangent and the nearest one have nearly the same direction."""
-    apart, length = (ca.sumsqr(slope @ body.by_X) for slope in (fixed.slope - nearest.slope, fixed.slope))
-    return apart < TANGENT_TOLERANCE**2 * length
+    return body.square(fixed.slope - nearest.slope) < TANGENT_TOLERANCE**2 * body.square(fixed.slope)
