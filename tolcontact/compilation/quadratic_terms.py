@@ -70,8 +70,9 @@ def quadratic_terms(
 
 def _lagrangian_hessian(setting: Setting, poses: Sequence[Pose], bends: ca.SX) -> ca.SX:
     """Return the Hessian, at z = 0, of the Lagrangian: the objective less the reactions' work on the gaps (linear in X_RM)."""
-    work = ca.dot(bends, ca.vertcat(*(X_RM.vector() for X_RM in setting.relative(poses))))
-    return setting.curvature(energy(setting, poses).value - work)
+    weights = ca.SX.sym("bends", bends.numel())  # do not depend on z: as symbols they are left alone by the derivatives
+    work = ca.dot(weights, ca.vertcat(*(X_RM.vector() for X_RM in setting.relative(poses))))
+    return ca.substitute(setting.curvature(energy(setting, poses).value - work), weights, bends)
 
 
 def is_convex(Q: ca.SX) -> ca.SX:

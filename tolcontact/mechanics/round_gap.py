@@ -64,10 +64,8 @@ def round_gaps(points: RoundPoints, X_RM: ca.SX, heights: ca.SX, reactions: ca.S
         elif nearest is not None and body.has(known[nearest]) and _touches(point, known[nearest]):
             # Otherwise either could carry, to a solver's accuracy, and the steps would not converge.
             nearer = terms_of_points[nearest][1]
-            is_alike = _are_alike(of_point, nearer, body)
-            gap, slope = ca.if_else(is_alike, nearer.gap, gap), ca.if_else(is_alike, nearer.slope, slope)
-            loads[nearest] += ca.if_else(is_alike, loads[k], 0)
-            loads[k] = ca.if_else(is_alike, 0, loads[k])
+            gap, slope, passed, kept = body.merged.call([gap, slope, nearer.gap, nearer.slope, body.squares, loads[k]])
+            loads[nearest], loads[k] = loads[nearest] + passed, kept
         gaps.append(gap)
         slopes.append(slope @ body.by_z)
     if reactions.nnz():
@@ -89,6 +87,8 @@ class _Body:
 
     place          (n, 1): its centre, or a point of its axis and the axis
     by_X, by_z     (n, 12), (n, z): the derivatives of `place`
+    squares        (n / 3, n / 3): by_X by_X' in blocks, which are these times the identity: no direction in space differs
+    merged         see _merged
     wrap           (z, z): what closing walls subtract from the second derivative by z of the sum of loads times gaps
     """
 
@@ -97,9 +97,8 @@ class _Body:
         self._function = _place(bool(point.on_moving), bool(point.axis.any()))
         self.place, self.by_X, _ = self._placed(ca.SX(self._function.size1_in("weights"), 1))
         self.by_z = self.by_X @ by_z
-        # In by_X by_X' the blocks of centre and axis are multiples of the identity, since no direction in space differs.
-        of_centre, of_axis = self.by_X[0, :], self.by_X[3, :] if point.axis.any() else ca.SX(1, ENTRIES)
-        self._squares = ca.sumsqr(of_centre), ca.sumsqr(of_axis), 2 * ca.dot(of_centre, of_axis)
+        rows = self.by_X[::3, :]
+        self.squares, self.merged = rows @ rows.T, _merged(rows.size1())
         size, freedoms = self.place.numel(), by_z.size2()
         self._slope, self._bend, self.wrap = ca.SX(1, size), ca.SX(size, size), ca.SX(freedoms, freedoms)
 
@@ -119,13 +118,6 @@ class _Body:
     def station(self, point: RoundPoint) -> float:
         """Return the place [mm] of a point on the axis of a shaft, from that of its first point."""
         return float((point.centre - self._point.centre) @ point.axis)
-
-    def square(self, slope: ca.SX) -> ca.SX:
-        """Return the square of the derivative by X_RM that belongs to a `slope` (1, n) by the place."""
-        by_centre, by_axis = slope[:3], slope[3:]
-        of_centre, of_axis, of_both = self._squares
-        length = of_centre * ca.sumsqr(by_centre)
-        return length + of_axis * ca.sumsqr(by_axis) + of_both * ca.dot(by_centre, by_axis) if by_axis.numel() else length
 
     def add(self, of_point: Terms, load: ca.SX) -> None:
         """Add the terms of a point that pushes with a load."""
@@ -176,6 +168,27 @@ def _touches(plane: RoundPoint, hollow: RoundPoint) -> bool:
     return abs(offset) < TOLERANCE * plane.radius and abs(lean) < TOLERANCE
 
 
-def _are_alike(fixed: Terms, nearest: Terms, body: _Body) -> ca.SX:
-    """Return whether a fixed tangent and the nearest one have nearly the same direction."""
-    return body.square(fixed.slope - nearest.slope) < TANGENT_TOLERANCE**2 * body.square(fixed.slope)
+@functools.cache
+def _merged(vectors: int) -> ca.Function:
+    """Return a Function of the gaps and slopes of a fixed tangent and of the nearest one, and of the fixed one's load.
+
+    Its results are gap and slope of the fixed tangent, which are those of the nearest one if they have nearly the same
+    direction, the load that it passes on to that one then, and the load that it keeps. The place has a number of `vectors`,
+    centre and axis, of which `squares` (vector, vector) gives the derivatives by X_RM.
+    """
+    gap, nearest_gap, load = (ca.SX.sym(name) for name in ("gap", "nearest_gap", "load"))
+    slope, nearest_slope = (ca.SX.sym(name, 1, 3 * vectors) for name in ("slope", "nearest_slope"))
+    squares = ca.SX.sym("squares", vectors, vectors)
+
+    def square(by_place: ca.SX) -> ca.SX:
+        by_vector = ca.reshape(by_place, 3, vectors)
+        return ca.dot(squares, by_vector.T @ by_vector)
+
+    is_alike = square(slope - nearest_slope) < TANGENT_TOLERANCE**2 * square(slope)
+    results = [
+        ca.if_else(is_alike, nearest_gap, gap),
+        ca.if_else(is_alike, nearest_slope, slope),
+        ca.if_else(is_alike, load, 0),
+        ca.if_else(is_alike, 0, load),
+    ]
+    return ca.Function("merged", [gap, slope, nearest_gap, nearest_slope, squares, load], results)
