@@ -104,6 +104,21 @@ def test_a_wall_beside_a_hollow_has_gaps_of_its_own():
     assert gaps.full().ravel() == pytest.approx([0, 8, 2], abs=1e-9)
 
 
+def test_a_tangent_at_one_end_of_a_shaft_is_not_that_of_the_other_end():
+    axis, x = np.array([0, 0, 1.0]), np.array([1.0, 0, 0])
+    hollow, tangent = Cylinder(np.zeros(3), axis, radius=20.0), Plane(np.array([20.0, 0, 0]), -x)
+    ends = [np.array([1.0, 0, height]) for height in (0.0, 0.1)]
+    points = [
+        RoundPoint(hollow, True, ends[0], axis, NONE, 18.0, True, x, np.pi),
+        *(RoundPoint(tangent, False, end, axis, NONE, 18.0, True, x, np.pi) for end in ends),
+    ]
+    leaning = np.concatenate([Rotation.from_rotvec([0, 0.01, 0]).as_matrix().ravel(), np.zeros(3)])
+    together = evaluation(RoundPoints.of(points))(leaning, np.zeros(2), np.zeros(3), NO_MOVES)[0].full().ravel()
+    alone = [float(evaluation(RoundPoints.of([point]))(leaning, np.zeros(2), 0, NO_MOVES)[0]) for point in points]
+    assert together == pytest.approx([alone[0], alone[0], alone[2]], abs=1e-12)
+    assert alone[0] - alone[2] == pytest.approx(0.1 * np.sin(0.01), abs=1e-12)
+
+
 def test_a_ball_in_a_hollow_that_is_open_is_free_to_leave():
     """Gaps beyond the end of the wall are those of its last tangent planes; and there is no wall where it is open."""
     rng, points, out = np.random.default_rng(4), [], []

@@ -61,7 +61,7 @@ def round_gaps(points: RoundPoints, X_RM: ca.SX, heights: ca.SX, reactions: ca.S
         distances.append(gap)
         if point.is_hollow:
             nearest = k
-        elif nearest is not None and body.has(known[nearest]) and _touches(point, known[nearest]):
+        elif nearest is not None and _is_at(point, known[nearest]) and _touches(point, known[nearest]):
             # Otherwise either could carry, to a solver's accuracy, and the steps would not converge.
             nearer = terms_of_points[nearest][1]
             gap, slope, passed, kept = body.merged.call([gap, slope, nearer.gap, nearer.slope, body.squares, loads[k]])
@@ -156,6 +156,12 @@ def _place(on_moving: bool, has_axis: bool) -> ca.Function:
     inputs = {"X_RM": X, "centre": centre, "axis": axis, "weights": weights}
     outputs = {"place": place, "by_X": ca.jacobian(place, X), "turning": turning}
     return ca.Function("place", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs])
+
+
+def _is_at(point: RoundPoint, other: RoundPoint) -> bool:
+    """Return whether two points are of one ball, or of one end of a shaft."""
+    is_same = (point.centre == other.centre).all() and (point.axis == other.axis).all()
+    return bool(is_same and point.on_moving == other.on_moving)
 
 
 def _touches(plane: RoundPoint, hollow: RoundPoint) -> bool:
