@@ -2,6 +2,7 @@
 
 import itertools
 
+import casadi as ca
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -18,9 +19,16 @@ NONE = np.zeros(3)
 AS_IT_IS, NO_MOVES = np.eye(ENTRIES), np.zeros((ENTRIES, 0))  # X_RM itself as z, and no z at all
 
 
+def evaluation(points, freedoms=0):
+    """Round gaps as a Function of X_RM, heights, reactions and by_z."""
+    shapes = {"X_RM": (ENTRIES, 1), "heights": (2, 1), "reactions": (len(points), 1), "by_z": (ENTRIES, freedoms)}
+    inputs = [ca.SX.sym(name, *shape) for name, shape in shapes.items()]
+    return ca.Function("round_gaps", inputs, list(round_gaps(points, *inputs)))
+
+
 def check_gaps(points, rng, turn):
     """Gaps computed another way, and their derivatives by differences, at some poses."""
-    evaluate, count = round_gaps(points, ENTRIES), len(points)
+    evaluate, count = evaluation(points, ENTRIES), len(points)
     again = as_archived(points)
     step, heights = 1e-6, np.random.default_rng(2)
     for _ in range(3):
@@ -39,7 +47,7 @@ def check_gaps(points, rng, turn):
         rates = np.hstack([(up[0] - down[0]) / (2 * step) for up, down in moved])
         turns = np.column_stack([(up[1] - down[1]).T @ reactions / (2 * step) for up, down in moved])
         by_z = rng.normal(size=(ENTRIES, 3))
-        by_three = [each.full() for each in round_gaps(points, 3)(X, grown, reactions, by_z)]
+        by_three = [each.full() for each in evaluation(points, 3)(X, grown, reactions, by_z)]
         assert np.abs(rates - slopes).max() < 1e-6 * max(1, np.abs(slopes).max())
         assert np.abs(slopes.T @ reactions - bends.ravel()).max() < 1e-9 * max(1, np.abs(bends).max())
         assert np.abs(turns - bow + wrap).max() < 1e-6 * max(1, np.abs(bow - wrap).max())
@@ -92,8 +100,23 @@ def test_a_wall_beside_a_hollow_has_gaps_of_its_own():
             RoundPoint(beside, False, np.array([18.0, 9, 0]), NONE, NONE, 2.0, True, x, np.pi),
         ]
     )
-    gaps = round_gaps(points)(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), np.zeros(2), np.zeros(3), NO_MOVES)[0]
+    gaps = evaluation(points)(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), np.zeros(2), np.zeros(3), NO_MOVES)[0]
     assert gaps.full().ravel() == pytest.approx([0, 8, 2], abs=1e-9)
+
+
+def test_a_tangent_at_one_end_of_a_shaft_is_not_that_of_the_other_end():
+    axis, x = np.array([0, 0, 1.0]), np.array([1.0, 0, 0])
+    hollow, tangent = Cylinder(np.zeros(3), axis, radius=20.0), Plane(np.array([20.0, 0, 0]), -x)
+    ends = [np.array([1.0, 0, height]) for height in (0.0, 0.1)]
+    points = [
+        RoundPoint(hollow, True, ends[0], axis, NONE, 18.0, True, x, np.pi),
+        *(RoundPoint(tangent, False, end, axis, NONE, 18.0, True, x, np.pi) for end in ends),
+    ]
+    leaning = np.concatenate([Rotation.from_rotvec([0, 0.01, 0]).as_matrix().ravel(), np.zeros(3)])
+    together = evaluation(RoundPoints.of(points))(leaning, np.zeros(2), np.zeros(3), NO_MOVES)[0].full().ravel()
+    alone = [float(evaluation(RoundPoints.of([point]))(leaning, np.zeros(2), 0, NO_MOVES)[0]) for point in points]
+    assert together == pytest.approx([alone[0], alone[0], alone[2]], abs=1e-12)
+    assert alone[0] - alone[2] == pytest.approx(0.1 * np.sin(0.01), abs=1e-12)
 
 
 def test_a_ball_in_a_hollow_that_is_open_is_free_to_leave():
@@ -116,7 +139,7 @@ def test_a_ball_in_a_hollow_that_is_open_is_free_to_leave():
     ]
     check_gaps(RoundPoints.of(ends), rng, turn=3e-3)
     for k, far in enumerate(out):
-        evaluate = round_gaps(RoundPoints.of([points[k]]))
+        evaluate = evaluation(RoundPoints.of([points[k]]))
         assert float(evaluate(np.concatenate([np.eye(3).ravel(), far]), np.zeros(2), 0, NO_MOVES)[0]) > 40
 
 
@@ -127,7 +150,7 @@ def test_curvature_on_an_axis_is_that_of_some_room_beside_it():
         (Cone(np.zeros(3), axis, angle=0.6), np.array([0, 0, 20.0]), np.cos(0.6)),
         (Cylinder(np.zeros(3), axis, radius=2.0), np.zeros(3), 1.0),  # as large as the ball: it has no room at all
     ):
-        evaluate = round_gaps(RoundPoints.of([RoundPoint(wall, True, centre, NONE, NONE, 2.0, True, x, np.pi)]), ENTRIES)
+        evaluate = evaluation(RoundPoints.of([RoundPoint(wall, True, centre, NONE, NONE, 2.0, True, x, np.pi)]), ENTRIES)
         at_rest = np.concatenate([np.eye(3).ravel(), np.zeros(3)])
         *_, bow, wrap, _ = (each.full() for each in evaluate(at_rest, np.zeros(2), [1], AS_IT_IS))
         assert np.isfinite(bow).all()

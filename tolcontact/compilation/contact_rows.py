@@ -110,17 +110,15 @@ def contact_rows(
         if pair.round is not None:
             of_pair = reactions[len(pairs) : len(pairs) + len(pair.round)]
             z = sorted(set(by_z.sparsity().get_triplet()[1]))  # of the two parts of the pair
-            point_gaps, point_slopes, bend_of_pair, bow_of_pair, wrap_of_pair, _ = round_gaps(pair.round, len(z))(
-                start.vector(), setting.heights[k], of_pair, by_z[:, z]
-            )
+            of_points = round_gaps(pair.round, start.vector(), setting.heights[k], of_pair, by_z[:, z])
             slopes.append(ca.SX(len(pair.round), setting.z.numel()))
-            slopes[-1][:, z] = point_slopes
-            gaps.append(point_gaps)
+            slopes[-1][:, z] = of_points.slopes
+            gaps.append(of_points.gaps)
             filled.append(ca.SX.ones(len(pair.round)))
             pairs += [k] * len(pair.round)
-            bends.append(bend_of_pair)
-            bow[z, z] += bow_of_pair
-            wrap[z, z] += wrap_of_pair
+            bends.append(of_points.bends)
+            bow[z, z] += of_points.bow
+            wrap[z, z] += of_points.wrap
             continue
         total = ca.SX.zeros(ENTRIES) if bend is None else bend
         for P_m, P_r, n_r, is_filled in points:

@@ -176,8 +176,9 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
 
 def _round_gap_function(pair: ContactPoints, points: RoundPoints, deviations: ca.SX) -> ca.Function:
     X_RM = ca.SX.sym("X_RM", ENTRIES)
-    gaps, *_, distances = round_gaps(points)(X_RM, face_heights(pair, deviations), 0, ca.SX(ENTRIES, 0))
-    return ca.Function("round_gaps", [X_RM, deviations], [gaps, distances], ["X_RM", "deviations"], ["gaps", "distances"])
+    of_points = round_gaps(points, X_RM, face_heights(pair, deviations), ca.SX(len(points), 1), ca.SX(ENTRIES, 0))
+    outputs = {"gaps": of_points.gaps, "distances": of_points.distances}
+    return ca.Function("round_gaps", [X_RM, deviations], [*outputs.values()], ["X_RM", "deviations"], [*outputs])
 
 
 def _meetings(

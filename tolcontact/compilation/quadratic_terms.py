@@ -10,6 +10,7 @@ from tolcontact.mechanics.correction import FREEDOMS, Motion, linear, quadratic
 from tolcontact.mechanics.objective import energy, proximity
 from tolcontact.mechanics.pose import Pose
 from tolcontact.mechanics.setting import Setting
+from tolcontact.mechanics.symmetric_products import congruent
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +62,7 @@ def quadratic_terms(
     curvature += (rows.wrap - rows.bow) / goal.scale - Q
     # A penalty holds the rows that carry. It does not change the answer, and restores convexity in most cases.
     hold = (1 + 2 * load / goal.scale / setting.group.length) * ca.if_else(reactions > 0, rows.filled, 0)
-    curvature += rows.slopes.T @ ca.diag(hold) @ rows.slopes
+    curvature += congruent(ca.diag(hold), rows.slopes)
     give = rows.gaps + rows.compliance * reactions
     nearness = setting.curvature(proximity(setting, motion.poses, moved)) / setting.group.length if projects else nothing
     return QuadraticTerms(Q, pull, curvature, rows.slopes.T @ (hold * give), nearness, goal.scale)
@@ -69,8 +70,9 @@ def quadratic_terms(
 
 def _lagrangian_hessian(setting: Setting, poses: Sequence[Pose], bends: ca.SX) -> ca.SX:
     """Return the Hessian, at z = 0, of the Lagrangian: the objective less the reactions' work on the gaps (linear in X_RM)."""
-    work = ca.dot(bends, ca.vertcat(*(X_RM.vector() for X_RM in setting.relative(poses))))
-    return setting.curvature(energy(setting, poses).value - work)
+    weights = ca.SX.sym("bends", bends.numel())  # do not depend on z: as symbols they are left alone by the derivatives
+    work = ca.dot(weights, ca.vertcat(*(X_RM.vector() for X_RM in setting.relative(poses))))
+    return ca.substitute(setting.curvature(energy(setting, poses).value - work), weights, bends)
 
 
 def is_convex(Q: ca.SX) -> ca.SX:

@@ -53,6 +53,10 @@ class AnalyticSurface(ABC):
         """
 
     @abstractmethod
+    def height_beside_axis(self, radial: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """Return `distance` [mm] at distances from the axis, through the origin, and places along it [mm]."""
+
+    @abstractmethod
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return signed distances (point,) [mm] of `points` (point, 3) [mm], and their gradients (point, 3), unit vectors.
 
@@ -103,6 +107,10 @@ class Plane(AnalyticSurface):
         """Return the height over the plane [mm]."""
         return along
 
+    def height_beside_axis(self, radial: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """Return signed distances [mm]."""
+        return self.height(radial, along)
+
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return heights (point,) [mm] over the plane, and its normal (point, 3)."""
         return (points - self.origin) @ self.axis, np.broadcast_to(self.axis, points.shape)
@@ -122,6 +130,10 @@ class Cylinder(RoundSurface):
     def height(self, radial: Any, along: Any) -> Any:
         """Return the signed distance [mm] from the cylinder."""
         return radial - self.radius
+
+    def height_beside_axis(self, radial: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """Return signed distances [mm]."""
+        return self.height(radial, along)
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return signed distances (point,) [mm], and their gradients (point, 3)."""
@@ -147,6 +159,10 @@ class Cone(RoundSurface):
     def height(self, radial: Any, along: Any) -> Any:
         """Return the signed distance [mm] from the nappe on the side of the axis."""
         return radial * np.cos(self.angle) - along * np.sin(self.angle)
+
+    def height_beside_axis(self, radial: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """Return signed distances [mm]."""
+        return self.height(radial, np.abs(along))
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return signed distances (point,) [mm] from the nearest of both nappes, and their gradients (point, 3)."""
@@ -180,6 +196,10 @@ class Sphere(RoundSurface):
         """Return the signed distance [mm] from the sphere."""
         return radial - self.radius
 
+    def height_beside_axis(self, radial: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """Return signed distances [mm]."""
+        return self.height(np.hypot(radial, along), along)
+
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return signed distances (point,) [mm], and their gradients (point, 3)."""
         radial, outward = _length_and_direction(points - self.origin)
@@ -208,6 +228,10 @@ class Torus(AnalyticSurface):
         `outward` is the unit vector from the axis to the point. Arrays and CasADi expressions are accepted alike.
         """
         return (radial - self.radius) * outward + along * axis
+
+    def height_beside_axis(self, radial: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """Return signed distances [mm]."""
+        return self.height(np.hypot(radial - self.radius, along), along)
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return signed distances (point,) [mm], and their gradients (point, 3)."""

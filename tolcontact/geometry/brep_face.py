@@ -20,6 +20,7 @@ from tolcontact.geometry.interrupted_surfaces import FaceOnSurface, interruption
 FIT_TOLERANCE = 1e-3  # [mm] largest distance of the vertices of a face from the surface on which it is
 RESIDUAL_FACTOR = 10  # times the residuals of two faces: distance at which they still are parts of one surface
 POSITION_TOLERANCE = 1e-9  # of a part's size: distance between faces of one surface
+PIECES = "pieces"
 DESCRIPTIONS = "descriptions"
 ON_SURFACES = "on_surfaces"
 UNKNOWN = StatedFace(0, "", (), 0, None)  # a face of a mesh, or from an archive, which keeps no measures
@@ -28,11 +29,13 @@ UNKNOWN = StatedFace(0, "", (), 0, None)  # a face of a mesh, or from an archive
 def number_faces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, Sequence[AnalyticSurface | None]]:
     """Return the number of each triangle's face (face,), from 0, and the surface that a STEP file states for each face.
 
-    The faces of other meshes are their smooth pieces, without stated surfaces.
+    The faces of other meshes are their smooth pieces, without stated surfaces; the mesh keeps them.
     """
     if BREP in mesh.face_attributes:
         return np.asarray(mesh.face_attributes[BREP]).ravel(), mesh.metadata[SURFACES]
-    pieces = smooth_pieces(mesh, np.arange(len(mesh.faces)))
+    if PIECES not in mesh.metadata:
+        mesh.metadata[PIECES] = smooth_pieces(mesh, np.arange(len(mesh.faces)))
+    pieces = mesh.metadata[PIECES]
     return pieces, [None] * (int(pieces.max(initial=-1)) + 1)
 
 

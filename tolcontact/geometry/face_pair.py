@@ -48,7 +48,9 @@ class BodyFace:
         lower, upper = self.body.bounds
         inside = np.flatnonzero(((points >= lower) & (points <= upper)).all(axis=1))
         row, points = row[inside], points[inside]
-        depth = self.face.depth(points) if len(points) else np.zeros(0)
+        depth, behind = np.zeros(len(points)), self._is_behind(points)
+        if behind.any():
+            depth[behind] = self.face.depth(points[behind])
         if not self._is_closed:
             np.maximum.at(largest, row, depth)
             return
@@ -87,13 +89,25 @@ class BodyFace:
 
     def _behind_round(self, motion: np.ndarray, other: "BodyFace", outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return rows and numbers as `behind` does, of a face that is not flat."""
-        row, point = (numbers.ravel() for numbers in np.indices((len(motion), len(other.points))))
         if len(self._unknown.mesh.faces):
-            return row, point
-        moved = _moved(motion, row, other.points[point])
-        levels = [surface.distance(moved)[0] * (-1.0 if is_hollow else 1.0) for surface, is_hollow, _ in self._pieces]
-        is_near = np.min(levels, axis=0) < np.abs(outward)[row]
-        return row[is_near], point[is_near]
+            row, point = np.indices((len(motion), len(other.points)))
+            return row.ravel(), point.ravel()
+        R, t = pose.rotation(motion), pose.translation(motion)
+        is_near = np.zeros((len(motion), len(other.points)), dtype=bool)
+        for surface, is_hollow, _ in self._pieces:
+            along, *across = np.linalg.svd(surface.axis[None])[2]
+            axes = np.array([*across, along if along @ surface.axis > 0 else -along])
+            places = (axes @ R) @ other.points.T + ((t - surface.origin) @ axes.T)[..., None]
+            level = surface.height_beside_axis(np.hypot(places[:, 0], places[:, 1]), places[:, 2])
+            is_near |= (-level if is_hollow else level) < np.abs(outward)[:, None]
+        row, point = np.nonzero(is_near)
+        return row, point
+
+    def _is_behind(self, points: np.ndarray) -> np.ndarray:
+        """Return a mask (point,) of the points (point, 3) [mm] that may lie behind this face."""
+        if not self._pieces or len(self._unknown.mesh.faces):
+            return np.ones(len(points), dtype=bool)
+        return np.any([surface.distance(points)[0] * (-1 if hollow else 1) < 0 for surface, hollow, _ in self._pieces], axis=0)
 
     @cached_property
     def _bulge(self) -> float:
@@ -195,8 +209,8 @@ def body_face(face: Surface, body: trimesh.Trimesh, contacts: int) -> BodyFace:
     flat = _plane_of(face)
     if flat is not None:
         return BodyFace(face, body, points, np.broadcast_to(flat[0], points.shape))
-    triangle, nearest = face.nearest(points)
-    return BodyFace(face, body, face.project(points)[0] if face.surfaces else points, face.normals(triangle, nearest))
+    feet, normals, _ = face.project(points)
+    return BodyFace(face, body, feet if face.surfaces else points, normals)
 
 
 def _plane_of(face: Surface) -> tuple[np.ndarray, float] | None:

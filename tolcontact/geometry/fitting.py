@@ -1,5 +1,6 @@
 """Planes, cylinders, cones and spheres fitted to the corners of triangles, where a file states no surface. Lengths in mm."""
 
+import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -14,6 +15,8 @@ MIN_CONE_ANGLE = 1e-4  # rad: of a cone to its axis, and to the plane across it
 SAMPLED_TRIANGLES = 300  # triangles that are tried before all are
 SAMPLE_TOLERANCE = 10  # times the tolerance: distance at which these still pass
 RADIUS_TOLERANCE = 0.1  # of the distance of vertices from a surface: uncertainty of its radius
+EXACT = 1e-14  # of a size: distance of vertices from a surface that is rounding
+DIFFERENCE = 1e-8  # of the size of a number: change by which slopes are computed
 MAX_DIGITS = 12  # of a radius behind the point
 MAX_SIZE = 1e4  # radii, in sizes of what they are fitted to; larger ones are a plane's rounding
 
@@ -22,26 +25,45 @@ def fit_surface(triangles: np.ndarray, tolerance: float) -> AnalyticSurface | No
     """Return the surface on which the corners of `triangles` (face, 3, 3) [mm] lie within `tolerance` [mm], if there is one.
 
     Both a sphere and a cone pass through two rings of vertices: the simpler one is taken. Triangles in fewer than
-    MIN_DIRECTIONS directions are a plane, or bent.
+    MIN_DIRECTIONS directions are a plane, or bent. Fasteners, features and contact pairs ask for the same faces, and parts of
+    one shape have them, too: each is fitted once.
     """
-    if len(np.unique(triangles.reshape(-1, 3), axis=0)) < 4:
+    key = hashlib.blake2b(triangles.tobytes()).digest(), tolerance
+    if key not in _known_fits:
+        _known_fits[key] = _fit(triangles, tolerance)
+    return _known_fits[key]
+
+
+_known_fits: dict[tuple[bytes, float], AnalyticSurface | None] = {}
+
+
+def _fit(triangles: np.ndarray, tolerance: float) -> AnalyticSurface | None:
+    vertices = _vertices(triangles)
+    if len(vertices) < 4:
         return None
     is_bent = len(np.unique(np.round(_normals(triangles) / NORMAL_TOLERANCE), axis=0)) < MIN_DIRECTIONS
+    trials = [(vertices, triangles, tolerance)]
+    if len(triangles) > SAMPLED_TRIANGLES:  # a few triangles rule out most surfaces at once
+        sample = _sampled(triangles)
+        trials.insert(0, (_vertices(sample), sample, tolerance * SAMPLE_TOLERANCE))
     for fit in FITS[:1] if is_bent else FITS:
-        # A few triangles rule out most surfaces at once.
-        samples = (_sampled(triangles), triangles) if len(triangles) > SAMPLED_TRIANGLES else (triangles,)
-        for sample in samples:
-            surface = fit(np.unique(sample.reshape(-1, 3), axis=0), sample)
-            if surface is None or surface.residual > tolerance * (1 if sample is triangles else SAMPLE_TOLERANCE):
+        for corners, faces, limit in trials:
+            surface = fit(corners, faces)
+            if surface is None or surface.residual > limit:
                 break
         else:
             return surface
     return None
 
 
+def _vertices(triangles: np.ndarray) -> np.ndarray:
+    """Return the corners (vertex, 3) of triangles without repetitions."""
+    return np.unique(triangles.reshape(-1, 3), axis=0)
+
+
 def nearest_surface(triangles: np.ndarray) -> AnalyticSurface:
     """Return the plane, cylinder, cone or sphere that is nearest to `triangles` (face, 3, 3) [mm]."""
-    vertices = np.unique(triangles.reshape(-1, 3), axis=0)
+    vertices = _vertices(triangles)
     places = np.vstack([vertices, triangles.mean(axis=1)])  # two rings of vertices alone lie on a sphere, too
     surfaces = [fit(vertices, triangles) for fit in FITS]
     return min(
@@ -88,7 +110,7 @@ def fit_cylinder(vertices: np.ndarray, triangles: np.ndarray) -> AnalyticSurface
     solution = _least_squares(
         lambda numbers: cylinder(numbers).distance(vertices)[0], [0.0, 0.0, x, y, r], [1e-3, 1e-3, size, size, size]
     )
-    return _with_residual(cylinder(solution.x), vertices) if abs(solution.x[4]) < MAX_SIZE * size else None
+    return _with_residual(cylinder(solution), vertices) if abs(solution[4]) < MAX_SIZE * size else None
 
 
 def fit_cone(vertices: np.ndarray, triangles: np.ndarray) -> AnalyticSurface | None:
@@ -119,7 +141,7 @@ def fit_cone(vertices: np.ndarray, triangles: np.ndarray) -> AnalyticSurface | N
         [0.0, 0.0, 0.0, 0.0, 0.0, angle],
         [1e-3, 1e-3, size, size, size, 1e-3],
     )
-    return _with_residual(cone(solution.x), vertices) if 0 < solution.x[5] < np.pi / 2 else None
+    return _with_residual(cone(solution), vertices) if 0 < solution[5] < np.pi / 2 else None
 
 
 def fit_sphere(vertices: np.ndarray, triangles: np.ndarray) -> AnalyticSurface | None:
@@ -131,7 +153,7 @@ def fit_sphere(vertices: np.ndarray, triangles: np.ndarray) -> AnalyticSurface |
     if not start[3] < MAX_SIZE * size:
         return None
     solution = _least_squares(lambda numbers: np.linalg.norm(offset - numbers[:3], axis=1) - numbers[3], start, size)
-    sphere = Sphere(centre + solution.x[:3], np.array([0.0, 0.0, 1.0]), radius=abs(float(solution.x[3])))
+    sphere = Sphere(centre + solution[:3], np.array([0.0, 0.0, 1.0]), radius=abs(float(solution[3])))
     return _with_residual(sphere, vertices)
 
 
@@ -141,8 +163,20 @@ FITS: tuple[Callable[[np.ndarray, np.ndarray], AnalyticSurface | None], ...] = (
 
 def _least_squares(
     residuals: Callable[[np.ndarray], np.ndarray], start: Sequence[float], scale: Sequence[float] | float
-) -> "scipy.optimize.OptimizeResult":
-    return scipy.optimize.least_squares(residuals, start, x_scale=scale, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=50)
+) -> np.ndarray:
+    """Return the numbers (n,) with the least sum of squared residuals [mm], from a start, of sizes as in `scale`.
+
+    Where vertices are exact, the start is, too, but for its rounding: one step of Gauss and Newton takes that away.
+    """
+    numbers, sizes = np.array(start), np.broadcast_to(scale, len(start))
+    errors = residuals(numbers)
+    if np.abs(errors).max() > EXACT * sizes.max():
+        best = scipy.optimize.least_squares(residuals, start, x_scale=scale, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=50)
+        return np.asarray(best.x)
+    changes = DIFFERENCE * sizes
+    slopes = [residuals(numbers + change) - errors for change in np.diag(changes)]
+    better = numbers - changes * np.linalg.lstsq(np.column_stack(slopes), errors, rcond=None)[0]
+    return better if np.linalg.norm(residuals(better)) < np.linalg.norm(errors) else numbers
 
 
 def _circle(points: np.ndarray) -> tuple[float, float, float]:

@@ -22,6 +22,13 @@ def moment_table(P: np.ndarray, centre: np.ndarray, radii: np.ndarray | float = 
     return np.vstack([np.ones(len(P)), p, *(p[i] * p[j] + (inside if i == j else 0.0) for i, j in _UPPER)])
 
 
+def moments_about(centre: np.ndarray, moments: np.ndarray, other_centre: np.ndarray) -> np.ndarray:
+    """Return the moments (10,) about a centre (3,) [mm] of points whose `moments` (10,) are those about another one (3,)."""
+    count, first, offset = moments[0], moments[1:4], other_centre - centre
+    second = np.outer(offset, first) + np.outer(first, offset) + count * np.outer(offset, offset)
+    return np.concatenate([[count], first + count * offset, moments[4:] + [second[i, j] for i, j in _UPPER]])
+
+
 def displacement_energy(moments: ca.SX, centre: Vector, start: Pose, end: Pose) -> ca.SX:
     """Return 1/2 sum |x_end - x_start|^2 [mm^2] over the points with the given `moments` (10, 1); it is quadratic in `end`.
 

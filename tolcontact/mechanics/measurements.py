@@ -113,8 +113,9 @@ def _round_clearance(clearance: RoundClearance, observed: Observed) -> ca.SX:
     moving, reference = clearance.moving, clearance.reference
     X_RM = _relative(moving, reference, observed)
     grown = ca.vertcat(*(face_height(face.deviation, observed.deviations) for face in (moving, reference)))
-    gaps, *_ = round_gaps(clearance.points)(X_RM.vector(), grown, 0, ca.SX(ENTRIES, 0))
-    return least(ca.vertsplit(gaps))
+    points = clearance.points
+    of_points = round_gaps(points, X_RM.vector(), grown, ca.SX(len(points), 1), ca.SX(ENTRIES, 0))
+    return least(ca.vertsplit(of_points.gaps))
 
 
 def _mesh_clearance(clearance: MeshClearance, observed: Observed) -> ca.SX:

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from tolcontact.mechanics.displacement import displacement_energy
+from tolcontact.mechanics.displacement import MOMENTS, displacement_energy, moments_about
 from tolcontact.mechanics.groups import Group, Side
 from tolcontact.mechanics.placement import elongation
-from tolcontact.mechanics.pose import Pose, constant, relative
+from tolcontact.mechanics.pose import Pose, Vector, constant, relative
 from tolcontact.mechanics.setting import Setting
 from tolcontact.method import Method
 
@@ -53,8 +53,8 @@ def objective_scale(group: Group, method: Method, moments: ca.SX) -> ca.SX:
 
 def proximity(setting: Setting, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
     """Return half the mean squared displacement of all contact points [mm^2] between two poses."""
-    sides = setting.group.sides
-    return sum((_side_energy(setting, side, start, end) for side in sides), ca.SX(0)) / setting.group.count
+    energies = (_displaced(setting, points, start, end) for points in _points_of_parts(setting.group))
+    return sum(energies, ca.SX(0)) / setting.group.count
 
 
 def _points(setting: Setting, poses: Sequence[Pose], scale: ca.SX) -> ca.SX:
@@ -102,7 +102,7 @@ def _regularization(setting: Setting, poses: Sequence[Pose]) -> ca.SX:
 
 def _point_energies(setting: Setting, poses: Sequence[Pose]) -> list[ca.SX]:
     """Return the displacement energy of all contact points of each side."""
-    return [_side_energy(setting, side, setting.raw, poses) for side in setting.group.sides]
+    return [_displaced(setting, _points_of_side(side), setting.raw, poses) for side in setting.group.sides]
 
 
 def _identity_energies(setting: Setting, poses: Sequence[Pose]) -> list[ca.SX]:
@@ -117,13 +117,37 @@ def _identity_energies(setting: Setting, poses: Sequence[Pose]) -> list[ca.SX]:
 _REGULARIZATIONS = {"points": _point_energies, "identity": _identity_energies}
 
 
-def _side_energy(setting: Setting, side: Side, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
-    """Return the displacement energy of all points of a side, relative to the free part that it is located on, if any."""
-    group, part = setting.group, side.part
-    moments = ca.SX(side.all_moments)
+class _PartPoints(NamedTuple):
+    """Contact points of a part of the group, by their moments (10,) about a nominal centre (3,) [mm]."""
+
+    part: int
+    centre: Vector
+    moments: Vector
+
+
+def _points_of_parts(group: Group) -> list[_PartPoints]:
+    """Return all contact points, together those of each part, or those of each side where moments are symbols."""
+    sides = [_points_of_side(side) for side in group.sides]
+    together: dict[int, _PartPoints] = {}
+    for points in sides:
+        if isinstance(points.centre, ca.SX) or isinstance(points.moments, ca.SX):
+            return sides
+        first = together.get(points.part, points._replace(moments=np.zeros(MOMENTS)))
+        moments = first.moments + moments_about(np.asarray(first.centre), points.moments, points.centre)
+        together[points.part] = first._replace(moments=moments)
+    return list(together.values())
+
+
+def _points_of_side(side: Side) -> _PartPoints:
+    return _PartPoints(side.part, side.centre, side.all_moments)
+
+
+def _displaced(setting: Setting, points: _PartPoints, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
+    """Return the displacement energy of points, relative to the free part that theirs is located on, if any."""
+    group, (part, centre, moments) = setting.group, points
     supporting = group.mobilities[part].movers[:-1]
     if not supporting:
-        return displacement_energy(moments, side.centre, start[part], end[part])
+        return displacement_energy(ca.SX(moments), centre, start[part], end[part])
     support = group.position(group.free[supporting[-1]])
     end_relative = setting.linear(relative(end[part], end[support]))
-    return displacement_energy(moments, side.centre, relative(start[part], start[support]), end_relative)
+    return displacement_energy(ca.SX(moments), centre, relative(start[part], start[support]), end_relative)

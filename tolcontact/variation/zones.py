@@ -18,6 +18,7 @@ import numpy as np
 import scipy
 from scipy.special import gammainc, ndtri
 
+from tolcontact.variation.bracketed_root import bracketed_root
 from tolcontact.variation.sobol_points import MAX_DIMENSIONS, scrambled_points
 
 SHARE = 0.9973002039367398  # of a normal distribution within three standard deviations
@@ -67,7 +68,10 @@ class MemberZone:
             rows, varied = self.rows @ _root(scaled @ scaled.T), np.ones(self.rows.shape[2])
         if not len(varied):
             return 1.0
-        longest = _longest(rows, directions(len(varied))[:count] * varied)
+        if (varied == varied[0]).all():  # the root of a spread tries many
+            longest = varied[0] * _unit_longest(rows.tobytes(), rows.shape, count)
+        else:
+            longest = _longest(rows, directions(len(varied))[:count] * varied)
         return float(chi_share(width / 2 / np.maximum(longest, 1e-300), len(varied)).mean())
 
 
@@ -119,7 +123,7 @@ def _equal_spread(members: Sequence[MemberZone], inner_spreads: np.ndarray, coun
     upper = width
     while excess(upper) > 0:  # rows may be short
         upper *= 2
-    return float(scipy.optimize.brentq(excess, MIN_SPREAD * width, upper, xtol=1e-9 * width))
+    return bracketed_root(excess, MIN_SPREAD * width, upper, 1e-9 * width)
 
 
 def extreme_spread(members: Sequence[MemberZone], inner_spreads: np.ndarray, count: int, width: float) -> float:
@@ -145,6 +149,12 @@ def _longest(rows: np.ndarray, components: np.ndarray) -> np.ndarray:
         squares = (np.einsum("pec,nc->npe", rows, components[chunk]) ** 2).sum(axis=2)
         longest[chunk] = np.sqrt(squares.max(axis=1, initial=0.0))
     return longest
+
+
+@functools.lru_cache(64)
+def _unit_longest(rows: bytes, shape: tuple[int, ...], count: int) -> np.ndarray:
+    """Return `_longest` (count,) of rows of a shape (point, entry, component) in all directions evenly."""
+    return _longest(np.frombuffer(rows).reshape(shape), directions(shape[2])[:count])
 
 
 def component_bounds(rows: np.ndarray, width: float) -> np.ndarray:
