@@ -14,7 +14,6 @@ import scipy
 
 from tolcontact.features import FormField
 from tolcontact.features.least_zone import ZoneMember, least_widths
-from tolcontact.variation.bracketed_root import bracketed_root
 from tolcontact.variation.zones import SHARE, MemberZone, chi_share, directions
 
 DIRECTIONS = 1 << 12
@@ -58,7 +57,7 @@ class FormSpread:
         def excess(spread: float) -> float:
             return self.share_inside(spread, width) - SHARE
 
-        return bracketed_root(excess, MIN_SPREAD * width, MAX_SPREAD * width, 1e-12 * width)
+        return float(scipy.optimize.brentq(excess, MIN_SPREAD * width, MAX_SPREAD * width, xtol=1e-12 * width))
 
     def spreads(self, width: float, cp: float) -> np.ndarray:
         """Return the standard deviations (mode,) [mm] of the coefficients, for a process capability: equal, or as measured."""

@@ -18,7 +18,6 @@ import numpy as np
 import scipy
 from scipy.special import gammainc, ndtri
 
-from tolcontact.variation.bracketed_root import bracketed_root
 from tolcontact.variation.sobol_points import MAX_DIMENSIONS, scrambled_points
 
 SHARE = 0.9973002039367398  # of a normal distribution within three standard deviations
@@ -123,7 +122,7 @@ def _equal_spread(members: Sequence[MemberZone], inner_spreads: np.ndarray, coun
     upper = width
     while excess(upper) > 0:  # rows may be short
         upper *= 2
-    return bracketed_root(excess, MIN_SPREAD * width, upper, 1e-9 * width)
+    return float(scipy.optimize.brentq(excess, MIN_SPREAD * width, upper, xtol=1e-9 * width))
 
 
 def extreme_spread(members: Sequence[MemberZone], inner_spreads: np.ndarray, count: int, width: float) -> float:
