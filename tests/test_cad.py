@@ -334,6 +334,8 @@ def test_wrong_bodies_and_names_are_told_and_names_do_not_steer_a_terminal(file)
     listed = CliRunner().invoke(app, ["bodies", str(file)]).stdout
     assert "red" in listed and "\x1b" not in listed
     assert "\x1b" not in "".join(tc.parts_from(tc.Assembly("stack"), file))
+    file.write_text(file.read_text().replace("\x1b[31m red", r"two\X\0Alines"))
+    assert r"two\nlines" in CliRunner().invoke(app, ["bodies", str(file)]).stdout
 
 
 def test_the_units_of_a_file_are_stated(file):

@@ -109,6 +109,16 @@ def test_rows_of_a_population_stay_together(kind, tmp_path):
     assert stats.chisquare(counts).pvalue > 1e-3
 
 
+def test_contributors_that_follow_from_each_other_have_a_common_cause():
+    model = tc.Assembly("opposite")
+    block = model.part("block", tc.Box(10, 20, 10))
+    model.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=0)
+    model.variable("play", 0.6, drives={"block.A1": 1.0, "block.A2": -1.0})
+    model.measure("height", block.point(0, 0, 0), along="z")
+    drawn = draws_of(model)
+    assert np.array_equal(drawn["block.A1"], -drawn["block.A2"]) and np.std(drawn["block.A1"]) == pytest.approx(0.1, rel=0.05)
+
+
 @pytest.mark.slow
 def test_a_population_is_in_the_archive():
     first = np.random.default_rng(0).normal(size=50) * 0.1
@@ -122,6 +132,7 @@ def test_a_population_is_in_the_archive():
     ("declare", "said"),
     [
         (lambda a: a.correlate(["top.A1", "top.A2"], 1.5), "not positive definite"),
+        (lambda a: a.correlate(["top.A1", "top.A2"], -1.0), "common cause by variable(name, tolerance, drives="),
         (lambda a: a.correlate(["top.A1", "top.A2"], [[1, 0.5], [0.4, 1]]), "not symmetric"),
         (lambda a: a.correlate(["top.A1", "top.A2"], [[4, 0.5], [0.5, 4]]), "correlation coefficients, not covariances"),
         (lambda a: a.correlate(["top.A1"], [[1]]), "two or more different labels"),

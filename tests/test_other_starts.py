@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
+from scipy.optimize import linprog
 
 import tolcontact as tc
 from tests import cases
@@ -75,3 +76,24 @@ def test_a_tab_that_is_wider_than_its_slot_shares_the_excess_whatever_it_was_tri
     assert np.abs(run["gap_min"][:, CORRECTED, :2] + 0.05).max() < 1e-4
     assert (run["gap_min"][:, CORRECTED, 2] > -1e-4).all()
     assert run["kkt_residual"].max() < 1e-4
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_shaft_whose_spin_nothing_holds_comes_to_rest_in_a_lobed_bore():
+    """Rounding makes it spin and fall through planes at fixed points; a linear programme over the points knows its place."""
+    a = tc.Assembly("lobed")
+    ring = a.part("ring", tc.Mesh(trimesh.creation.annulus(10.15, 20, 20, sections=120)), fixed=True)
+    shaft = a.part("shaft", tc.Mesh(trimesh.creation.cylinder(10, 20, sections=120)))
+    bore = ring.feature("bore", ring.face(tc.Cylinder(inner=True)), tc.Cylindricity(0.15, form=tc.Form(lobes=5)))
+    a.locate(shaft, [tc.Locator(f"Z{k}", p, "z", 0) for k, p in enumerate([(0, 0, 0), (5, 0, 0), (0, 5, 0)])], floating=True)
+    a.contact("fit", moving=shaft.face(tc.Cylinder()), reference=bore)
+    a.force("weight", at=shaft.point(0, 0, 0), vector=(0, -50, 0))
+    a.measure("y", shaft.point(0, 0, 0), along="y")
+    program, run = simulate(a, samples=40, seed=2, solver="daqp", method=SEATED)
+    assert (run["status"] == Status.RESOLVED).all()
+    assert (run["starts"] == 2).sum() >= 5 and not run["searched"].any()
+    (pair,) = program.nominal.pairs
+    everywhere = np.broadcast_to(np.arange(len(pair.P_m)), (40, len(pair.P_m)))
+    clearances = ((pair.P_m - pair.P_r) * pair.n_r).sum(axis=1) - pair.offsets.heights(run["deviations"], everywhere)
+    lowest = [linprog([0, 1], A_ub=-pair.n_r[:, :2], b_ub=c, bounds=[(None, None)] * 2).fun for c in clearances]
+    assert run["measured"][:, CORRECTED, 0] == pytest.approx(np.array(lowest), abs=1e-9)

@@ -247,3 +247,14 @@ def test_faces_of_other_parts_do_not_locate_a_joint():
 
     with pytest.raises(ModelError, match=r'face c -x is of part "c"; the parts of the joint are: a, b'):
         tc.build(welded(with_stranger))
+
+
+def test_a_pair_within_a_joint_is_to_be_declared_before_it_is_joined():
+    line = welded(on_points)
+    a, b = line.parts
+    line.stations[1].contact("seam", moving=b.face("-x"), reference=a.face("+x"))
+    (fault,) = tc.check(line)
+    assert fault.endswith(
+        'both parts belong to joint "ab", which keeps them as station "weld" left them; declare the pair in station "weld", '
+        "or leave it out"
+    )

@@ -20,6 +20,11 @@ def shown(text: str) -> str:
     return CONTROL_CHARACTERS.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
+def shown_name(name: str) -> str:
+    """Return a name as it may be printed on one line: tabs and line breaks become escapes, too."""
+    return shown(name).replace("\t", "\\t").replace("\n", "\\n")
+
+
 def clipped(text: str, max_length: int = 400) -> str:
     """Return the text of a file as a message may quote it: on one line, printable and short."""
     line = " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())

@@ -9,7 +9,7 @@ import typer
 
 from tolcontact.cli.app import AsJson, StepFile, app, examples
 from tolcontact.cli.progress import waiting
-from tolcontact.errors import shown
+from tolcontact.errors import shown_name
 from tolcontact.geometry import bodies_in, faces_in, group_lines
 
 Body = Annotated[str | None, typer.Option(help="Name or number of the body. Not needed for a file with a single body.")]
@@ -30,7 +30,7 @@ def bodies(file: StepFile, as_json: AsJson = False) -> None:
         *products, _ = body.path or ("",)
         for depth, name in enumerate(products):
             if parents[: depth + 1] != tuple(products[: depth + 1]):
-                typer.echo(f"{'  ' * depth}{shown(name)}")
+                typer.echo(f"{'  ' * depth}{shown_name(name)}")
         parents = tuple(products)
         typer.echo(f"{'  ' * len(products)}{body}")
 

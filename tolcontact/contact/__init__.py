@@ -35,8 +35,10 @@ The exact resolution first takes steps like the paper's. Realizations that have 
 Newton steps, which take the curvature of the gaps and the objective into account. They stop when none of
 twenty steps in a row is smaller than all before, or, if parts contradict each other, when ten steps do not reduce the
 penetration. If there is a conflict, no solution, or a solution far from the raw pose, other starts are tried: from the nominal
-pose, with small steps, or with contact points that are projected again. If two starts end in the same conflict, there is no
-third. The best solution is kept; `starts` counts the starts.
+pose, with small steps, or with contact points that are projected again. If a sampled round face has no solution, steps from
+the raw pose first end where they are rounding, since rounding may grow from there: a shaft whose spin nothing holds would fall
+through planes at fixed points. If two starts end in the same conflict, there is no third. The best solution is kept; `starts`
+counts the starts.
 
 ## Contact search
 

@@ -57,8 +57,13 @@ STEPS_WHERE_FACES_END = (
 )
 
 
-def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, task: Task, state: State, stride: float) -> None:
-    """Take the steps of `state` to their end. Without rest there is an answer only if the parts contradict each other."""
+def repeat(
+    step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, task: Task, state: State, stride: float, balances: bool
+) -> None:
+    """Take the steps of `state` to their end. Without rest there is an answer only if the parts contradict each other.
+
+    With `balances`, realizations also rest where steps like the paper's are rounding, though these may grow from there.
+    """
     unsettled, trail = Unsettled(task, state), list[np.ndarray]()
     progress: Progress | None = None
     if not len(task):
@@ -70,8 +75,8 @@ def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, t
         if asleep.all():
             continue
         size, scaled = _take(step, unsettled, np.flatnonzero(~asleep), kind, stride)
-        knows_curvature = kind.newton or step.knows_walls
-        moves = (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not knows_curvature)))
+        rounding_counts = kind.newton or step.knows_walls or balances
+        moves = (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
         if kind.width > 1:
             moves |= ~candidates.hold(unsettled.task, unsettled.state)
         # The smaller one tells: steps are large in freedoms that nothing holds, and in the norm of the objective if

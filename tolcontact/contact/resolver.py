@@ -22,7 +22,7 @@ from tolcontact.contact.record import accumulate_starts
 from tolcontact.contact.repeated_steps import repeat
 from tolcontact.contact.scan import min_gaps, undone
 from tolcontact.contact.springs import spring_misfit
-from tolcontact.contact.state import Resolved, State, Task
+from tolcontact.contact.state import NO_ANSWER, Resolved, State, Task
 
 STRIDE, SMALL_STRIDE = 0.5, 0.05  # rad: the largest turn of a part in one step; linear rows are wrong long before
 SAME_CONFLICT = 1e-3  # share by which the penetration of two conflicts differs that are taken for the same
@@ -35,15 +35,19 @@ class Start(NamedTuple):
     at_nominal   whether they start from the nominal instead of the raw place
     projected    whether contact points are projected again, before every step, onto curved faces
     stride       the largest turn of a part in one step [rad]
+    balances     whether steps end where they are rounding, though they may grow from there
     """
 
     at_nominal: bool = False
     projected: bool = False
     stride: float = STRIDE
+    balances: bool = False
 
 
 OTHER_STARTS = (Start(at_nominal=True), Start(stride=SMALL_STRIDE))  # if no face is curved
 OTHER_STARTS_CURVED = (Start(projected=True), Start(projected=True, at_nominal=True))
+# Planes at fixed points of a shaft leave it as it spins. If its spin is free, rounding grows until it falls through them.
+BALANCE = Start(balances=True)
 
 
 class ContactResolver:
@@ -126,7 +130,7 @@ class ContactResolver:
             caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull far if nothing holds
             search(self._step, self._limits, self._candidates, self._energy_of, task, state, start.stride, caution)
         elif self._method.is_exact:
-            repeat(self._step, self._limits, self._candidates, task, state, start.stride)
+            repeat(self._step, self._limits, self._candidates, task, state, start.stride, start.balances)
         else:
             self._step.take(task, state, stride=start.stride)
         state.searched[:] = projected
@@ -165,20 +169,26 @@ class ContactResolver:
 
         The same conflict from two starts is not looked for from a third one.
         """
+        if self._candidates.curved:
+            self._try_again(task, state, np.flatnonzero(state.rank == NO_ANSWER), BALANCE)
         rows = np.flatnonzero((state.rank > 0) | ~self._limits.is_near(task, state))
         for start in OTHER_STARTS_CURVED if self._candidates.curved else OTHER_STARTS:
-            if not rows.size:
-                return
-            part = task.take(rows)
-            poses, relative = self._at_nominal(part) if start.at_nominal else (part.raw, part.relative)
-            part = replace(part, scans=self._candidates.scans(relative, part.deviations, projected=start.projected))
-            attempt = self._step.start(poses, relative)
-            self._attempt(part, attempt, start)
-            accumulate_starts(state, rows, attempt)
-            best = state.take(rows)
-            better = is_better(attempt, self._energy_of(part, attempt), best, self._energy_of(part, best))
-            state.put(rows[better], attempt.take(better))
-            rows = rows[(state.rank[rows] > 0) & ~is_same_conflict(attempt, best)]
+            rows = self._try_again(task, state, rows, start)
+
+    def _try_again(self, task: Task, state: State, rows: Int[Array, " n"], start: Start) -> Int[Array, " left"]:
+        """Try some realizations (n,) again and keep the better answer. Return those to be tried further (left,)."""
+        if not rows.size:
+            return rows
+        part = task.take(rows)
+        poses, relative = self._at_nominal(part) if start.at_nominal else (part.raw, part.relative)
+        part = replace(part, scans=self._candidates.scans(relative, part.deviations, projected=start.projected))
+        attempt = self._step.start(poses, relative)
+        self._attempt(part, attempt, start)
+        accumulate_starts(state, rows, attempt)
+        best = state.take(rows)
+        better = is_better(attempt, self._energy_of(part, attempt), best, self._energy_of(part, best))
+        state.put(rows[better], attempt.take(better))
+        return rows[(state.rank[rows] > 0) & ~is_same_conflict(attempt, best)]
 
     def _energy_of(self, task: Task, state: State) -> Float[Array, " n"]:
         return self._energy(poses=state.poses, raw=task.raw, moments=task.moments, deviations=task.deviations)

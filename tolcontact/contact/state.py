@@ -16,6 +16,7 @@ from tolcontact.contact.scan import Scan
 from tolcontact.contact.slots import Slots
 from tolcontact.discretization import ContactPoints
 
+NO_ANSWER = 2  # the rank of a realization without a certified answer or conflict
 LOADED_SHARE = 1e-4  # of the largest reaction of a realization: smaller ones only oppose the regularization
 ANSWER = ("poses", "relative", "multipliers", "slack", "astray")
 
@@ -93,7 +94,7 @@ class State(Record):
     @property
     def rank(self) -> Int[Array, " n"]:
         """(n,): 0 for a certified answer, 1 for a conflict, 2 if there is no answer, or a doubtful one."""
-        return np.where(self.solved & ~self.doubtful, np.where(self.in_conflict, 1, 0), 2)
+        return np.where(self.solved & ~self.doubtful, np.where(self.in_conflict, 1, 0), NO_ANSWER)
 
     @property
     def loaded(self) -> Bool[Array, "n row"]:

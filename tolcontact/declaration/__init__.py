@@ -126,9 +126,9 @@ Every quantity that varies is a *contributor* with a label: "part.locator", "par
 >>> batch = clamp.population({"cover.side.tilt z": [0.004, -0.002, 0.001]})
 
 A variable adds its factor times its own deviation to each contributor that it drives. A correlation is a matrix, or a number
-for two contributors; it leaves their distributions unchanged. A population is a table of measured parts (a CSV file, a
-DataFrame, a Dataset, a mapping) whose rows are drawn as a whole, with replacement. Each column replaces the draws of the
-contributor that it is named after.
+between -1 and 1 for two contributors; it leaves their distributions unchanged. A population is a table of measured parts (a
+CSV file, a DataFrame, a Dataset, a mapping) whose rows are drawn as a whole, with replacement. Each column replaces the draws
+of the contributor that it is named after.
 
 ## Contact pairs
 

@@ -17,7 +17,7 @@ from tolcontact.errors import shown
 from tolcontact.readable import Readable
 
 SEPARATORS = {";": "semicolons", "\t": "tabs"}
-MIN_EIGENVALUE = 1e-12  # of a correlation matrix
+MIN_EIGENVALUE = 1e-12  # of a correlation matrix; of a smaller absolute value it is zero
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -72,10 +72,16 @@ class Correlation(Readable):
             yield f"its matrix is not {count} x {count} finite numbers, one row for each contributor"
         elif not (np.allclose(matrix, matrix.T, atol=1e-12) and np.allclose(np.diag(matrix), 1, atol=1e-12)):
             yield "its matrix is not symmetric with ones on the diagonal; expected correlation coefficients, not covariances"
-        elif (smallest := float(np.linalg.eigvalsh(matrix).min())) < MIN_EIGENVALUE:
+        elif (smallest := float(np.linalg.eigvalsh(matrix).min())) < -MIN_EIGENVALUE:
             yield (
                 f"its matrix is not positive definite (smallest eigenvalue {smallest:.3g}): nothing is correlated like "
                 "that; check the signs, or make the coefficients smaller"
+            )
+        elif smallest < MIN_EIGENVALUE:
+            yield (
+                "its matrix is singular: a contributor in it follows from the others, as with a coefficient of 1 or -1; "
+                "expected contributors with a part of their own. Give those that follow a tolerance of 0, and declare their "
+                "common cause by variable(name, tolerance, drives={label: factor, ...}), with factors of opposite signs for -1"
             )
 
     def __str__(self) -> str:

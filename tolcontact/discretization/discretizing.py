@@ -316,7 +316,18 @@ def _immovable_pairs(scene: Scene) -> list[str]:
     """Return a fault for each pair that no free part can open."""
     return [
         f"{designation('contact pair', pair)}: contact cannot move its sides relative to each other; "
-        f'declare part "{pair.moving.part.name}" free (fixed=False)'
+        f"{_way_to_open(scene, pair.moving.part, pair.reference.part)}"
         for pair in scene.assembly.pairs
         if scene.movers(pair.moving.part) == scene.movers(pair.reference.part)
     ]
+
+
+def _way_to_open(scene: Scene, moving: Part, reference: Part) -> str:
+    """Return the end of a message: how contact may move two parts relative to each other."""
+    joint = next((joint for joint in scene.assembly.joints if {moving, reference} <= set(joint.members)), None)
+    if joint is None:
+        return f'declare part "{moving.name}" free (fixed=False)'
+    return (
+        f'both parts belong to joint "{joint.name}", which keeps them as station "{joint.station}" left them; declare the pair '
+        f'in station "{joint.station}", or leave it out'
+    )

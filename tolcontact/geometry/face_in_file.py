@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from tolcontact.declaration.values import Vector
-from tolcontact.errors import shown
+from tolcontact.errors import shown_name
 from tolcontact.readable import Readable
 
 GENERAL = "general"  # kind of a face without an analytic surface
@@ -45,7 +45,7 @@ class FaceInFile(Readable):
     copies: int = 0
 
     def __str__(self) -> str:
-        name = f'"{shown(self.name)}", ' if self.name else ""
+        name = f'"{shown_name(self.name)}", ' if self.name else ""
         entries = [f"{self.number}. {name}{'inner ' if self.is_inner else ''}{self.kind}"]
         if self.radius is not None:
             entries.append(f"radius {self.radius:.6g} mm")

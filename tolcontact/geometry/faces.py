@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from tolcontact.declaration import Brep, Cylinder, Face, Facing, Inside, Largest, Near, Part, Picked, Triangles
 from tolcontact.declaration.selection import FACE_ANGLE
 from tolcontact.declaration.values import Vector
-from tolcontact.errors import GeometryFault, shown
+from tolcontact.errors import GeometryFault, shown_name
 from tolcontact.geometry.boxes import overlaps
 from tolcontact.geometry.brep_face import describe_faces, faces_at, number_faces
 from tolcontact.geometry.face_groups import group_lines
@@ -206,7 +206,9 @@ def _brep_numbers(face: Face, mesh: trimesh.Trimesh, which: int | str | Vector) 
 
 def _by_name(face: Face, names: Sequence[str], name: str) -> np.ndarray:
     if name not in names:
-        listed = ", ".join(f'"{shown(entry)}"' for entry in [entry for entry in dict.fromkeys(names) if entry][:MAX_LISTED])
+        listed = ", ".join(
+            f'"{shown_name(entry)}"' for entry in [entry for entry in dict.fromkeys(names) if entry][:MAX_LISTED]
+        )
         content = f"its faces are called {listed}" if listed else "its file gives no face of it a name"
         more = ", ...; tolcontact faces lists them" if len(set(names) - {""}) > MAX_LISTED else ""
         raise GeometryFault(f"face {face}: the part has no such face; {content}{more}")

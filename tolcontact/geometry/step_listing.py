@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from tolcontact.declaration import Assembly, Mesh, Part
 from tolcontact.declaration.geometry import STEP
 from tolcontact.declaration.values import Vector
-from tolcontact.errors import CONTROL_CHARACTERS, GeometryFault, ModelError, OptionError, nearest_name, shown
+from tolcontact.errors import CONTROL_CHARACTERS, GeometryFault, ModelError, OptionError, nearest_name, shown, shown_name
 from tolcontact.geometry.brep_face import describe_faces, plain_vector
 from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
 from tolcontact.geometry.files import SURFACES, key_of, read_files
@@ -52,7 +52,7 @@ class BodyInFile(Readable):
     units: str
 
     def __str__(self) -> str:
-        title = f"{self.number}. {shown(self.name) or 'without a name'}"
+        title = f"{self.number}. {shown_name(self.name) or 'without a name'}"
         size = " x ".join(f"{up - low:.4g}" for low, up in zip(self.lower, self.upper, strict=True))
         return f"{title}: {'open, ' if self.is_open else ''}{size} mm, {self.faces} faces"
 
@@ -164,7 +164,7 @@ def parts_from(
 
 def _first(names: Sequence[str]) -> str:
     """Return the first names of a list for a message."""
-    return ", ".join(f'"{name}"' for name in names[:MAX_LISTED]) + (", ..." if len(names) > MAX_LISTED else "")
+    return ", ".join(f'"{shown_name(name)}"' for name in names[:MAX_LISTED]) + (", ..." if len(names) > MAX_LISTED else "")
 
 
 def _names(option: str, value: Any) -> list[str]:

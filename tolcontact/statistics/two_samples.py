@@ -1,7 +1,8 @@
 """Differences of two samples with 95 % intervals: samples of the same realizations (paired), or of different ones.
 
 Realization k of both samples is one pair. Pairs are independent of each other whether or not their two members are, so paired
-intervals hold for any two runs of equally many realizations; equal draws make them narrow.
+intervals hold for any two runs of equally many realizations; equal draws make them narrow. Of runs with a sampling plan the
+replicates are independent, and their differences tell how wide intervals are (see Sample.widening).
 """
 
 import math
@@ -20,7 +21,7 @@ def shift(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:
     """Return the difference of the means: Student's t of paired differences, or Welch's interval."""
     if paired:
         return intervals.mean(sample - baseline)
-    squared_errors = [x.moments[0] / (x.count - 1) for x in (sample, baseline)]
+    squared_errors = [x.moments[0] / (x.count - 1) * x.widening**2 for x in (sample, baseline)]
     difference, total = sample.mean - baseline.mean, sum(squared_errors)
     if not total > 0:
         return Estimate(difference, difference, difference) if math.isfinite(difference) else UNDEFINED
@@ -49,17 +50,28 @@ def share_shift(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:
     paired (Agresti and Min, 2005), one hit and one miss in each sample if not (Agresti and Caffo, 2000).
     """
     if paired:
-        n = sample.count
-        pairs = [(int((a & ~b).sum()), int((b & ~a).sum())) for a, b in zip(sample.pieces(), baseline.pieces(), strict=True)]
-        gained, lost = (sum(counts) for counts in zip(*pairs, strict=True))
-        middle, change = (gained - lost) / (n + 2), gained + lost + 1
-        error = math.sqrt(max(change / (n + 2) - middle**2, 0) / (n + 2))
-        return _bounded((gained - lost) / n, middle, error)
-    hits = [sum(int(piece.sum()) for piece in x.pieces()) for x in (sample, baseline)]
-    counts = [sample.count, baseline.count]
-    shares = [(k + 1) / (n + 2) for k, n in zip(hits, counts, strict=True)]
+        change = sample.map(lambda piece: piece.astype(float)) - baseline.map(lambda piece: piece.astype(float))
+        gained, lost = (sum(int((piece == sign).sum()) for piece in change.pieces()) for sign in (1, -1))
+        weight = _weight(change)
+        n = weight * change.count
+        middle, changed = weight * (gained - lost) / (n + 2), weight * (gained + lost) + 1
+        error = math.sqrt(max(changed / (n + 2) - middle**2, 0) / (n + 2))
+        return _bounded((gained - lost) / change.count, middle, error)
+    hits = [x.map(lambda piece: piece.astype(float)) for x in (sample, baseline)]
+    weights = [_weight(x) for x in hits]
+    counts = [weight * x.count for weight, x in zip(weights, hits, strict=True)]
+    shares = [(n * x.mean + 1) / (n + 2) for n, x in zip(counts, hits, strict=True)]
     error = math.sqrt(sum(p * (1 - p) / (n + 2) for p, n in zip(shares, counts, strict=True)))
-    return _bounded(hits[0] / counts[0] - hits[1] / counts[1], shares[0] - shares[1], error)
+    return _bounded(hits[0].mean - hits[1].mean, shares[0] - shares[1], error)
+
+
+def _weight(x: Sample) -> float:
+    """Return how many independent realizations tell as much about the mean as one of a sample does.
+
+    It is 1 if replicates do not differ, since that is no reason to be sure of a share.
+    """
+    widening = x.widening
+    return 1 / widening**2 if widening > 0 else 1.0
 
 
 def _bounded(estimate: float, middle: float, error: float) -> Estimate:
