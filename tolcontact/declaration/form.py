@@ -23,7 +23,8 @@ class Form(Readable):
     lobes        of a cylinder or cone: all sections have this number of lobes, as waviness has; covariances then count the
                  distance along the axis alone
     measured     path of the points of measured faces, one CSV or PLY file for each part, as in "scans/*.csv": lines x, y, z
-                 [mm] in the frame of the part. Faces then vary as these do, regardless of the tolerance
+                 [mm] in the frame of the part. Faces then vary as these do, regardless of the tolerance, without the
+                 scatter of points about a smooth form; waves too short for the points or for 1280 stations are refused
     """
 
     covariance: str = "squared exponential"

@@ -11,6 +11,7 @@ import trimesh
 from tolcontact.declaration import Assembly, ContactPair, Face, Part
 from tolcontact.declaration.contact_pair import MAX_POINTS
 from tolcontact.discretization.form_points import (
+    affordable_spacing,
     check_facing,
     check_resolved,
     coaxial_points,
@@ -33,6 +34,7 @@ from tolcontact.geometry.surface import Surface
 
 DEFAULT_REACH = 0.1  # of the moving part's size
 DEFAULT_POINTS = 200
+FORM_POINTS = 10_000  # with form, if that resolves it
 DEFAULT_SPRINGS = 40  # all of which may carry at once, so that a QP has a row for each
 POINT_TOLERANCE = 1e-9  # of the part's size: points that are no farther apart are one point
 
@@ -118,7 +120,8 @@ def _candidates(
     if isinstance(pair.points, str):
         points = distinct_vertices(mesh)
     else:
-        spacing = form_spacing(lengths) if lengths and _is_open(pair) else pair.spacing
+        is_fine = lengths and _is_open(pair)
+        spacing = affordable_spacing(lengths, float(mesh.area), FORM_POINTS) if is_fine else pair.spacing
         open_count = DEFAULT_POINTS if pair.stiffness is None else DEFAULT_SPRINGS
         count = open_count if _is_open(pair) else pair.points
         if spacing is not None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tolcontact.discretization.form_points import form_lengths, form_spacing, with_rims
+from tolcontact.discretization.form_points import affordable_spacing, form_lengths, with_rims
 from tolcontact.discretization.measured_geometry import FaceGap, MeasuredFace, MeasuredPoint
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.errors import GeometryFault
@@ -10,7 +10,7 @@ from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.overlap import overlap_corners
 from tolcontact.geometry.spreading import spread
 
-DEFAULT_PLACES, MAX_PLACES = 200, 1000
+DEFAULT_PLACES, FORM_PLACES, MAX_PLACES = 200, 600, 4000  # by default, of a face with form if that resolves it, at all
 MIN_SHARE = 0.04  # of a face, over which the other one is: smaller regions have fewer places
 MAX_FACING = 0.0  # cosine between the normals of faces that do not face each other
 
@@ -43,7 +43,9 @@ def face_gap(moving: MeasuredFace, reference: MeasuredFace, is_largest: bool) ->
 def _places(moving: MeasuredFace, reference: MeasuredFace) -> np.ndarray:
     """Return places (place, 3) of the moving face over the reference face, also along the rim of the region that they cover."""
     surface, lengths = moving.surface, form_lengths([moving.deviation, reference.deviation])
-    spacing = form_spacing(lengths) if lengths else (surface.mesh.area / DEFAULT_PLACES) ** 0.5
+    spacing = (
+        affordable_spacing(lengths, surface.mesh.area, FORM_PLACES) if lengths else (surface.mesh.area / DEFAULT_PLACES) ** 0.5
+    )
     places = spread(surface.mesh, None, spacing)
     share = float(reference.surface.project(places)[2].mean())
     if not lengths and share < 1:
@@ -59,6 +61,6 @@ def _places(moving: MeasuredFace, reference: MeasuredFace) -> np.ndarray:
     if len(places) > MAX_PLACES:
         raise GeometryFault(
             f"the gap between {moving.face} and {reference.face} needs {len(places)} places, by the correlation length of "
-            f"their form; expected at most {MAX_PLACES}; choose smaller faces, or a larger length"
+            f"their form, {min(lengths):.3g} mm; expected at most {MAX_PLACES}; choose smaller faces, or a larger length"
         )
     return places

@@ -21,7 +21,9 @@ MIN_AZIMUTHS = 48  # of a cylinder
 END_SHARE = 1e-6  # of the length: how far inside their ends the outermost points of cylinders are
 PARALLEL_TOLERANCE = 1e-3  # rad between the axes of cylinders
 MAX_SPACING_SHARE = 1 / 2
+WIDE_SPACING_SHARE = 2 / 5  # the usual spacing of many points: spreads leave some places farther away
 COVER_SHARE = 0.71  # of the spacing of a square grid: the distance of the middle of a square from the nearest point
+SQUARE_SHARE = 1.25  # of the area of a square of the grid: what a point of a spread covers, at least
 MIN_DISTANCE_SHARE = 1 / 4  # of the spacing: points of a rim that are nearer to others are left out
 EDGES = 8  # of the triangles whose corners are compared with contact points, in a correlation length
 
@@ -34,6 +36,12 @@ def form_lengths(deviating: Sequence[FaceDeviation | None]) -> list[float]:
 def form_spacing(lengths: Sequence[float]) -> float:
     """Return the usual distance [mm] within which every place of a face has a contact point, for correlation lengths."""
     return COVER_SHARE * SPACING_SHARE * min(lengths)
+
+
+def affordable_spacing(lengths: Sequence[float], area: float, count: int) -> float:
+    """Return the same for an area [mm2] that should have at most a number of points: wider, but no wider than is resolved."""
+    affordable = COVER_SHARE * (SQUARE_SHARE * area / count) ** 0.5
+    return min(max(form_spacing(lengths), affordable), COVER_SHARE * WIDE_SPACING_SHARE * min(lengths))
 
 
 def check_facing(moving: Surface, reference: Surface, deviating: Sequence[FaceDeviation | None]) -> None:

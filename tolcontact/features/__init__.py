@@ -72,8 +72,16 @@ longest extent of the face, and the number of modes. For cylinders and cones it 
 the diameter across it. `tc.Form(lobes=3)` has this number of lobes in all sections. `tc.Form(measured="scans/*.csv")` varies as
 measured faces do, whose points are in files, one for each part: about their mean by their principal components. It is not
 scaled to the tolerance, and of its mean the zones around it count nothing. Of several tolerances of form the narrowest is
-drawn. Archives state which share of the variance the modes leave out, and the
-mean width of the zones. The field is orthogonal to displacements of the face as a whole, so that it moves no datum that is
+drawn. Archives state which share of the variance the modes leave out, of measured faces the share of their mean square that
+modes and stations leave out, and the mean width of the zones.
+
+A measured face is a smooth field at 160 stations, or at up to 1280 if these predict points that are left out better, and as
+smooth as predicts them best: scatter that neighbouring points do not share is no form. Of very many points some thousands are
+taken at random. A form that changes over too short lengths for the stations, or of which the field is far higher between the
+points than at them, is refused or warned of, as are outliers. Contact points are as close as its slopes require: waves that are
+12 mm long need points 1 mm apart, and many.
+
+The field is orthogonal to displacements of the face as a whole, so that it moves no datum that is
 fitted by least squares. The tolerances around a form limit form and displacement together: displacements have what the form
 leaves of their zones, and a form that leaves nothing is refused.
 

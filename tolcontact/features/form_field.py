@@ -5,9 +5,10 @@ a pivoted Cholesky factor of the covariance, so that they are known at any place
 - removed. All that uses a face thus shares one field.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,9 +22,28 @@ from tolcontact.geometry.surface import Surface
 
 LENGTH_SHARE = 1 / 3  # of the longest extent of a face: the usual correlation length
 MAX_STATIONS = 200
-POINTS_AT_ONCE = 1 << 14
+VALUES_AT_ONCE = 1 << 22  # of covariances with stations
 REST = 1e-5  # of the variance: what the stations leave out at no place
 MIN_VARIANCE = 1e-10  # of the largest: a mode with less is rounding
+
+
+class ScanFit(NamedTuple):
+    """A measured face, and how the field agrees with its points.
+
+    width     [mm] of its least zone, without scatter
+    height    [mm] of its form, root mean square
+    lost      [mm] of what the field leaves out of it, root mean square
+    scatter   [mm] of the points about the field, root mean square without outliers
+    farthest  [mm] of the points from the field, largest
+    excess    largest height between or beside the points, relative to that at the points
+    """
+
+    width: float
+    height: float
+    lost: float
+    scatter: float
+    farthest: float
+    excess: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,20 +53,22 @@ class FormField:
     form        as declared
     associated  what the form is measured from
     lengths     correlation lengths
+    scales      lengths over which heights change
     places      (place, 3) [mm] all over the face, at which zones are evaluated
     stations    (station, 3) [mm]
     weights     (station, mode)
     removed     (7, mode): growth, translation and rotation [1/mm] about the origin of the face as a whole, which a mode leaves
                 out
-    left_out    share of the variance of the field that the modes leave out
+    left_out    share of the variance of the field that the modes leave out, of measured faces also what the field leaves out
     spreads     (mode,) [mm] standard deviations of the coefficients, as measured; None if these follow from a tolerance
     means       (mode,) [mm] of the coefficients; None: 0
-    scans       widths [mm] of the least zones of the measured faces, by file; empty if the form follows from a tolerance
+    scans       measured faces by file; empty if the form follows from a tolerance
     """
 
     form: Form
     associated: AssociatedFeature
     lengths: Lengths
+    scales: Lengths
     places: np.ndarray
     stations: np.ndarray
     weights: np.ndarray
@@ -54,7 +76,7 @@ class FormField:
     left_out: float
     spreads: np.ndarray | None
     means: np.ndarray | None
-    scans: Mapping[str, float]
+    scans: Mapping[str, ScanFit]
 
     @property
     def modes(self) -> int:
@@ -65,18 +87,6 @@ class FormField:
     def normals(self) -> np.ndarray:
         """Unit normals (place, 3) of the surface at the places, away from its axis or centre."""
         return self.associated.surface.distance(self.places)[1]
-
-    @cached_property
-    def scales(self) -> Lengths:
-        """The lengths over which heights change: the correlation lengths, or half of the extents of the face if that is less.
-
-        A length far beyond the face leaves heights that bend once over the face.
-        """
-        surface = self.associated.surface
-        if not isinstance(surface, Cylinder | Cone):
-            return Lengths(*np.minimum(self.lengths, longest_extent(self.places) / 2))
-        across, along = axial_extents(surface.origin, surface.axis, self.places)
-        return Lengths(min(self.lengths.across, across / 2), min(self.lengths.along, along / 2))
 
     @cached_property
     def zone(self) -> tuple[ZoneMember, ...]:
@@ -93,9 +103,10 @@ class FormField:
         """Return the heights (..., mode) of each mode at points (..., 3) [mm] of the face."""
         flat = points.reshape(-1, 3)
         heights = np.zeros((len(flat), self.modes))
-        # A product of matrices would depend, in its last bits, on the number of points.
-        for factor, row in zip(np.hstack(self._functions(flat)).T, (*self.weights, *-self.removed), strict=True):
-            heights += factor[:, None] * row
+        for piece in self._pieces(len(flat)):
+            # A product of matrices would depend, in its last bits, on the number of points.
+            for factor, row in zip(np.hstack(self._functions(flat[piece])).T, (*self.weights, *-self.removed), strict=True):
+                heights[piece] += factor[:, None] * row
         return heights.reshape(*points.shape[:-1], self.modes)
 
     def sums(self, points: np.ndarray, row: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
@@ -104,13 +115,17 @@ class FormField:
         for k, mode in enumerate(np.vstack([self.weights, -self.removed]).T):
             factors += coefficients[:, k, None] * mode
         heights = np.zeros(len(points))
-        for start in range(0, len(points), POINTS_AT_ONCE):
-            piece = slice(start, start + POINTS_AT_ONCE)
+        for piece in self._pieces(len(points)):
             values, terms = self._functions(points[piece])
             of_points, count = factors[row[piece]], len(self.stations)
             heights[piece] = (values * of_points[:, :count]).sum(axis=1)
             heights[piece] += (terms * of_points[:, count:]).sum(axis=1)
         return heights
+
+    def _pieces(self, count: int) -> Iterator[slice]:
+        """Yield pieces of a number of points that are evaluated at once."""
+        step = max(VALUES_AT_ONCE // len(self.stations), 1)
+        yield from (slice(start, start + step) for start in range(0, count, step))
 
     def _functions(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return covariances with stations (point, station) and displacements of the face (point, 7) at points (point, 3)."""
@@ -147,6 +162,7 @@ def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> Form
         form=form,
         associated=associated,
         lengths=lengths,
+        scales=scales_within(lengths, associated, places),
         places=places,
         stations=stations,
         weights=inverse @ modes,
@@ -181,6 +197,18 @@ def _lengths(form: Form, face: Surface, associated: AssociatedFeature) -> Length
     diameter, extent = axial_extents(surface.origin, surface.axis, vertices)
     across = diameter / 2 / form.lobes if form.lobes else form.length or LENGTH_SHARE * diameter
     return Lengths(across, form.length or LENGTH_SHARE * extent)
+
+
+def scales_within(lengths: Lengths, associated: AssociatedFeature, places: np.ndarray) -> Lengths:
+    """Return lengths over which heights change at places (place, 3) of a face, at most half of its extents.
+
+    A length far beyond the face leaves heights that bend once over the face.
+    """
+    surface = associated.surface
+    if not isinstance(surface, Cylinder | Cone):
+        return Lengths(*np.minimum(lengths, longest_extent(places) / 2))
+    across, along = axial_extents(surface.origin, surface.axis, places)
+    return Lengths(min(lengths.across, across / 2), min(lengths.along, along / 2))
 
 
 def axial_extents(origin: np.ndarray, axis: np.ndarray, points: np.ndarray) -> tuple[float, float]:

@@ -1,7 +1,8 @@
 """The form field of measured faces: their mean, and the principal components of what they deviate from it.
 
-Heights of the points of each part over the nominal surface are interpolated at stations all over the face, and between these
-by a covariance, so that the field is known at any place like any other. Coefficients vary as the measured faces do.
+Heights of the points of each part over the nominal surface are fitted with functions of place (see height_regression), so that
+the field is known at any place like any other. Coefficients vary as the measured faces do. The field is compared with the
+points: a form that changes over shorter lengths than the distance of stations, or of points, is refused.
 """
 
 from dataclasses import replace
@@ -11,33 +12,41 @@ import scipy
 
 from tolcontact.declaration.form import Form
 from tolcontact.errors import GeometryFault
-from tolcontact.features.associated_features import AssociatedFeature
-from tolcontact.features.covariances import Lengths, covariance
-from tolcontact.features.form_field import FormField, associated_covariance, beside_displacements
-from tolcontact.features.least_zone import least_widths
+from tolcontact.features.associated_features import AssociatedFeature, displacement_terms
+from tolcontact.features.covariances import Lengths
+from tolcontact.features.form_field import FormField, ScanFit, associated_covariance, beside_displacements, scales_within
+from tolcontact.features.height_regression import STATIONS, HeightRegression, Scan
+from tolcontact.features.least_zone import ZoneMember, least_widths
+from tolcontact.geometry.analytic_surfaces import Cone, Cylinder
 from tolcontact.geometry.measured_points import measured_points
 from tolcontact.geometry.spreading import spread
 from tolcontact.geometry.surface import Surface
 
 COVARIANCE = "matern 5/2"  # by which heights between stations follow from theirs
-STATIONS = 160
-NEIGHBOURS = 24  # points that a height between them follows from
-LENGTH_FACTOR = 3.0  # times the distance of stations
+MIN_POINTS = 24
 MAX_HEIGHT_SHARE = 0.02  # of a face's size: a point farther from its surface was not measured on it
-MIN_DISTANCE = 1e-6  # of a point from a station, relative to the farthest: nearer ones count alike
+DIGITS = 6  # of mm: points that are no farther apart are one, whose scatter is not independent
 MIN_VARIANCE = 1e-8  # of the largest: a component with less is rounding
+MAX_LOST_SHARE = 0.25  # of the form: what the field may leave out
+MAX_EXCESS = 3.0  # times the largest height at the points: what the field may reach between them
+NEIGHBOURS = 8  # of a point, whose deviations from the field are compared with its own
+SIGNIFICANT = 5.0  # standard deviations of a mean, by which deviations from the field are more than scatter
+MEDIAN_SHARE = 0.6745  # of the standard deviation of normal numbers: the median of their sizes
+STEP_SHARE = 1e-4  # of the correlation length: steps of slopes
 
 
 def measured_field(form: Form, pattern: str, face: Surface, associated: AssociatedFeature) -> FormField:
     """Return the form field of faces whose points are in files, in the frame of their part. Raises GeometryFault."""
     form = replace(form, covariance=COVARIANCE)
-    stations = associated.surface.project(spread(face.mesh, STATIONS, None))
-    length = LENGTH_FACTOR * float(np.sqrt(face.mesh.area / len(stations)))
-    lengths, clouds = Lengths(length, length), measured_points(pattern)
+    everywhere = associated.surface.project(spread(face.mesh, STATIONS[0], None))
+    scans = [_scan(cloud, str(path), face, everywhere, associated) for path, cloud in measured_points(pattern).items()]
+    regression = HeightRegression.of(form, face, associated, scans)
+    scans = regression.samples(scans)
+    weights = regression.weights(scans)
+    fits = [_fit(scan, of_part, regression) for scan, of_part in zip(scans, weights.T, strict=True)]
+    lengths = _lengths(regression, weights)
     places, areas = associated.places(face, lengths)
-    heights = np.column_stack([_heights_at(stations, cloud, str(path), face, associated) for path, cloud in clouds.items()])
-    weights = np.linalg.solve(covariance(form, lengths, associated.surface, stations, stations), heights)
-    functions = associated_covariance(form, lengths, associated, places, stations) @ weights  # (place, part)
+    functions = associated_covariance(form, regression.lengths, associated, places, regression.stations) @ weights
     shares = areas / areas.sum()
     remainder, removed = beside_displacements(functions, associated, places, shares)
     mean, count = remainder.mean(axis=1), remainder.shape[1]
@@ -48,52 +57,114 @@ def measured_field(form: Form, pattern: str, face: Surface, associated: Associat
     mixes[:, 1:] -= mixes[:, 1:].mean(axis=0)
     size = max(float(np.linalg.norm(mean)), 1e-300)
     mixes[:, 0] /= size
+    lost = float(np.mean([fit.lost**2 for fit in fits]))
     field = FormField(
         form=form,
         associated=associated,
-        lengths=lengths,
+        lengths=regression.lengths,
+        scales=scales_within(lengths, associated, places),
         places=places,
-        stations=stations,
+        stations=regression.stations,
         weights=weights @ mixes,
         removed=removed @ mixes,
-        left_out=float((spreads[kept:] ** 2).sum() / (spreads**2).sum()),
+        left_out=(float((spreads[kept:] ** 2).sum()) + lost) / max(size**2 + float((spreads**2).sum()) + lost, 1e-300),
         spreads=np.array([0.0, *spreads[:kept]]),
         means=np.array([size, *[0.0] * kept]),
         scans={},
     )
-    widths = least_widths(field.zone, (remainder / np.sqrt(shares)[:, None]).T)
-    return replace(field, scans={str(path): float(width) for path, width in zip(clouds, widths, strict=True)})
+    if not associated.is_whole:  # each section or line has a zone of its own, at places
+        widths = least_widths(field.zone, (remainder / np.sqrt(shares)[:, None]).T)
+        fits = [fit._replace(width=float(width)) for fit, width in zip(fits, widths, strict=True)]
+    return replace(field, scans={scan.path: fit for scan, fit in zip(scans, fits, strict=True)})
 
 
-def _heights_at(stations: np.ndarray, cloud: np.ndarray, name: str, face: Surface, associated: AssociatedFeature) -> np.ndarray:
-    """Return the heights (station,) [mm] of a measured part at stations (station, 3), from its points (point, 3)."""
+def _scan(cloud: np.ndarray, path: str, face: Surface, everywhere: np.ndarray, associated: AssociatedFeature) -> Scan:
+    """Return the heights of a measured part over its nominal face, from its points (point, 3) [mm].
+
+    Raises GeometryFault for points that are not of the face, or not near places (place, 3) everywhere on it.
+    """
     outward = -1.0 if any(piece.is_hollow for piece in face.pieces) else 1.0
-    heights = outward * associated.surface.distance(cloud)[0]
+    distances, normals = associated.surface.distance(cloud)
+    heights = outward * distances
     farthest = int(np.abs(heights).argmax())
     if abs(heights[farthest]) > MAX_HEIGHT_SHARE * face.mesh.scale:
         raise GeometryFault(
-            f'"{name}": point {farthest + 1} is {abs(heights[farthest]):.3g} mm away from the face; expected points of the '
+            f'"{path}": point {farthest + 1} is {abs(heights[farthest]):.3g} mm away from the face; expected points of the '
             "face, in mm in the frame of the part"
         )
-    if len(cloud) < NEIGHBOURS:
-        raise GeometryFault(f'"{name}" has {len(cloud)} points; expected at least {NEIGHBOURS}, all over the face')
+    if len(cloud) < MIN_POINTS:
+        raise GeometryFault(f'"{path}" has {len(cloud)} points; expected at least {MIN_POINTS}, all over the face')
     feet = associated.surface.project(cloud)
-    distances, _ = scipy.spatial.KDTree(feet).query(stations)
-    if distances.max() > face.mesh.scale / 4:
+    distance = float(scipy.spatial.KDTree(feet).query(everywhere)[0].max())
+    if distance > face.mesh.scale / 4:
         raise GeometryFault(
-            f'"{name}" has no points within {distances.max():.3g} mm of a place of the face; expected points all over it'
+            f'"{path}" has no points within {distance:.3g} mm of a place of the face; expected points all over it'
         )
-    return _interpolated(feet, heights, stations, associated.surface.distance(stations)[1])
+    _, distinct = np.unique(feet.round(DIGITS), axis=0, return_index=True)
+    feet, normals, heights = feet[distinct], normals[distinct], heights[distinct]
+    terms = displacement_terms(normals, feet - feet.mean(axis=0))
+    displacement, *_ = np.linalg.lstsq(terms, heights, rcond=1e-10)
+    return Scan(path, feet, heights - terms @ displacement)
 
 
-def _interpolated(feet: np.ndarray, heights: np.ndarray, stations: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Return heights (station,) between those of feet (point, 3): paraboloids through the nearest, weighed by distance."""
-    distances, numbers = scipy.spatial.KDTree(feet).query(stations, NEIGHBOURS)
-    u = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
-    arms = (feet[numbers] - stations[:, None]) / distances.max(axis=1)[:, None, None]
-    x, y = (np.einsum("spk,sk->sp", arms, direction) for direction in (u, np.cross(normals, u)))
-    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2)
-    roots = 1 / np.maximum(np.hypot(x, y), MIN_DISTANCE)[..., None]
-    solutions = np.linalg.pinv(roots * terms, rcond=1e-6) @ (roots * heights[numbers][..., None])
-    return np.asarray(solutions[:, 0, 0])
+def _fit(scan: Scan, weights: np.ndarray, regression: HeightRegression) -> ScanFit:
+    """Return how a field of weights (station,) agrees with the points of a scan. Raises GeometryFault if it does not.
+
+    What neighbours deviate by alike is form that the field leaves out; the rest is scatter.
+    """
+    feet, values = scan.feet, regression.values(scan.feet) @ weights
+    deviations = scan.heights - values
+    # Alike or opposite: waves of a few points are opposite at the second neighbour or the third.
+    products = deviations[:, None] * deviations[scipy.spatial.KDTree(feet).query(feet, NEIGHBOURS + 1)[1][:, 1:]]
+    alike = float((np.abs(products.mean(axis=0)) - SIGNIFICANT * products.std(axis=0) / np.sqrt(len(feet))).max())
+    lost, elsewhere = float(np.sqrt(max(alike, 0.0))), regression.values(regression.stations) @ weights
+    fit = ScanFit(
+        width=float(least_widths([ZoneMember(np.arange(len(feet)), regression.associated.rows(feet))], values[None])[0]),
+        height=float(np.hypot(values.std(), lost)),
+        lost=lost,
+        scatter=float(np.median(np.abs(deviations))) / MEDIAN_SHARE,
+        farthest=float(np.abs(deviations).max()),
+        excess=float(np.abs(elsewhere).max() / max(np.abs(values).max(), 1e-300)),
+    )
+    if fit.lost > MAX_LOST_SHARE * fit.height:
+        raise GeometryFault(
+            f'"{scan.path}": its form changes over too short lengths: the field of {len(weights)} stations leaves out '
+            f"{fit.lost:.2g} mm of its {fit.height:.2g} mm (root mean square), and up to {fit.farthest:.2g} mm; filter short "
+            "waves out of the points, or divide the face into several features"
+        )
+    if fit.excess > MAX_EXCESS:
+        raise GeometryFault(
+            f'"{scan.path}": its points are too far apart for its form: the field is up to {fit.excess:.2g} times as high '
+            "between or beside them; measure more points, also along the rim, or filter short waves out of the points"
+        )
+    return fit
+
+
+def _lengths(regression: HeightRegression, weights: np.ndarray) -> Lengths:
+    """Return the lengths [mm] over which fields of weights (station, part) change: their heights divided by their slopes.
+
+    A squared exponential of this correlation length has the same slopes.
+    """
+    surface, stations = regression.associated.surface, regression.stations
+    _, normals = surface.distance(stations)
+    is_axial = isinstance(surface, Cylinder | Cone)
+    across = np.cross(surface.axis, normals) if is_axial else np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    step = STEP_SHARE * min(regression.lengths)
+    slopes = np.stack([
+        (_heights(regression, stations + arms, weights) - _heights(regression, stations - arms, weights)) / (2 * step)
+        for arms in (step * across, step * np.cross(normals, across))
+    ]).reshape(2, -1)  # fmt: skip
+    moments = slopes @ slopes.T / slopes.shape[1]
+    steepest = np.diagonal(moments) if is_axial else np.full(2, np.linalg.eigvalsh(moments)[-1])
+    height2 = float((_heights(regression, stations, weights) ** 2).mean())
+    return Lengths(*(
+        min(length, float(np.sqrt(height2 / slope2))) if slope2 > 0 else length
+        for length, slope2 in zip(regression.lengths, steepest, strict=True)
+    ))  # fmt: skip
+
+
+def _heights(regression: HeightRegression, points: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Return the heights (point, part) [mm] of fields of weights (station, part) at points (point, 3)."""
+    form, lengths, associated = regression.form, regression.lengths, regression.associated
+    return associated_covariance(form, lengths, associated, points, regression.stations) @ weights

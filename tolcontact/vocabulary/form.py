@@ -43,7 +43,11 @@ FORM_SPREAD = ArchiveVariable(
     "mm",
 )
 FORM_LEFT_OUT = ArchiveVariable(
-    "form_left_out", (FEATURE_FACE,), "f8", "share of the variance of the field that the modes leave out; NaN: none", "1"
+    "form_left_out",
+    (FEATURE_FACE,),
+    "f8",
+    "share of the variance of the form that the modes leave out, or of the mean square of measured forms; NaN: none",
+    "1",
 )
 FORM_MEAN_ZONE = ArchiveVariable(
     "form_mean_zone", (FEATURE_FACE,), "f8", "mean width of the least zones of faces with this form; NaN: none", "mm"
