@@ -33,6 +33,7 @@ class InterpretedFunction:
         self._calls = [_Buffers(caller, width, fixed_inputs or {}) for width in (*WIDTHS, 1)]
         self._sizes_out = [function.nnz_out(i) for i in range(function.n_out())]
         self._solvers = [function] if function.is_a("Conic") else []
+        self._is_new = True
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
         """Return the outputs (realization, stored entry), and `failed` (realization,), for the inputs that are not fixed.
@@ -47,24 +48,23 @@ class InterpretedFunction:
         results = [np.empty((count, size)) for size in self._sizes_out]
         failed = np.zeros(count, dtype=bool)
         for call, start, stop in self._turns(count):
-            rows = slice(start, stop)
-            if not call([array[rows] for array in inputs], [result[rows] for result in results]):
+            if not self._succeeds(call, slice(start, stop), inputs, results):
                 # A plugin that gives up on one realization ends the whole call (qpOASES does), so each is evaluated alone.
-                self._forget()
                 for k in range(start, stop):
-                    entry = slice(k, k + 1)
-                    if not self._calls[-1]([array[entry] for array in inputs], [result[entry] for result in results]):
+                    if not self._succeeds(self._calls[-1], slice(k, k + 1), inputs, results):
                         failed[k] = True
-                        self._forget()
                         for result in results:
                             result[k] = np.nan
         return results, failed
 
     def _turns(self, count: int) -> Iterator[tuple["_Buffers", int, int]]:
-        """Yield buffers and the range of realizations they evaluate; the narrower of WIDTHS may have idle places at the end."""
+        """Yield buffers and the range of realizations they evaluate; the narrower of WIDTHS may have idle places at the end.
+
+        The first realization of all is evaluated alone, since other threads wait for it.
+        """
         start = 0
         while start < count:
-            remaining = count - start
+            remaining = 1 if self._is_new else count - start
             call = (
                 self._calls[0] if remaining >= WIDTHS[0] else self._calls[1] if remaining >= WIDTHS[1] // 2 else self._calls[2]
             )
@@ -72,12 +72,19 @@ class InterpretedFunction:
             yield call, start, stop
             start = stop
 
-    def _forget(self) -> None:
-        """Give the solvers a new memory. qpOASES starts from its last problem, and after one failure it always fails."""
-        for solver in self._solvers:
-            solver.checkout()  # the spoiled memory, never released: the next evaluation gets another
-        for call in self._calls:
-            call.is_new = True
+    def _succeeds(self, call: "_Buffers", rows: slice, inputs: Sequence[np.ndarray], results: Sequence[np.ndarray]) -> bool:
+        """Evaluate some rows of the inputs, and return whether it succeeded; if not, the solvers get a new memory.
+
+        qpOASES starts from its last problem, and after one failure it always fails.
+        """
+        # The first evaluation constructs objects of CasADi: the memory of solvers, which wider calls then take, too.
+        with CONSTRUCTION_LOCK if self._is_new else contextlib.nullcontext():
+            succeeds = call([array[rows] for array in inputs], [result[rows] for result in results])
+        if not succeeds:
+            for solver in self._solvers:
+                solver.checkout()  # the spoiled memory, never released: the next evaluation gets another
+        self._is_new = not succeeds
+        return succeeds
 
 
 class _Buffers:
@@ -86,7 +93,6 @@ class _Buffers:
     def __init__(self, function: ca.Function, width: int, fixed_inputs: Mapping[int, np.ndarray]) -> None:
         self._function, self.width, self._fixed_inputs = function, width, fixed_inputs
         self._evaluate: Callable[[], None] | None = None
-        self.is_new = True
 
     def _allocate(self) -> Callable[[], None]:
         """Allocate the arrays, and return what evaluates the Function on them."""
@@ -115,12 +121,9 @@ class _Buffers:
             buffer[:count] = array
             buffer[count:] = array[-1:]
         try:
-            # The first evaluation constructs objects of CasADi.
-            with CONSTRUCTION_LOCK if self.is_new else contextlib.nullcontext():
-                self._evaluate()
+            self._evaluate()
         except RuntimeError:  # CasADi's only exception: bounds that are not numbers
             return False
-        self.is_new = False
         for buffer, array in zip(self._outputs, outputs, strict=True):
             array[:] = buffer[:count]
         return bool(self._buffer.ret() == 0)
