@@ -60,7 +60,7 @@ def test_many_bodies_are_resolved(make, objective):
     far = run["status"] == Status.DOUBTFUL
     assert (run["status"][~far] == Status.RESOLVED).all()
     # Of a block that hardly penetrates "active points" hold next to nothing: it may slide off its neighbours.
-    assert far.mean() <= (0.01 if make.__name__ == "<lambda>" and objective == "active points" else 0)
+    assert far.sum() <= (3 if make.__name__ == "<lambda>" and objective == "active points" else 0)
     for k in np.flatnonzero(far):
         R, t = (after - before for before, after in (each for each in R_t(run["poses"][k])))
         slid = [np.linalg.norm(pair.P_m @ R[pair.moving].T + t[pair.moving], axis=1).max() for pair in program.nominal.pairs]

@@ -108,6 +108,11 @@ def test_files_that_are_no_points_of_the_face_are_refused(batch, tmp_path):
         np.savetxt(tmp_path / "far" / f"{number}.csv", points)
         (tmp_path / f"{number}.csv").write_text("x,y\n1,2\n")
     assert "mm away from the face; expected points of the face" in fault(tc.Form(measured=str(tmp_path / "far" / "*")))
+    (tmp_path / "few").mkdir()
+    for path in batch[0].glob("*.csv"):
+        few = "\n".join(path.read_text().splitlines()[:6])  # a heading and five places
+        (tmp_path / "few" / path.name).write_text("\n".join([few, *few.splitlines()[1:] * 10]))
+    assert "has 5 points; expected at least 24" in fault(tc.Form(measured=str(tmp_path / "few" / "*")))
     lines = "expected lines of three numbers x, y, z [mm], in the frame of the part"
     texts = {
         "x,y\n1,2\n": f"0.csv\" cannot be read as measured points: line 2 is '1,2'; {lines}",

@@ -31,6 +31,10 @@ LINES = {
         'tc.Locator("A1", (0, 0, 0), "z", stifness=1)',
         'Locator() has no argument "stifness"; the nearest name is "stiffness"',
     ),
+    "argument that a method of resolution does not have": (
+        'tc.Method(objectiv="all points")',
+        'Method() has no argument "objectiv"; the nearest name is "objective"; expected some of: resolution, objective,',
+    ),
     "argument that a function of the script does not have": ("(lambda x: x)(y=1)", "TypeError: "),
     "archive that is missing": ('tc.open_archive("nowhere.nc")', "does not exist"),
 }

@@ -21,7 +21,7 @@ def unknown_argument(error: Exception) -> str:
         return ""
     path, argument = match[1].split("."), match[2]
     modules = [module for name, module in sorted(sys.modules.items()) if name.startswith(PACKAGES)]
-    functions = [function for module in modules if callable(function := _resolved(module, path))]
+    functions = [function for module in modules if inspect.isfunction(function := _resolved(module, path))]
     if not functions:
         return ""
     names = [name for name in inspect.signature(functions[0]).parameters if name != "self"]

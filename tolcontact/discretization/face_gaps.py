@@ -61,6 +61,7 @@ def _places(moving: MeasuredFace, reference: MeasuredFace) -> np.ndarray:
     if len(places) > MAX_PLACES:
         raise GeometryFault(
             f"the gap between {moving.face} and {reference.face} needs {len(places)} places, by the correlation length of "
-            f"their form, {min(lengths):.3g} mm; expected at most {MAX_PLACES}; choose smaller faces, or a larger length"
+            f"their form, {min(lengths):.3g} mm; expected at most {MAX_PLACES}; choose smaller faces, or a form "
+            "that changes over larger lengths"
         )
     return places

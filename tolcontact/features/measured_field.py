@@ -92,15 +92,15 @@ def _scan(cloud: np.ndarray, path: str, face: Surface, everywhere: np.ndarray, a
             f'"{path}": point {farthest + 1} is {abs(heights[farthest]):.3g} mm away from the face; expected points of the '
             "face, in mm in the frame of the part"
         )
-    if len(cloud) < MIN_POINTS:
-        raise GeometryFault(f'"{path}" has {len(cloud)} points; expected at least {MIN_POINTS}, all over the face')
     feet = associated.surface.project(cloud)
+    _, distinct = np.unique(feet.round(DIGITS), axis=0, return_index=True)
+    if len(distinct) < MIN_POINTS:
+        raise GeometryFault(f'"{path}" has {len(distinct)} points; expected at least {MIN_POINTS}, all over the face')
     distance = float(scipy.spatial.KDTree(feet).query(everywhere)[0].max())
     if distance > face.mesh.scale / 4:
         raise GeometryFault(
             f'"{path}" has no points within {distance:.3g} mm of a place of the face; expected points all over it'
         )
-    _, distinct = np.unique(feet.round(DIGITS), axis=0, return_index=True)
     feet, normals, heights = feet[distinct], normals[distinct], heights[distinct]
     terms = displacement_terms(normals, feet - feet.mean(axis=0))
     displacement, *_ = np.linalg.lstsq(terms, heights, rcond=1e-10)

@@ -52,9 +52,9 @@ class AnalyticSurface(ABC):
         Numbers, NumPy arrays and CasADi expressions are accepted alike.
         """
 
-    @abstractmethod
     def height_beside_axis(self, radial: np.ndarray, along: np.ndarray) -> np.ndarray:
         """Return `distance` [mm] at distances from the axis, through the origin, and places along it [mm]."""
+        return np.asarray(self.height(radial, along))
 
     @abstractmethod
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -107,10 +107,6 @@ class Plane(AnalyticSurface):
         """Return the height over the plane [mm]."""
         return along
 
-    def height_beside_axis(self, radial: np.ndarray, along: np.ndarray) -> np.ndarray:
-        """Return signed distances [mm]."""
-        return self.height(radial, along)
-
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return heights (point,) [mm] over the plane, and its normal (point, 3)."""
         return (points - self.origin) @ self.axis, np.broadcast_to(self.axis, points.shape)
@@ -130,10 +126,6 @@ class Cylinder(RoundSurface):
     def height(self, radial: Any, along: Any) -> Any:
         """Return the signed distance [mm] from the cylinder."""
         return radial - self.radius
-
-    def height_beside_axis(self, radial: np.ndarray, along: np.ndarray) -> np.ndarray:
-        """Return signed distances [mm]."""
-        return self.height(radial, along)
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return signed distances (point,) [mm], and their gradients (point, 3)."""
