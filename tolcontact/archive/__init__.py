@@ -26,7 +26,7 @@ Each realization is one row and carries its own certificate.
 |---|---|---|
 | `measured` | realization, state, measure | values of the measures |
 | `translation`, `rotation` | realization, state, part, axis (, body_axis) | t and R of x = R x0 + t |
-| `gap_min` | realization, state, pair | smallest gap of each pair; negative is penetration |
+| `gap_min` | realization, state, pair | smallest gap of each pair, with `coordinate_error`; negative is penetration |
 | `active` | realization, pair | contact points that penetrate in the raw state |
 | `carrying`, `reaction` | realization, pair | contact points under load, and the sum of their reactions |
 | `status` | realization | see `tolcontact.contact` |

@@ -19,6 +19,7 @@ from tolcontact.declaration import Mesh
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.features import FaceDeviation
 from tolcontact.geometry import known_surfaces, surface_arrays
+from tolcontact.geometry.coordinate_error import COORDINATE_SPACING, coordinate_spacing
 from tolcontact.vocabulary import ArchiveVariable
 
 
@@ -166,6 +167,8 @@ def _write_model(contents: Contents, group: netCDF4.Group, nominal: Nominal, doc
             mesh.createDimension(terms.CORNER, 3)
             contents.add(mesh, terms.MESH_VERTICES, part.mesh.vertices)
             contents.add(mesh, terms.MESH_FACES, part.mesh.faces)
+            if COORDINATE_SPACING in part.mesh.metadata:
+                contents.add(mesh, terms.COORDINATE_SPACING, coordinate_spacing(part.mesh))
             surfaces = known_surfaces(part.mesh)
             if surfaces is not None:
                 mesh.createDimension(terms.BREP_FACE, len(surfaces[1]))
@@ -221,7 +224,7 @@ def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
     if any(pair.is_springy for pair in pairs):
         stiffness = [np.full(len(pair.P_m), np.inf) if pair.stiffness is None else pair.stiffness for pair in pairs]
         values[terms.POINT_STIFFNESS] = np.concatenate(stiffness)
-    values |= _bounded_values(program) | _round_values(nominal) | _face_values(nominal)
+    values |= _bounded_values(program) | _coordinate_values(nominal) | _round_values(nominal) | _face_values(nominal)
     return values | form_values(program) | datum_values(program)
 
 
@@ -233,6 +236,17 @@ def _bounded_values(program: Program) -> dict[ArchiveVariable, Any]:
     return {
         terms.BOUNDED: [k in program.meetings for k in numbers],
         terms.PLANE_ERROR: [program.trials[k].error if k in program.trials else np.nan for k in numbers],
+    }
+
+
+def _coordinate_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
+    """Return the errors of coordinates in files, by which gaps count larger; none unless a file rounds coordinates."""
+    coordinates = [pair.coordinates for pair in nominal.pairs]
+    if not any(stored.error for stored in coordinates):
+        return {}
+    return {
+        terms.COORDINATE_ERROR: [stored.error for stored in coordinates],
+        terms.COORDINATES_STORED: [stored.in_words for stored in coordinates],
     }
 
 

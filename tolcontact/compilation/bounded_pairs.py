@@ -80,7 +80,7 @@ def bounded_pair(
         travel=TRAVEL_FACTOR * travel + pushed + MIN_TRAVEL_SHARE * size,
         tilt=tilt + pushed / size,
         spread=travel,
-        overlap=max(-float(pair.least_gap(pose.AT_REST[None])[0]), 0.0),
+        overlap=pair.coordinates.error + max(-float(pair.least_gap(pose.AT_REST[None])[0]), 0.0),
         clearance=clearance(pair),
     )
     places = meeting((pair.moving_face, pair.reference_face), bodies, reach)

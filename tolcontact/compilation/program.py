@@ -20,7 +20,7 @@ from tolcontact.compilation.station_program import StationProgram, station_progr
 from tolcontact.declaration.locator import FIRST_ORDER
 from tolcontact.declaration.measure import Tape
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
-from tolcontact.errors import ModelError
+from tolcontact.errors import ModelError, shown
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.limits import Limits
 from tolcontact.mechanics.correction import FREEDOMS
@@ -36,6 +36,7 @@ from tolcontact.method import Method
 from tolcontact.poses import AT_REST
 from tolcontact.readable import Pictured
 from tolcontact.variation import Draws
+from tolcontact.vocabulary import STATED_ERROR_SHARE
 
 log = logging.getLogger(__name__)
 
@@ -92,11 +93,22 @@ class Program(Pictured):
             for part in nominal.parts
         ]
         rows += [f"  contact {pair.name}: {self.contact_in_words(k)}" for k, pair in enumerate(nominal.pairs)]
+        rows += [f"  {line}" for line in self.stored_coordinates]
         rows += [
             f"  measurement {measure.name}: nominally {value:.6g} {measure.units}"
             for measure, value in zip(nominal.measures, self.nominal_measures, strict=True)
         ]
         return "\n".join(rows)
+
+    @property
+    def stored_coordinates(self) -> tuple[str, ...]:
+        """A line for each pair whose gaps count noticeably larger, by the error of coordinates in files."""
+        limit = STATED_ERROR_SHARE * self.nominal.assembly.smallest_zone()
+        return tuple(
+            f'contact pair "{shown(pair.name)}": {pair.coordinates.in_words}'
+            for pair in self.nominal.pairs
+            if pair.coordinates.error > limit
+        )
 
     def limits(self, measure: int) -> Limits:
         """Return the limits of a measure, given by number, with its accuracy."""

@@ -21,6 +21,7 @@ from tolcontact.discretization.form_points import (
 )
 from tolcontact.discretization.nominal import ContactPoints, Offsets
 from tolcontact.discretization.nominal_part import NominalPart
+from tolcontact.discretization.pair_coordinates import pair_coordinates
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.scenes import Scene
@@ -52,7 +53,7 @@ def contact_points(
     reference_face = patch(pair.reference, meshes).placed(*reference.placement)
     reach = pair.within if pair.within is not None else DEFAULT_REACH * moving.mesh.scale
     deviating = _deviation(pair.moving, moving, meshes, features), _deviation(pair.reference, reference, meshes, features)
-    lengths = form_lengths(deviating)
+    lengths, coordinates = form_lengths(deviating), pair_coordinates(moving, reference)
     if lengths:
         check_facing(moving_face, reference_face, deviating)
     balls_and_shafts = round_points(moving_face, reference_face, reach) if _is_open(pair) and not lengths else []
@@ -61,18 +62,20 @@ def contact_points(
     else:
         candidates = coaxial_points(moving_face, reference_face, deviating) if _is_open(pair) and lengths else None
         if candidates is None:
-            candidates = _candidates(scene.assembly, pair, moving, unplaced.mesh, (moving_face, reference_face), reach, lengths)
+            faces, rounding = (moving_face, reference_face), coordinates.error
+            candidates = _candidates(scene.assembly, pair, moving, unplaced.mesh, faces, reach, lengths, rounding)
         P_m, P_r, n_r = _touching(pair, candidates, moving_face, reference_face, reach)
     points = ContactPoints(
         name=pair.name,
         moving=scene.index(moving.part),
         reference=scene.index(reference.part),
         P_m=P_m,
-        P_r=P_r,
+        P_r=P_r - coordinates.error * n_r if coordinates.error else P_r,
         n_r=n_r,
         offsets=Offsets.none(len(P_m)),
         reference_face=reference_face,
         moving_face=moving_face,
+        coordinates=coordinates,
         facets=facet_error(moving_face, reference_face, reach),
         round=RoundPoints.of(balls_and_shafts) if balls_and_shafts else None,
         deviating=deviating,
@@ -110,11 +113,12 @@ def _candidates(
     faces: tuple[Surface, Surface],
     reach: float,
     lengths: Sequence[float],
+    rounding: float,
 ) -> np.ndarray:
     """Return points (point, 3) of the moving face that become contact points if they lie over the reference face.
 
     `mesh` is the moving face in its part's own frame, `faces` are both faces in their nominal places, `lengths` are those of
-    their forms.
+    their forms, and `rounding` [mm] is the error of coordinates in files.
     """
     moving_face, reference_face = faces
     if isinstance(pair.points, str):
@@ -136,7 +140,7 @@ def _candidates(
             if lengths:
                 P_m = with_rims(P_m, moving_face, reference_face, form_spacing(lengths), reach)
     elif math.isfinite(finest):
-        P_m = _with_curvature(pair, moving_face, reference_face, P_m, finest, reach)
+        P_m = _with_curvature(pair, moving_face, reference_face, P_m, finest, reach, rounding)
     P_m = distinct(P_m, POINT_TOLERANCE * moving.mesh.scale)
     if moving_face.surfaces:
         P_m, _, _ = moving_face.project(P_m)
@@ -192,11 +196,18 @@ def _check_number(points: float, subject: str) -> None:
 
 
 def _with_curvature(
-    pair: ContactPair, moving_face: Surface, reference_face: Surface, P_m: np.ndarray, finest: float, reach: float
+    pair: ContactPair,
+    moving_face: Surface,
+    reference_face: Surface,
+    P_m: np.ndarray,
+    finest: float,
+    reach: float,
+    rounding: float,
 ) -> np.ndarray:
     """Return points P_m (point, 3) of curved faces; if the choice is open, with the points that follow curvature added.
 
-    Warns if the points, or the triangles, leave more than CHORD_SHARE times `finest` undetected, the smallest tolerance range.
+    Warns if the points, or the triangles, leave more than CHORD_SHARE times `finest` undetected, the smallest tolerance range,
+    and more than the `rounding` [mm] of coordinates in files, which bends flat faces.
     """
     dense = curvature_points(moving_face, reference_face, chord=CHORD_SHARE * finest, within=reach)
     if is_flat(reference_face) and moving_face.curvature > 0:
@@ -210,7 +221,7 @@ def _with_curvature(
         (between_points, "between its contact points", "give it more points, or leave points and spacing out"),
         (under_facets, "between flat triangles and the round faces that they approximate", "use a finer mesh"),
     ):
-        if error > CHORD_SHARE * finest:
+        if error > max(CHORD_SHARE * finest, rounding):
             warnings.warn(
                 f"{designation('contact pair', pair)}: parts may be off by up to {error:.2g} mm {place}, "
                 f"{error / finest:.2g} of the smallest tolerance ({finest:.4g} mm); {advice}",

@@ -13,6 +13,7 @@ from tolcontact.discretization.form_points import form_lengths, form_spacing
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.measured_geometry import NominalMeasurement
 from tolcontact.discretization.nominal_part import NominalPart
+from tolcontact.discretization.pair_coordinates import EXACT, PairCoordinates
 from tolcontact.discretization.pair_form import PairForm
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
@@ -26,6 +27,7 @@ from tolcontact.geometry.surface import Surface
 
 EVERY_POINT = slice(None)
 RIM_REACH = 0.1  # of the size of the moving face: how far from it, nominally, rim points of the other face count
+FITTED_ERRORS = 2.0  # errors of coordinates, by which triangles lie beyond the planes that are fitted to them, and inset
 GAPS_TOGETHER = 1 << 20  # that are computed at once
 
 
@@ -74,6 +76,7 @@ class ContactPoints:
     reference is the part that they are on, or None for the ground. They have no faces; their offsets are the deviations.
 
     moving_face, reference_face   in their nominal places
+    coordinates how files store the coordinates of both faces; P_r lie below the reference face by their error
     facets      [mm] largest distance between their triangles and the round faces that these approximate
     round       the balls and shafts beside walls from which gaps follow at any pose; None if the contact points are fixed
     deviating   deviations of the moving and the reference face, if these belong to features; their heights at fixed points are
@@ -92,6 +95,7 @@ class ContactPoints:
     offsets: Offsets
     reference_face: Surface | None = None
     moving_face: Surface | None = None
+    coordinates: PairCoordinates = EXACT
     facets: float = 0.0
     round: RoundPoints | None = None
     deviating: tuple[FaceDeviation | None, FaceDeviation | None] = (None, None)
@@ -233,6 +237,7 @@ class Nominal:
             self._face_pairs[index] = FacePair(
                 body_face(pair.moving_face, self.parts[pair.moving].body, len(pair.P_m)),
                 body_face(pair.reference_face, self.parts[pair.reference].body, len(pair.P_m)),
+                FITTED_ERRORS * pair.coordinates.error,
             )
         return self._face_pairs[index]
 

@@ -6,7 +6,9 @@ import numpy as np
 import trimesh
 
 from tolcontact.arrays import Array, Float, Int
+from tolcontact.geometry.coordinate_error import coordinate_error
 from tolcontact.geometry.edges import edges
+from tolcontact.geometry.inset import inset
 from tolcontact.geometry.surface import Surface
 
 SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
@@ -55,14 +57,17 @@ class Polyhedron:
 def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
     """Return the polyhedron of a face of a body, both in their nominal places.
 
-    Facets of the body count as a whole, also where the face was cut out of them: the body does not end there.
+    Facets of the body count as a whole, also where the face was cut out of them: the body does not end there. If its file
+    rounds coordinates, it is smaller by their error.
     """
     merged = trimesh.Trimesh(body.vertices, body.faces, process=False)
     merged.merge_vertices(digits_vertex=int(np.ceil(-np.log10(MERGE_SHARE * max(merged.scale, 1e-9)))))
     merged.update_faces(merged.area_faces > 0)
+    numbers, _ = Surface(merged).nearest(np.asarray(face.mesh.triangles_center))
+    if error := coordinate_error(body):
+        merged = trimesh.Trimesh(inset(merged, error), merged.faces, process=False)
     vertices, faces = np.asarray(merged.vertices), np.asarray(merged.faces)
     facet_normals = np.asarray(merged.face_normals)
-    numbers, _ = Surface(merged).nearest(np.asarray(face.mesh.triangles_center))
     chosen = np.unique(numbers)
     is_chosen = np.zeros(len(faces), dtype=bool)
     is_chosen[chosen] = True
