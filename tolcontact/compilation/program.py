@@ -22,6 +22,7 @@ from tolcontact.declaration.measure import Tape
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
 from tolcontact.errors import ModelError
 from tolcontact.geometry.meeting import Meeting
+from tolcontact.interference import Watch, ordered
 from tolcontact.limits import Limits
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.gap import GapMap, gap_map, gap_matrix
@@ -64,6 +65,7 @@ class Program(Pictured):
     nominal_measures  values of the measures in the nominal assembly
     accuracies   of the measures, in their units (see measure_accuracies)
     stations     of an assembly that is built in steps, in their order; `place` then places the parts of all of them
+    watch        the bodies, which may lie in each other
     tapes        the users' own expressions by measure name
     """
 
@@ -80,6 +82,7 @@ class Program(Pictured):
     groups: tuple[ContactGroup, ...]
     nominal_measures: np.ndarray
     accuracies: np.ndarray
+    watch: Watch
     tapes: dict[str, Tape]
     stations: tuple[StationProgram, ...] = ()
 
@@ -164,6 +167,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             trials=trials,
             groups=tuple(_contact_group(nominal, group, gaps, method, conic_plugin, meetings, trials) for group in groups),
             accuracies=measure_accuracies(nominal, groups, draws, place, observed),
+            watch=Watch(nominal, _allowed_depths(nominal, meetings, trials)),
             nominal_measures=observe(np.tile(AT_REST, len(nominal.parts)), np.zeros(d.numel()))[0].full().ravel(),
             tapes={
                 measure.name: record(value, ca.vertcat(entries, d))
@@ -201,6 +205,23 @@ def _meetings(
             decisions[k] = bounded_pair(nominal, k, relative[:, k], deviations, pushed=pushed, room=room)
     meetings = {k: places for k, (places, _) in decisions.items() if places is not None}
     return meetings, {k: trial for k, (_, trial) in decisions.items()}
+
+
+def _allowed_depths(
+    nominal: Nominal, meetings: Mapping[int, Meeting], trials: Mapping[int, Trial]
+) -> dict[tuple[int, int], float]:
+    """Return how deep [mm] bodies of contact pairs may lie in each other, where that is more than usual.
+
+    Fixed planes err by what was allowed in their trial. Springs let faces into each other, and form is not part of a solid.
+    """
+    depths = dict[tuple[int, int], float]()
+    for k, pair in enumerate(nominal.pairs):
+        if pair.reference is not None and pair.moving_face is not None:
+            bodies = ordered(pair.moving, pair.reference)
+            is_free = pair.is_springy or pair.has_form
+            planes = trials[k].allowed if k in trials and k not in meetings and np.isfinite(trials[k].allowed) else 0.0
+            depths[bodies] = max(depths.get(bodies, 0.0), np.inf if is_free else planes)
+    return depths
 
 
 def _contact_group(

@@ -7,11 +7,14 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import SLOTS
 from tolcontact.contact import bounded_kernel
+from tolcontact.contact.guard import GUARD, Guard
 from tolcontact.contact.scan import Deepest, Scan, SlotScan
 from tolcontact.discretization import FIRST_POINT, ContactPoints, raised_places
 from tolcontact.geometry.kernel import CORNER_ON_FACET
-from tolcontact.geometry.meeting import NEARNESS, Meeting
+from tolcontact.geometry.meeting import NEARNESS, Meeting, Places
+from tolcontact.interference import WayOut
 
+PENETRATION = 1e-10  # mm: less than this is no penetration
 MAX_DEEPEST = SLOTS  # places of a pair that get a row in one round
 
 
@@ -80,8 +83,28 @@ def bounded_scan(
     kept: Int[Array, "n k"] | None = None,
     error: float = 0.0,
     nearness: float = NEARNESS,
+    guard: Guard | None = None,
 ) -> BoundedScan:
-    """Return the places at which a pair can touch at X_RM (n, 12); see Meeting.at for `kept`, `error` and `nearness`."""
+    """Return the places at which a pair can touch at X_RM (n, 12); see Meeting.at for `kept`, `error` and `nearness`.
+
+    Where no place shows penetration, a `guard` adds one if bodies lie in each other.
+    """
     found, heights = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness)
+    if guard is not None:
+        found, heights = _with_guard(found, heights, guard, X_RM)
     arrays = found.labels, found.P_m, found.P_r, found.n_r, np.isfinite(found.gaps)
     return BoundedScan(scan.tables, scan.P_m, scan.offsets, meeting, *arrays, np.ascontiguousarray(heights))
+
+
+def _with_guard(found: Places, heights: np.ndarray, guard: Guard, X_RM: np.ndarray) -> tuple[Places, np.ndarray]:
+    """Return places, and their heights (n, place), with one more where bodies lie in each other and no place shows it."""
+    rows = np.flatnonzero((found.gaps - heights).min(axis=1, initial=np.inf) >= -PENETRATION)
+    rows = rows[guard.interferes(X_RM[rows])]
+    way = guard.ways_out(X_RM[rows])
+    rows, way = rows[way.widths > 0], WayOut(*(values[way.widths > 0] for values in way))
+    count, added = len(X_RM), (GUARD, -way.widths, way.places, way.feet, way.normals)
+    extra = Places(np.full((count, 1), -1), np.full((count, 1), np.inf), *np.zeros((3, count, 1, 3)))
+    for values, of_rows in zip(extra, added, strict=True):
+        values[rows, 0] = of_rows
+    joined = Places(*(np.concatenate(arrays, axis=1) for arrays in zip(found, extra, strict=True)))
+    return joined, np.concatenate([heights, np.zeros((count, 1))], axis=1)

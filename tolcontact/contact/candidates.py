@@ -11,6 +11,7 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
 from tolcontact.contact.bounded_scan import bounded_scan
+from tolcontact.contact.guard import Guard
 from tolcontact.contact.raised_scan import RaisedScan, raised_scan
 from tolcontact.contact.scan import PairScan, RoundScan, Scan, changing, fixed, min_gaps, pair_scan
 from tolcontact.contact.slots import Slots
@@ -138,6 +139,8 @@ class Candidates:
         self._with_form = [k for k, pair in enumerate(self._pairs) if pair.has_form]
         self._edge_error = EDGE_SHARE * program.nominal.assembly.smallest_zone()
         self.bounded = {k: program.meetings[index] for k, index in enumerate(group.group.pairs) if index in program.meetings}
+        guards = {k: Guard.of(program, group.group.pairs[k]) for k in self.bounded}
+        self.guards = {k: guard for k, guard in guards.items() if guard is not None}
         is_iterated = self._method.is_iterated
         curved = curved_pairs(program.nominal, group.group) if self._method.is_exact and not is_iterated else []
         self.curved = [k for k in curved if k not in self.bounded]
@@ -155,11 +158,13 @@ class Candidates:
         width: float = 1.0,
         at_rest: Bool[Array, " realization"] | None = None,
         earlier: Sequence[Scan] = (),
+        guarded: bool = False,
     ) -> list[Scan]:
         """Return scans of the points that may carry, projected again if the method requires it.
 
         Places of bounded pairs are found anew; in steps, with the `slots` of the pairs with changing points, places that carry
         remain a little beyond their edges, `width` times as far as they may in an answer, unless the realization is `at_rest`.
+        With `guarded`, bodies that lie in each other where no place shows it get one more place (see Guard).
         With `projected`, points against curved faces are projected again in any case. `earlier` are scans of the same
         realizations, whose heights are summed up.
         """
@@ -175,9 +180,16 @@ class Candidates:
             kept, error = (slots[self._varying.index(k)].labels, width * self._edge_error) if slots else (None, 0.0)
             if kept is not None and at_rest is not None:
                 kept[at_rest] = -1
-            nearness = NEARNESS if width == 1 else np.inf
-            scans[k] = bounded_scan(scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness)
+            nearness, guard = NEARNESS if width == 1 else np.inf, self.guards.get(k) if guarded else None
+            scans[k] = bounded_scan(scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness, guard)
         return scans
+
+    def interfere(self, relative: Float[Array, "realization pair 12"]) -> Bool[Array, " realization"]:
+        """Return whether bodies of a pair lie in each other (realization,), by a test that does not know the list of places."""
+        found = np.zeros(len(relative), dtype=bool)
+        for k, guard in self.guards.items():
+            found |= guard.interferes(relative[:, k])
+        return found
 
     def hold(self, task: Task, state: State) -> Bool[Array, " n"]:
         """Return whether the places that carry are as near to their faces as they may be in an answer (n,)."""

@@ -58,10 +58,18 @@ STEPS_WHERE_FACES_END = (
 
 
 def repeat(
-    step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, task: Task, state: State, stride: float, balances: bool
+    step: LinearStep,
+    limits: AcceptanceLimits,
+    candidates: Candidates,
+    task: Task,
+    state: State,
+    stride: float,
+    balances: bool,
+    guarded: bool = False,
 ) -> None:
     """Take the steps of `state` to their end. Without rest there is an answer only if the parts contradict each other.
 
+    With `guarded`, places are those of guards as well (see Candidates.scans).
     With `balances`, realizations also rest where steps like the paper's are rounding, though these may grow from there.
     """
     unsettled, trail = Unsettled(task, state), list[np.ndarray]()
@@ -100,7 +108,7 @@ def repeat(
         if candidates.bounded:
             poses, deviations, slots = unsettled.state.relative, unsettled.task.deviations, unsettled.state.slots
             at_rest = (size[moves] < NEARLY_AT_REST) & kind.sharp
-            scans = candidates.scans(poses, deviations, slots=slots, width=kind.width, at_rest=at_rest)
+            scans = candidates.scans(poses, deviations, slots=slots, width=kind.width, at_rest=at_rest, guarded=guarded)
             unsettled.task = replace(unsettled.task, scans=scans)
         if kind.newton:
             penetration = _true_penetration(unsettled.task, unsettled.state)

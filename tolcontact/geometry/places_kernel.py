@@ -18,6 +18,7 @@ from tolcontact.geometry.kernel import (
     facet_on_corner,
 )
 from tolcontact.geometry.vector_kernel import (
+    along,
     cross,
     dot,
     first_from,
@@ -32,6 +33,7 @@ from tolcontact.geometry.vector_kernel import (
 )
 
 MAX_SHEAR = 1.8  # by which a corner's place beside a facet changes with its height, where planes face each other
+NEARLY_PARALLEL = 1e-3  # sine of the angle between edges whose common normal does not tell how far they are apart
 EVERYWHERE = (-np.inf, -np.inf, np.inf, np.inf)
 
 
@@ -98,6 +100,25 @@ def _keep_shallowest(candidates, touching, gaps):  # type: ignore[no-untyped-def
             best = s
 
 
+@inlined_uncounted
+def _nominal_height(A, B, candidates, s, X, n, place, foot):  # type: ignore[no-untyped-def]
+    """Return the height of candidate s in the nominal assembly: that of its place over its foot along n, or along R'n.
+
+    Two edges have shifted along each other since: their height is that of the lines on which they lie.
+    """
+    arm = minus(place, foot)
+    if candidates.kinds[s] == EDGE_ON_EDGE:
+        start_A, start_B = row_of(A.edges, candidates.firsts[s], 0), row_of(B.edges, candidates.seconds[s], 0)
+        d = minus(row_of(A.edges, candidates.firsts[s], 1), start_A)
+        e = minus(row_of(B.edges, candidates.seconds[s], 1), start_B)
+        arm = minus(start_A, start_B)
+        arm = along(arm, -dot(arm, e) / dot(e, e), e)
+        across = along(d, -dot(d, e) / dot(e, e), e)
+        if dot(across, across) > NEARLY_PARALLEL * NEARLY_PARALLEL * dot(d, d):
+            arm = along(arm, -dot(arm, across) / dot(across, across), across)
+    return max(dot(n, arm), dot(turn_back(X, n), arm))  # whichever body the normal belongs to
+
+
 @uncounted
 def _drop_passed(A, B, candidates, passed, X, touching, gaps, all_places, is_held):  # type: ignore[no-untyped-def]
     """Drop places that lie nominally deeper than `passed` [mm], where a corner beside them is held: there the body came in.
@@ -111,8 +132,8 @@ def _drop_passed(A, B, candidates, passed, X, touching, gaps, all_places, is_hel
         for s in touching:
             is_edge = candidates.kinds[s] == EDGE_ON_EDGE
             owner = candidates.firsts[s] if candidates.kinds[s] == CORNER_ON_FACET else count + candidates.seconds[s]
-            n, nominal = row(normals, s), minus(row(places, s), row(feet, s))
-            has_passed = max(dot(n, nominal), dot(turn_back(X, n), nominal)) < -passed  # whichever body the normal belongs to
+            height = _nominal_height(A, B, candidates, s, X, row(normals, s), row(places, s), row(feet, s))
+            has_passed = height < -passed
             if is_first and not is_edge and not has_passed and gaps[s] <= INSIDE:
                 is_held[owner] = True
             elif not is_first and has_passed and candidates.planes[s] < 0 and gaps[s] < -INSIDE:

@@ -55,17 +55,13 @@ class Polyhedron:
 def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
     """Return the polyhedron of a face of a body, both in their nominal places.
 
-    Facets of the body count as a whole, also where the face was cut out of them: the body does not end there.
+    Planes of the body count as a whole, also where the face was cut out of them: the body does not end there.
     """
     merged = trimesh.Trimesh(body.vertices, body.faces, process=False)
     merged.merge_vertices(digits_vertex=int(np.ceil(-np.log10(MERGE_SHARE * max(merged.scale, 1e-9)))))
     merged.update_faces(merged.area_faces > 0)
     vertices, faces = np.asarray(merged.vertices), np.asarray(merged.faces)
     facet_normals = np.asarray(merged.face_normals)
-    numbers, _ = Surface(merged).nearest(np.asarray(face.mesh.triangles_center))
-    chosen = np.unique(numbers)
-    is_chosen = np.zeros(len(faces), dtype=bool)
-    is_chosen[chosen] = True
     outer_ends, edge, triangles_there = edges(faces)
     is_open = triangles_there[edge] == 1
     lone = np.flatnonzero(is_open)[:, None] // 3
@@ -74,6 +70,9 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
     is_sharp = np.concatenate([np.asarray(merged.face_adjacency_angles) > SHARP_ANGLE, np.ones(len(lone), dtype=bool)])
     is_convex = np.concatenate([merged.face_adjacency_convex, np.ones(len(lone), dtype=bool)])
     planes = trimesh.graph.connected_component_labels(neighbours[~is_sharp], node_count=len(faces))
+    numbers, _ = Surface(merged).nearest(np.asarray(face.mesh.triangles_center))
+    is_chosen = np.isin(planes, planes[numbers])
+    chosen = np.flatnonzero(is_chosen)
     is_ours = is_sharp & is_chosen[neighbours].any(axis=1)
     start, end = vertices[ends[:, 0]], vertices[ends[:, 1]]
     along = (end - start) / np.linalg.norm(end - start, axis=1)[:, None]
