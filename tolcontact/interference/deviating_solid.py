@@ -58,7 +58,7 @@ class DeviatingSolid:
 def deviating_solid(
     solid: Solid, faces: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], bulges: np.ndarray
 ) -> DeviatingSolid:
-    """Return a solid whose faces deviate: the triangles (m,) of each, columns (k,), and outward (m, 3, k) for unit deviations."""
+    """Return a solid whose faces deviate: triangles (m,), columns (k,) and outward (m, 3, k) of each face."""
     columns = np.unique(np.concatenate([np.zeros(0, dtype=int), *(face[1] for face in faces)]))
     outward = np.zeros((len(solid.faces), 3, len(columns)))
     for triangles, of_face, motion in faces:

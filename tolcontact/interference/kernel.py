@@ -1,4 +1,4 @@
-"""Compiled test whether closed bodies interfere: edges of one that pass triangles of the other, and how deep they run inside."""
+"""Compiled test whether closed bodies interfere: edges of one that pass triangles of the other, and how deep they do."""
 
 import math
 from typing import NamedTuple
@@ -194,7 +194,7 @@ def interfere(A, B, poses, found):  # type: ignore[no-untyped-def]
 
 
 @inlined_uncounted
-def _nearest_on_triangle(p, a, b, c):  # type: ignore[no-untyped-def]
+def _nearest_on_triangle(p, a, b, c):  # type: ignore[no-untyped-def]  # noqa: PLR0911
     """Return the place on a triangle that is nearest to p (Ericson, Real-Time Collision Detection, 5.1.5)."""
     ab, ac, ap, bp, cp = minus(b, a), minus(c, a), minus(p, a), minus(p, b), minus(p, c)
     d1, d2, d3, d4, d5, d6 = dot(ab, ap), dot(ac, ap), dot(ab, bp), dot(ac, bp), dot(ab, cp), dot(ac, cp)
@@ -226,7 +226,7 @@ def _box_distance(boxes, node, p):  # type: ignore[no-untyped-def]
 
 @uncounted
 def _nearest(side, k, p, enough):  # type: ignore[no-untyped-def]
-    """Return the distance of p from the surface, the triangle and the place there; anything if the distance is below `enough`."""
+    """Return the distance of p from the surface, the triangle and the place there; any if the distance is below `enough`."""
     node, inner, best, foot, least = 0, side.next.size // 2, -1, p, np.inf
     while node < side.next.size:
         if math.sqrt(_box_distance(side.boxes, node, p)) - side.spare > math.sqrt(least):
@@ -354,7 +354,7 @@ def _add(vectors, count, v):  # type: ignore[no-untyped-def]
 
 
 @uncounted
-def _collect(owner, other, k, X, is_forward, region, counts, normals, crossing):  # type: ignore[no-untyped-def]
+def _collect(owner, other, k, X, is_forward, region, counts, normals, crossing):  # type: ignore[no-untyped-def]  # noqa: PLR0912
     """Add what edges of a body say of the common region: its corners on them, and normals of triangles that they pass.
 
     All are in the frame of B. `counts` (3,) are those of points in `region`, of `normals` and of edges in `crossing`.
@@ -421,7 +421,7 @@ def _add_common_normals(A, B, k, X, first, second, normals, count):  # type: ign
 
 @compiled
 def ways_out(A, B, poses, inset, places, feet, normals, widths):  # type: ignore[no-untyped-def]
-    """Write how bodies that interfere at poses X_BA (n, 12) part with the least motion: along n, by the width of what they share.
+    """Write how bodies that interfere at poses X_BA (n, 12) part: along n, by the width of what they share.
 
     The corners of the region that both bodies share lie on their edges. Of the normals of facets that edges pass, and of
     crossing edges, the one counts along which this region is narrowest. Its lowest point is held above its highest one.

@@ -70,7 +70,8 @@ class Neighbours:
         if deviations is None:
             return self._nominal
         sides = []
-        for body, side in zip((self.A, self.B), self._nominal, strict=True):
+        for body, nominal in zip((self.A, self.B), self._nominal, strict=True):
+            side = nominal
             if body.varies:
                 shifts = body.shifts_of(deviations)
                 side = side._replace(vertices=side.vertices + shifts, spare=side.spare + _farthest(shifts))

@@ -31,7 +31,7 @@ def part_solid(nominal: Nominal, index: int) -> DeviatingSolid | None:
 def _deviating_faces(
     nominal: Nominal, index: int, body: Solid, whole: Surface
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield the triangles (m,) of each face that deviates, the columns (k,), and how far its corners move outwards (m, 3, k)."""
+    """Yield triangles (m,) of each face that deviates, columns (k,), and how far its corners move outwards (m, 3, k)."""
     part = nominal.parts[index]
     for feature in nominal.features:
         if nominal.parts[feature.part].part is not part.part or not feature.varies:

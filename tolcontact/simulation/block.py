@@ -13,7 +13,7 @@ from tolcontact.contact import ContactResolver, Resolved
 from tolcontact.contact.record import Record, join_groups, untouched_numbers
 from tolcontact.mechanics import ENTRIES
 from tolcontact.readable import Readable
-from tolcontact.simulation.bodies import watch_bodies
+from tolcontact.simulation.bodies import watched_bodies
 from tolcontact.simulation.sequence import Beginning, hand_over, stages
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
@@ -31,8 +31,8 @@ class Block(Record, Readable):
     reaction      (n, pair): sum of their reactions, in the units of the objective
     clashes       (n,): number of pairs of parts without declared contact that lie in each other in the corrected state; -1 if
                   they were not tested
-    clash_depth   (n,) [mm]: how deep those of the deepest of these pairs do, and clash_part, clash_other (n,) their indices among
-                  the parts of the assembly, -1 for none
+    clash_depth   (n,) [mm]: how deep the parts of the deepest of these pairs do; clash_part, clash_other (n,) are their indices
+                  among the parts of the assembly, -1 for none
     status        (n,), Status: with stations, that of the worst station
     station_status  (n, station), Status
 
@@ -150,7 +150,11 @@ def simulate_block(
                 _put_raw(block, resolver, changed, raw_relative)
             worst[resolved.touched] = np.maximum(worst[resolved.touched], _outcome(resolved))
     if program.method.is_bounded:
-        for station, rows in watch_bodies(program, block, [pair for resolver in resolvers for pair in resolver.watched]):
+        tested = [pair for resolver in resolvers for pair in resolver.watched]
+        bodies = watched_bodies(program, block.poses[:, CORRECTED], deviations, tested)
+        block.clashes[:], block.clash_depth[:] = bodies.clashes, bodies.depth
+        block.clash_part[:], block.clash_other[:] = bodies.part, bodies.other
+        for station, rows in bodies.withdrawn:
             worst = outcomes_by_stage[:, station]
             worst[rows] = np.where(worst[rows] <= Outcome.RESOLVED, Outcome.DOUBTFUL, worst[rows])
     is_unknown |= ~np.isfinite(begin.poses).all(axis=(1, 2))
