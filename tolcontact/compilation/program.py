@@ -39,6 +39,8 @@ from tolcontact.readable import Pictured
 from tolcontact.variation import Draws
 
 log = logging.getLogger(__name__)
+WATCH_DRAWS = 64  # that tell how far bodies move
+PLANES_FACTOR = 3.0  # times the error that a trial allows: how deep faces on fixed planes may lie in each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +169,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             trials=trials,
             groups=tuple(_contact_group(nominal, group, gaps, method, conic_plugin, meetings, trials) for group in groups),
             accuracies=measure_accuracies(nominal, groups, draws, place, observed),
-            watch=Watch(nominal, _allowed_depths(nominal, meetings, trials)),
+            watch=_watch(nominal, draws, place, _allowed_depths(nominal, meetings, trials)),
             nominal_measures=observe(np.tile(AT_REST, len(nominal.parts)), np.zeros(d.numel()))[0].full().ravel(),
             tapes={
                 measure.name: record(value, ca.vertcat(entries, d))
@@ -207,19 +209,30 @@ def _meetings(
     return meetings, {k: trial for k, (_, trial) in decisions.items()}
 
 
+def _watch(nominal: Nominal, draws: Draws, place: NamedFunction, allowed: dict[tuple[int, int], float]) -> Watch:
+    deviations = draws(seed=TRIAL_SEED, start=0, stop=WATCH_DRAWS)
+    poses = place(deviations=deviations)["poses"].reshape(len(deviations), len(nominal.parts), ENTRIES)
+    return Watch(nominal, allowed, poses, deviations)
+
+
 def _allowed_depths(
     nominal: Nominal, meetings: Mapping[int, Meeting], trials: Mapping[int, Trial]
 ) -> dict[tuple[int, int], float]:
     """Return how deep [mm] bodies of contact pairs may lie in each other, where that is more than usual.
 
-    Fixed planes err by what was allowed in their trial. Springs let faces into each other, and form is not part of a solid.
+    Fixed planes err by what was allowed in their trial, of raw poses; other contact tilts parts more. Springs let faces into
+    each other, and form is not part of a solid.
     """
     depths = dict[tuple[int, int], float]()
     for k, pair in enumerate(nominal.pairs):
         if pair.reference is not None and pair.moving_face is not None:
             bodies = ordered(pair.moving, pair.reference)
             is_free = pair.is_springy or pair.has_form
-            planes = trials[k].allowed if k in trials and k not in meetings and np.isfinite(trials[k].allowed) else 0.0
+            planes = (
+                PLANES_FACTOR * trials[k].allowed
+                if k in trials and k not in meetings and np.isfinite(trials[k].allowed)
+                else 0.0
+            )
             depths[bodies] = max(depths.get(bodies, 0.0), np.inf if is_free else planes)
     return depths
 

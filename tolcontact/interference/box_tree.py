@@ -42,6 +42,17 @@ def box_tree(corners: Float[Array, "t 3 3"]) -> BoxTree:
     return BoxTree(places.reshape(leaves, LEAF), np.concatenate(levels), _successors(2 * leaves - 1))
 
 
+def inflated(tree: BoxTree, margins: Float[Array, " t"]) -> Float[Array, "n 6"]:
+    """Return boxes that hold triangles which move by no more than `margins` (t,) [mm]."""
+    level = np.where(tree.triangles >= 0, margins[tree.triangles], 0.0).max(axis=1)
+    levels = [level]
+    while len(level) > 1:
+        level = level.reshape(-1, 2).max(axis=1)
+        levels.insert(0, level)
+    spare = np.concatenate(levels)[:, None]
+    return np.concatenate([tree.boxes[:, :3] - spare, tree.boxes[:, 3:] + spare], axis=1)
+
+
 def _joined(boxes: np.ndarray, count: int) -> np.ndarray:
     """Return the boxes around each `count` boxes in a row."""
     groups = boxes.reshape(-1, count, 6)

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import trimesh
 
-from tolcontact.arrays import Array, Float, Int
+from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.interference.solid import Solid
 
 
@@ -31,17 +32,37 @@ class DeviatingSolid:
         return bool(self.columns.size)
 
     @cached_property
+    def moves(self) -> Bool[Array, " t"]:
+        """Whether deviations move a corner of each triangle (t,)."""
+        moved = np.zeros(len(self.solid.vertices), dtype=bool)
+        moved[self._motions[0]] = True
+        return moved[self.solid.faces].any(axis=1)
+
+    @cached_property
+    def facet_of(self) -> Int[Array, " t"]:
+        """The facet of each triangle (t,): neighbours in one plane are one facet, unless deviations move their corners."""
+        pairs = self.solid.flat[~self.moves[self.solid.flat].any(axis=1)]
+        return np.asarray(trimesh.graph.connected_component_labels(pairs, node_count=len(self.solid.faces)), dtype=np.int64)
+
+    @cached_property
+    def first_of_facet(self) -> Int[Array, " f"]:
+        """A triangle of each facet."""
+        return np.unique(self.facet_of, return_index=True)[1]
+
+    @cached_property
     def _motions(self) -> tuple[np.ndarray, np.ndarray]:
         """The vertices that deviations move (m,), and how far (m, 3, k) [mm] for unit deviations."""
+        if not self.varies:
+            return np.zeros(0, dtype=int), np.zeros((0, 3, 0))
         shifts = self.solid.shifts(self.outward)
         moved = np.flatnonzero(np.abs(shifts).max(axis=(1, 2), initial=0) > 0)
         return moved, shifts[moved]
 
-    def shifts_of(self, deviations: Float[Array, "n contributor"]) -> Float[Array, "n v 3"]:
-        """Return how far deviations (n, contributor) move the vertices [mm]."""
-        shifts, (moved, motions) = np.zeros((len(deviations), *self.solid.vertices.shape)), self._motions
-        shifts[:, moved] = np.einsum("vik,nk->nvi", motions, deviations[:, self.columns])
-        return shifts
+    def shifts(self, deviations: Float[Array, "n contributor"]) -> tuple[Int[Array, " m"], Float[Array, "n m 3"]]:
+        """Return the vertices (m,) that deviations (n, contributor) move, and how far (n, m, 3) [mm]."""
+        moved, motions = self._motions
+        shifts = deviations[:, self.columns] @ motions.reshape(-1, len(self.columns)).T
+        return moved, np.ascontiguousarray(shifts.reshape(len(deviations), len(moved), 3))
 
     def growth(self, deviations: Float[Array, "n contributor"]) -> float:
         """Return how far [mm] deviations (n, contributor) move any vertex at most."""
@@ -52,7 +73,7 @@ class DeviatingSolid:
 
     def inset(self, depth: float) -> Float[Array, "v 3"]:
         """Return the vertices (v, 3) [mm] of a body whose surface lies `depth` [mm] deeper, and inside round faces."""
-        return self.solid.vertices + self.solid.inset(depth + self.bulges)
+        return np.ascontiguousarray(self.solid.vertices + self.solid.inset(depth + self.bulges))
 
 
 def deviating_solid(

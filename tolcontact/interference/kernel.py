@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.compiled import compiled, inlined_uncounted, uncounted
-from tolcontact.geometry.vector_kernel import along, cross, dot, minus, move, move_back, row, scaled, turn
+from tolcontact.geometry.vector_kernel import along, cross, dot, minus, move, move_back, row, row_of, scaled, turn
 
 LEAF = 4
 MIN_SINE = 1e-3  # of the angle between edges that have a common normal
@@ -20,13 +20,21 @@ MAX_CROSSING = 12  # edges of each body whose common normals are compared
 class Side(NamedTuple):
     """A body of a pair.
 
-    vertices    (n or 1, v, 3) [mm]: of each realization, or of all of them
+    vertices    (v, 3) [mm], without deviations
+    moved       (v,): index of each vertex among those that deviations move, -1 for others
+    shifts      (n, m, 3) [mm]: how far deviations move these, in each realization
     faces       (t, 3)
+    planes      (t, 4): outward normal n and level n . x of each triangle; NaN for triangles that deviations move
     edges       (e, 2), those nominally nearest to the other body first
     outward     (e, 3): sums of the outward normals of the facets that meet at each edge
     distances   (e,) [mm]: bounds from below of their nominal distances from it
+    facets      (f, 10): of each facet, triangles in one plane, its box (6), normal n and level n . x
+    members, first_members   the triangles of each facet, as in a CSR matrix
+    vertices_of_facets   (f, 3): three vertices of facets that deviations move, -1 for others
+    starts, near, reaches   the facets `near` each edge, as in a CSR matrix, the nearest first, with their nominal distances
+    reach       [mm] up to which facets are near
     triangles, boxes, next   its BoxTree
-    spare       [mm] by which vertices may lie outside of the boxes
+    spare       [mm] by which deviations move a vertex at most
     bounds      (8, 3) [mm]: corners of a box that holds the body
     witnesses   (c,): a vertex of each connected component, nominally far from the surface of the other body
     far         (c,) [mm]: bounds from below of that distance
@@ -34,10 +42,21 @@ class Side(NamedTuple):
     """
 
     vertices: np.ndarray
+    moved: np.ndarray
+    shifts: np.ndarray
     faces: np.ndarray
+    planes: np.ndarray
     edges: np.ndarray
     outward: np.ndarray
     distances: np.ndarray
+    facets: np.ndarray
+    members: np.ndarray
+    first_members: np.ndarray
+    vertices_of_facets: np.ndarray
+    starts: np.ndarray
+    near: np.ndarray
+    reaches: np.ndarray
+    reach: float
     triangles: np.ndarray
     boxes: np.ndarray
     next: np.ndarray
@@ -51,32 +70,49 @@ class Side(NamedTuple):
 @inlined_uncounted
 def _corner(side, k, number):  # type: ignore[no-untyped-def]
     """Return a vertex of a body in realization k."""
-    i = 0 if side.vertices.shape[0] == 1 else k
-    return side.vertices[i, number, 0], side.vertices[i, number, 1], side.vertices[i, number, 2]
+    m, x = side.moved[number], row(side.vertices, number)
+    return x if m < 0 else along(x, 1.0, row_of(side.shifts, k, m))
 
 
 @inlined_uncounted
-def _share(p, q, a, b, c):  # type: ignore[no-untyped-def]
+def _triangle(side, k, triangle):  # type: ignore[no-untyped-def]
+    """Return the corners of a triangle in realization k."""
+    faces = side.faces
+    return (
+        _corner(side, k, faces[triangle, 0]), _corner(side, k, faces[triangle, 1]), _corner(side, k, faces[triangle, 2]),
+    )  # fmt: skip
+
+
+@inlined_uncounted
+def _share(side, k, triangle, p, q):  # type: ignore[no-untyped-def]
     """Return the share of the segment from p to q at which it passes a triangle, and its sense: -1 inwards, 1 outwards, 0 none.
 
     Places on the edges of the triangle count, so that none gets through between two triangles.
     """
-    n = cross(minus(b, a), minus(c, a))
-    start, end = dot(n, minus(p, a)), dot(n, minus(q, a))
-    if start * end > 0.0 or start == end:
-        return 0.0, 0
+    planes, is_known = side.planes, side.planes[triangle, 3] == side.planes[triangle, 3]
+    if is_known:
+        n = (planes[triangle, 0], planes[triangle, 1], planes[triangle, 2])
+        start, end = dot(n, p) - planes[triangle, 3], dot(n, q) - planes[triangle, 3]
+        if start * end > 0.0 or start == end:
+            return 0.0, 0
+    a, b, c = _triangle(side, k, triangle)
+    if not is_known:
+        n = cross(minus(b, a), minus(c, a))
+        start, end = dot(n, minus(p, a)), dot(n, minus(q, a))
+        if start * end > 0.0 or start == end:
+            return 0.0, 0
     d, u, v, w = minus(q, p), minus(a, p), minus(b, p), minus(c, p)
     first, second, third = dot(d, cross(u, v)), dot(d, cross(v, w)), dot(d, cross(w, u))
     is_through = (first >= 0.0 and second >= 0.0 and third >= 0.0) or (first <= 0.0 and second <= 0.0 and third <= 0.0)
     return start / (start - end), 0 if not is_through else (-1 if end < start else 1)
 
 
-@uncounted
+@inlined_uncounted
 def _passes(side, k, p, q, shares, senses):  # type: ignore[no-untyped-def]
     """Write at which shares, in order, and in which senses the segment from p to q passes the surface; return how often."""
-    spare, count, node, inner = side.spare, 0, 0, side.next.size // 2
-    low_x, low_y, low_z = min(p[0], q[0]) - spare, min(p[1], q[1]) - spare, min(p[2], q[2]) - spare
-    high_x, high_y, high_z = max(p[0], q[0]) + spare, max(p[1], q[1]) + spare, max(p[2], q[2]) + spare
+    count, node, inner = 0, 0, side.next.size // 2
+    low_x, low_y, low_z = min(p[0], q[0]), min(p[1], q[1]), min(p[2], q[2])
+    high_x, high_y, high_z = max(p[0], q[0]), max(p[1], q[1]), max(p[2], q[2])
     boxes = side.boxes
     while node < side.next.size:
         if (
@@ -92,8 +128,7 @@ def _passes(side, k, p, q, shares, senses):  # type: ignore[no-untyped-def]
             triangle = side.triangles[node - inner, j]
             if triangle < 0:
                 break
-            a, b = _corner(side, k, side.faces[triangle, 0]), _corner(side, k, side.faces[triangle, 1])
-            share, sense = _share(p, q, a, b, _corner(side, k, side.faces[triangle, 2]))
+            share, sense = _share(side, k, triangle, p, q)
             if sense != 0 and count < shares.size:
                 place = count
                 while place > 0 and shares[place - 1] > share:
@@ -104,12 +139,12 @@ def _passes(side, k, p, q, shares, senses):  # type: ignore[no-untyped-def]
 
 
 @uncounted
-def _near_count(side, motion):  # type: ignore[no-untyped-def]
-    """Return how many of the edges may reach the other body if that moves by no more than `motion` [mm]."""
-    low, high = 0, side.distances.size
+def _near_count(distances, motion):  # type: ignore[no-untyped-def]
+    """Return how many of the edges, at `distances` (e,) that ascend, may reach a body that moves by `motion` [mm] at most."""
+    low, high = 0, distances.size
     while low < high:
         middle = (low + high) // 2
-        if side.distances[middle] <= motion:
+        if distances[middle] <= motion:
             low = middle + 1
         else:
             high = middle
@@ -138,9 +173,8 @@ def _is_within(side, k, p):  # type: ignore[no-untyped-def]
     """Return whether p lies in a body: its triangles fill all solid angles (van Oosterom and Strackee, 1983)."""
     total = 0.0
     for t in range(side.faces.shape[0]):
-        a = minus(_corner(side, k, side.faces[t, 0]), p)
-        b = minus(_corner(side, k, side.faces[t, 1]), p)
-        c = minus(_corner(side, k, side.faces[t, 2]), p)
+        a, b, c = _triangle(side, k, t)
+        a, b, c = minus(a, p), minus(b, p), minus(c, p)
         length_a, length_b, length_c = math.sqrt(dot(a, a)), math.sqrt(dot(b, b)), math.sqrt(dot(c, c))
         near = length_a * length_b * length_c + dot(a, b) * length_c + dot(b, c) * length_a + dot(c, a) * length_b
         total += math.atan2(dot(a, cross(b, c)), near)
@@ -150,10 +184,10 @@ def _is_within(side, k, p):  # type: ignore[no-untyped-def]
 @inlined_uncounted
 def _is_beyond(side, p):  # type: ignore[no-untyped-def]
     """Return whether p lies outside of the box of a body."""
-    spare, boxes = side.spare, side.boxes
+    boxes = side.boxes
     return (
-        p[0] < boxes[0, 0] - spare or p[1] < boxes[0, 1] - spare or p[2] < boxes[0, 2] - spare
-        or p[0] > boxes[0, 3] + spare or p[1] > boxes[0, 4] + spare or p[2] > boxes[0, 5] + spare
+        p[0] < boxes[0, 0] or p[1] < boxes[0, 1] or p[2] < boxes[0, 2]
+        or p[0] > boxes[0, 3] or p[1] > boxes[0, 4] or p[2] > boxes[0, 5]
     )  # fmt: skip
 
 
@@ -167,6 +201,57 @@ def motion_of(X, bounds):  # type: ignore[no-untyped-def]
     return math.sqrt(largest)
 
 
+@inlined_uncounted
+def _may_pass(other, facets, f, p, q):  # type: ignore[no-untyped-def]
+    """Return whether the segment from p to q reaches the box of a facet, and passes its plane."""
+    if (
+        facets[f, 0] > max(p[0], q[0]) or facets[f, 3] < min(p[0], q[0]) or facets[f, 1] > max(p[1], q[1])
+        or facets[f, 4] < min(p[1], q[1]) or facets[f, 2] > max(p[2], q[2]) or facets[f, 5] < min(p[2], q[2])
+    ):  # fmt: skip
+        return False
+    n = (facets[f, 6], facets[f, 7], facets[f, 8])
+    return not (dot(n, p) - facets[f, 9]) * (dot(n, q) - facets[f, 9]) > 0.0
+
+
+@uncounted
+def _put_planes(side, k, facets):  # type: ignore[no-untyped-def]
+    """Write the planes of the facets that deviations move in realization k."""
+    for f in range(facets.shape[0]):
+        if side.vertices_of_facets[f, 0] >= 0:
+            a = _corner(side, k, side.vertices_of_facets[f, 0])
+            b, c = _corner(side, k, side.vertices_of_facets[f, 1]), _corner(side, k, side.vertices_of_facets[f, 2])
+            n = cross(minus(b, a), minus(c, a))
+            facets[f, 6], facets[f, 7], facets[f, 8], facets[f, 9] = n[0], n[1], n[2], dot(n, a)
+
+
+@uncounted
+def _passes_any(owner, other, facets, k, X, is_forward, motion, shares, senses):  # type: ignore[no-untyped-def]
+    """Return whether an edge of a body passes the surface of the other one, whose `facets` are those of realization k."""
+    is_listed, boxes = motion <= owner.reach, other.boxes
+    for j in range(_near_count(owner.distances, motion)):
+        p, q = _corner(owner, k, owner.edges[j, 0]), _corner(owner, k, owner.edges[j, 1])
+        p, q = (move(X, p), move(X, q)) if is_forward else (move_back(X, p), move_back(X, q))
+        if (
+            boxes[0, 0] > max(p[0], q[0]) or boxes[0, 3] < min(p[0], q[0]) or boxes[0, 1] > max(p[1], q[1])
+            or boxes[0, 4] < min(p[1], q[1]) or boxes[0, 2] > max(p[2], q[2]) or boxes[0, 5] < min(p[2], q[2])
+        ):  # fmt: skip
+            continue
+        if not is_listed:
+            if _passes(other, k, p, q, shares, senses) > 0:
+                return True
+            continue
+        for m in range(owner.starts[j], owner.starts[j + 1]):
+            if owner.reaches[m] > motion:
+                break
+            facet = owner.near[m]
+            if _may_pass(other, facets, facet, p, q):
+                for place in range(other.first_members[facet], other.first_members[facet + 1]):
+                    _, sense = _share(other, k, other.members[place], p, q)
+                    if sense != 0:
+                        return True
+    return False
+
+
 @compiled
 def interfere(A, B, poses, found):  # type: ignore[no-untyped-def]
     """Write whether (n,) body A interferes with body B at its poses X_BA (n, 12) in the frame of B.
@@ -174,23 +259,20 @@ def interfere(A, B, poses, found):  # type: ignore[no-untyped-def]
     It does if an edge of one passes a triangle of the other, or else if one holds a component of the other.
     """
     shares, senses = np.empty(1), np.empty(1, dtype=np.int64)
+    facets_of_A, facets_of_B = A.facets.copy(), B.facets.copy()
     for k in range(poses.shape[0]):
         X = poses[k]
         motion = motion_of(X, A.bounds) + 2.0 * (A.spare + B.spare)
-        found[k] = False
-        for j in range(_near_count(A, motion)):
-            p, q = move(X, _corner(A, k, A.edges[j, 0])), move(X, _corner(A, k, A.edges[j, 1]))
-            if _passes(B, k, p, q, shares, senses) > 0:
-                found[k] = True
-                break
-        if not found[k]:
-            for j in range(_near_count(B, motion)):
-                p, q = move_back(X, _corner(B, k, B.edges[j, 0])), move_back(X, _corner(B, k, B.edges[j, 1]))
-                if _passes(A, k, p, q, shares, senses) > 0:
-                    found[k] = True
-                    break
-        if not found[k]:
-            found[k] = _holds(A, B, k, X, True, motion) or _holds(B, A, k, X, False, motion)
+        if A.spare > 0.0:
+            _put_planes(A, k, facets_of_A)
+        if B.spare > 0.0:
+            _put_planes(B, k, facets_of_B)
+        found[k] = (
+            _passes_any(A, B, facets_of_B, k, X, True, motion, shares, senses)
+            or _passes_any(B, A, facets_of_A, k, X, False, motion, shares, senses)
+            or _holds(A, B, k, X, True, motion)
+            or _holds(B, A, k, X, False, motion)
+        )
 
 
 @inlined_uncounted
@@ -229,7 +311,7 @@ def _nearest(side, k, p, enough):  # type: ignore[no-untyped-def]
     """Return the distance of p from the surface, the triangle and the place there; any if the distance is below `enough`."""
     node, inner, best, foot, least = 0, side.next.size // 2, -1, p, np.inf
     while node < side.next.size:
-        if math.sqrt(_box_distance(side.boxes, node, p)) - side.spare > math.sqrt(least):
+        if _box_distance(side.boxes, node, p) > least:
             node = side.next[node]
             continue
         if node < inner:
@@ -239,8 +321,8 @@ def _nearest(side, k, p, enough):  # type: ignore[no-untyped-def]
             triangle = side.triangles[node - inner, j]
             if triangle < 0:
                 break
-            a, b = _corner(side, k, side.faces[triangle, 0]), _corner(side, k, side.faces[triangle, 1])
-            place = _nearest_on_triangle(p, a, b, _corner(side, k, side.faces[triangle, 2]))
+            a, b, c = _triangle(side, k, triangle)
+            place = _nearest_on_triangle(p, a, b, c)
             arm = minus(p, place)
             if dot(arm, arm) < least:
                 least, best, foot = dot(arm, arm), triangle, place
@@ -303,11 +385,7 @@ def _sound_centres(owner, other, k, X, is_forward, depths, triangles, places):  
     Where faces are flush, edges lie on the surface, and only what is between them is inside.
     """
     for t in range(owner.faces.shape[0]):
-        a, b, c = (
-            _corner(owner, k, owner.faces[t, 0]),
-            _corner(owner, k, owner.faces[t, 1]),
-            _corner(owner, k, owner.faces[t, 2]),
-        )
+        a, b, c = _triangle(owner, k, t)
         p = scaled(1.0 / 3.0, along(along(a, 1.0, b), 1.0, c))
         p = move(X, p) if is_forward else move_back(X, p)
         if _is_beyond(other, p):
@@ -336,9 +414,9 @@ def sound(A, B, poses, depths, triangles, places):  # type: ignore[no-untyped-de
     for k in range(poses.shape[0]):
         depths[k], triangles[k, :], places[k] = 0.0, 0, 0.0
         X = poses[k]
-        _sound_edges(A, B, k, X, True, np.zeros(A.vertices.shape[1], dtype=np.bool_), shares, senses, depths, triangles, places)
+        _sound_edges(A, B, k, X, True, np.zeros(A.vertices.shape[0], dtype=np.bool_), shares, senses, depths, triangles, places)
         _sound_edges(
-            B, A, k, X, False, np.zeros(B.vertices.shape[1], dtype=np.bool_), shares, senses, depths, triangles, places
+            B, A, k, X, False, np.zeros(B.vertices.shape[0], dtype=np.bool_), shares, senses, depths, triangles, places
         )
         _sound_centres(A, B, k, X, True, depths, triangles, places)
         _sound_centres(B, A, k, X, False, depths, triangles, places)
@@ -359,7 +437,7 @@ def _collect(owner, other, k, X, is_forward, region, counts, normals, crossing):
 
     All are in the frame of B. `counts` (3,) are those of points in `region`, of `normals` and of edges in `crossing`.
     """
-    spare, node_count, inner = other.spare, other.next.size, other.next.size // 2
+    node_count, inner = other.next.size, other.next.size // 2
     counts[2] = 0
     for j in range(owner.edges.shape[0]):
         p, q = _corner(owner, k, owner.edges[j, 0]), _corner(owner, k, owner.edges[j, 1])
@@ -369,7 +447,7 @@ def _collect(owner, other, k, X, is_forward, region, counts, normals, crossing):
             boxes = other.boxes
             is_off = False
             for i in range(3):
-                is_off = is_off or boxes[node, i] > max(p[i], q[i]) + spare or boxes[node, 3 + i] < min(p[i], q[i]) - spare
+                is_off = is_off or boxes[node, i] > max(p[i], q[i]) or boxes[node, 3 + i] < min(p[i], q[i])
             if is_off:
                 node = other.next[node]
                 continue
@@ -380,10 +458,9 @@ def _collect(owner, other, k, X, is_forward, region, counts, normals, crossing):
                 triangle = other.triangles[node - inner, m]
                 if triangle < 0:
                     break
-                a, b = _corner(other, k, other.faces[triangle, 0]), _corner(other, k, other.faces[triangle, 1])
-                c = _corner(other, k, other.faces[triangle, 2])
-                share, sense = _share(p, q, a, b, c)
+                share, sense = _share(other, k, triangle, p, q)
                 if sense != 0:
+                    a, b, c = _triangle(other, k, triangle)
                     place, n = along(p, share, minus(q, p)), cross(minus(b, a), minus(c, a))
                     n = scaled(1.0 / math.sqrt(dot(n, n)), n)
                     place, n = (place, n) if is_forward else (move(X, place), scaled(-1.0, turn(X, n)))
@@ -486,3 +563,43 @@ def distances(lower, upper, boxes, successors, result):  # type: ignore[no-untyp
             else:
                 least, node = square, successors[node]
         result[k] = math.sqrt(least)
+
+
+@compiled
+def near_facets(lower, upper, tree, around, facet_of, reach, is_written, starts, near, reaches):  # type: ignore[no-untyped-def]
+    """Count, or write, the facets that are no farther than `reach` [mm] from each box from `lower` to `upper` (n, 3).
+
+    tree        triangles, boxes, next of a BoxTree
+    around      (t, 6) [mm]: boxes of the triangles
+    facet_of    (t,): the facet of each triangle
+    starts      (n + 1,): written if not `is_written`, else read; near, reaches (m,): the facets, and their distances [mm]
+    """
+    triangles, boxes, successors = tree
+    inner, least = successors.size // 2, np.full(facet_of.max() + 1, np.inf)
+    found = np.empty(least.size, dtype=np.int64)
+    for k in range(lower.shape[0]):
+        low, high, node, count = row(lower, k), row(upper, k), 0, 0
+        while node < successors.size:
+            square = _distance_of_boxes(boxes, node, low, high)
+            if square > reach * reach:
+                node = successors[node]
+            elif node < inner:
+                node = 2 * node + 1
+            else:
+                for j in range(LEAF):
+                    triangle = triangles[node - inner, j]
+                    if triangle >= 0:
+                        facet, distance = facet_of[triangle], math.sqrt(_distance_of_boxes(around, triangle, low, high))
+                        if distance <= reach:
+                            if least[facet] == np.inf:
+                                found[count], count = facet, count + 1
+                            least[facet] = min(least[facet], distance)
+                node = successors[node]
+        if is_written:
+            order = np.argsort(least[found[:count]])
+            for j in range(count):
+                facet = found[order[j]]
+                near[starts[k] + j], reaches[starts[k] + j] = facet, least[facet]
+        else:
+            starts[k + 1] = starts[k] + count
+        least[found[:count]] = np.inf

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import igl
 import numpy as np
 
-from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.interference import kernel
+from tolcontact.interference.box_tree import BoxTree, box_tree, inflated
 from tolcontact.interference.deviating_solid import DeviatingSolid
 
 CORNERS = np.array(np.meshgrid(*[(0, 1)] * 3)).reshape(3, -1).T
@@ -49,17 +49,19 @@ class Neighbours:
 
     insets   [mm] by which the surfaces of A and of B lie inside the bodies: touching bodies are apart by their sum, and faces
              that are flush are not, since the insets differ
+    reach    [mm]: how far A usually moves against B, with deviations; beyond, tests take longer
     """
 
     A: DeviatingSolid
     B: DeviatingSolid
     insets: tuple[float, float]
+    reach: float
 
     @cached_property
     def _nominal(self) -> tuple[kernel.Side, kernel.Side]:
         """Both bodies without deviations."""
         first, second = (body.inset(depth) for body, depth in zip((self.A, self.B), self.insets, strict=True))
-        return _side(self.A, first, self.B, second), _side(self.B, second, self.A, first)
+        return _side(self.A, first, self.B, second, self.reach), _side(self.B, second, self.A, first, self.reach)
 
     @property
     def varies(self) -> bool:
@@ -69,14 +71,11 @@ class Neighbours:
     def _sides(self, deviations: np.ndarray | None) -> tuple[kernel.Side, kernel.Side]:
         if deviations is None:
             return self._nominal
-        sides = []
-        for body, nominal in zip((self.A, self.B), self._nominal, strict=True):
-            side = nominal
-            if body.varies:
-                shifts = body.shifts_of(deviations)
-                side = side._replace(vertices=side.vertices + shifts, spare=side.spare + _farthest(shifts))
-            sides.append(side)
-        return sides[0], sides[1]
+        first, second = (
+            nominal if not body.varies else _deviating(nominal, body, deviations)
+            for body, nominal in zip((self.A, self.B), self._nominal, strict=True)
+        )
+        return first, second
 
     def interfere(
         self, X_BA: Float[Array, "n 12"], deviations: Float[Array, "n contributor"] | None = None
@@ -95,50 +94,103 @@ class Neighbours:
         kernel.ways_out(*self._nominal, np.ascontiguousarray(X_BA), sum(self.insets), *way)
         return way
 
-    def measured(self, X_BA: Float[Array, "n 12"], deviations: Float[Array, "n contributor"]) -> Interference:
+    def measured(self, X_BA: Float[Array, "n 12"], deviations: Float[Array, "n contributor"] | None = None) -> Interference:
         """Return how deep bodies lie in each other at poses X_BA at which they interfere."""
         result = Interference(np.empty(len(X_BA)), np.empty((len(X_BA), 2), dtype=np.int64), np.empty((len(X_BA), 2, 3)))
         kernel.sound(*self._sides(deviations), np.ascontiguousarray(X_BA), *result)
         return result._replace(depths=result.depths + sum(self.insets))
 
 
-def _side(body: DeviatingSolid, vertices: np.ndarray, other: DeviatingSolid, vertices_of_other: np.ndarray) -> kernel.Side:
-    """Return a body with shifted vertices (v, 3) as compiled passes take it, with what its other body decides."""
-    solid, tree = body.solid, body.solid.tree
-    ends = vertices[solid.edges]
-    spare = _farthest(vertices_of_other - other.solid.vertices)
-    distances = np.empty(len(ends))
-    kernel.distances(
-        ends.min(axis=1) - spare, ends.max(axis=1) + spare, other.solid.tree.boxes, other.solid.tree.next, distances
+def _side(
+    body: DeviatingSolid, vertices: np.ndarray, other: DeviatingSolid, vertices_of_other: np.ndarray, reach: float
+) -> kernel.Side:
+    """Return a body with inset vertices (v, 3) as compiled passes take it, with what its other body decides."""
+    solid, tree, tree_of_other = (
+        body.solid,
+        box_tree(vertices[body.solid.faces]),
+        box_tree(vertices_of_other[other.solid.faces]),
     )
+    ends, distances = vertices[solid.edges], np.empty(len(solid.edges))
+    kernel.distances(ends.min(axis=1), ends.max(axis=1), tree_of_other.boxes, tree_of_other.next, distances)
     order = np.argsort(distances, kind="stable")
-    corners = np.ascontiguousarray(vertices_of_other)
-    squares, _, _ = igl.point_mesh_squared_distance(np.ascontiguousarray(vertices), corners, other.solid.faces)
+    squares, _, _ = igl.point_mesh_squared_distance(vertices, vertices_of_other, other.solid.faces)
     witnesses = np.array([rows[np.argmax(squares[rows])] for rows in solid.components])
-    turns = igl.winding_number(corners, other.solid.faces, np.ascontiguousarray(vertices[witnesses]))
-    lower, upper = vertices.min(axis=0), vertices.max(axis=0)
+    turns = igl.winding_number(vertices_of_other, other.solid.faces, np.ascontiguousarray(vertices[witnesses]))
+    corners = vertices[solid.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    planes = np.column_stack([normals, (normals * corners[:, 0]).sum(axis=1)])
+    near = _near_facets(ends[order], tree_of_other, vertices_of_other[other.solid.faces], other.facet_of, reach)
     return kernel.Side(
-        vertices=np.ascontiguousarray(vertices)[None],
+        vertices=vertices,
+        moved=np.full(len(vertices), -1),
+        shifts=np.zeros((1, 0, 3)),
         faces=solid.faces,
+        planes=planes,
         edges=np.ascontiguousarray(solid.edges[order]),
         outward=np.ascontiguousarray(solid.outward[order]),
         distances=distances[order],
+        facets=_facets(body, corners, planes),
+        members=np.argsort(body.facet_of, kind="stable"),
+        first_members=np.cumsum([0, *np.bincount(body.facet_of)]),
+        vertices_of_facets=np.where(body.moves[body.first_of_facet][:, None], solid.faces[body.first_of_facet], -1),
+        **near._asdict(),
+        reach=reach,
         triangles=tree.triangles,
         boxes=tree.boxes,
         next=tree.next,
-        spare=_farthest(vertices - solid.vertices),
-        bounds=np.where(CORNERS == 0, lower, upper),
+        spare=0.0,
+        bounds=np.where(CORNERS == 0, vertices.min(axis=0), vertices.max(axis=0)),
         witnesses=witnesses,
         far=np.sqrt(squares[witnesses]),
         is_in=np.atleast_1d(turns) > 0.5,
     )
 
 
-def _farthest(shifts: np.ndarray) -> float:
-    """Return the length of the longest of some vectors (..., 3)."""
-    return float(np.linalg.norm(shifts, axis=-1).max(initial=0))
+class _NearFacets(NamedTuple):
+    """See kernel.Side."""
+
+    starts: np.ndarray
+    near: np.ndarray
+    reaches: np.ndarray
 
 
-def relative(poses: Float[Array, "n part 12"], first: int, second: int) -> Float[Array, "n 12"]:
-    """Return the poses X_BA (n, 12) of a part in the frame of another one."""
-    return pose.relative(poses[:, first], poses[:, second])
+def _near_facets(edges: np.ndarray, tree: BoxTree, corners: np.ndarray, facets: np.ndarray, reach: float) -> _NearFacets:
+    """Return the facets no farther than `reach` [mm] from each of the edges (e, 2, 3), of triangles with `corners` (t, 3, 3)."""
+    boxes = np.ascontiguousarray(edges.min(axis=1)), np.ascontiguousarray(edges.max(axis=1))
+    around = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
+    near = _NearFacets(np.zeros(len(edges) + 1, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0))
+    kernel.near_facets(*boxes, tree, around, facets, reach, False, *near)
+    count = int(near.starts[-1])
+    near = near._replace(near=np.empty(count, dtype=np.int64), reaches=np.empty(count))
+    kernel.near_facets(*boxes, tree, around, facets, reach, True, *near)
+    return near
+
+
+def _facets(body: DeviatingSolid, corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
+    """Return box and plane (f, 10) of each facet, from corners (t, 3, 3) and planes (t, 4) of the triangles."""
+    facets = np.concatenate(
+        [np.full((len(body.first_of_facet), 3), np.inf), np.full((len(body.first_of_facet), 3), -np.inf)], axis=1
+    )
+    np.minimum.at(facets[:, :3], body.facet_of, corners.min(axis=1))
+    np.maximum.at(facets[:, 3:], body.facet_of, corners.max(axis=1))
+    return np.concatenate([facets, planes[body.first_of_facet]], axis=1)
+
+
+def _deviating(side: kernel.Side, body: DeviatingSolid, deviations: np.ndarray) -> kernel.Side:
+    """Return a body with the deviations (n, contributor) of some realizations."""
+    vertices, shifts = body.shifts(deviations)
+    moved = side.moved.copy()
+    moved[vertices] = np.arange(len(vertices))
+    lengths = np.zeros(len(moved))
+    lengths[vertices] = np.linalg.norm(shifts, axis=2).max(axis=0, initial=0)
+    of_triangles = lengths[side.faces].max(axis=1)
+    planes = np.where((of_triangles > 0)[:, None], np.nan, side.planes)
+    boxes = inflated(BoxTree(side.triangles, side.boxes, side.next), of_triangles)
+    spare = np.zeros(len(side.facets))
+    np.maximum.at(spare, body.facet_of, of_triangles)
+    facets = side.facets.copy()
+    facets[:, :3] -= spare[:, None]
+    facets[:, 3:6] += spare[:, None]
+    return side._replace(
+        facets=facets, moved=moved, shifts=shifts, planes=planes, boxes=boxes, spare=float(lengths.max(initial=0))
+    )

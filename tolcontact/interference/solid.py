@@ -7,7 +7,6 @@ import numpy as np
 import trimesh
 
 from tolcontact.arrays import Array, Float, Int
-from tolcontact.interference.box_tree import BoxTree, box_tree
 
 MERGE_SHARE = 1e-9  # of the size: vertices that are no farther apart are one
 SAME_PLANE = 1e-5  # rad: facets whose normals differ by less are one plane
@@ -24,6 +23,7 @@ class Solid:
     faces       (t, 3): triangles
     edges       (e, 2): edges between different planes
     outward     (e, 3): sums of the outward normals of the two triangles at each edge
+    flat        (n, 2): triangles that share an edge and lie in one plane
     sources     (t,): the triangle of the part's mesh that each triangle is
     """
 
@@ -31,6 +31,7 @@ class Solid:
     faces: Int[Array, "t 3"]
     edges: Int[Array, "e 2"]
     outward: Float[Array, "e 3"]
+    flat: Int[Array, "n 2"]
     sources: Int[Array, " t"]
 
     @cached_property
@@ -48,16 +49,6 @@ class Solid:
         used = np.unique(self.faces)
         order = used[np.argsort(labels[used], kind="stable")]
         return np.split(order, np.flatnonzero(np.diff(labels[order])) + 1)
-
-    @cached_property
-    def tree(self) -> BoxTree:
-        """The boxes of the triangles."""
-        return box_tree(self.vertices[self.faces])
-
-    @cached_property
-    def bounds(self) -> Float[Array, "2 3"]:
-        """Lower and upper corner [mm] of the box around the body."""
-        return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     def shifts(self, outward: Float[Array, "t 3 k"]) -> Float[Array, "v 3 k"]:
         """Return how vertices move if the plane of each triangle moves out of the body by `outward` at its corners.
@@ -98,5 +89,6 @@ def solid(body: trimesh.Trimesh) -> Solid | None:
         np.ascontiguousarray(merged.faces, dtype=np.int64),
         np.ascontiguousarray(edges, dtype=np.int64),
         np.asarray(merged.face_normals)[np.asarray(merged.face_adjacency)[sharp]].sum(axis=1),
+        np.asarray(merged.face_adjacency)[~sharp],
         kept,
     )

@@ -14,10 +14,12 @@ from tolcontact.interference.deviating_solid import DeviatingSolid
 from tolcontact.interference.neighbours import CORNERS, Interference, Neighbours
 from tolcontact.interference.part_solid import part_solid
 
-ALLOWED_SHARE = 1 / 2000  # of the smallest tolerance range: the depth from which on bodies lie in each other
+# Of the smallest tolerance range, twice the radius of a ball in both bodies: the depth from which on these lie in each other.
+ALLOWED_SHARE = 1 / 1000
 RANGE = 1.0  # mm: in its place if nothing is toleranced
 MIN_DEPTH = 1e-7  # mm, and MIN_SHARE of the sizes of both bodies: below, poses and vertices are rounded
 MIN_SHARE = 1e-8
+MOTION_FACTOR = 2.0  # times the motion of raw poses: how far bodies usually move
 SHARES = (0.4, 0.6)  # of that depth, by which the surfaces of both bodies are moved inwards
 
 
@@ -44,10 +46,13 @@ class Watch:
     nominal   the assembly
     allowed   [mm] by pair of bodies: a depth at which they do not count as in each other yet, if that is larger than usual;
               infinite where they may lie in each other
+    poses, deviations   (n, part, 12), (n, contributor): some raw poses; tests are quickest where bodies move about as far
     """
 
     nominal: Nominal
     allowed: Mapping[tuple[int, int], float]
+    poses: Float[Array, "n part 12"]
+    deviations: Float[Array, "n contributor"]
     _neighbours: dict[tuple[int, int], Neighbours | None] = field(default_factory=dict, init=False)
     _solids: dict[int, DeviatingSolid | None] = field(default_factory=dict, init=False)
 
@@ -93,7 +98,7 @@ class Watch:
             A, B = (self.solid(number) for number in pair)
             depth = self._depth(pair)
             is_tested = A is not None and B is not None and np.isfinite(depth)
-            found = Neighbours(A, B, (SHARES[0] * depth, SHARES[1] * depth)) if is_tested else None
+            found = Neighbours(A, B, (SHARES[0] * depth, SHARES[1] * depth), self._reach(pair)) if is_tested else None
             self._neighbours[pair] = found
         return self._neighbours[pair]
 
@@ -102,6 +107,15 @@ class Watch:
         if number not in self._solids:
             self._solids[number] = part_solid(self.nominal, number)
         return self._solids[number]
+
+    @cached_property
+    def _usual_motions(self) -> Float[Array, " part"]:
+        """How far (part,) [mm] raw poses and deviations move any point of each body at most."""
+        known = np.isfinite(self.poses).all(axis=(1, 2))
+        return self._motions(self.poses[known]).max(axis=0, initial=0) + self._growth(self.deviations[known])
+
+    def _reach(self, pair: tuple[int, int]) -> float:
+        return MOTION_FACTOR * float(self._usual_motions[list(pair)].sum())
 
     def _depth(self, pair: tuple[int, int]) -> float:
         size = float(np.ptp(self._bounds[list(pair)], axis=1).max())
