@@ -33,8 +33,8 @@ ROOMS = {
 }
 NOT_IN = {
     "xarray": (
-        "declaration/", "geometry/", "features/", "discretization/", "variation/", "mechanics/", "interference/", "compilation/",
-        "contact/", "simulation/", "statics/",
+        "declaration/", "geometry/", "features/", "discretization/", "variation/", "mechanics/", "interference/",
+        "compilation/", "contact/", "simulation/", "statics/",
     )
 }  # fmt: skip
 # Who may import a library by a call, when it is first needed: it is optional, or slow to import.

@@ -120,7 +120,7 @@ class ContactResolver:
         """
         relative = relative[:, self.pairs]
         survey = self._candidates.survey(relative, deviations)
-        moves = (survey.min_gap < -PENETRATION).any(axis=1) | self._method.minimizes.presses
+        moves = np.any(survey.min_gap < -PENETRATION, axis=1) | self._method.minimizes.presses
         unseen = np.flatnonzero(~moves)
         moves[unseen] = self._candidates.interfere(relative[unseen])
         touched = np.flatnonzero(moves)

@@ -83,5 +83,5 @@ def deviating_solid(
     columns = np.unique(np.concatenate([np.zeros(0, dtype=int), *(face[1] for face in faces)]))
     outward = np.zeros((len(solid.faces), 3, len(columns)))
     for triangles, of_face, motion in faces:
-        outward[np.ix_(triangles, range(3), np.searchsorted(columns, of_face))] += motion
+        outward[np.ix_(triangles, np.arange(3), np.searchsorted(columns, of_face))] += motion
     return DeviatingSolid(solid, columns, outward, bulges)

@@ -90,7 +90,8 @@ class Neighbours:
 
     def ways_out(self, X_BA: Float[Array, "n 12"]) -> WayOut:
         """Return how bodies without deviations part at poses X_BA (n, 12) at which they interfere."""
-        way = WayOut(*np.zeros((3, len(X_BA), 3)), np.zeros(len(X_BA)))
+        places, feet, normals = np.zeros((3, len(X_BA), 3))
+        way = WayOut(places, feet, normals, np.zeros(len(X_BA)))
         kernel.ways_out(*self._nominal, np.ascontiguousarray(X_BA), sum(self.insets), *way)
         return way
 

@@ -73,8 +73,8 @@ def _round_faces(
             if surface is not None and not isinstance(surface, Plane):
                 yield surface.placed(*part.placement), np.flatnonzero(numbers[body.sources] == number)
     for pair in nominal.pairs:
-        for number, face in ((pair.moving, pair.moving_face), (pair.reference, pair.reference_face)):
-            if face is not None and number is not None and nominal.parts[number].part is part.part:
+        for body_of_face, face in ((pair.moving, pair.moving_face), (pair.reference, pair.reference_face)):
+            if face is not None and body_of_face is not None and nominal.parts[body_of_face].part is part.part:
                 for piece in face.pieces:
                     if piece.surface.is_fitted and not isinstance(piece.surface, Plane):
                         yield piece.surface, _triangles(whole, piece.face)

@@ -95,10 +95,9 @@ class Watch:
     def neighbours(self, pair: tuple[int, int]) -> Neighbours | None:
         """Return two bodies that are tested; None if one of them is not closed, or they may lie in each other."""
         if pair not in self._neighbours:
-            A, B = (self.solid(number) for number in pair)
-            depth = self._depth(pair)
-            is_tested = A is not None and B is not None and np.isfinite(depth)
-            found = Neighbours(A, B, (SHARES[0] * depth, SHARES[1] * depth), self._reach(pair)) if is_tested else None
+            A, B, depth, found = self.solid(pair[0]), self.solid(pair[1]), self._depth(pair), None
+            if A is not None and B is not None and np.isfinite(depth):
+                found = Neighbours(A, B, (SHARES[0] * depth, SHARES[1] * depth), self._reach(pair))
             self._neighbours[pair] = found
         return self._neighbours[pair]
 
