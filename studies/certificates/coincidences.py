@@ -1,0 +1,131 @@
+"""Set bodies on each other whose corners, edges and faces coincide, or nearly, and judge every certified realization.
+
+`stacks` has the bodies, `placements` the assemblies, and `polyhedra` the judge, which shares no code with the simulation.
+"""
+
+import argparse
+import collections
+import time
+import warnings
+
+import numpy as np
+
+import tolcontact as tc
+from studies.certificates.placements import Scene, scene
+from studies.certificates.polyhedra import ball_of_pairs, separation_of_pairs
+from studies.certificates.stacks import FAMILIES
+from tolcontact.method import OBJECTIVES
+from tolcontact.simulation import simulate_blocks
+from tolcontact.vocabulary import CORRECTED, RAW, Status
+
+ALLOWED, NOTICED = 5e-4, 1e-4  # radius of a ball in two bodies, as a share of the smallest tolerance range
+TOUCHING = 1e-6  # mm
+UNANSWERED = 0.1  # share of the realizations of a scene
+CONTRADICTIONS = ("inside", "noticed", "missed", "falsely touched", "lifted off")
+UNCERTIFIED = ("not converged", "not assemblable", "doubtful")
+COLUMNS = ("scenes", "rows", "certified", *CONTRADICTIONS, "undeclared", *UNCERTIFIED, "refused", "seconds")
+
+
+def judged(scene: Scene, samples: int, seed: int, solver: str) -> tuple[collections.Counter[str], float]:
+    """Return the numbers of realizations by finding, and the largest ball in two bodies of a certified one [tolerance]."""
+    program = tc.build(scene.assembly, solver=solver)
+    blocks = list(simulate_blocks(program, samples=samples, seed=seed, threads=1))
+    names = [part.name for part in program.nominal.parts]
+    order = [names.index(f"body {k}") for k in range(len(scene.bodies))]
+    poses = np.concatenate([block.poses for block in blocks])[:, :, order]
+    status = np.concatenate([block.status for block in blocks])
+    certified, touched = np.flatnonzero(status <= Status.RESOLVED), np.flatnonzero(status == Status.RESOLVED)
+    final, least = poses[certified, CORRECTED], NOTICED * scene.tolerance
+    radii = ball_of_pairs(scene.bodies, scene.pairs, final, least) / scene.tolerance
+    aside = ball_of_pairs(scene.bodies, scene.undeclared, final, least) / scene.tolerance
+    before = separation_of_pairs(scene.bodies, scene.pairs, poses[touched, RAW])
+    after = separation_of_pairs(scene.bodies, scene.pairs, poses[touched, CORRECTED])
+    counts = {
+        "rows": samples,
+        "certified": certified.size,
+        "inside": np.sum(radii > ALLOWED),
+        "noticed": np.sum(radii > NOTICED),
+        "missed": np.sum(radii[status[certified] == Status.UNTOUCHED] > ALLOWED),
+        "falsely touched": np.sum(before > TOUCHING),
+        "lifted off": np.sum(after > ALLOWED * scene.tolerance),
+        "undeclared": np.sum(aside > ALLOWED),
+        **{kind: np.sum(status == Status[kind.replace(" ", "_").upper()]) for kind in UNCERTIFIED},
+    }
+    return collections.Counter({name: int(count) for name, count in counts.items()}), float(radii.max(initial=0.0))
+
+
+class Tally:
+    """Counts of all scenes by family, the deepest ball of each, and the messages of refused scenes."""
+
+    def __init__(self) -> None:
+        self.counts: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
+        self.deepest: dict[str, float] = collections.defaultdict(float)
+        self.messages: collections.Counter[str] = collections.Counter()
+
+    def add(self, family: str, counts: collections.Counter[str], deepest: float) -> None:
+        self.counts[family].update(counts)
+        self.deepest[family] = max(self.deepest[family], deepest)
+
+    def print(self) -> None:
+        """Print a row for each family, with its counts that are not 0, and the total."""
+        total: collections.Counter[str] = collections.Counter()
+        for family, counts in sorted(self.counts.items()):
+            total.update(counts)
+            print(f"{family:18}", row(counts), f"deepest {self.deepest[family]:.2g}")
+        print(f"{'all':18}", row(total), f"deepest {max(self.deepest.values(), default=0.0):.2g} tolerances")
+        for message, count in self.messages.most_common():
+            print(f"refused {count} times: {message}")
+
+
+def row(counts: collections.Counter[str]) -> str:
+    """Return counts that are not 0 as one line."""
+    return ", ".join(f"{name} {counts[name]}" for name in COLUMNS if counts[name])
+
+
+def message(error: Exception) -> str:
+    """Return the last line of an error, without the numbers in it."""
+    text = str(error).splitlines()[-1].strip()
+    return f"{type(error).__name__}: " + "".join("#" if c.isdigit() else c for c in text)[:150]
+
+
+def simulated(tally: Tally, seed: int, family: str, options: argparse.Namespace) -> None:
+    """Judge one scene, add it to the tally, and print it if a certificate is contradicted or many realizations have none."""
+    start, counts, deepest = time.perf_counter(), collections.Counter[str](), 0.0
+    drawn = scene(seed, family, options.objective)
+    try:
+        counts, deepest = judged(drawn, options.samples, seed, options.solver)
+    except tc.TolcontactError as error:
+        counts["refused"] = 1
+        tally.messages[message(error)] += 1
+    seconds = time.perf_counter() - start
+    without = sum(counts[kind] for kind in UNCERTIFIED)
+    if any(counts[kind] for kind in CONTRADICTIONS) or without > UNANSWERED * options.samples or options.verbose:
+        depth = f"deepest {deepest:.2g} tolerances; " if deepest else ""
+        print(f"{seed} {family}: {row(counts)}; {depth}{drawn.choices}; {seconds:.1f} s", flush=True)
+    tally.add(family, counts + collections.Counter(scenes=1, seconds=round(seconds)), deepest)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--first", type=int, default=0, help="seed of the first scene")
+    parser.add_argument("--scenes", type=int, default=1000)
+    parser.add_argument("--samples", type=int, default=40)
+    parser.add_argument("--solver", default="daqp")
+    parser.add_argument("--objective", choices=tuple(OBJECTIVES), default="all points")
+    parser.add_argument("--families", nargs="+", choices=tuple(FAMILIES), default=list(FAMILIES))
+    parser.add_argument("--seconds", type=float, default=np.inf, help="begin no scene after this time")
+    parser.add_argument("--verbose", action="store_true", help="print every scene")
+    options = parser.parse_args()
+    warnings.simplefilter("ignore")
+    tally, start = Tally(), time.perf_counter()
+    for seed in range(options.first, options.first + options.scenes):
+        if time.perf_counter() - start > options.seconds:
+            print(f"stopped before scene {seed}")
+            break
+        simulated(tally, seed, options.families[seed % len(options.families)], options)
+    tally.print()
+    print(f"{time.perf_counter() - start:.0f} s")
+
+
+if __name__ == "__main__":
+    main()
