@@ -10,28 +10,39 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
+from studies.certificates.loose_stacks import LOOSE
+from studies.certificates.mating_stacks import MATING
 from studies.certificates.polyhedra import Body, Polyhedron, separation_of_pairs
-from studies.certificates.stacks import FAMILIES, HEIGHT, Pieces, Stack
+from studies.certificates.stacks import HEIGHT, Pieces, Stack
 
+FAMILIES = LOOSE | MATING
 FEET = (((-8, -8, 0), "z"), ((8, -8, 0), "z"), ((0, 8, 0), "z"), ((-8, 0, 0), "y"), ((8, 0, 0), "y"), ((0, 0, 0), "x"))
-REACH = 50.0  # mm
+REACH = 10.0  # mm
 TRIES = 30
-STEEP = 0.05  # the largest normal component of faces that count as sides
+STEEP = 0.3  # the largest vertical component of the normals of sides
 Pairs = list[tuple[int, int]]
 
 
 @dataclass
 class Scene:
-    """An assembly, its bodies in the nominal assembly, the pairs that may touch, and its smallest tolerance range [mm].
+    """An assembly, its bodies in the nominal assembly, and the pairs that may touch.
 
-    `choices` names what was drawn.
+    ranges    the tolerance ranges [mm] of locators along the stack, and across it
+    up        the direction of the stack
+    choices   a description of what was drawn
     """
 
     assembly: tc.Assembly
     bodies: list[Body]
     pairs: Pairs
-    tolerance: float
+    ranges: tuple[float, float]
+    up: np.ndarray
     choices: str
+
+    @property
+    def tolerance(self) -> float:
+        """The smallest tolerance range [mm]."""
+        return min(self.ranges)
 
     @property
     def undeclared(self) -> Pairs:
@@ -143,14 +154,16 @@ def declared_parts(assembly: tc.Assembly, bodies: list[Pieces], frame: Frame, fi
 def declare_contacts(assembly: tc.Assembly, parts: list[tc.Part], stack: Stack, frame: Frame, rng) -> str:
     """Declare the contact pairs of a stack, of whole surfaces or faces by normals, in either order; return the choices."""
     is_swapped, is_whole = rng.random() < 0.4, stack.undercut or rng.random() < 0.7
-    points = None if rng.random() < 0.1 else int(rng.choice([20, 60, 100]))
+    points = None if rng.random() < 0.05 else int(rng.choice([20, 60, 100]))
+    within = REACH if rng.random() < 0.3 else None
     z = frame.in_part[:, 2]
     below, above = ((), ()) if is_whole else ((lambda c, n: n @ z < STEEP,), (lambda c, n: n @ z > -STEEP,))
     for k, (upper, lower) in enumerate(stack.pairs):
         faces = parts[upper].face(*below), parts[lower].face(*above)
         moving, reference = faces[::-1] if is_swapped else faces
-        assembly.contact(f"joint {k}", moving=moving, reference=reference, points=points, within=REACH)
-    return f"{'lower on upper' if is_swapped else 'upper on lower'}, {'whole surfaces' if is_whole else 'faces by normals'}"
+        assembly.contact(f"joint {k}", moving=moving, reference=reference, points=points, within=within)
+    order, extent = "lower on upper" if is_swapped else "upper on lower", "whole surfaces" if is_whole else "faces by normals"
+    return f"{order}, {extent}, {points or 'default'} points within {within or 'default'}"
 
 
 def scene(seed: int, family: str, objective: str) -> Scene:
@@ -168,11 +181,12 @@ def scene(seed: int, family: str, objective: str) -> Scene:
     for k, part in enumerate(parts):
         if k != fixed:
             assembly.locate(part, locators(frame, tolerance, sideways, is_pressed))
-        if is_pressed:
-            assembly.force(f"weight {k}", at=part.point(0, 0, 0), vector=tuple(frame.turn.apply((0.05, -0.02, -1))))
+            if is_pressed:
+                assembly.force(f"weight {k}", at=part.point(0, 0, 0), vector=tuple(frame.turn.apply((0.05, -0.02, -1))))
     contacts = declare_contacts(assembly, parts, stack, frame, rng)
-    assembly.measure("height", parts[-1].point(0, 0, 0), along=tuple(frame.turn.apply((0, 0, 1))))
+    up = frame.turn.apply((0, 0, 1))
+    assembly.measure("height", parts[-1].point(0, 0, 0), along=tuple(up))
     polyhedra = [[Polyhedron(frame.turn.apply(points) + frame.shift) for points in pieces] for pieces in bodies]
     held = f"body {fixed} fixed" if fixed < len(bodies) else "no body fixed"
     choices = f"{noise}; {frame.name}; {contacts}; {held}; tolerances {tolerance:.2g} and {sideways:.2g}"
-    return Scene(assembly, polyhedra, list(stack.pairs), min(tolerance, sideways), choices)
+    return Scene(assembly, polyhedra, list(stack.pairs), (tolerance, sideways), up, choices)
