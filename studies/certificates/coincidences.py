@@ -7,7 +7,9 @@ with the simulation.
 import argparse
 import collections
 import contextlib
+import re
 import time
+import types
 import warnings
 from collections.abc import Iterator
 from unittest import mock
@@ -17,6 +19,8 @@ import numpy as np
 import tolcontact as tc
 from studies.certificates.placements import FAMILIES, Scene, scene
 from studies.certificates.polyhedra import ball_of_pairs, separation_of_pairs
+from tolcontact import code_cache
+from tolcontact.compilation.functions import named, native
 from tolcontact.discretization import contact_points
 from tolcontact.method import OBJECTIVES
 from tolcontact.simulation import simulate_blocks
@@ -107,13 +111,21 @@ class Tally:
 
 @contextlib.contextmanager
 def quick_builds() -> Iterator[None]:
-    """Leave out a warning about too few contact points, which takes most of a build and does not change it."""
+    """Leave out what takes most of a build and does not change it.
+
+    That is a warning about too few contact points, and to keep machine code that no other scene will need.
+    """
     sample = contact_points._with_curvature
 
     def unchecked(pair, moving_face, reference_face, P_m, *limits):
         return P_m if isinstance(pair.points, int) else sample(pair, moving_face, reference_face, P_m, *limits)
 
-    with mock.patch.object(contact_points, "_with_curvature", unchecked):
+    forgetful = types.SimpleNamespace(load=code_cache.load, store=lambda *entry: None)
+    with (
+        mock.patch.object(contact_points, "_with_curvature", unchecked),
+        mock.patch.object(named, "code_cache", forgetful),
+        mock.patch.object(native, "code_cache", forgetful),
+    ):
         yield
 
 
@@ -124,8 +136,8 @@ def row(counts: collections.Counter[str]) -> str:
 
 def message(error: Exception) -> str:
     """Return the last line of an error, without the numbers in it."""
-    text = (str(error).splitlines() or [""])[-1].strip()
-    return f"{type(error).__name__}: " + "".join("#" if c.isdigit() else c for c in text)[:150]
+    text = (str(error).splitlines() or [""])[-1].strip(" -")
+    return f"{type(error).__name__}: {re.sub(r'[0-9][0-9.e+-]*', '#', text)[:150]}"
 
 
 def simulated(tally: Tally, seed: int, family: str, options: argparse.Namespace) -> None:

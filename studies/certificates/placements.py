@@ -144,7 +144,8 @@ def declared_parts(assembly: tc.Assembly, bodies: list[Pieces], frame: Frame, fi
     parts = []
     for k, pieces in enumerate(bodies):
         origin = np.array([0, 0, HEIGHT * (k - 1)])
-        surface = surface_mesh([(points - origin) @ frame.in_part.T for points in pieces])
+        surface = surface_mesh([points - origin for points in pieces])
+        surface.vertices = surface.vertices @ frame.in_part.T
         at = frame.turn.apply(origin) + frame.shift
         is_fixed = k == fixed
         parts.append(assembly.part(f"body {k}", tc.Mesh(surface), at=tuple(at), rotation=tuple(frame.rotation), fixed=is_fixed))
@@ -161,7 +162,8 @@ def declare_contacts(assembly: tc.Assembly, parts: list[tc.Part], stack: Stack, 
     for k, (upper, lower) in enumerate(stack.pairs):
         faces = parts[upper].face(*below), parts[lower].face(*above)
         moving, reference = faces[::-1] if is_swapped else faces
-        assembly.contact(f"joint {k}", moving=moving, reference=reference, points=points, within=within)
+        reach = within if upper == lower + 1 else REACH  # the third body is no neighbour
+        assembly.contact(f"joint {k}", moving=moving, reference=reference, points=points, within=reach)
     order, extent = "lower on upper" if is_swapped else "upper on lower", "whole surfaces" if is_whole else "faces by normals"
     return f"{order}, {extent}, {points or 'default'} points within {within or 'default'}"
 
