@@ -12,6 +12,7 @@ import time
 import types
 import warnings
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from unittest import mock
 
 import numpy as np
@@ -30,24 +31,36 @@ ALLOWED, NOTICED = 5e-4, 1e-4  # radius of a ball in two bodies, as a share of t
 TOUCHING = 1e-6  # mm
 LIFTS = (0.0, 0.25, 0.5, 1, 2, 4)  # in tolerance ranges
 UNANSWERED = 0.1  # share of the realizations of a scene
+LISTED = 6  # wrong realizations of a scene
 CONTRADICTIONS = ("inside", "noticed", "missed", "falsely touched", "lifted off")
 UNCERTIFIED = ("not converged", "not assemblable", "doubtful")
-COLUMNS = (
-    "scenes",
-    "rows",
-    "certified",
-    *CONTRADICTIONS,
-    "undeclared",
-    *UNCERTIFIED,
-    "liftable",
-    "refused",
-    "crashed",
-    "seconds",
-)
+OTHERS = ("liftable", "refused", "crashed", "seconds")
+COLUMNS = ("scenes", "rows", "certified", *CONTRADICTIONS, "undeclared", *UNCERTIFIED, *OTHERS)
 
 
-def judged(scene: Scene, samples: int, seed: int, solver: str) -> tuple[collections.Counter[str], float]:
-    """Return the numbers of realizations by finding, and the largest ball in two bodies of a certified one [tolerance]."""
+@dataclass
+class Findings:
+    """Numbers of realizations by finding, the largest ball [tolerance] in two bodies, and the realizations that are wrong."""
+
+    counts: collections.Counter[str] = field(default_factory=collections.Counter)
+    deepest: float = 0.0
+    wrong: list[int] = field(default_factory=list)
+
+    @property
+    def are_remarkable(self) -> bool:
+        """Whether a certificate is contradicted, many realizations have none, or the simulation crashed."""
+        without = sum(self.counts[kind] for kind in UNCERTIFIED)
+        return bool(self.wrong or without > UNANSWERED * self.counts["rows"] or self.counts["crashed"])
+
+    def __str__(self) -> str:
+        """Return what is found as one line."""
+        depth = f"; deepest {self.deepest:.2g} tolerances" if self.deepest else ""
+        listed = " ".join(map(str, self.wrong[:LISTED])) + (" ..." if len(self.wrong) > LISTED else "")
+        return row(self.counts) + depth + (f"; realizations {listed}" if listed else "")
+
+
+def judged(scene: Scene, samples: int, seed: int, solver: str) -> Findings:
+    """Return what the judge finds in realizations of a scene."""
     program = tc.build(scene.assembly, solver=solver)
     blocks = list(simulate_blocks(program, samples=samples, seed=seed, threads=1))
     names = [part.name for part in program.nominal.parts]
@@ -60,20 +73,23 @@ def judged(scene: Scene, samples: int, seed: int, solver: str) -> tuple[collecti
     aside = ball_of_pairs(scene.bodies, scene.undeclared, final, least) / scene.tolerance
     before = separation_of_pairs(scene.bodies, scene.pairs, poses[touched, RAW])
     after = separation_of_pairs(scene.bodies, scene.pairs, poses[touched, CORRECTED])
-    is_pressed = program.method.minimizes.presses  # forces also close gaps, and supports also hold
+    if program.method.minimizes.presses:  # forces also close gaps, and supports also hold
+        before, after = np.zeros((2, touched.size))
     counts = {
         "rows": samples,
         "certified": certified.size,
         "inside": np.sum(radii > ALLOWED),
         "noticed": np.sum(radii > NOTICED),
         "missed": np.sum(radii[status[certified] == Status.UNTOUCHED] > ALLOWED),
-        "falsely touched": 0 if is_pressed else np.sum(before > TOUCHING),
-        "lifted off": 0 if is_pressed else np.sum(after > ALLOWED * scene.tolerance),
+        "falsely touched": np.sum(before > TOUCHING),
+        "lifted off": np.sum(after > ALLOWED * scene.tolerance),
         "undeclared": np.sum(aside > ALLOWED),
-        "liftable": 0 if is_pressed else np.sum(liftable(scene, poses[status == Status.NOT_ASSEMBLABLE, CORRECTED])),
+        "liftable": np.sum(liftable(scene, poses[status == Status.NOT_ASSEMBLABLE, CORRECTED])),
         **{kind: np.sum(status == Status[kind.replace(" ", "_").upper()]) for kind in UNCERTIFIED},
     }
-    return collections.Counter({name: int(count) for name, count in counts.items()}), float(radii.max(initial=0.0))
+    wrong = {*certified[radii > NOTICED], *touched[(before > TOUCHING) | (after > ALLOWED * scene.tolerance)]}
+    numbers = collections.Counter({name: int(count) for name, count in counts.items()})
+    return Findings(numbers, float(radii.max(initial=0.0)), sorted(map(int, wrong)))
 
 
 def liftable(scene: Scene, poses: np.ndarray) -> np.ndarray:
@@ -94,9 +110,9 @@ class Tally:
         self.deepest: dict[str, float] = collections.defaultdict(float)
         self.messages: collections.Counter[str] = collections.Counter()
 
-    def add(self, family: str, counts: collections.Counter[str], deepest: float) -> None:
-        self.counts[family].update(counts)
-        self.deepest[family] = max(self.deepest[family], deepest)
+    def add(self, family: str, findings: Findings) -> None:
+        self.counts[family].update(findings.counts)
+        self.deepest[family] = max(self.deepest[family], findings.deepest)
 
     def print(self) -> None:
         """Print a row for each family, with its counts that are not 0, and the total."""
@@ -142,27 +158,20 @@ def message(error: Exception) -> str:
 
 def simulated(tally: Tally, seed: int, family: str, options: argparse.Namespace) -> None:
     """Judge one scene, add it to the tally, and print it if a certificate is contradicted or many realizations have none."""
-    start, counts, deepest = time.perf_counter(), collections.Counter[str](), 0.0
-    drawn = scene(seed, family, options.objective)
+    start, findings, drawn = time.perf_counter(), Findings(), scene(seed, family, options.objective)
     try:
-        counts, deepest = judged(drawn, options.samples, seed, options.solver)
+        findings = judged(drawn, options.samples, seed, options.solver)
     except tc.TolcontactError as error:
-        counts["refused"] = 1
+        findings.counts["refused"] = 1
         tally.messages[message(error)] += 1
     except Exception as error:  # a finding, too
-        counts["crashed"] = 1
+        findings.counts["crashed"] = 1
         tally.messages[message(error)] += 1
     seconds = time.perf_counter() - start
-    without = sum(counts[kind] for kind in UNCERTIFIED)
-    if (
-        any(counts[kind] for kind in CONTRADICTIONS)
-        or without > UNANSWERED * options.samples
-        or counts["crashed"]
-        or options.verbose
-    ):
-        depth = f"deepest {deepest:.2g} tolerances; " if deepest else ""
-        print(f"{seed} {family}: {row(counts)}; {depth}{drawn.choices}; {seconds:.1f} s", flush=True)
-    tally.add(family, counts + collections.Counter(scenes=1, seconds=round(seconds)), deepest)
+    if findings.are_remarkable or options.verbose:
+        print(f"{seed} {family}: {findings}; {drawn.choices}; {seconds:.1f} s", flush=True)
+    findings.counts.update(scenes=1, seconds=round(seconds))
+    tally.add(family, findings)
 
 
 def main() -> None:
