@@ -154,7 +154,8 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             _check_forces(nominal, groups)
         place = NamedFunction.dense(ca.Function("place", [d], [raw], ["deviations"], ["poses"]))
         observed = NamedFunction.dense(observe)
-        meetings, trials = _meetings(nominal, groups, draws, place, observed, method) if method.is_bounded else ({}, {})
+        watch = _watch(nominal, draws, place)
+        meetings, trials = _meetings(watch, groups, draws, place, observed, method) if method.is_bounded else ({}, {})
         log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
         return Program(
             nominal=nominal,
@@ -169,7 +170,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             trials=trials,
             groups=tuple(_contact_group(nominal, group, gaps, method, conic_plugin, meetings, trials) for group in groups),
             accuracies=measure_accuracies(nominal, groups, draws, place, observed),
-            watch=_watch(nominal, draws, place, _allowed_depths(nominal, meetings, trials)),
+            watch=watch.allowing(_allowed_depths(nominal, meetings, trials)),
             nominal_measures=observe(np.tile(AT_REST, len(nominal.parts)), np.zeros(d.numel()))[0].full().ravel(),
             tapes={
                 measure.name: record(value, ca.vertcat(entries, d))
@@ -188,9 +189,10 @@ def _round_gap_function(pair: ContactPoints, points: RoundPoints, deviations: ca
 
 
 def _meetings(
-    nominal: Nominal, groups: Sequence[Group], draws: Draws, place: NamedFunction, observe: NamedFunction, method: Method
+    watch: Watch, groups: Sequence[Group], draws: Draws, place: NamedFunction, observe: NamedFunction, method: Method
 ) -> tuple[dict[int, Meeting], dict[int, Trial]]:
     """Return the meetings of the pairs that need them, and the trials of all pairs of faces."""
+    nominal = watch.nominal
     if not nominal.pairs:
         return {}, {}
     deviations = draws(seed=TRIAL_SEED, start=0, stop=TRIALS)
@@ -204,15 +206,15 @@ def _meetings(
         pushed = sum(pushes[k] for k in group.pairs)
         for k in group.pairs:
             room = pushed if presses else pushed - pushes[k]
-            decisions[k] = bounded_pair(nominal, k, relative[:, k], deviations, pushed=pushed, room=room)
+            decisions[k] = bounded_pair(watch, k, relative[:, k], deviations, pushed=pushed, room=room)
     meetings = {k: places for k, (places, _) in decisions.items() if places is not None}
     return meetings, {k: trial for k, (_, trial) in decisions.items()}
 
 
-def _watch(nominal: Nominal, draws: Draws, place: NamedFunction, allowed: dict[tuple[int, int], float]) -> Watch:
+def _watch(nominal: Nominal, draws: Draws, place: NamedFunction) -> Watch:
     deviations = draws(seed=TRIAL_SEED, start=0, stop=WATCH_DRAWS)
     poses = place(deviations=deviations)["poses"].reshape(len(deviations), len(nominal.parts), ENTRIES)
-    return Watch(nominal, allowed, poses, deviations)
+    return Watch(nominal, {}, poses, deviations)
 
 
 def _allowed_depths(

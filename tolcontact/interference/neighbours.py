@@ -156,7 +156,7 @@ class _NearFacets(NamedTuple):
 
 
 def _near_facets(edges: np.ndarray, tree: BoxTree, corners: np.ndarray, facets: np.ndarray, reach: float) -> _NearFacets:
-    """Return the facets no farther than `reach` [mm] from each of the edges (e, 2, 3), of triangles with `corners` (t, 3, 3)."""
+    """Return the facets no farther than `reach` [mm] from edges (e, 2, 3); triangles have `corners` (t, 3, 3)."""
     boxes = np.ascontiguousarray(edges.min(axis=1)), np.ascontiguousarray(edges.max(axis=1))
     around = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
     near = _NearFacets(np.zeros(len(edges) + 1, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0))

@@ -56,6 +56,16 @@ class Watch:
     _neighbours: dict[tuple[int, int], Neighbours | None] = field(default_factory=dict, init=False)
     _solids: dict[int, DeviatingSolid | None] = field(default_factory=dict, init=False)
 
+    def allowing(self, allowed: Mapping[tuple[int, int], float]) -> "Watch":
+        """Return the same bodies with other depths that are allowed."""
+        watch = Watch(self.nominal, allowed, self.poses, self.deviations)
+        watch._solids.update(self._solids)
+        return watch
+
+    def overlap(self, first: int, second: int) -> bool:
+        """Return whether two bodies lie in each other in the nominal assembly, or may, since one of them is not closed."""
+        return self.neighbours(ordered(first, second)) is None or self._overlaps(ordered(first, second))
+
     @cached_property
     def _bounds(self) -> Float[Array, "part 2 3"]:
         """The lower and upper corners of the boxes around the bodies."""
