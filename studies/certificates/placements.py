@@ -91,13 +91,16 @@ def close_stack(family: str, tolerance: float, rng) -> Stack:
     return stack
 
 
-def disturbed(stack: Stack, rng) -> tuple[list[Pieces], str]:
-    """Return the bodies of a stack as they are, in one affine map, or with noise of corners or of places; and the choice."""
+def disturbed(stack: Stack, rng) -> tuple[list[Pieces], np.ndarray, str]:
+    """Return the bodies of a stack as they are, or with noise of corners or places, a linear map (3, 3), and the choice.
+
+    The map acts on unions of pieces, since faces that pieces share would come apart by rounding.
+    """
     size = 10 ** rng.uniform(-2, 0)  # mm
     kind = str(rng.choice(["exact", "affine", "corners", "sideways", "places"], p=[0.5, 0.2, 0.1, 0.1, 0.1]))
-    bodies = stack.bodies
+    bodies, A = stack.bodies, np.eye(3)
     if kind == "exact":
-        return bodies, kind
+        return bodies, A, kind
     if kind in ("corners", "sideways") and all(len(pieces) == 1 for pieces in bodies):
         along = np.array([1, 1, kind == "corners"])
         bodies = [[points + rng.normal(size=points.shape) * size * along] for (points,) in bodies]
@@ -105,9 +108,8 @@ def disturbed(stack: Stack, rng) -> tuple[list[Pieces], str]:
         shifts = rng.normal(size=(len(bodies), 3)) * size * 0.3
         bodies = [[points + shift for points in pieces] for pieces, shift in zip(bodies, shifts, strict=True)]
     else:
-        kind, A = "affine", np.eye(3) + rng.normal(size=(3, 3)) * size / 10
-        bodies = [[points @ A.T for points in pieces] for pieces in bodies]
-    return bodies, f"{kind} {size:.2g}"
+        kind, A = "affine", A + rng.normal(size=(3, 3)) * size / 10
+    return bodies, A, f"{kind} {size:.2g}"
 
 
 def random_frame(rng) -> Frame:
@@ -139,13 +141,13 @@ def locators(frame: Frame, tolerance: float, sideways: float, supports: bool) ->
     ]
 
 
-def declared_parts(assembly: tc.Assembly, bodies: list[Pieces], frame: Frame, fixed: int) -> list[tc.Part]:
-    """Return the parts of bodies in a frame; `fixed` is the index of the one that does not move."""
+def declared_parts(assembly: tc.Assembly, bodies: list[Pieces], A: np.ndarray, frame: Frame, fixed: int) -> list[tc.Part]:
+    """Return the parts of bodies, mapped by A (3, 3), in a frame; `fixed` is the index of the one that does not move."""
     parts = []
     for k, pieces in enumerate(bodies):
         origin = np.array([0, 0, HEIGHT * (k - 1)])
-        surface = surface_mesh([points - origin for points in pieces])
-        surface.vertices = surface.vertices @ frame.in_part.T
+        surface = surface_mesh(pieces)
+        surface.vertices = (surface.vertices @ A.T - origin) @ frame.in_part.T
         at = frame.turn.apply(origin) + frame.shift
         is_fixed = k == fixed
         parts.append(assembly.part(f"body {k}", tc.Mesh(surface), at=tuple(at), rotation=tuple(frame.rotation), fixed=is_fixed))
@@ -173,12 +175,12 @@ def scene(seed: int, family: str, objective: str) -> Scene:
     rng = np.random.default_rng([seed, zlib.crc32(family.encode())])
     tolerance = float(rng.choice([0.1, 0.5, 1, 2, 4]) if rng.random() < 0.7 else 10 ** rng.uniform(-1, 0.6))
     stack = close_stack(family, tolerance, rng)
-    bodies, noise = disturbed(stack, rng)
+    bodies, A, noise = disturbed(stack, rng)
     sideways = tolerance * float(rng.choice([1, 1, 0.1]))
     frame = random_frame(rng)
     fixed = int(rng.choice([0, 0, 0, len(bodies) - 1, len(bodies)]))  # the last one: no body
     assembly = tc.Assembly(f"{family} {seed}", method=tc.Method(objective=objective))
-    parts = declared_parts(assembly, bodies, frame, fixed)
+    parts = declared_parts(assembly, bodies, A, frame, fixed)
     is_pressed = objective == "seating"
     for k, part in enumerate(parts):
         if k != fixed:
@@ -188,7 +190,7 @@ def scene(seed: int, family: str, objective: str) -> Scene:
     contacts = declare_contacts(assembly, parts, stack, frame, rng)
     up = frame.turn.apply((0, 0, 1))
     assembly.measure("height", parts[-1].point(0, 0, 0), along=tuple(up))
-    polyhedra = [[Polyhedron(frame.turn.apply(points) + frame.shift) for points in pieces] for pieces in bodies]
+    polyhedra = [[Polyhedron(frame.turn.apply(points @ A.T) + frame.shift) for points in pieces] for pieces in bodies]
     held = f"body {fixed} fixed" if fixed < len(bodies) else "no body fixed"
     choices = f"{noise}; {frame.name}; {contacts}; {held}; tolerances {tolerance:.2g} and {sideways:.2g}"
     return Scene(assembly, polyhedra, list(stack.pairs), (tolerance, sideways), up, choices)
