@@ -29,7 +29,7 @@ from tolcontact.mechanics.gap import GapMap, gap_map, gap_matrix
 from tolcontact.mechanics.groups import Group, contact_groups
 from tolcontact.mechanics.measures import measured, record
 from tolcontact.mechanics.placement import raw_poses
-from tolcontact.mechanics.pose import ENTRIES, poses_of
+from tolcontact.mechanics.pose import ENTRIES, Pose, poses_of
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 from tolcontact.mechanics.round_gap import round_gaps
 from tolcontact.mechanics.setting import face_heights, face_poses, facing_pose
@@ -134,12 +134,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         entries = ca.SX.sym("poses", ENTRIES * len(nominal.parts))
         poses = poses_of(entries)
         values = measured(nominal, poses, d)
-        X_RM = [
-            facing_pose(
-                face_poses(pair, d), poses[pair.moving], None if pair.reference is None else poses[pair.reference]
-            ).vector()
-            for pair in nominal.pairs
-        ]
+        X_RM = _facing_poses(nominal, poses, d)
         observe = ca.Function(
             "observe",
             [entries, d],
@@ -179,6 +174,12 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             },
             stations=tuple(station_programs(nominal, groups, method)),
         )
+
+
+def _facing_poses(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list[ca.SX]:
+    """Return X_RM of each pair as vectors of 12 entries."""
+    pairs = [(pair, poses[pair.moving], None if pair.reference is None else poses[pair.reference]) for pair in nominal.pairs]
+    return [facing_pose(face_poses(pair, deviations), moving, reference).vector() for pair, moving, reference in pairs]
 
 
 def _round_gap_function(pair: ContactPoints, points: RoundPoints, deviations: ca.SX) -> ca.Function:

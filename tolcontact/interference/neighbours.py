@@ -8,7 +8,7 @@ import igl
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
-from tolcontact.interference import kernel
+from tolcontact.interference import depth_kernel, kernel, near_kernel, parting_kernel
 from tolcontact.interference.box_tree import BoxTree, box_tree, inflated
 from tolcontact.interference.deviating_solid import DeviatingSolid
 
@@ -60,8 +60,10 @@ class Neighbours:
     @cached_property
     def _nominal(self) -> tuple[kernel.Side, kernel.Side]:
         """Both bodies without deviations."""
-        first, second = (body.inset(depth) for body, depth in zip((self.A, self.B), self.insets, strict=True))
-        return _side(self.A, first, self.B, second, self.reach), _side(self.B, second, self.A, first, self.reach)
+        vertices_A, vertices_B = (body.inset(depth) for body, depth in zip((self.A, self.B), self.insets, strict=True))
+        return _side(self.A, vertices_A, self.B, vertices_B, self.reach), _side(
+            self.B, vertices_B, self.A, vertices_A, self.reach
+        )
 
     @property
     def varies(self) -> bool:
@@ -71,11 +73,11 @@ class Neighbours:
     def _sides(self, deviations: np.ndarray | None) -> tuple[kernel.Side, kernel.Side]:
         if deviations is None:
             return self._nominal
-        first, second = (
+        side_A, side_B = (
             nominal if not body.varies else _deviating(nominal, body, deviations)
             for body, nominal in zip((self.A, self.B), self._nominal, strict=True)
         )
-        return first, second
+        return side_A, side_B
 
     def interfere(
         self, X_BA: Float[Array, "n 12"], deviations: Float[Array, "n contributor"] | None = None
@@ -84,43 +86,43 @@ class Neighbours:
 
         Without `deviations`, faces are as they are nominally.
         """
-        found = np.zeros(len(X_BA), dtype=bool)
-        kernel.interfere(*self._sides(deviations), np.ascontiguousarray(X_BA), found)
-        return found
+        interferes = np.zeros(len(X_BA), dtype=bool)
+        kernel.interfere(*self._sides(deviations), np.ascontiguousarray(X_BA), interferes)
+        return interferes
 
     def ways_out(self, X_BA: Float[Array, "n 12"]) -> WayOut:
         """Return how bodies without deviations part at poses X_BA (n, 12) at which they interfere."""
         places, feet, normals = np.zeros((3, len(X_BA), 3))
         way = WayOut(places, feet, normals, np.zeros(len(X_BA)))
-        kernel.ways_out(*self._nominal, np.ascontiguousarray(X_BA), sum(self.insets), *way)
+        parting_kernel.ways_out(*self._nominal, np.ascontiguousarray(X_BA), sum(self.insets), *way)
         return way
 
     def measured(self, X_BA: Float[Array, "n 12"], deviations: Float[Array, "n contributor"] | None = None) -> Interference:
         """Return how deep bodies lie in each other at poses X_BA at which they interfere."""
         result = Interference(np.empty(len(X_BA)), np.empty((len(X_BA), 2), dtype=np.int64), np.empty((len(X_BA), 2, 3)))
-        kernel.sound(*self._sides(deviations), np.ascontiguousarray(X_BA), *result)
+        depth_kernel.sound(*self._sides(deviations), np.ascontiguousarray(X_BA), *result)
         return result._replace(depths=result.depths + sum(self.insets))
 
 
 def _side(
-    body: DeviatingSolid, vertices: np.ndarray, other: DeviatingSolid, vertices_of_other: np.ndarray, reach: float
+    body: DeviatingSolid, vertices: np.ndarray, target: DeviatingSolid, vertices_of_target: np.ndarray, reach: float
 ) -> kernel.Side:
     """Return a body with inset vertices (v, 3) as compiled passes take it, with what its other body decides."""
-    solid, tree, tree_of_other = (
+    solid, tree, tree_of_target = (
         body.solid,
         box_tree(vertices[body.solid.faces]),
-        box_tree(vertices_of_other[other.solid.faces]),
+        box_tree(vertices_of_target[target.solid.faces]),
     )
     ends, distances = vertices[solid.edges], np.empty(len(solid.edges))
-    kernel.distances(ends.min(axis=1), ends.max(axis=1), tree_of_other.boxes, tree_of_other.next, distances)
+    near_kernel.distances(ends.min(axis=1), ends.max(axis=1), tree_of_target.boxes, tree_of_target.next, distances)
     order = np.argsort(distances, kind="stable")
-    squares, _, _ = igl.point_mesh_squared_distance(vertices, vertices_of_other, other.solid.faces)
+    squares, _, _ = igl.point_mesh_squared_distance(vertices, vertices_of_target, target.solid.faces)
     witnesses = np.array([rows[np.argmax(squares[rows])] for rows in solid.components])
-    turns = igl.winding_number(vertices_of_other, other.solid.faces, np.ascontiguousarray(vertices[witnesses]))
+    turns = igl.winding_number(vertices_of_target, target.solid.faces, np.ascontiguousarray(vertices[witnesses]))
     corners = vertices[solid.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     planes = np.column_stack([normals, (normals * corners[:, 0]).sum(axis=1)])
-    near = _near_facets(ends[order], tree_of_other, vertices_of_other[other.solid.faces], other.facet_of, reach)
+    lists = _near_facets(ends[order], tree_of_target, vertices_of_target[target.solid.faces], target.facet_of, reach)
     return kernel.Side(
         vertices=vertices,
         moved=np.full(len(vertices), -1),
@@ -134,7 +136,7 @@ def _side(
         members=np.argsort(body.facet_of, kind="stable"),
         first_members=np.cumsum([0, *np.bincount(body.facet_of)]),
         vertices_of_facets=np.where(body.moves[body.first_of_facet][:, None], solid.faces[body.first_of_facet], -1),
-        **near._asdict(),
+        **lists._asdict(),
         reach=reach,
         triangles=tree.triangles,
         boxes=tree.boxes,
@@ -142,7 +144,7 @@ def _side(
         spare=0.0,
         bounds=np.where(CORNERS == 0, vertices.min(axis=0), vertices.max(axis=0)),
         witnesses=witnesses,
-        far=np.sqrt(squares[witnesses]),
+        clearances=np.sqrt(squares[witnesses]),
         is_in=np.atleast_1d(turns) > 0.5,
     )
 
@@ -151,7 +153,7 @@ class _NearFacets(NamedTuple):
     """See kernel.Side."""
 
     starts: np.ndarray
-    near: np.ndarray
+    listed: np.ndarray
     reaches: np.ndarray
 
 
@@ -159,12 +161,12 @@ def _near_facets(edges: np.ndarray, tree: BoxTree, corners: np.ndarray, facets: 
     """Return the facets no farther than `reach` [mm] from edges (e, 2, 3); triangles have `corners` (t, 3, 3)."""
     boxes = np.ascontiguousarray(edges.min(axis=1)), np.ascontiguousarray(edges.max(axis=1))
     around = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
-    near = _NearFacets(np.zeros(len(edges) + 1, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0))
-    kernel.near_facets(*boxes, tree, around, facets, reach, False, *near)
-    count = int(near.starts[-1])
-    near = near._replace(near=np.empty(count, dtype=np.int64), reaches=np.empty(count))
-    kernel.near_facets(*boxes, tree, around, facets, reach, True, *near)
-    return near
+    lists = _NearFacets(np.zeros(len(edges) + 1, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0))
+    near_kernel.near_facets(*boxes, tree, around, facets, reach, False, *lists)
+    count = int(lists.starts[-1])
+    lists = lists._replace(listed=np.empty(count, dtype=np.int64), reaches=np.empty(count))
+    near_kernel.near_facets(*boxes, tree, around, facets, reach, True, *lists)
+    return lists
 
 
 def _facets(body: DeviatingSolid, corners: np.ndarray, planes: np.ndarray) -> np.ndarray:

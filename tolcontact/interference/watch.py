@@ -105,10 +105,10 @@ class Watch:
     def neighbours(self, pair: tuple[int, int]) -> Neighbours | None:
         """Return two bodies that are tested; None if one of them is not closed, or they may lie in each other."""
         if pair not in self._neighbours:
-            A, B, depth, found = self.solid(pair[0]), self.solid(pair[1]), self._depth(pair), None
+            A, B, depth, neighbours = self.solid(pair[0]), self.solid(pair[1]), self._depth(pair), None
             if A is not None and B is not None and np.isfinite(depth):
-                found = Neighbours(A, B, (SHARES[0] * depth, SHARES[1] * depth), self._reach(pair))
-            self._neighbours[pair] = found
+                neighbours = Neighbours(A, B, (SHARES[0] * depth, SHARES[1] * depth), self._reach(pair))
+            self._neighbours[pair] = neighbours
         return self._neighbours[pair]
 
     def solid(self, number: int) -> DeviatingSolid | None:
@@ -120,8 +120,8 @@ class Watch:
     @cached_property
     def _usual_motions(self) -> Float[Array, " part"]:
         """How far (part,) [mm] raw poses and deviations move any point of each body at most."""
-        known = np.isfinite(self.poses).all(axis=(1, 2))
-        return self._motions(self.poses[known]).max(axis=0, initial=0) + self._growth(self.deviations[known])
+        is_finite = np.isfinite(self.poses).all(axis=(1, 2))
+        return self._motions(self.poses[is_finite]).max(axis=0, initial=0) + self._growth(self.deviations[is_finite])
 
     def _reach(self, pair: tuple[int, int]) -> float:
         return MOTION_FACTOR * float(self._usual_motions[list(pair)].sum())
@@ -137,9 +137,9 @@ class Watch:
         return frozenset(pair for pair in self._near(np.zeros(len(self.nominal.parts))) if self._overlaps(pair))
 
     def _overlaps(self, pair: tuple[int, int]) -> bool:
-        found = self.neighbours(pair)
+        neighbours = self.neighbours(pair)
         nominal = np.zeros((1, len(self.nominal.contributors)))
-        return found is not None and bool(found.interfere(pose.AT_REST[None], nominal)[0])
+        return neighbours is not None and bool(neighbours.interfere(pose.AT_REST[None], nominal)[0])
 
     @cached_property
     def declared(self) -> frozenset[tuple[int, int]]:
@@ -163,13 +163,13 @@ class Watch:
 
         Pairs of numbers in `left_out` are not tested.
         """
-        known = np.isfinite(poses).all(axis=(1, 2))
-        reach = self._motions(poses[known]).max(axis=0, initial=0) + self._growth(deviations[known])
+        is_finite = np.isfinite(poses).all(axis=(1, 2))
+        reach = self._motions(poses[is_finite]).max(axis=0, initial=0) + self._growth(deviations[is_finite])
         for pair in self._near(reach):
-            found = None if pair in left_out else self.neighbours(pair)
-            if found is not None:
+            neighbours = None if pair in left_out else self.neighbours(pair)
+            if neighbours is not None:
                 X_BA = pose.relative(poses[:, pair[0]], poses[:, pair[1]])
-                rows = np.flatnonzero(found.interfere(X_BA, deviations) & known)
+                rows = np.flatnonzero(neighbours.interfere(X_BA, deviations) & is_finite)
                 if rows.size:
                     yield Clash(pair, rows)
 
@@ -177,7 +177,7 @@ class Watch:
         self, clash: Clash, poses: Float[Array, "n part 12"], deviations: Float[Array, "n contributor"]
     ) -> Interference:
         """Return how deep two bodies lie in each other, in the realizations of a clash."""
-        found = self.neighbours(clash.pair)
-        assert found is not None
+        neighbours = self.neighbours(clash.pair)
+        assert neighbours is not None
         i, j = clash.pair
-        return found.measured(pose.relative(poses[clash.rows, i], poses[clash.rows, j]), deviations[clash.rows])
+        return neighbours.measured(pose.relative(poses[clash.rows, i], poses[clash.rows, j]), deviations[clash.rows])

@@ -2,6 +2,7 @@
 
 import unicodedata
 
+from tolcontact.vocabulary.clashes import CLASH_DEPTH, CLASH_OTHER, CLASH_PART, CLASHES
 from tolcontact.vocabulary.labels import (
     AXIS,
     BLOCK,
@@ -152,30 +153,6 @@ SEARCHED = ArchiveVariable(
     "1: contact points were projected again, or found, at the poses themselves, and gap_min refers to those; "
     "0: it refers to the archived ones",
     "1",
-)
-CLASHES = ArchiveVariable(
-    "clashes",
-    (REALIZATION,),
-    "i2",
-    "number of pairs of parts without declared contact that lie in each other in the corrected state; -1: not tested",
-    "1",
-)
-CLASH_DEPTH = ArchiveVariable(
-    "clash_depth",
-    (REALIZATION,),
-    "f8",
-    "how deep the parts of the deepest of these pairs lie in each other; 0: no such pair",
-    "mm",
-)
-CLASH_PART = ArchiveVariable(
-    "clash_part",
-    (REALIZATION,),
-    "i2",
-    "index of the first part of the deepest of these pairs along `part`; -1: no such pair",
-    "1",
-)
-CLASH_OTHER = ArchiveVariable(
-    "clash_other", (REALIZATION,), "i2", "index of the second part of this pair along `part`; -1: no such pair", "1"
 )
 STATUS = ArchiveVariable(
     "status",
