@@ -10,12 +10,14 @@ from tolcontact.contact import bounded_kernel
 from tolcontact.contact.guard import GUARD, Guard
 from tolcontact.contact.scan import Deepest, Scan, SlotScan
 from tolcontact.discretization import FIRST_POINT, ContactPoints, raised_places
-from tolcontact.geometry.kernel import CORNER_ON_FACET
+from tolcontact.geometry.kernel import CORNER_ON_FACET, INSIDE
 from tolcontact.geometry.meeting import NEARNESS, Meeting, Places
+from tolcontact.geometry.parting import Parting
 from tolcontact.interference import WayOut
 
 PENETRATION = 1e-10  # mm: less than this is no penetration
 MAX_DEEPEST = SLOTS  # places of a pair that get a row in one round
+ALIGNED = 0.87  # cosine of the angle to the axis along which bodies part, up to which places in each other count
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,14 +86,18 @@ def bounded_scan(
     error: float = 0.0,
     nearness: float = NEARNESS,
     guard: Guard | None = None,
+    parting: Parting | None = None,
 ) -> BoundedScan:
     """Return the places at which a pair can touch at X_RM (n, 12); see Meeting.at for `kept`, `error` and `nearness`.
 
-    Where no place shows penetration, a `guard` adds one if bodies lie in each other.
+    Where no place shows penetration, a `guard` adds one if bodies lie in each other. A `parting` leaves out places that hold
+    bodies apart in other directions than the one in which they part best, and adds the place that does.
     """
     found, heights = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness)
     if guard is not None:
         found, heights = _with_guard(found, heights, guard, X_RM)
+    if parting is not None:
+        found, heights = _with_parting(found, heights, parting, X_RM)
     arrays = found.labels, found.P_m, found.P_r, found.n_r, np.isfinite(found.gaps)
     return BoundedScan(scan.tables, scan.P_m, scan.offsets, meeting, *arrays, np.ascontiguousarray(heights))
 
@@ -108,3 +114,17 @@ def _with_guard(found: Places, heights: np.ndarray, guard: Guard, X_RM: np.ndarr
         values[rows, 0] = of_rows
     joined = Places(*(np.concatenate(arrays, axis=1) for arrays in zip(found, extra, strict=True)))
     return joined, np.concatenate([heights, np.zeros((count, 1))], axis=1)
+
+
+def _with_parting(found: Places, heights: np.ndarray, parting: Parting, X_RM: np.ndarray) -> tuple[Places, np.ndarray]:
+    """Return places, and their heights (n, place), that hold convex bodies apart where they part best, and the best one.
+
+    Bodies are free once they part in one direction. Places in each other along others would push them as well.
+    """
+    axis = parting.at(X_RM)
+    is_inside, are_inside = found.gaps - heights < -INSIDE, axis.gaps[:, None] < -INSIDE
+    counts = ~is_inside | (are_inside & ((found.n_r * axis.n_r[:, None]).sum(axis=2) > ALIGNED))
+    found = found._replace(gaps=np.where(counts, found.gaps, np.inf))
+    extra = Places(np.full((len(X_RM), 1), GUARD), *(values[:, None] for values in axis))
+    joined = Places(*(np.concatenate(arrays, axis=1) for arrays in zip(found, extra, strict=True)))
+    return joined, np.concatenate([heights, np.zeros((len(X_RM), 1))], axis=1)
