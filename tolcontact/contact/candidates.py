@@ -183,12 +183,13 @@ class Candidates:
                 scans[k] = self.projected(k, relative[:, k])
         for k, places in self.bounded.items():
             kept, error = (slots[self._varying.index(k)].labels, width * self._edge_error) if slots else (None, 0.0)
+            carried = None if kept is None else kept.copy()
             if kept is not None and at_rest is not None:
                 kept[at_rest] = -1
             nearness, guard = NEARNESS if width == 1 else np.inf, self.guards.get(k) if guarded else None
             parting = self.partings.get(k) if parted else None
             scans[k] = bounded_scan(
-                scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness, guard, parting
+                scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness, guard, parting, carried
             )
         return scans
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import trimesh
 
-from tolcontact.arrays import Array, Float
+from tolcontact.arrays import Array, Float, Int
 from tolcontact.geometry import parting_kernel
 
 SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
@@ -23,14 +23,29 @@ MAX_COMPARISONS = 10_000_000  # of edges with edges
 class Axis(NamedTuple):
     """The axis along which two convex bodies part best, at n poses.
 
+    edges          (n,): the index of the pair of edges that cross along it, -1 if it is the normal of a plane
     gaps           (n,) [mm] of the bodies along the axis; negative if they lie in each other
     P_m, P_r, n_r  (n, 3): the places of both bodies that are nearest along it, and the axis, in the frames of the paper
     """
 
+    edges: Int[Array, " n"]
     gaps: Float[Array, " n"]
     P_m: Float[Array, "n 3"]
     P_r: Float[Array, "n 3"]
     n_r: Float[Array, "n 3"]
+
+
+class Crossings(NamedTuple):
+    """Pairs of edges of two bodies, at n poses.
+
+    gaps           (n, k) [mm] along their common normals; infinite where they do not cross
+    P_m, P_r, n_r  (n, k, 3): the places on the edges, and their common normals, in the frames of the paper
+    """
+
+    gaps: Float[Array, "n k"]
+    P_m: Float[Array, "n k 3"]
+    P_r: Float[Array, "n k 3"]
+    n_r: Float[Array, "n k 3"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,9 +57,17 @@ class Parting:
 
     def at(self, X_RM: Float[Array, "n 12"]) -> Axis:
         """Return the axis along which the bodies part best at poses X_RM (n, 12)."""
-        axis = Axis(np.empty(len(X_RM)), *np.empty((3, len(X_RM), 3)))
+        count = len(X_RM)
+        axis = Axis(np.empty(count, dtype=np.int64), np.empty(count), *np.empty((3, count, 3)))
         parting_kernel.part(self.moving, self.reference, np.ascontiguousarray(X_RM), *axis)
         return axis
+
+    def crossings(self, X_RM: Float[Array, "n 12"], edges: Int[Array, "n k"], axes: Float[Array, "n 3"]) -> Crossings:
+        """Return pairs of `edges` (n, k), -1 for none, at poses X_RM (n, 12), with normals in the sense of `axes` (n, 3)."""
+        found = Crossings(np.empty(edges.shape), *np.zeros((3, *edges.shape, 3)))
+        poses, pairs, senses = (np.ascontiguousarray(values) for values in (X_RM, edges, axes))
+        parting_kernel.cross_edges(self.moving, self.reference, poses, pairs, senses, *found)
+        return found
 
 
 def parting(moving: trimesh.Trimesh, reference: trimesh.Trimesh) -> Parting | None:

@@ -67,8 +67,9 @@ def _nearest_shares(w, d, e):  # type: ignore[no-untyped-def]
 
 
 @uncounted
-def _across_edges(A, B, X, lines, into, best, least):  # type: ignore[no-untyped-def]
-    """Return the pair of edges whose common normal separates the bodies by more than `least` [mm]; `best` if there is none."""
+def _across_edges(B, lines, into, least):  # type: ignore[no-untyped-def]
+    """Return the pair of edges whose common normal separates the bodies by most, and by how much; -1 if not by over `least`."""
+    best = -1, -1
     for i in range(lines.shape[0]):
         start, d = row_of(lines, i, 0), row_of(lines, i, 1)
         length_d = math.sqrt(dot(d, d))
@@ -83,13 +84,25 @@ def _across_edges(A, B, X, lines, into, best, least):  # type: ignore[no-untyped
     return best, least
 
 
+@uncounted
+def _place_edges(A, X, lines, into):  # type: ignore[no-untyped-def]
+    """Write starts and vectors of the edges of A in `lines` (e, 2, 3), and its `into` (e, 2, 3), in the frame of B."""
+    for i in range(A.edges.shape[0]):
+        start = row_of(A.edges, i, 0)
+        lines[i, 0, 0], lines[i, 0, 1], lines[i, 0, 2] = move(X, start)
+        lines[i, 1, 0], lines[i, 1, 1], lines[i, 1, 2] = turn(X, minus(row_of(A.edges, i, 1), start))
+        for f in range(2):
+            into[i, f, 0], into[i, f, 1], into[i, f, 2] = turn(X, row_of(A.into, i, f))
+
+
 @compiled
-def part(A, B, poses, gaps, places, feet, normals):  # type: ignore[no-untyped-def]
+def part(A, B, poses, edges, gaps, places, feet, normals):  # type: ignore[no-untyped-def]
     """Write how convex bodies part at poses X_BA (n, 12): along the axis that separates them by the largest gap.
 
     It is a normal of a plane of either body, or a common normal of two edges that separate them. Bodies that lie in each other
     have negative gaps only.
 
+    edges           (n,): e i + j if the axis is the common normal of edge i of A and edge j of the e edges of B, else -1
     gaps            (n,) [mm], how far apart they are along the axis
     places, feet    (n, 3) [mm] on A and on B, in the frames of these bodies
     normals         (n, 3): the axis from B to A, in the frame of B
@@ -97,12 +110,7 @@ def part(A, B, poses, gaps, places, feet, normals):  # type: ignore[no-untyped-d
     lines, into = np.empty(A.edges.shape), np.empty(A.into.shape)
     for k in range(poses.shape[0]):
         X = poses[k]
-        for i in range(A.edges.shape[0]):
-            start = row_of(A.edges, i, 0)
-            lines[i, 0, 0], lines[i, 0, 1], lines[i, 0, 2] = move(X, start)
-            lines[i, 1, 0], lines[i, 1, 1], lines[i, 1, 2] = turn(X, minus(row_of(A.edges, i, 1), start))
-            for f in range(2):
-                into[i, f, 0], into[i, f, 1], into[i, f, 2] = turn(X, row_of(A.into, i, f))
+        _place_edges(A, X, lines, into)
         gap, place, foot, n = -np.inf, ORIGIN, ORIGIN, ORIGIN
         for f in range(B.normals.shape[0]):
             normal = row(B.normals, f)
@@ -120,9 +128,9 @@ def part(A, B, poses, gaps, places, feet, normals):  # type: ignore[no-untyped-d
             if height > gap:
                 corner = row(B.vertices, vertex)
                 gap, n, foot, place = height, normal, corner, move_back(X, along(corner, height, normal))
-        edges, gap = _across_edges(A, B, X, lines, into, (-1, -1), gap)
-        if edges[0] >= 0:
-            i, j = edges
+        (i, j), gap = _across_edges(B, lines, into, gap)
+        edges[k] = i * B.edges.shape[0] + j if i >= 0 else -1
+        if i >= 0:
             x, d, y = row_of(lines, i, 0), row_of(lines, i, 1), row_of(B.edges, j, 0)
             e = minus(row_of(B.edges, j, 1), y)
             c, length = _common_normal(d, e, into, B.into, i, j)
@@ -132,3 +140,31 @@ def part(A, B, poses, gaps, places, feet, normals):  # type: ignore[no-untyped-d
         gaps[k] = gap
         for i in range(3):
             places[k, i], feet[k, i], normals[k, i] = place[i], foot[i], n[i]
+
+
+@compiled
+def cross_edges(A, B, poses, edges, axes, gaps, places, feet, normals):  # type: ignore[no-untyped-def]
+    """Write gaps of some pairs of `edges` (n, k), see `part`, along their common normals nearest to the `axes` (n, 3).
+
+    gaps                     (n, k) [mm], infinite where edges do not cross, seen along their common normal, or for edges -1
+    places, feet, normals    (n, k, 3), as in `part`
+    """
+    gaps[:] = np.inf
+    for k in range(poses.shape[0]):
+        X = poses[k]
+        for m in range(edges.shape[1]):
+            if edges[k, m] < 0:
+                continue
+            i, j = edges[k, m] // B.edges.shape[0], edges[k, m] % B.edges.shape[0]
+            x, y = move(X, row_of(A.edges, i, 0)), row_of(B.edges, j, 0)
+            d, e = minus(move(X, row_of(A.edges, i, 1)), x), minus(row_of(B.edges, j, 1), y)
+            c, w = cross(d, e), minus(y, x)
+            square = dot(c, c)
+            s, u = dot(cross(w, e), c), dot(cross(w, d), c)
+            if not (square > PARALLEL * PARALLEL * dot(d, d) * dot(e, e) and 0.0 <= s <= square and 0.0 <= u <= square):
+                continue
+            n = scaled((1.0 if dot(c, row(axes, k)) > 0.0 else -1.0) / math.sqrt(square), c)
+            gaps[k, m] = -dot(n, w)
+            place, foot = move_back(X, along(x, s / square, d)), along(y, u / square, e)
+            for f in range(3):
+                places[k, m, f], feet[k, m, f], normals[k, m, f] = place[f], foot[f], n[f]
