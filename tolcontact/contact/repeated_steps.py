@@ -66,10 +66,11 @@ def repeat(
     stride: float,
     balances: bool,
     guarded: bool = False,
+    parted: bool = False,
 ) -> None:
     """Take the steps of `state` to their end. Without rest there is an answer only if the parts contradict each other.
 
-    With `guarded`, places are those of guards as well (see Candidates.scans).
+    With `guarded`, places are those of guards as well, with `parted` those that part convex bodies (see Candidates.scans).
     With `balances`, realizations also rest where steps like the paper's are rounding, though these may grow from there.
     """
     unsettled, trail = Unsettled(task, state), list[np.ndarray]()
@@ -86,7 +87,7 @@ def repeat(
         rounding_counts = kind.newton or step.knows_walls or balances
         moves = (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
         if kind.width > 1:
-            moves |= ~candidates.hold(unsettled.task, unsettled.state)
+            moves |= ~candidates.hold(unsettled.task, unsettled.state, guarded=guarded, parted=parted)
         # The smaller one tells: steps are large in freedoms that nothing holds, and in the norm of the objective if
         # Newton's curvature is stiff.
         unrest = np.minimum(size, scaled)
@@ -108,7 +109,9 @@ def repeat(
         if candidates.bounded:
             poses, deviations, slots = unsettled.state.relative, unsettled.task.deviations, unsettled.state.slots
             at_rest = (size[moves] < NEARLY_AT_REST) & kind.sharp
-            scans = candidates.scans(poses, deviations, slots=slots, width=kind.width, at_rest=at_rest, guarded=guarded)
+            scans = candidates.scans(
+                poses, deviations, slots=slots, width=kind.width, at_rest=at_rest, guarded=guarded, parted=parted
+            )
             unsettled.task = replace(unsettled.task, scans=scans)
         if kind.newton:
             penetration = _true_penetration(unsettled.task, unsettled.state)

@@ -38,6 +38,7 @@ class Start(NamedTuple):
     stride       the largest turn of a part in one step [rad]
     balances     whether steps end where they are rounding, though they may grow from there
     guarded      whether bodies that lie in each other, where no place of contact shows it, get one (see Guard)
+    parted       whether convex bodies are held apart only in the direction in which they part best (see Parting)
     """
 
     at_nominal: bool = False
@@ -45,6 +46,7 @@ class Start(NamedTuple):
     stride: float = STRIDE
     balances: bool = False
     guarded: bool = False
+    parted: bool = False
 
 
 OTHER_STARTS = (Start(at_nominal=True), Start(stride=SMALL_STRIDE))  # if no face is curved
@@ -52,6 +54,7 @@ OTHER_STARTS_CURVED = (Start(projected=True), Start(projected=True, at_nominal=T
 # Planes at fixed points of a shaft leave it as it spins. If its spin is free, rounding grows until it falls through them.
 BALANCE = Start(balances=True)
 GUARDED = (Start(guarded=True), Start(guarded=True, stride=SMALL_STRIDE))
+PARTED = (Start(parted=True), Start(parted=True, stride=SMALL_STRIDE))
 
 
 class ContactResolver:
@@ -148,12 +151,16 @@ class ContactResolver:
             caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull far if nothing holds
             search(self._step, self._limits, self._candidates, self._energy_of, task, state, start.stride, caution)
         elif self._method.is_exact:
-            repeat(self._step, self._limits, self._candidates, task, state, start.stride, start.balances, start.guarded)
+            repeat(
+                self._step, self._limits, self._candidates, task, state, start.stride, start.balances, start.guarded, start.parted
+            )
         else:
             self._step.take(task, state, stride=start.stride)
         state.searched[:] = projected
         self._leave_adrift(task, state)
-        scans = self._candidates.scans(state.relative, task.deviations, projected=projected, earlier=task.scans)
+        scans = self._candidates.scans(
+            state.relative, task.deviations, projected=projected, earlier=task.scans, parted=start.parted
+        )
         task = replace(task, scans=scans)
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
         if self._method.is_exact:
@@ -198,6 +205,9 @@ class ContactResolver:
         rows = np.flatnonzero((state.rank > 0) | ~self._limits.is_near(task, state))
         for start in OTHER_STARTS_CURVED if self._candidates.curved else OTHER_STARTS:
             rows = self._try_again(task, state, rows, start)
+        rows = np.flatnonzero(state.rank == NO_ANSWER)
+        for start in PARTED if rows.size and self._candidates.partings else ():
+            rows = self._try_again(task, state, rows, start)
 
     def _try_again(self, task: Task, state: State, rows: Int[Array, " n"], start: Start) -> Int[Array, " left"]:
         """Try some realizations (n,) again and keep the better answer. Return those to be tried further (left,)."""
@@ -206,7 +216,10 @@ class ContactResolver:
         part = task.take(rows)
         poses, relative = self._at_nominal(part) if start.at_nominal else (part.raw, part.relative)
         part = replace(
-            part, scans=self._candidates.scans(relative, part.deviations, projected=start.projected, guarded=start.guarded)
+            part,
+            scans=self._candidates.scans(
+                relative, part.deviations, projected=start.projected, guarded=start.guarded, parted=start.parted
+            ),
         )
         attempt = self._step.start(poses, relative)
         self._attempt(part, attempt, start)
