@@ -93,8 +93,8 @@ def bounded_scan(
     """Return the places at which a pair can touch at X_RM (n, 12); see Meeting.at for `kept`, `error` and `nearness`.
 
     Where no place shows penetration, a `guard` adds one if bodies lie in each other. A `parting` leaves out places that hold
-    bodies apart in other directions than the one in which they part best, and adds the place that does; `carried` (n, k) are the
-    labels of places that carried before, -1 for none.
+    bodies apart in other directions than the one in which they part best, and adds the place that does; `carried` (n, k) are
+    the labels of places that carried before, -1 for none.
     """
     found, heights = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness)
     if guard is not None:

@@ -7,7 +7,6 @@ far from the raw pose are tried again from other starts.
 
 import copy
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,39 +21,12 @@ from tolcontact.contact.record import accumulate_starts
 from tolcontact.contact.repeated_steps import repeat
 from tolcontact.contact.scan import min_gaps, undone
 from tolcontact.contact.springs import spring_misfit
+from tolcontact.contact.starts import BALANCE, GUARDED, OTHER_STARTS, OTHER_STARTS_CURVED, PARTED, Start
 from tolcontact.contact.state import NO_ANSWER, Resolved, State, Task
 from tolcontact.interference import ordered
 
-STRIDE, SMALL_STRIDE = 0.5, 0.05  # rad: the largest turn of a part in one step; linear rows are wrong long before
 SAME_CONFLICT = 1e-3  # share by which the penetration of two conflicts differs that are taken for the same
 MIN_GAIN = 1e-6  # of the objective, or mm of penetration: what another start must gain to be preferred
-
-
-class Start(NamedTuple):
-    """Where steps start, and how large they may be.
-
-    at_nominal   whether they start from the nominal instead of the raw place
-    projected    whether contact points are projected again, before every step, onto curved faces
-    stride       the largest turn of a part in one step [rad]
-    balances     whether steps end where they are rounding, though they may grow from there
-    guarded      whether bodies that lie in each other, where no place of contact shows it, get one (see Guard)
-    parted       whether convex bodies are held apart only in the direction in which they part best (see Parting)
-    """
-
-    at_nominal: bool = False
-    projected: bool = False
-    stride: float = STRIDE
-    balances: bool = False
-    guarded: bool = False
-    parted: bool = False
-
-
-OTHER_STARTS = (Start(at_nominal=True), Start(stride=SMALL_STRIDE))  # if no face is curved
-OTHER_STARTS_CURVED = (Start(projected=True), Start(projected=True, at_nominal=True))
-# Planes at fixed points of a shaft leave it as it spins. If its spin is free, rounding grows until it falls through them.
-BALANCE = Start(balances=True)
-GUARDED = (Start(guarded=True), Start(guarded=True, stride=SMALL_STRIDE))
-PARTED = (Start(parted=True), Start(parted=True, stride=SMALL_STRIDE))
 
 
 class ContactResolver:
@@ -151,9 +123,7 @@ class ContactResolver:
             caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull far if nothing holds
             search(self._step, self._limits, self._candidates, self._energy_of, task, state, start.stride, caution)
         elif self._method.is_exact:
-            repeat(
-                self._step, self._limits, self._candidates, task, state, start.stride, start.balances, start.guarded, start.parted
-            )
+            repeat(self._step, self._limits, self._candidates, task, state, start)
         else:
             self._step.take(task, state, stride=start.stride)
         state.searched[:] = projected
