@@ -27,8 +27,8 @@ ROOMS = {
     "h5py": ("archive/raw_file.py",),
     "typer": ("cli/",),
     "msgspec": ("declaration/",),
-    "trimesh": ("geometry/", "discretization/"),
-    "igl": ("geometry/", "report/html/decimation.py"),
+    "trimesh": ("geometry/", "discretization/", "interference/"),
+    "igl": ("geometry/", "interference/", "report/html/decimation.py"),
     "OCP": ("kernel/",),
 }
 NOT_IN = {
@@ -66,8 +66,9 @@ ORDER = (
     "version", "errors", "interrupts", "later", "readable", "child", "shape_worker", "kernel", "vocabulary", "checksums",
     "labelled", "realizations",
     "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "features",
-    "fasteners", "pmi", "discretization", "variation", "mechanics", "compilation", "statics", "plausibility", "contact",
-    "simulation", "statistics", "archive", "report", "plot", "workflow", "analyses", "testing", "cli", "__init__", "__main__",
+    "fasteners", "pmi", "discretization", "interference", "variation", "mechanics", "compilation", "statics", "contact",
+    "simulation", "plausibility", "statistics", "archive", "report", "plot", "workflow", "analyses", "testing", "cli",
+    "__init__", "__main__",
 )  # fmt: skip
 
 

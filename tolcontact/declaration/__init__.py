@@ -327,6 +327,7 @@ from tolcontact.declaration.measurement import (
     stations,
 )
 from tolcontact.declaration.mobility import has_supports, is_free, movers
+from tolcontact.declaration.overlap import Overlap
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.size import Size
@@ -340,8 +341,8 @@ __all__ = [
     "Coaxiality", "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets", "Difference",
     "Face", "Facing", "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance", "Geometry", "Inside",
     "Joint", "Largest", "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean", "MeanGap", "Measure",
-    "Measurement", "Mesh", "Minimum", "Near", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin", "Point",
-    "Population", "Position", "Profile", "Roundness", "Size", "Station", "Straightness", "Sum", "Symmetry", "ThreeTwoOne",
-    "TitleBlock", "Tolerance", "TotalRunout",
+    "Measurement", "Mesh", "Minimum", "Near", "Overlap", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin",
+    "Point", "Population", "Position", "Profile", "Roundness", "Size", "Station", "Straightness", "Sum", "Symmetry",
+    "ThreeTwoOne", "TitleBlock", "Tolerance", "TotalRunout",
     "Triangles", "Variable", "degrees", "has_supports", "is_free", "movers", "stations", "three_two_one",
 ]  # fmt: skip

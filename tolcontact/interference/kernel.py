@@ -12,6 +12,7 @@ LEAF = 4
 MIN_SINE = 1e-3  # of the angle between edges that have a common normal
 SAMPLES = 4  # of a piece of an edge inside the other body
 MAX_PASSES = 64  # of one edge
+RAY = (1.0, 0.01307, 0.00713)  # a direction that few edges have, and in which few boxes are passed
 MAX_POINTS = 512  # of the common region of two bodies
 MAX_NORMALS = 256
 MAX_CROSSING = 12  # edges of each body whose common normals are compared
@@ -147,6 +148,14 @@ def _is_within(side, k, p):  # type: ignore[no-untyped-def]
     return total > math.pi
 
 
+@uncounted
+def _seems_within(side, k, p, shares, senses):  # type: ignore[no-untyped-def]
+    """Return whether a ray from p leaves a body where it first passes the surface; a ray along an edge may be wrong."""
+    boxes = side.boxes
+    reach = 2.0 * (boxes[0, 3] - boxes[0, 0] + boxes[0, 4] - boxes[0, 1] + boxes[0, 5] - boxes[0, 2] + side.spare)
+    return _passes(side, k, p, along(p, reach, RAY), shares, senses) > 0 and senses[0] > 0
+
+
 @inlined_uncounted
 def _is_beyond(side, p):  # type: ignore[no-untyped-def]
     """Return whether p lies outside of the box of a body."""
@@ -225,11 +234,29 @@ def _box_distance(boxes, node, p):  # type: ignore[no-untyped-def]
 
 
 @uncounted
+def _near_leaf(side, k, p):  # type: ignore[no-untyped-def]
+    """Return a bound from above of the squared distance of p from the surface: that from a leaf with a near box."""
+    node, inner, least = 0, side.next.size // 2, np.inf
+    while node < inner:
+        left, right = 2 * node + 1, 2 * node + 2
+        node = left if _box_distance(side.boxes, left, p) <= _box_distance(side.boxes, right, p) else right
+    for j in range(LEAF):
+        triangle = side.triangles[node - inner, j]
+        if triangle < 0:
+            break
+        a, b = _corner(side, k, side.faces[triangle, 0]), _corner(side, k, side.faces[triangle, 1])
+        arm = minus(p, _nearest_on_triangle(p, a, b, _corner(side, k, side.faces[triangle, 2])))
+        least = min(least, dot(arm, arm))
+    return least * (1.0 + 1e-12)
+
+
+@uncounted
 def _nearest(side, k, p, enough):  # type: ignore[no-untyped-def]
     """Return the distance of p from the surface, the triangle and the place there; any if the distance is below `enough`."""
     node, inner, best, foot, least = 0, side.next.size // 2, -1, p, np.inf
+    bound = _near_leaf(side, k, p)
     while node < side.next.size:
-        if math.sqrt(_box_distance(side.boxes, node, p)) - side.spare > math.sqrt(least):
+        if math.sqrt(_box_distance(side.boxes, node, p)) - side.spare > math.sqrt(min(least, bound)):
             node = side.next[node]
             continue
         if node < inner:
@@ -297,7 +324,7 @@ def _sound_edges(owner, other, k, X, is_forward, is_in, shares, senses, depths, 
 
 
 @uncounted
-def _sound_centres(owner, other, k, X, is_forward, depths, triangles, places):  # type: ignore[no-untyped-def]
+def _sound_centres(owner, other, k, X, is_forward, shares, senses, depths, triangles, places):  # type: ignore[no-untyped-def]
     """Raise the depth of realization k to that of centres of triangles of a body that lie in the other one, deeper than edges.
 
     Where faces are flush, edges lie on the surface, and only what is between them is inside.
@@ -310,7 +337,7 @@ def _sound_centres(owner, other, k, X, is_forward, depths, triangles, places):  
         )
         p = scaled(1.0 / 3.0, along(along(a, 1.0, b), 1.0, c))
         p = move(X, p) if is_forward else move_back(X, p)
-        if _is_beyond(other, p):
+        if _is_beyond(other, p) or not _seems_within(other, k, p, shares, senses):
             continue
         depth, triangle, foot = _nearest(other, k, p, depths[k])
         if depth > depths[k] and _is_within(other, k, p):
@@ -340,8 +367,8 @@ def sound(A, B, poses, depths, triangles, places):  # type: ignore[no-untyped-de
         _sound_edges(
             B, A, k, X, False, np.zeros(B.vertices.shape[1], dtype=np.bool_), shares, senses, depths, triangles, places
         )
-        _sound_centres(A, B, k, X, True, depths, triangles, places)
-        _sound_centres(B, A, k, X, False, depths, triangles, places)
+        _sound_centres(A, B, k, X, True, shares, senses, depths, triangles, places)
+        _sound_centres(B, A, k, X, False, shares, senses, depths, triangles, places)
 
 
 @inlined_uncounted

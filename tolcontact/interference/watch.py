@@ -91,7 +91,7 @@ class Watch:
         """Return two bodies that are tested; None if one of them is not closed, or they may lie in each other."""
         if pair not in self._neighbours:
             A, B = (self.solid(number) for number in pair)
-            depth = self._depth(pair)
+            depth = self.depth(pair)
             is_tested = A is not None and B is not None and np.isfinite(depth)
             found = Neighbours(A, B, (SHARES[0] * depth, SHARES[1] * depth)) if is_tested else None
             self._neighbours[pair] = found
@@ -103,7 +103,8 @@ class Watch:
             self._solids[number] = part_solid(self.nominal, number)
         return self._solids[number]
 
-    def _depth(self, pair: tuple[int, int]) -> float:
+    def depth(self, pair: tuple[int, int]) -> float:
+        """Return the depth [mm] from which on two bodies count as in each other; infinite if they may be."""
         size = float(np.ptp(self._bounds[list(pair)], axis=1).max())
         zone = min(self.nominal.assembly.smallest_zone(), RANGE)
         return max(ALLOWED_SHARE * zone, self.allowed.get(pair, 0.0), MIN_DEPTH, MIN_SHARE * size)
@@ -135,15 +136,16 @@ class Watch:
         poses: Float[Array, "n part 12"],
         deviations: Float[Array, "n contributor"],
         left_out: Collection[tuple[int, int]] = (),
+        among: Collection[tuple[int, int]] | None = None,
     ) -> Iterator[Clash]:
         """Yield the pairs of bodies that lie in each other at poses (n, part, 12), for deviations (n, contributor).
 
-        Pairs of numbers in `left_out` are not tested.
+        Pairs of numbers in `left_out` are not tested, nor pairs that are not `among` others, if these are given.
         """
         known = np.isfinite(poses).all(axis=(1, 2))
         reach = self._motions(poses[known]).max(axis=0, initial=0) + self._growth(deviations[known])
         for pair in self._near(reach):
-            found = None if pair in left_out else self.neighbours(pair)
+            found = None if pair in left_out or (among is not None and pair not in among) else self.neighbours(pair)
             if found is not None:
                 X_BA = pose.relative(poses[:, pair[0]], poses[:, pair[1]])
                 rows = np.flatnonzero(found.interfere(X_BA, deviations) & known)
