@@ -148,6 +148,10 @@ Contact can move any part that is the moving side of a pair, or that has one-sid
 part that is only ever a reference stays where its locators put it; let it move with `fixed=False`. All parts that contact can
 move are corrected together, each with six degrees of freedom, including parts that are located on other parts.
 
+Only declared contact moves parts. Bodies without it may pass through each other: checks name them, and runs count the
+realizations (see `tolcontact.plausibility`). `may_overlap(part, part, ...)` states that any two of these parts are meant to
+lie in each other, as press fits and welds are, or that locators stand for the contact of a part with the one it is located on.
+
 ## Forces
 
 `force(name, at=point, vector=...)` declares a force in N, constant in the assembly frame. Only the objective "seating" uses
@@ -249,6 +253,8 @@ model's own, the defaults, or set by options.
 >>> tc.check(clamp)
 ('part "cover" (...): it is not located; call locate(...), or declare it fixed=True to hold it at its nominal place',)
 >>> place = clamp.locate(cover, tc.three_two_one(foot, side, cover.face("-x")), tolerance=0.1, on=plate)
+>>> clamp.may_overlap(cover, plate)
+overlap of cover, plate
 >>> tc.check(clamp)
 ()
 >>> nothing = tc.Assembly("nothing")

@@ -292,13 +292,13 @@ def _sound(other, k, X, is_forward, p, q, edge, depths, triangles, places):  # t
 
 
 @uncounted
-def _sound_edges(owner, other, k, X, is_forward, is_in, shares, senses, depths, triangles, places):  # type: ignore
+def _sound_edges(owner, other, k, X, is_forward, motion, is_in, shares, senses, depths, triangles, places):  # type: ignore
     """Raise the depth of realization k to that of the edges of a body in the other one; `is_in` (v,) is false before."""
     for is_first in (True, False):
         changes = True
         while changes:
             changes = False
-            for j in range(owner.edges.shape[0]):
+            for j in range(_near_count(owner, motion) if is_first else owner.edges.shape[0]):
                 i, m = owner.edges[j, 0], owner.edges[j, 1]
                 if not is_first and is_in[i] == is_in[m]:
                     continue
@@ -363,10 +363,10 @@ def sound(A, B, poses, depths, triangles, places):  # type: ignore[no-untyped-de
     for k in range(poses.shape[0]):
         depths[k], triangles[k, :], places[k] = 0.0, 0, 0.0
         X = poses[k]
-        _sound_edges(A, B, k, X, True, np.zeros(A.vertices.shape[1], dtype=np.bool_), shares, senses, depths, triangles, places)
-        _sound_edges(
-            B, A, k, X, False, np.zeros(B.vertices.shape[1], dtype=np.bool_), shares, senses, depths, triangles, places
-        )
+        motion = motion_of(X, A.bounds) + 2.0 * (A.spare + B.spare)
+        in_B, in_A = np.zeros(A.vertices.shape[1], dtype=np.bool_), np.zeros(B.vertices.shape[1], dtype=np.bool_)
+        _sound_edges(A, B, k, X, True, motion, in_B, shares, senses, depths, triangles, places)
+        _sound_edges(B, A, k, X, False, motion, in_A, shares, senses, depths, triangles, places)
         _sound_centres(A, B, k, X, True, shares, senses, depths, triangles, places)
         _sound_centres(B, A, k, X, False, shares, senses, depths, triangles, places)
 

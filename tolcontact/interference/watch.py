@@ -106,8 +106,29 @@ class Watch:
     def depth(self, pair: tuple[int, int]) -> float:
         """Return the depth [mm] from which on two bodies count as in each other; infinite if they may be."""
         size = float(np.ptp(self._bounds[list(pair)], axis=1).max())
-        zone = min(self.nominal.assembly.smallest_zone(), RANGE)
-        return max(ALLOWED_SHARE * zone, self.allowed.get(pair, 0.0), MIN_DEPTH, MIN_SHARE * size)
+        return max(self._usual_depth, self.allowed.get(pair, 0.0), MIN_DEPTH, MIN_SHARE * size)
+
+    @cached_property
+    def _usual_depth(self) -> float:
+        return ALLOWED_SHARE * min(self.nominal.assembly.smallest_zone(), RANGE)
+
+    @property
+    def largest_depth(self) -> float:
+        """The largest depth [mm] from which on bodies count as in each other, of tested pairs."""
+        depths = [self.depth(pair) for pair in self.declared]
+        return max([self._usual_depth, MIN_DEPTH, *(depth for depth in depths if np.isfinite(depth))])
+
+    @property
+    def open_parts(self) -> tuple[str, ...]:
+        """The names of parts that are not closed, so that nothing can lie in them."""
+        numbers = {part.name: number for number, part in enumerate(self.nominal.parts)}
+        return tuple(name for name, number in numbers.items() if self.solid(number) is None)
+
+    @property
+    def untested_pairs(self) -> tuple[str, ...]:
+        """The names of contact pairs whose bodies may lie in each other, since they give way or have form."""
+        pairs = [pair for pair in self.nominal.pairs if pair.reference is not None and (pair.is_springy or pair.has_form)]
+        return tuple(dict.fromkeys(pair.name for pair in pairs))
 
     @cached_property
     def overlapping(self) -> frozenset[tuple[int, int]]:

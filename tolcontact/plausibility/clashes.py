@@ -59,9 +59,11 @@ def clashes(draws: TrialDraws) -> Iterator[str]:
             yield f"more than {MAX_CLASHES} pairs of parts lie in each other without contact; declare that of these first"
             return
         moving, reference = moving_first(nominal, clash.pair)
+        location = nominal.assembly.location_of(moving.part)
+        basis = ", on which it is located," if location is not None and location.parent is reference.part else ""
         yield (
-            f'{designation("part", moving.part)}: it lies in part "{reference.name}" in {_extent(draws, measured, 0)}, and '
-            f"no contact holds them apart; declare it: {contact_line(nominal, clash.pair, measured.places[0])}, or say that it "
+            f'{designation("part", moving.part)}: it lies in part "{reference.name}"{basis} in {_extent(draws, measured, 0)}, '
+            f"and no contact holds them apart; declare it: {contact_line(nominal, clash.pair, measured.places[0])}, or say that it "
             f"is meant: {overlap_line(nominal, clash.pair)}"
         )
 
