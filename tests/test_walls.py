@@ -66,9 +66,9 @@ ORDER = (
     "version", "errors", "interrupts", "later", "readable", "child", "shape_worker", "kernel", "vocabulary", "checksums",
     "labelled", "realizations",
     "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "features",
-    "fasteners", "pmi", "discretization", "variation", "mechanics", "interference",
-    "compilation", "statics", "plausibility", "contact",
-    "simulation", "statistics", "archive", "report", "plot", "workflow", "analyses", "testing", "cli", "__init__", "__main__",
+    "fasteners", "pmi", "discretization", "interference", "variation", "mechanics",
+    "compilation", "statics", "contact", "simulation", "plausibility", "statistics", "archive", "report", "plot", "workflow",
+    "analyses", "testing", "cli", "__init__", "__main__",
 )  # fmt: skip
 
 

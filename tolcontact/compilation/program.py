@@ -1,8 +1,9 @@
 """The compiled model: it is built once, and evaluated by name for blocks of realizations."""
 
+import itertools
 import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -224,7 +225,7 @@ def _allowed_depths(
     """Return how deep [mm] bodies of contact pairs may lie in each other, where that is more than usual.
 
     Fixed planes err by what was allowed in their trial, of raw poses; other contact tilts parts more. Springs let faces into
-    each other, and form is not part of a solid.
+    each other, and form is not part of a solid. Parts that are declared to overlap may lie in each other at any depth.
     """
     depths = dict[tuple[int, int], float]()
     for k, pair in enumerate(nominal.pairs):
@@ -237,7 +238,16 @@ def _allowed_depths(
                 else 0.0
             )
             depths[bodies] = max(depths.get(bodies, 0.0), np.inf if is_free else planes)
-    return depths
+    return depths | dict.fromkeys(_meant_overlaps(nominal), np.inf)
+
+
+def _meant_overlaps(nominal: Nominal) -> Iterator[tuple[int, int]]:
+    """Yield the pairs of bodies, of one station, that are declared to overlap."""
+    for overlap in nominal.assembly.overlaps:
+        numbers = [number for number, part in enumerate(nominal.parts) if part.part in overlap.parts]
+        for left, right in itertools.combinations(numbers, 2):
+            if nominal.parts[left].station == nominal.parts[right].station:
+                yield left, right
 
 
 def _contact_group(

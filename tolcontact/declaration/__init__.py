@@ -148,6 +148,10 @@ Contact can move any part that is the moving side of a pair, or that has one-sid
 part that is only ever a reference stays where its locators put it; let it move with `fixed=False`. All parts that contact can
 move are corrected together, each with six degrees of freedom, including parts that are located on other parts.
 
+Only declared contact moves parts. Bodies without it may pass through each other: checks name them, and runs count the
+realizations (see `tolcontact.plausibility`). `may_overlap(part, part, ...)` states that any two of these parts are meant to
+lie in each other, as press fits and welds are, or that locators stand for the contact of a part with the one it is located on.
+
 ## Forces
 
 `force(name, at=point, vector=...)` declares a force in N, constant in the assembly frame. Only the objective "seating" uses
@@ -249,6 +253,8 @@ model's own, the defaults, or set by options.
 >>> tc.check(clamp)
 ('part "cover" (...): it is not located; call locate(...), or declare it fixed=True to hold it at its nominal place',)
 >>> place = clamp.locate(cover, tc.three_two_one(foot, side, cover.face("-x")), tolerance=0.1, on=plate)
+>>> clamp.may_overlap(cover, plate)
+overlap of cover, plate
 >>> tc.check(clamp)
 ()
 >>> nothing = tc.Assembly("nothing")
@@ -327,6 +333,7 @@ from tolcontact.declaration.measurement import (
     stations,
 )
 from tolcontact.declaration.mobility import has_supports, is_free, movers
+from tolcontact.declaration.overlap import Overlap
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.size import Size
@@ -340,8 +347,8 @@ __all__ = [
     "Coaxiality", "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets", "Difference",
     "Face", "Facing", "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance", "Geometry", "Inside",
     "Joint", "Largest", "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean", "MeanGap", "Measure",
-    "Measurement", "Mesh", "Minimum", "Near", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin", "Point",
-    "Population", "Position", "Profile", "Roundness", "Size", "Station", "Straightness", "Sum", "Symmetry", "ThreeTwoOne",
-    "TitleBlock", "Tolerance", "TotalRunout",
+    "Measurement", "Mesh", "Minimum", "Near", "Overlap", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin",
+    "Point", "Population", "Position", "Profile", "Roundness", "Size", "Station", "Straightness", "Sum", "Symmetry",
+    "ThreeTwoOne", "TitleBlock", "Tolerance", "TotalRunout",
     "Triangles", "Variable", "degrees", "has_supports", "is_free", "movers", "stations", "three_two_one",
 ]  # fmt: skip

@@ -6,10 +6,11 @@ import numpy as np
 
 from tolcontact.compiled import compiled, inlined_uncounted, uncounted
 from tolcontact.geometry.vector_kernel import along, dot, minus, move, move_back, scaled
-from tolcontact.interference.kernel import LEAF, corners_of, is_beyond, is_within, passes, vertex
+from tolcontact.interference.kernel import LEAF, corners_of, is_beyond, is_within, motion_of, near_count, passes, vertex
 
 SAMPLES = 4  # of a piece of an edge inside the other body
 MAX_PASSES = 64  # of one edge
+RAY = (1.0, 0.01307, 0.00713)  # a direction that few edges have, and in which few boxes are passed
 
 
 @inlined_uncounted
@@ -44,11 +45,37 @@ def _box_distance(boxes, node, p):  # type: ignore[no-untyped-def]
 
 
 @uncounted
+def _seems_within(side, k, p, shares, senses):  # type: ignore[no-untyped-def]
+    """Return whether a ray from p leaves a body where it first passes the surface; a ray along an edge may be wrong."""
+    boxes = side.boxes
+    reach = 2.0 * (boxes[0, 3] - boxes[0, 0] + boxes[0, 4] - boxes[0, 1] + boxes[0, 5] - boxes[0, 2])
+    return passes(side, k, p, along(p, reach, RAY), shares, senses) > 0 and senses[0] > 0
+
+
+@uncounted
+def _near_leaf(side, k, p):  # type: ignore[no-untyped-def]
+    """Return a bound from above of the squared distance of p from the surface: that from a leaf with a near box."""
+    node, inner, square = 0, side.next.size // 2, np.inf
+    while node < inner:
+        left, right = 2 * node + 1, 2 * node + 2
+        node = left if _box_distance(side.boxes, left, p) <= _box_distance(side.boxes, right, p) else right
+    for j in range(LEAF):
+        triangle = side.triangles[node - inner, j]
+        if triangle < 0:
+            break
+        a, b, c = corners_of(side, k, triangle)
+        arm = minus(p, _nearest_on_triangle(p, a, b, c))
+        square = min(square, dot(arm, arm))
+    return square * (1.0 + 1e-12)
+
+
+@uncounted
 def _nearest(side, k, p, enough):  # type: ignore[no-untyped-def]
     """Return the distance of p from the surface, the triangle and the place there; any if the distance is below `enough`."""
     node, inner, best, foot, square = 0, side.next.size // 2, -1, p, np.inf
+    bound = _near_leaf(side, k, p)
     while node < side.next.size:
-        if _box_distance(side.boxes, node, p) > square:
+        if _box_distance(side.boxes, node, p) > min(square, bound):
             node = side.next[node]
             continue
         if node < inner:
@@ -84,13 +111,13 @@ def _sound(target, k, X, is_forward, p, q, edge, depths, triangles, places):  # 
 
 
 @uncounted
-def _sound_edges(owner, target, k, X, is_forward, is_in, shares, senses, depths, triangles, places):  # type: ignore
+def _sound_edges(owner, target, k, X, is_forward, motion, is_in, shares, senses, depths, triangles, places):  # type: ignore
     """Raise the depth of realization k to that of the edges of a body in the other one; `is_in` (v,) is false before."""
     for is_first in (True, False):
         changes = True
         while changes:
             changes = False
-            for j in range(owner.edges.shape[0]):
+            for j in range(near_count(owner.distances, motion) if is_first else owner.edges.shape[0]):
                 i, m = owner.edges[j, 0], owner.edges[j, 1]
                 if not is_first and is_in[i] == is_in[m]:
                     continue
@@ -116,7 +143,7 @@ def _sound_edges(owner, target, k, X, is_forward, is_in, shares, senses, depths,
 
 
 @uncounted
-def _sound_centres(owner, target, k, X, is_forward, depths, triangles, places):  # type: ignore[no-untyped-def]
+def _sound_centres(owner, target, k, X, is_forward, shares, senses, depths, triangles, places):  # type: ignore[no-untyped-def]
     """Raise the depth of realization k to that of centres of triangles of a body that lie in the other one, deeper than edges.
 
     Where faces are flush, edges lie on the surface, and only what is between them is inside.
@@ -125,7 +152,7 @@ def _sound_centres(owner, target, k, X, is_forward, depths, triangles, places): 
         a, b, c = corners_of(owner, k, t)
         p = scaled(1.0 / 3.0, along(along(a, 1.0, b), 1.0, c))
         p = move(X, p) if is_forward else move_back(X, p)
-        if is_beyond(target, p):
+        if is_beyond(target, p) or not _seems_within(target, k, p, shares, senses):
             continue
         depth, triangle, foot = _nearest(target, k, p, depths[k])
         if depth > depths[k] and is_within(target, k, p):
@@ -141,7 +168,7 @@ def sound(A, B, poses, depths, triangles, places):  # type: ignore[no-untyped-de
     """Write how deep bodies lie in each other at poses X_BA (n, 12) of realizations that interfere.
 
     The depth is that of the deepest of some places, on edges and in the middle of triangles of one body, below the surface of
-    the target.
+    the other.
 
     depths      (n,) [mm]
     triangles   (n, 2): of A and of B, the triangle nearest to that place, or on which it lies; -1 minus an edge
@@ -151,9 +178,9 @@ def sound(A, B, poses, depths, triangles, places):  # type: ignore[no-untyped-de
     for k in range(poses.shape[0]):
         depths[k], triangles[k, :], places[k] = 0.0, 0, 0.0
         X = poses[k]
-        _sound_edges(A, B, k, X, True, np.zeros(A.vertices.shape[0], dtype=np.bool_), shares, senses, depths, triangles, places)
-        _sound_edges(
-            B, A, k, X, False, np.zeros(B.vertices.shape[0], dtype=np.bool_), shares, senses, depths, triangles, places
-        )
-        _sound_centres(A, B, k, X, True, depths, triangles, places)
-        _sound_centres(B, A, k, X, False, depths, triangles, places)
+        motion = motion_of(X, A.bounds) + 2.0 * (A.spare + B.spare)
+        in_B, in_A = np.zeros(A.vertices.shape[0], dtype=np.bool_), np.zeros(B.vertices.shape[0], dtype=np.bool_)
+        _sound_edges(A, B, k, X, True, motion, in_B, shares, senses, depths, triangles, places)
+        _sound_edges(B, A, k, X, False, motion, in_A, shares, senses, depths, triangles, places)
+        _sound_centres(A, B, k, X, True, shares, senses, depths, triangles, places)
+        _sound_centres(B, A, k, X, False, shares, senses, depths, triangles, places)

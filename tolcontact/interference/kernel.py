@@ -135,7 +135,7 @@ def passes(side, k, p, q, shares, senses):  # type: ignore[no-untyped-def]
 
 
 @uncounted
-def _near_count(distances, motion):  # type: ignore[no-untyped-def]
+def near_count(distances, motion):  # type: ignore[no-untyped-def]
     """Return how many of the edges, at `distances` (e,) that ascend, may reach a body that moves by `motion` [mm] at most."""
     low, high = 0, distances.size
     while low < high:
@@ -224,7 +224,7 @@ def _put_planes(side, k, facets):  # type: ignore[no-untyped-def]
 def _passes_any(owner, target, facets, k, X, is_forward, motion, shares, senses):  # type: ignore[no-untyped-def]
     """Return whether an edge of a body passes the surface of the other one, whose `facets` are those of realization k."""
     is_listed, boxes = motion <= owner.reach, target.boxes
-    for j in range(_near_count(owner.distances, motion)):
+    for j in range(near_count(owner.distances, motion)):
         p, q = vertex(owner, k, owner.edges[j, 0]), vertex(owner, k, owner.edges[j, 1])
         p, q = (move(X, p), move(X, q)) if is_forward else (move_back(X, p), move_back(X, q))
         if (

@@ -101,6 +101,10 @@ class Neighbours:
         """Return how deep bodies lie in each other at poses X_BA at which they interfere."""
         result = Interference(np.empty(len(X_BA)), np.empty((len(X_BA), 2), dtype=np.int64), np.empty((len(X_BA), 2, 3)))
         depth_kernel.sound(*self._sides(deviations), np.ascontiguousarray(X_BA), *result)
+        for solid, side, triangles in zip((self.A.solid, self.B.solid), self._nominal, result.triangles.T, strict=True):
+            for row in np.flatnonzero(triangles < 0):
+                is_edge = (solid.edges == side.edges[-1 - triangles[row]]).all(axis=1)
+                triangles[row] = -1 - int(is_edge.argmax())
         return result._replace(depths=result.depths + sum(self.insets))
 
 

@@ -105,7 +105,7 @@ class Watch:
     def neighbours(self, pair: tuple[int, int]) -> Neighbours | None:
         """Return two bodies that are tested; None if one of them is not closed, or they may lie in each other."""
         if pair not in self._neighbours:
-            A, B, depth, neighbours = self.solid(pair[0]), self.solid(pair[1]), self._depth(pair), None
+            A, B, depth, neighbours = self.solid(pair[0]), self.solid(pair[1]), self.depth(pair), None
             if A is not None and B is not None and np.isfinite(depth):
                 neighbours = Neighbours(A, B, (SHARES[0] * depth, SHARES[1] * depth), self._reach(pair))
             self._neighbours[pair] = neighbours
@@ -126,10 +126,32 @@ class Watch:
     def _reach(self, pair: tuple[int, int]) -> float:
         return MOTION_FACTOR * float(self._usual_motions[list(pair)].sum())
 
-    def _depth(self, pair: tuple[int, int]) -> float:
+    def depth(self, pair: tuple[int, int]) -> float:
+        """Return the depth [mm] from which on two bodies count as in each other; infinite if they may be."""
         size = float(np.ptp(self._bounds[list(pair)], axis=1).max())
-        zone = min(self.nominal.assembly.smallest_zone(), RANGE)
-        return max(ALLOWED_SHARE * zone, self.allowed.get(pair, 0.0), MIN_DEPTH, MIN_SHARE * size)
+        return max(self._usual_depth, self.allowed.get(pair, 0.0), MIN_DEPTH, MIN_SHARE * size)
+
+    @cached_property
+    def _usual_depth(self) -> float:
+        return ALLOWED_SHARE * min(self.nominal.assembly.smallest_zone(), RANGE)
+
+    @property
+    def largest_depth(self) -> float:
+        """The largest depth [mm] from which on bodies count as in each other, of tested pairs."""
+        depths = [self.depth(pair) for pair in self.declared]
+        return max([self._usual_depth, MIN_DEPTH, *(depth for depth in depths if np.isfinite(depth))])
+
+    @property
+    def open_parts(self) -> tuple[str, ...]:
+        """The names of parts that are not closed, so that nothing can lie in them."""
+        numbers = {part.name: number for number, part in enumerate(self.nominal.parts)}
+        return tuple(name for name, number in numbers.items() if self.solid(number) is None)
+
+    @property
+    def untested_pairs(self) -> tuple[str, ...]:
+        """The names of contact pairs whose bodies may lie in each other, since they give way or have form."""
+        pairs = [pair for pair in self.nominal.pairs if pair.reference is not None and (pair.is_springy or pair.has_form)]
+        return tuple(dict.fromkeys(pair.name for pair in pairs))
 
     @cached_property
     def overlapping(self) -> frozenset[tuple[int, int]]:
@@ -158,15 +180,17 @@ class Watch:
         poses: Float[Array, "n part 12"],
         deviations: Float[Array, "n contributor"],
         left_out: Collection[tuple[int, int]] = (),
+        among: Collection[tuple[int, int]] | None = None,
     ) -> Iterator[Clash]:
         """Yield the pairs of bodies that lie in each other at poses (n, part, 12), for deviations (n, contributor).
 
-        Pairs of numbers in `left_out` are not tested.
+        Pairs of numbers in `left_out` are not tested, nor pairs that are not `among` others, if these are given.
         """
         is_finite = np.isfinite(poses).all(axis=(1, 2))
         reach = self._motions(poses[is_finite]).max(axis=0, initial=0) + self._growth(deviations[is_finite])
         for pair in self._near(reach):
-            neighbours = None if pair in left_out else self.neighbours(pair)
+            is_left_out = pair in left_out or (among is not None and pair not in among)
+            neighbours = None if is_left_out else self.neighbours(pair)
             if neighbours is not None:
                 X_BA = pose.relative(poses[:, pair[0]], poses[:, pair[1]])
                 rows = np.flatnonzero(neighbours.interfere(X_BA, deviations) & is_finite)

@@ -31,8 +31,9 @@ class Block(Record, Readable):
     reaction      (n, pair): sum of their reactions, in the units of the objective
     clashes       (n,): number of pairs of parts without declared contact that lie in each other in the corrected state; -1 if
                   they were not tested
-    clash_depth   (n,) [mm]: how deep the parts of the deepest of these pairs do; clash_part, clash_other (n,) are their indices
-                  among the parts of the assembly, -1 for none
+    clash_depth   (n,) [mm]: how deep the parts of the deepest of these pairs do, NaN if that is not measured; clash_part,
+                  clash_other (n,) are their indices among the parts of the assembly, -1 for none. Without such a pair they name
+                  parts with declared contact that make the answer doubtful
     status        (n,), Status: with stations, that of the worst station
     station_status  (n, station), Status
 
@@ -150,8 +151,16 @@ def simulate_block(
                 _put_raw(block, resolver, changed, raw_relative)
             worst[resolved.touched] = np.maximum(worst[resolved.touched], _outcome(resolved))
     if program.method.is_bounded:
-        tested = [pair for resolver in resolvers for pair in resolver.watched]
-        bodies = watched_bodies(program, block.poses[:, CORRECTED], deviations, tested)
+        worst = outcomes_by_stage.max(axis=1)
+        bodies = watched_bodies(
+            program,
+            block.poses[:, CORRECTED],
+            deviations,
+            start=start,
+            tested=[pair for resolver in resolvers for pair in resolver.watched],
+            is_doubtful=worst == Outcome.DOUBTFUL,
+            is_certified=worst <= Outcome.RESOLVED,
+        )
         block.clashes[:], block.clash_depth[:] = bodies.clashes, bodies.depth
         block.clash_part[:], block.clash_other[:] = bodies.part, bodies.other
         for station, rows in bodies.withdrawn:

@@ -13,16 +13,17 @@ CLASH_DEPTH = ArchiveVariable(
     "clash_depth",
     (REALIZATION,),
     "f8",
-    "how deep the parts of the deepest of these pairs lie in each other; 0: no such pair",
+    "how deep the parts of the deepest of these pairs lie in each other; without such a pair, parts with declared contact "
+    "whose answer is doubtful; 0: no parts; NaN: not measured",
     "mm",
 )
 CLASH_PART = ArchiveVariable(
     "clash_part",
     (REALIZATION,),
     "i2",
-    "index of the first part of the deepest of these pairs along `part`; -1: no such pair",
+    "index along `part` of the first of the two parts that clash_depth is of; -1: no parts",
     "1",
 )
 CLASH_OTHER = ArchiveVariable(
-    "clash_other", (REALIZATION,), "i2", "index of the second part of this pair along `part`; -1: no such pair", "1"
+    "clash_other", (REALIZATION,), "i2", "index along `part` of the second of these parts; -1: no parts", "1"
 )
