@@ -146,11 +146,8 @@ contact seat: plate -z (moving) against base +z (reference), spacing 5 mm
 
 Contact can move any part that is the moving side of a pair, or that has one-sided locators; prevent it with `fixed=True`. A
 part that is only ever a reference stays where its locators put it; let it move with `fixed=False`. All parts that contact can
-move are corrected together, each with six degrees of freedom, including parts that are located on other parts.
-
-Only declared contact moves parts. Bodies without it may pass through each other: checks name them, and runs count the
-realizations (see `tolcontact.plausibility`). `may_overlap(part, part, ...)` states that any two of these parts are meant to
-lie in each other, as press fits and welds are, or that locators stand for the contact of a part with the one it is located on.
+move are corrected together, each with six degrees of freedom, including parts that are located on other parts. Other parts that
+lie in each other are named; `may_overlap(part, part)` states that it is meant (see `tolcontact.plausibility`).
 
 ## Forces
 
@@ -343,12 +340,12 @@ from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import degrees
 
 __all__ = [
-    "OUTSIDE", "Angle", "Angularity", "Assembly", "AxisDistance", "Box", "Brep", "CircularRunout", "Clearance",
-    "Coaxiality", "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets", "Difference",
-    "Face", "Facing", "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance", "Geometry", "Inside",
-    "Joint", "Largest", "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean", "MeanGap", "Measure",
-    "Measurement", "Mesh", "Minimum", "Near", "Overlap", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin",
-    "Point", "Population", "Position", "Profile", "Roundness", "Size", "Station", "Straightness", "Sum", "Symmetry",
-    "ThreeTwoOne", "TitleBlock", "Tolerance", "TotalRunout",
-    "Triangles", "Variable", "degrees", "has_supports", "is_free", "movers", "stations", "three_two_one",
+    "OUTSIDE", "Angle", "Angularity", "Assembly", "AxisDistance", "Box", "Brep", "CircularRunout", "Clearance", "Coaxiality",
+    "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets", "Difference", "Face", "Facing",
+    "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance", "Geometry", "Inside", "Joint", "Largest",
+    "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean", "MeanGap", "Measure", "Measurement", "Mesh",
+    "Minimum", "Near", "Overlap", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin", "Point", "Population",
+    "Position", "Profile", "Roundness", "Size", "Station", "Straightness", "Sum", "Symmetry", "ThreeTwoOne", "TitleBlock",
+    "Tolerance", "TotalRunout", "Triangles", "Variable", "degrees", "has_supports", "is_free", "movers", "stations",
+    "three_two_one",
 ]  # fmt: skip

@@ -15,8 +15,7 @@ from tolcontact.arrays import Array, Float, Int
 from tolcontact.geometry import parting_kernel
 
 SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
-MERGE_SHARE = 1e-9  # of the body's size: vertices that are no farther apart are one
-CONVEX_SHARE = 1e-9  # of the body's size, by which vertices of a convex body may lie above its planes
+CONVEX_SHARE = 1e-6  # of the hull's size, by which the surface of a convex body may lie inside its hull: files are rounded
 MAX_COMPARISONS = 10_000_000  # of edges with edges
 
 
@@ -79,28 +78,26 @@ def parting(moving: trimesh.Trimesh, reference: trimesh.Trimesh) -> Parting | No
 
 
 def convex(body: trimesh.Trimesh) -> parting_kernel.Convex | None:
-    """Return a body with its planes and edges; None if it is not convex."""
-    if not body.is_watertight:
+    """Return the convex hull of a body with its planes and edges; None if the body does not fill its hull."""
+    if not body.is_watertight or body.volume <= 0:
         return None
-    size = max(float(body.scale), 1e-9)
-    merged = trimesh.Trimesh(body.vertices, body.faces, process=False)
-    merged.merge_vertices(digits_vertex=int(np.ceil(-np.log10(MERGE_SHARE * size))))
-    merged.update_faces(merged.area_faces > 0)
-    vertices, facet_normals = np.asarray(merged.vertices), np.asarray(merged.face_normals)
-    neighbours = np.asarray(merged.face_adjacency)
-    is_sharp = np.asarray(merged.face_adjacency_angles) > SHARP_ANGLE
+    hull = trimesh.convex.convex_hull(np.asarray(body.vertices)[np.unique(body.faces)])
+    vertices, facet_normals = np.asarray(hull.vertices), np.asarray(hull.face_normals)
+    neighbours, is_sharp = np.asarray(hull.face_adjacency), np.asarray(hull.face_adjacency_angles) > SHARP_ANGLE
     planes = trimesh.graph.connected_component_labels(neighbours[~is_sharp], node_count=len(facet_normals))
     # The largest triangle of a plane has the most precise normal.
-    order = np.argsort(-np.asarray(merged.area_faces), kind="stable")
-    largest = order[np.unique(np.asarray(planes)[order], return_index=True)[1]]
-    normals, used = facet_normals[largest], np.unique(merged.faces)
-    heights = (vertices[used] @ normals.T).max(axis=0)
-    if (heights - (np.asarray(merged.triangles_center)[largest] * normals).sum(axis=1)).max() > CONVEX_SHARE * size:
+    order = np.argsort(-np.asarray(hull.area_faces), kind="stable")
+    normals = facet_normals[order[np.unique(np.asarray(planes)[order], return_index=True)[1]]]
+    heights = (vertices @ normals.T).max(axis=0)
+    triangles = np.asarray(body.triangles)
+    places = np.concatenate([triangles, (triangles + np.roll(triangles, 1, axis=1)) / 2]).reshape(-1, 3)
+    depths = (heights - places @ normals.T).min(axis=1)
+    if depths.max() > CONVEX_SHARE * float(hull.scale):
         return None
-    ends = vertices[np.asarray(merged.face_adjacency_edges)[is_sharp]]
+    beside = neighbours[is_sharp]
+    ends = vertices[np.asarray(hull.face_adjacency_edges)[is_sharp]]
     along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
-    into = np.cross(facet_normals[neighbours[is_sharp]], along[:, None])
-    towards = np.asarray(merged.triangles_center)[neighbours[is_sharp]] - ends[:, :1]
+    into = np.cross(facet_normals[beside], along[:, None])
+    towards = np.asarray(hull.triangles_center)[beside] - ends[:, :1]
     into *= np.where((into * towards).sum(axis=2) < 0, -1.0, 1.0)[..., None]
-    arrays = vertices[used], normals, heights, ends, into
-    return parting_kernel.Convex(*(np.ascontiguousarray(values) for values in arrays))
+    return parting_kernel.Convex(*(np.ascontiguousarray(values) for values in (vertices, normals, heights, ends, into)))

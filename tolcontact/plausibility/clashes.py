@@ -63,8 +63,8 @@ def clashes(draws: TrialDraws) -> Iterator[str]:
         basis = ", on which it is located," if location is not None and location.parent is reference.part else ""
         yield (
             f'{designation("part", moving.part)}: it lies in part "{reference.name}"{basis} in {_extent(draws, measured, 0)}, '
-            f"and no contact holds them apart; declare it: {contact_line(nominal, clash.pair, measured.places[0])}, or say that "
-            f"it is meant: {overlap_line(nominal, clash.pair)}"
+            f"and no contact holds them apart; declare it: {contact_line(nominal, clash.pair, measured.places[0])}, "
+            f"or say that it is meant: {overlap_line(nominal, clash.pair)}"
         )
 
 
