@@ -146,8 +146,8 @@ contact seat: plate -z (moving) against base +z (reference), spacing 5 mm
 
 Contact can move any part that is the moving side of a pair, or that has one-sided locators; prevent it with `fixed=True`. A
 part that is only ever a reference stays where its locators put it; let it move with `fixed=False`. All parts that contact can
-move are corrected together, each with six degrees of freedom, including parts that are located on other parts. Other parts
-that lie in each other are named; `may_overlap(part, part)` states that it is meant (see `tolcontact.plausibility`).
+move are corrected together, each with six degrees of freedom, also parts located on others. Other parts that lie in each
+other are named; `may_overlap(part, part)` states that it is meant (see `tolcontact.plausibility`).
 
 ## Forces
 
@@ -250,8 +250,7 @@ model's own, the defaults, or set by options.
 >>> tc.check(clamp)
 ('part "cover" (...): it is not located; call locate(...), or declare it fixed=True to hold it at its nominal place',)
 >>> place = clamp.locate(cover, tc.three_two_one(foot, side, cover.face("-x")), tolerance=0.1, on=plate)
->>> clamp.may_overlap(cover, plate)
-overlap of cover, plate
+>>> meant = clamp.may_overlap(cover, plate)
 >>> tc.check(clamp)
 ()
 >>> nothing = tc.Assembly("nothing")

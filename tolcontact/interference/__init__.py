@@ -50,7 +50,8 @@ With `search="bounded"`, the default, every realization is tested in its correct
 each other make the realization `doubtful`: it is tried again, with a row along the direction in which the region that both
 bodies share is narrowest, and certified only if the test passes then. Parts without declared contact that lie in each other
 do not change a status, since nothing holds them apart: the archive counts them in `clashes`. Parts that lie in each other
-nominally are left out of that count.
+nominally are left out, of that count and, unless their places of contact are found at every pose, of certificates; the
+attribute `not_watched` of an archive names them.
 
 Boxes decide first which bodies are near. Of an edge, only facets count that are nominally no farther away than the bodies
 have moved against each other."""

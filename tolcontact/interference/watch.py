@@ -158,6 +158,12 @@ class Watch:
         """Pairs of bodies that lie in each other in the nominal assembly."""
         return frozenset(pair for pair in self._near(np.zeros(len(self.nominal.parts))) if self._overlaps(pair))
 
+    @property
+    def overlapping_parts(self) -> tuple[str, ...]:
+        """The names of parts that lie in each other in the nominal assembly, as "(part, part)"."""
+        parts = self.nominal.parts
+        return tuple(dict.fromkeys(f"({parts[i].name}, {parts[j].name})" for i, j in sorted(self.overlapping)))
+
     def _overlaps(self, pair: tuple[int, int]) -> bool:
         neighbours = self.neighbours(pair)
         nominal = np.zeros((1, len(self.nominal.contributors)))

@@ -63,10 +63,12 @@ def watched_bodies(
     bodies, declared = WatchedBodies.none(count), list[Clash]()
     for clash in watch.clashes(poses, deviations, left_out=tested):
         rows, parts = clash.rows, _parts(program, clash)
+        if clash.pair in watch.overlapping:
+            continue
         if clash.pair in watch.declared:
             bodies.withdrawn.append((stations.index(nominal.parts[clash.pair[0]].station), rows))
             declared.append(clash)
-        elif clash.pair not in watch.overlapping:
+        else:
             is_counted = counted.setdefault(parts, np.zeros(count, dtype=bool))
             bodies.clashes[rows] += ~is_counted[rows]
             is_counted[rows] = True
