@@ -38,6 +38,7 @@ def assembly() -> tc.Assembly:
     outer = car.part("outer", tc.Box(LENGTH, WIDTH, SKIN), at=(0, 0, SKIN))
     fender = car.part("fender", tc.Box(LENGTH, 120, SKIN), at=(0, WIDTH + 4, SKIN))
     stops = [car.part(f"stop {k}", tc.Box(30, 30, 40), at=(40, y, -40)) for k, y in enumerate((60, WIDTH - 90), 1)]
+    car.may_overlap(body, *stops)  # stops are screwed into the body, to their height
 
     hem = car.station("hem")
     for panel in (inner, outer):

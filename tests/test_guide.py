@@ -14,7 +14,8 @@ from tolcontact.report import summary_text
 
 README = Path(__file__).parents[1] / "README.md"
 CHAPTERS = (
-    "declaration", "geometry", "pmi", "features", "fasteners", "discretization", "variation", "mechanics", "compilation",
+    "declaration", "geometry", "pmi", "features", "fasteners", "discretization", "variation", "mechanics",
+    "interference", "compilation",
     "plausibility", "contact", "simulation", "statistics", "archive", "report", "plot", "workflow", "analyses", "cli",
 )  # fmt: skip
 PACKAGES = ("tolcontact", *(f"tolcontact.{chapter}" for chapter in CHAPTERS))

@@ -22,6 +22,7 @@ STUDIES = {
     "cad/pmi_readings.py": [ROOT / "studies" / "cad"],
     "cad/read_files.py": [ROOT / "studies" / "cad"],
     "cad/trimmed_faces.py": [ROOT / "models" / "cover.step"],
+    "certificates/coincidences.py": ["--scenes", "6", "--samples", "3"],
     "certificates/ends.py": ["--scenes", "6", "--samples", "3"],
     "certificates/judge.py": ["--scenes", "3", "--samples", "20"],
     "exact/tables.py": ["--samples", "20"],

@@ -27,14 +27,14 @@ ROOMS = {
     "h5py": ("archive/raw_file.py",),
     "typer": ("cli/",),
     "msgspec": ("declaration/",),
-    "trimesh": ("geometry/", "discretization/"),
-    "igl": ("geometry/", "report/html/decimation.py"),
+    "trimesh": ("geometry/", "discretization/", "interference/"),
+    "igl": ("geometry/", "interference/", "report/html/decimation.py"),
     "OCP": ("kernel/",),
 }
 NOT_IN = {
     "xarray": (
-        "declaration/", "geometry/", "features/", "discretization/", "variation/", "mechanics/", "compilation/", "contact/",
-        "simulation/", "statics/",
+        "declaration/", "geometry/", "features/", "discretization/", "variation/", "mechanics/", "interference/",
+        "compilation/", "contact/", "simulation/", "statics/",
     )
 }  # fmt: skip
 # Who may import a library by a call, when it is first needed: it is optional, or slow to import.
@@ -66,8 +66,9 @@ ORDER = (
     "version", "errors", "interrupts", "later", "readable", "child", "stored_coordinates", "shape_worker", "kernel",
     "vocabulary", "checksums", "labelled", "realizations",
     "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "features",
-    "fasteners", "pmi", "discretization", "variation", "mechanics", "compilation", "statics", "plausibility", "contact",
-    "simulation", "statistics", "archive", "report", "plot", "workflow", "analyses", "testing", "cli", "__init__", "__main__",
+    "fasteners", "pmi", "discretization", "interference", "variation", "mechanics",
+    "compilation", "statics", "contact", "simulation", "plausibility", "statistics", "archive", "report", "plot", "workflow",
+    "analyses", "testing", "cli", "__init__", "__main__",
 )  # fmt: skip
 
 

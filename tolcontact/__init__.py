@@ -30,6 +30,7 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | discretize | `tolcontact.discretization` | contact points, balls and shafts, warnings |
 | draw | `tolcontact.variation` | distributions of deviations, zones of features, seeds |
 | equations | `tolcontact.mechanics` | poses, gaps, the QP, what the corrected pose minimizes |
+| interference | `tolcontact.interference` | whether bodies lie in each other, by a complete test |
 | compile | `tolcontact.compilation` | QP solvers, their accuracy |
 | nominal assembly | `tolcontact.plausibility` | warnings of what is probably a mistake |
 | resolve contact | `tolcontact.contact` | linearized or exact resolution, statuses, what a certificate covers, limits |

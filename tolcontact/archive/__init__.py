@@ -34,6 +34,15 @@ Each realization is one row and carries its own certificate.
 | `iterations`, `starts` | realization | number of linear steps, and number of starts |
 | `second_answers` | realization | QPs that another solver had to answer |
 | `searched` | realization | 1 if contact points were projected again |
+| `clashes` | realization | pairs of parts without declared contact that lie in each other, corrected; -1: not tested |
+| `clash_part`, `clash_other` | realization | indices of the parts of the deepest of these pairs; -1: none |
+| `clash_depth` | realization | how deep these lie in each other [mm]; NaN: not measured |
+
+An exact resolution tests the bodies of all parts, whether their contact is declared or not, by a test that is complete: no two
+lie in each other deeper than the attribute `interference_depth` [mm] where `clashes` is 0 and the realization is certified.
+The attribute `not_watched` names what the test leaves out: parts that are not closed, contact pairs that give way or have
+form, and overlaps that are declared. Where `clashes` is 0 and `clash_part` is not -1, parts with declared contact lie in each
+other, and the realization is `doubtful`. Linearized runs, and archives before these variables, were not tested.
 
 With stations (format 6) `measure_station`, `pair_station` and `part_station` state what belongs to which; the pose of a part is
 that in the last station that holds it, and the status is that of the worst station. Groups `station/<name>` hold the poses of

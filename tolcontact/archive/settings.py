@@ -64,6 +64,21 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
     }
 
 
+def watch_settings(program: Program) -> dict[str, Any]:
+    """Return the attributes on the test of interference: its depth [mm], and what is not tested; none if nothing is."""
+    if not program.method.is_bounded:
+        return {}
+    watch, assembly = program.watch, program.nominal.assembly
+    untested = {
+        "parts that are not closed": watch.open_parts,
+        "contact pairs that give way or have form": watch.untested_pairs,
+        "parts that lie in each other nominally": watch.overlapping_parts,
+        "overlaps that are declared": tuple(f"({overlap.name})" for overlap in assembly.overlaps),
+    }
+    texts = [f"{kind}: {', '.join(names)}" for kind, names in untested.items() if names]
+    return {terms.INTERFERENCE_DEPTH: watch.largest_depth, terms.NOT_WATCHED: "; ".join(texts)}
+
+
 def _weighting(program: Program) -> str:
     """Return which contact points count in the objective, and how."""
     method = program.method

@@ -12,6 +12,7 @@ from tolcontact.discretization import ContactPoints, Nominal, raised_places
 from tolcontact.errors import ContactWarning, ModelError, shown
 from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.meeting import Meeting, Reach, meeting
+from tolcontact.interference import Watch
 
 TRIALS = 1024  # raw poses
 TRIAL_SEED = 2_718_281_828
@@ -47,7 +48,7 @@ def push(pair: ContactPoints, X_RM: Float[Array, "n 12"], deviations: Float[Arra
 
 
 def bounded_pair(
-    nominal: Nominal,
+    watch: Watch,
     index: int,
     X_RM: Float[Array, "n 12"],
     deviations: Float[Array, "n contributor"],
@@ -61,7 +62,7 @@ def bounded_pair(
     pushed    [mm]: how far all contact together may push its parts
     room      [mm]: how far other contact, or forces, may: gaps below it are compared, and below the range of all gaps
     """
-    pair = nominal.pairs[index]
+    nominal, pair = watch.nominal, watch.nominal.pairs[index]
     smallest = nominal.assembly.smallest_zone()
     nothing = None, Trial(np.nan, np.nan)
     if pair.moving_face is None or pair.reference_face is None or pair.reference is None or pair.round is not None:
@@ -80,7 +81,7 @@ def bounded_pair(
         travel=TRAVEL_FACTOR * travel + pushed + MIN_TRAVEL_SHARE * size,
         tilt=tilt + pushed / size,
         spread=travel,
-        overlap=pair.coordinates.error + max(-float(pair.least_gap(pose.AT_REST[None])[0]), 0.0),
+        overlap=pair.coordinates.error + _overlap(watch, pair),
         clearance=clearance(pair),
     )
     places = meeting((pair.moving_face, pair.reference_face), bodies, reach)
@@ -100,6 +101,12 @@ def bounded_pair(
     allowed = max(ALLOWED_SHARE * smallest, FACET_FACTOR * bulge if stands_for_curves else 0.0)
     trial = Trial(error, allowed, most)
     return (places if trial.error > trial.allowed else None), trial
+
+
+def _overlap(watch: Watch, pair: ContactPoints) -> float:
+    """Return how deep [mm] the bodies of a pair lie in each other nominally: contact points of whole bodies only seem to."""
+    depth = max(-float(pair.least_gap(pose.AT_REST[None])[0]), 0.0)
+    return depth if depth > 0 and pair.reference is not None and watch.overlap(pair.moving, pair.reference) else 0.0
 
 
 def _check_corners(nominal: Nominal, pair: ContactPoints, places: Meeting) -> None:

@@ -1,8 +1,9 @@
 """The compiled model: it is built once, and evaluated by name for blocks of realizations."""
 
+import itertools
 import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -22,13 +23,14 @@ from tolcontact.declaration.measure import Tape
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
 from tolcontact.errors import ModelError, shown
 from tolcontact.geometry.meeting import Meeting
+from tolcontact.interference import Watch, ordered
 from tolcontact.limits import Limits
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.gap import GapMap, gap_map, gap_matrix
 from tolcontact.mechanics.groups import Group, contact_groups
 from tolcontact.mechanics.measures import measured, record
 from tolcontact.mechanics.placement import raw_poses
-from tolcontact.mechanics.pose import ENTRIES, poses_of
+from tolcontact.mechanics.pose import ENTRIES, Pose, poses_of
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 from tolcontact.mechanics.round_gap import round_gaps
 from tolcontact.mechanics.setting import face_heights, face_poses, facing_pose
@@ -39,6 +41,8 @@ from tolcontact.variation import Draws
 from tolcontact.vocabulary import STATED_ERROR_SHARE
 
 log = logging.getLogger(__name__)
+WATCH_DRAWS = 64  # that tell how far bodies move
+PLANES_FACTOR = 3.0  # times the error that a trial allows: how deep faces on fixed planes may lie in each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +69,7 @@ class Program(Pictured):
     nominal_measures  values of the measures in the nominal assembly
     accuracies   of the measures, in their units (see measure_accuracies)
     stations     of an assembly that is built in steps, in their order; `place` then places the parts of all of them
+    watch        the bodies, which may lie in each other
     tapes        the users' own expressions by measure name
     """
 
@@ -81,6 +86,7 @@ class Program(Pictured):
     groups: tuple[ContactGroup, ...]
     nominal_measures: np.ndarray
     accuracies: np.ndarray
+    watch: Watch
     tapes: dict[str, Tape]
     stations: tuple[StationProgram, ...] = ()
 
@@ -141,12 +147,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         entries = ca.SX.sym("poses", ENTRIES * len(nominal.parts))
         poses = poses_of(entries)
         values = measured(nominal, poses, d)
-        X_RM = [
-            facing_pose(
-                face_poses(pair, d), poses[pair.moving], None if pair.reference is None else poses[pair.reference]
-            ).vector()
-            for pair in nominal.pairs
-        ]
+        X_RM = _facing_poses(nominal, poses, d)
         observe = ca.Function(
             "observe",
             [entries, d],
@@ -161,7 +162,8 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             _check_forces(nominal, groups)
         place = NamedFunction.dense(ca.Function("place", [d], [raw], ["deviations"], ["poses"]))
         observed = NamedFunction.dense(observe)
-        meetings, trials = _meetings(nominal, groups, draws, place, observed, method) if method.is_bounded else ({}, {})
+        watch = _watch(nominal, draws, place)
+        meetings, trials = _meetings(watch, groups, draws, place, observed, method) if method.is_bounded else ({}, {})
         log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
         return Program(
             nominal=nominal,
@@ -176,6 +178,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             trials=trials,
             groups=tuple(_contact_group(nominal, group, gaps, method, conic_plugin, meetings, trials) for group in groups),
             accuracies=measure_accuracies(nominal, groups, draws, place, observed),
+            watch=watch.allowing(_allowed_depths(nominal, meetings, trials)),
             nominal_measures=observe(np.tile(AT_REST, len(nominal.parts)), np.zeros(d.numel()))[0].full().ravel(),
             tapes={
                 measure.name: record(value, ca.vertcat(entries, d))
@@ -186,6 +189,12 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         )
 
 
+def _facing_poses(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list[ca.SX]:
+    """Return X_RM of each pair as vectors of 12 entries."""
+    pairs = [(pair, poses[pair.moving], None if pair.reference is None else poses[pair.reference]) for pair in nominal.pairs]
+    return [facing_pose(face_poses(pair, deviations), moving, reference).vector() for pair, moving, reference in pairs]
+
+
 def _round_gap_function(pair: ContactPoints, points: RoundPoints, deviations: ca.SX) -> ca.Function:
     X_RM = ca.SX.sym("X_RM", ENTRIES)
     of_points = round_gaps(points, X_RM, face_heights(pair, deviations), ca.SX(len(points), 1), ca.SX(ENTRIES, 0))
@@ -194,9 +203,10 @@ def _round_gap_function(pair: ContactPoints, points: RoundPoints, deviations: ca
 
 
 def _meetings(
-    nominal: Nominal, groups: Sequence[Group], draws: Draws, place: NamedFunction, observe: NamedFunction, method: Method
+    watch: Watch, groups: Sequence[Group], draws: Draws, place: NamedFunction, observe: NamedFunction, method: Method
 ) -> tuple[dict[int, Meeting], dict[int, Trial]]:
     """Return the meetings of the pairs that need them, and the trials of all pairs of faces."""
+    nominal = watch.nominal
     if not nominal.pairs:
         return {}, {}
     deviations = draws(seed=TRIAL_SEED, start=0, stop=TRIALS)
@@ -210,9 +220,46 @@ def _meetings(
         pushed = sum(pushes[k] for k in group.pairs)
         for k in group.pairs:
             room = pushed if presses else pushed - pushes[k]
-            decisions[k] = bounded_pair(nominal, k, relative[:, k], deviations, pushed=pushed, room=room)
+            decisions[k] = bounded_pair(watch, k, relative[:, k], deviations, pushed=pushed, room=room)
     meetings = {k: places for k, (places, _) in decisions.items() if places is not None}
     return meetings, {k: trial for k, (_, trial) in decisions.items()}
+
+
+def _watch(nominal: Nominal, draws: Draws, place: NamedFunction) -> Watch:
+    deviations = draws(seed=TRIAL_SEED, start=0, stop=WATCH_DRAWS)
+    poses = place(deviations=deviations)["poses"].reshape(len(deviations), len(nominal.parts), ENTRIES)
+    return Watch(nominal, {}, poses, deviations)
+
+
+def _allowed_depths(
+    nominal: Nominal, meetings: Mapping[int, Meeting], trials: Mapping[int, Trial]
+) -> dict[tuple[int, int], float]:
+    """Return how deep [mm] bodies of contact pairs may lie in each other, where that is more than usual.
+
+    Fixed planes err by what was allowed in their trial, of raw poses; other contact tilts parts more. Springs let faces into
+    each other, and form is not part of a solid. Parts that are declared to overlap may lie in each other at any depth.
+    """
+    depths = dict[tuple[int, int], float]()
+    for k, pair in enumerate(nominal.pairs):
+        if pair.reference is not None and pair.moving_face is not None:
+            bodies = ordered(pair.moving, pair.reference)
+            is_free = pair.is_springy or pair.has_form
+            planes = (
+                PLANES_FACTOR * trials[k].allowed
+                if k in trials and k not in meetings and np.isfinite(trials[k].allowed)
+                else 0.0
+            )
+            depths[bodies] = max(depths.get(bodies, 0.0), np.inf if is_free else planes)
+    return depths | dict.fromkeys(_meant_overlaps(nominal), np.inf)
+
+
+def _meant_overlaps(nominal: Nominal) -> Iterator[tuple[int, int]]:
+    """Yield the pairs of bodies, of one station, that are declared to overlap."""
+    for overlap in nominal.assembly.overlaps:
+        numbers = [number for number, part in enumerate(nominal.parts) if part.part in overlap.parts]
+        for left, right in itertools.combinations(numbers, 2):
+            if nominal.parts[left].station == nominal.parts[right].station:
+                yield left, right
 
 
 def _contact_group(

@@ -102,24 +102,27 @@ No realization is dropped: a failed one is a row with its status, and its last p
 ## What a certificate covers
 
 `untouched` and `resolved` are certificates. They state that the optimality conditions hold to 1e-8 mm at a pose *near* the raw
-one and, in an exact resolution, that no contact point has a gap below 0 by more than that. Gaps count larger by the
-error of coordinates in files, which is `coordinate_error` in the archive, if any. The penetration that a linearized resolution
-leaves is in `gap_min`. "Near" means that no part turned by more than `near_turn` (1 rad), and no contact point
-moved by more than `near_travel` (half the size of the largest part). A longer travel is accepted if the faces themselves lie
-under the points that carry load, and penetrate each other by no more than 1 % of the smallest tolerance range (or 1e-4 sizes,
-if that is less) plus the error of their triangles. For other solutions far from the raw pose, other starts are tried; if these
-do not help, the realization is `doubtful`.
+one and, in an exact resolution, that no contact point has a gap below 0 by more than that. Gaps count larger by the error of
+coordinates in files, `coordinate_error` in the archive, if any. With `search="bounded"` they also state that the bodies of no
+contact pair lie in each other by more than a thousandth of the smallest tolerance range, by a test that does not know the list
+of contact points (see `tolcontact.interference`). The test looks at every realization. Where it contradicts the search, the
+realization is tried again; if that does not help, it is `doubtful`. The penetration that a linearized resolution leaves is in
+`gap_min`. "Near" means that no part turned by more than `near_turn` (1 rad), and no contact point moved by more than
+`near_travel` (half the size of the largest part). A longer travel is accepted if the faces themselves lie under the points that
+carry load, and penetrate each other by no more than 1 % of the smallest tolerance range (or 1e-4 sizes, if that is less) plus
+the error of their triangles. For other solutions far from the raw pose, other starts are tried; if these do not help, the
+realization is `doubtful`.
 
-Where faces end, a certificate covers both bodies as their triangles: corners, edges and facets, and faces under load touch.
-Only if steps come to no rest otherwise, a place that carries may lie beside its edge, as far as its plane errs there by a
-two-thousandth of the smallest tolerance range. Where contact points are fixed, or projected again, a certificate does not cover
-the surfaces *between* them. After the run, 64 certified realizations (`surfaces=`, `--surfaces`) are checked on the surfaces,
-at a much denser set of points and in both directions. One third are those that penetrate most, one third those with most points
-under load, and the rest are random. The check looks both ways: for penetration that contact points do not see, and, where
-points are fixed, for contact that was resolved while the surfaces were apart. The summary states the largest depths, shares
-with their intervals (from the random realizations), and how many touching points stand on a plane whose face has ended; above 1
-% of the smallest tolerance range a `tc.ContactWarning` names the pair and the remedy. The group `surface` of the archive states
-the realizations and pairs that were checked. One-sided locators are points, so they are not part of this check. The study in
+Where faces end, a certificate covers both bodies as their triangles, and faces under load touch. Only if steps come to no rest
+otherwise, a place that carries may lie beside its edge, as far as its plane errs there by a two-thousandth of the smallest
+tolerance range. Where contact points are fixed, or projected again, a certificate does not cover the surfaces *between* them.
+After the run, 64 certified realizations (`surfaces=`, `--surfaces`) are checked on the surfaces, at a much denser set of
+points and in both directions. One third are those that penetrate most, one third those with most points under load, and the
+rest are random. The check looks both ways: for penetration that contact points do not see, and, where points are fixed, for
+contact that was resolved while the surfaces were apart. The summary states the largest depths, shares with their intervals
+(from the random realizations), and how many touching points stand on a plane whose face has ended; above 1 % of the smallest
+tolerance range a `tc.ContactWarning` names the pair and the remedy. The group `surface` of the archive states the realizations
+and pairs that were checked. One-sided locators are points, so they are not part of this check. The study in
 `studies/certificates` looks for a counterexample in a million realizations.
 
 >>> float(exact["surface"].surface_penetration.max()) < 1e-6

@@ -7,12 +7,18 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import SLOTS
 from tolcontact.contact import bounded_kernel
+from tolcontact.contact.guard import GUARD, Guard
 from tolcontact.contact.scan import Deepest, Scan, SlotScan
 from tolcontact.discretization import FIRST_POINT, ContactPoints, raised_places
-from tolcontact.geometry.kernel import CORNER_ON_FACET
-from tolcontact.geometry.meeting import NEARNESS, Meeting
+from tolcontact.geometry.kernel import CORNER_ON_FACET, INSIDE
+from tolcontact.geometry.meeting import NEARNESS, Meeting, Places
+from tolcontact.geometry.parting import Parting
+from tolcontact.interference import WayOut
 
+PENETRATION = 1e-10  # mm: less than this is no penetration
 MAX_DEEPEST = SLOTS  # places of a pair that get a row in one round
+ALIGNED = 0.87  # cosine of the angle to the axis along which bodies part, up to which places in each other count
+SHOWN_SHARE = 0.05  # of the gap along this axis: where other places show it up to that, it needs no place of its own
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +86,60 @@ def bounded_scan(
     kept: Int[Array, "n k"] | None = None,
     error: float = 0.0,
     nearness: float = NEARNESS,
+    guard: Guard | None = None,
+    parting: Parting | None = None,
+    carried: Int[Array, "n k"] | None = None,
 ) -> BoundedScan:
-    """Return the places at which a pair can touch at X_RM (n, 12); see Meeting.at for `kept`, `error` and `nearness`."""
+    """Return the places at which a pair can touch at X_RM (n, 12); see Meeting.at for `kept`, `error` and `nearness`.
+
+    Where no place shows penetration, a `guard` adds one if bodies lie in each other. A `parting` leaves out places that hold
+    bodies apart in other directions than the one in which they part best, and adds the place that does; `carried` (n, k) are
+    the labels of places that carried before, -1 for none.
+    """
     found, heights = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness)
+    if guard is not None:
+        found, heights = _with_guard(found, heights, guard, X_RM)
+    if parting is not None:
+        found, heights = _with_parting(found, heights, parting, X_RM, carried)
     arrays = found.labels, found.P_m, found.P_r, found.n_r, np.isfinite(found.gaps)
     return BoundedScan(scan.tables, scan.P_m, scan.offsets, meeting, *arrays, np.ascontiguousarray(heights))
+
+
+def _with_guard(found: Places, heights: np.ndarray, guard: Guard, X_RM: np.ndarray) -> tuple[Places, np.ndarray]:
+    """Return places, and their heights (n, place), with one more where bodies lie in each other and no place shows it."""
+    rows = np.flatnonzero((found.gaps - heights).min(axis=1, initial=np.inf) >= -PENETRATION)
+    rows = rows[guard.interferes(X_RM[rows])]
+    way = guard.ways_out(X_RM[rows])
+    rows, way = rows[way.widths > 0], WayOut(*(values[way.widths > 0] for values in way))
+    count, added = len(X_RM), (GUARD, -way.widths, way.places, way.feet, way.normals)
+    extra = Places(np.full((count, 1), -1), np.full((count, 1), np.inf), *np.zeros((3, count, 1, 3)))
+    for values, of_rows in zip(extra, added, strict=True):
+        values[rows, 0] = of_rows
+    joined = Places(*(np.concatenate(arrays, axis=1) for arrays in zip(found, extra, strict=True)))
+    return joined, np.concatenate([heights, np.zeros((count, 1))], axis=1)
+
+
+def _with_parting(
+    found: Places, heights: np.ndarray, parting: Parting, X_RM: np.ndarray, carried: np.ndarray | None
+) -> tuple[Places, np.ndarray]:
+    """Return places, and their heights (n, place), that hold convex bodies apart where they part best, and the best one.
+
+    Bodies are free once they part in one direction. Places in each other along others would push them as well. The place that
+    parts them is added where no other shows as much. Nearly parallel edges that `carried` (n, k) before are added, too.
+    """
+    axis = parting.at(X_RM)
+    is_aligned = (found.n_r * axis.n_r[:, None]).sum(axis=2) > ALIGNED
+    counts = (found.gaps - heights >= -INSIDE) | ((axis.gaps[:, None] < -INSIDE) & is_aligned)
+    found = found._replace(gaps=np.where(counts, found.gaps, np.inf))
+    shown = np.where(is_aligned, found.gaps - heights, np.inf).min(axis=1, initial=np.inf)
+    is_new = axis.gaps < shown - SHOWN_SHARE * np.maximum(np.abs(axis.gaps), INSIDE)
+    labels = np.where(is_new, GUARD + 1 + axis.edges, -1)[:, None]
+    best = Places(labels, np.where(is_new, axis.gaps, np.inf)[:, None], *(values[:, None] for values in axis[2:]))
+    added = [best]
+    if carried is not None:
+        edges = np.where((carried > GUARD) & (carried != labels), carried - GUARD - 1, -1)
+        crossings = parting.crossings(X_RM, edges, axis.n_r)
+        added.append(Places(np.where(np.isfinite(crossings.gaps), carried, -1), *crossings))
+    joined = Places(*(np.concatenate(arrays, axis=1) for arrays in zip(found, *added, strict=True)))
+    spare = joined.gaps.shape[1] - heights.shape[1]
+    return joined, np.concatenate([heights, np.zeros((len(X_RM), spare))], axis=1)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -11,12 +12,14 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
 from tolcontact.contact.bounded_scan import bounded_scan
+from tolcontact.contact.guard import Guard
 from tolcontact.contact.raised_scan import RaisedScan, raised_scan
 from tolcontact.contact.scan import PairScan, RoundScan, Scan, changing, fixed, min_gaps, pair_scan
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.state import State, Task
 from tolcontact.discretization import ContactPoints
 from tolcontact.geometry.meeting import NEARNESS
+from tolcontact.geometry.parting import Parting, parting
 from tolcontact.mechanics import curved_pairs
 
 
@@ -120,6 +123,7 @@ class Candidates:
     def __init__(self, program: Program, group: ContactGroup) -> None:
         self._method = program.method
         self._pairs = [program.nominal.pairs[pair] for pair in group.group.pairs]
+        self._bodies = [part.body for part in program.nominal.parts]
         self._standing, self._spans = group.qp.standing, group.qp.spans
         self._varying = [k for k, points in enumerate(self._standing) if isinstance(points, int)]
         self._all_scans: list[Scan] = []
@@ -141,6 +145,8 @@ class Candidates:
         self._with_form = [k for k, pair in enumerate(self._pairs) if pair.has_form]
         self._edge_error = EDGE_SHARE * program.nominal.assembly.smallest_zone()
         self.bounded = {k: program.meetings[index] for k, index in enumerate(group.group.pairs) if index in program.meetings}
+        guards = {k: Guard.of(program, group.group.pairs[k]) for k in self.bounded}
+        self.guards = {k: guard for k, guard in guards.items() if guard is not None}
         is_iterated = self._method.is_iterated
         curved = curved_pairs(program.nominal, group.group) if self._method.is_exact and not is_iterated else []
         self.curved = [k for k in curved if k not in self.bounded]
@@ -158,11 +164,15 @@ class Candidates:
         width: float = 1.0,
         at_rest: Bool[Array, " realization"] | None = None,
         earlier: Sequence[Scan] = (),
+        guarded: bool = False,
+        parted: bool = False,
     ) -> list[Scan]:
         """Return scans of the points that may carry, projected again if the method requires it.
 
         Places of bounded pairs are found anew; in steps, with the `slots` of the pairs with changing points, places that carry
         remain a little beyond their edges, `width` times as far as they may in an answer, unless the realization is `at_rest`.
+        With `guarded`, bodies that lie in each other where no place shows it get one more place (see Guard). With `parted`,
+        places hold convex bodies apart only in the direction in which they part best (see Parting).
         With `projected`, points against curved faces are projected again in any case. `earlier` are scans of the same
         realizations, whose heights are summed up.
         """
@@ -176,15 +186,37 @@ class Candidates:
                 scans[k] = self.projected(k, relative[:, k])
         for k, places in self.bounded.items():
             kept, error = (slots[self._varying.index(k)].labels, width * self._edge_error) if slots else (None, 0.0)
+            carried = None if kept is None else kept.copy()
             if kept is not None and at_rest is not None:
                 kept[at_rest] = -1
-            nearness = NEARNESS if width == 1 else np.inf
-            scans[k] = bounded_scan(scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness)
+            nearness, guard = NEARNESS if width == 1 else np.inf, self.guards.get(k) if guarded else None
+            parting = self.partings.get(k) if parted else None
+            scans[k] = bounded_scan(
+                scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness, guard, parting, carried
+            )
         return scans
 
-    def hold(self, task: Task, state: State) -> Bool[Array, " n"]:
+    def interfere(self, relative: Float[Array, "realization pair 12"]) -> Bool[Array, " realization"]:
+        """Return whether bodies of a pair lie in each other (realization,), by a test that does not know the list of places."""
+        found = np.zeros(len(relative), dtype=bool)
+        for k, guard in self.guards.items():
+            found |= guard.interferes(relative[:, k])
+        return found
+
+    @cached_property
+    def partings(self) -> dict[int, Parting]:
+        """Of bounded pairs those of convex bodies without deviations, by their number in the group."""
+        partings = {}
+        for k, guard in self.guards.items():
+            pair = self._pairs[k]
+            assert pair.reference is not None
+            if not any(pair.deviating) and not guard.neighbours.varies:
+                partings[k] = parting(*(self._bodies[part] for part in (pair.moving, pair.reference)))
+        return {k: found for k, found in partings.items() if found is not None}
+
+    def hold(self, task: Task, state: State, *, guarded: bool = False, parted: bool = False) -> Bool[Array, " n"]:
         """Return whether the places that carry are as near to their faces as they may be in an answer (n,)."""
-        scans = self.scans(state.relative, task.deviations, slots=state.slots)
+        scans = self.scans(state.relative, task.deviations, slots=state.slots, guarded=guarded, parted=parted)
         held = np.ones(len(state), dtype=bool)
         for k in self.bounded:
             slots = state.slots[self._varying.index(k)]

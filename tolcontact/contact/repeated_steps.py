@@ -16,6 +16,7 @@ from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.linear_step import PENETRATION, LinearStep, Step
 from tolcontact.contact.progress import Progress
 from tolcontact.contact.scan import min_gaps
+from tolcontact.contact.starts import Start
 from tolcontact.contact.state import State, Task, Unsettled
 
 STEP_TOLERANCE = 1e-9  # mm: a smaller step is the last one
@@ -57,13 +58,8 @@ STEPS_WHERE_FACES_END = (
 )
 
 
-def repeat(
-    step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, task: Task, state: State, stride: float, balances: bool
-) -> None:
-    """Take the steps of `state` to their end. Without rest there is an answer only if the parts contradict each other.
-
-    With `balances`, realizations also rest where steps like the paper's are rounding, though these may grow from there.
-    """
+def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, task: Task, state: State, start: Start) -> None:
+    """Take the steps of `state` to their end, as the `start` says. Without rest there is only an answer to a contradiction."""
     unsettled, trail = Unsettled(task, state), list[np.ndarray]()
     progress: Progress | None = None
     if not len(task):
@@ -74,11 +70,11 @@ def repeat(
         last = kind
         if asleep.all():
             continue
-        size, scaled = _take(step, unsettled, np.flatnonzero(~asleep), kind, stride)
-        rounding_counts = kind.newton or step.knows_walls or balances
+        size, scaled = _take(step, unsettled, np.flatnonzero(~asleep), kind, start.stride)
+        rounding_counts = kind.newton or step.knows_walls or start.balances
         moves = (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
         if kind.width > 1:
-            moves |= ~candidates.hold(unsettled.task, unsettled.state)
+            moves |= ~candidates.hold(unsettled.task, unsettled.state, guarded=start.guarded, parted=start.parted)
         # The smaller one tells: steps are large in freedoms that nothing holds, and in the norm of the objective if
         # Newton's curvature is stiff.
         unrest = np.minimum(size, scaled)
@@ -100,7 +96,9 @@ def repeat(
         if candidates.bounded:
             poses, deviations, slots = unsettled.state.relative, unsettled.task.deviations, unsettled.state.slots
             at_rest = (size[moves] < NEARLY_AT_REST) & kind.sharp
-            scans = candidates.scans(poses, deviations, slots=slots, width=kind.width, at_rest=at_rest)
+            scans = candidates.scans(
+                poses, deviations, slots=slots, width=kind.width, at_rest=at_rest, guarded=start.guarded, parted=start.parted
+            )
             unsettled.task = replace(unsettled.task, scans=scans)
         if kind.newton:
             penetration = _true_penetration(unsettled.task, unsettled.state)

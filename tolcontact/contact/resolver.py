@@ -7,7 +7,6 @@ far from the raw pose are tried again from other starts.
 
 import copy
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,32 +21,12 @@ from tolcontact.contact.record import accumulate_starts
 from tolcontact.contact.repeated_steps import repeat
 from tolcontact.contact.scan import min_gaps, undone
 from tolcontact.contact.springs import spring_misfit
+from tolcontact.contact.starts import BALANCE, GUARDED, OTHER_STARTS, OTHER_STARTS_CURVED, PARTED, Start
 from tolcontact.contact.state import NO_ANSWER, Resolved, State, Task
+from tolcontact.interference import ordered
 
-STRIDE, SMALL_STRIDE = 0.5, 0.05  # rad: the largest turn of a part in one step; linear rows are wrong long before
 SAME_CONFLICT = 1e-3  # share by which the penetration of two conflicts differs that are taken for the same
 MIN_GAIN = 1e-6  # of the objective, or mm of penetration: what another start must gain to be preferred
-
-
-class Start(NamedTuple):
-    """Where steps start, and how large they may be.
-
-    at_nominal   whether they start from the nominal instead of the raw place
-    projected    whether contact points are projected again, before every step, onto curved faces
-    stride       the largest turn of a part in one step [rad]
-    balances     whether steps end where they are rounding, though they may grow from there
-    """
-
-    at_nominal: bool = False
-    projected: bool = False
-    stride: float = STRIDE
-    balances: bool = False
-
-
-OTHER_STARTS = (Start(at_nominal=True), Start(stride=SMALL_STRIDE))  # if no face is curved
-OTHER_STARTS_CURVED = (Start(projected=True), Start(projected=True, at_nominal=True))
-# Planes at fixed points of a shaft leave it as it spins. If its spin is free, rounding grows until it falls through them.
-BALANCE = Start(balances=True)
 
 
 class ContactResolver:
@@ -81,6 +60,18 @@ class ContactResolver:
         """The rows of each pair in the QP."""
         return self._step.spans
 
+    @property
+    def watched(self) -> list[tuple[int, int]]:
+        """Pairs of bodies that lie in each other in no certified answer, whatever deviates: these are tested here."""
+        return [
+            ordered(pair.moving, pair.reference)
+            for k, pair in enumerate(self.contact_points)
+            if k in self._candidates.guards
+            and pair.reference is not None
+            and not any(pair.deviating)
+            and not self._candidates.guards[k].neighbours.varies
+        ]
+
     def raw_contact(
         self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
     ) -> tuple[Float[Array, "realization pair_of_group"], Int[Array, "realization pair_of_group"]]:
@@ -104,7 +95,9 @@ class ContactResolver:
         """
         relative = relative[:, self.pairs]
         survey = self._candidates.survey(relative, deviations)
-        moves = (survey.min_gap < -PENETRATION).any(axis=1) | self._method.minimizes.presses
+        moves = np.any(survey.min_gap < -PENETRATION, axis=1) | self._method.minimizes.presses
+        unseen = np.flatnonzero(~moves)
+        moves[unseen] = self._candidates.interfere(relative[unseen])
         touched = np.flatnonzero(moves)
         scans = [scan.take(touched) for scan in survey.scans]
         task = Task(
@@ -130,12 +123,14 @@ class ContactResolver:
             caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull far if nothing holds
             search(self._step, self._limits, self._candidates, self._energy_of, task, state, start.stride, caution)
         elif self._method.is_exact:
-            repeat(self._step, self._limits, self._candidates, task, state, start.stride, start.balances)
+            repeat(self._step, self._limits, self._candidates, task, state, start)
         else:
             self._step.take(task, state, stride=start.stride)
         state.searched[:] = projected
         self._leave_adrift(task, state)
-        scans = self._candidates.scans(state.relative, task.deviations, projected=projected, earlier=task.scans)
+        scans = self._candidates.scans(
+            state.relative, task.deviations, projected=projected, earlier=task.scans, parted=start.parted
+        )
         task = replace(task, scans=scans)
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
         if self._method.is_exact:
@@ -146,6 +141,8 @@ class ContactResolver:
                 depth[:, k] = misfit - state.slack[:, k]
             state.kkt_residual[:] = checked_residual(state, depth.max(axis=1))
         state.doubtful[:] = self._limits.is_doubtful(task, state, self._candidates)
+        certified = np.flatnonzero(state.rank == 0)
+        state.doubtful[certified] = self._candidates.interfere(state.relative[certified])
         if not projected:
             self._doubt_rolled(task, state)
 
@@ -171,8 +168,15 @@ class ContactResolver:
         """
         if self._candidates.curved:
             self._try_again(task, state, np.flatnonzero(state.rank == NO_ANSWER), BALANCE)
+        doubtful = np.flatnonzero(state.doubtful)
+        rows = doubtful[self._candidates.interfere(state.relative[doubtful])]
+        for start in GUARDED:
+            rows = self._try_again(task, state, rows, start)
         rows = np.flatnonzero((state.rank > 0) | ~self._limits.is_near(task, state))
         for start in OTHER_STARTS_CURVED if self._candidates.curved else OTHER_STARTS:
+            rows = self._try_again(task, state, rows, start)
+        rows = np.flatnonzero(state.rank == NO_ANSWER)
+        for start in PARTED if rows.size and self._candidates.partings else ():
             rows = self._try_again(task, state, rows, start)
 
     def _try_again(self, task: Task, state: State, rows: Int[Array, " n"], start: Start) -> Int[Array, " left"]:
@@ -181,7 +185,12 @@ class ContactResolver:
             return rows
         part = task.take(rows)
         poses, relative = self._at_nominal(part) if start.at_nominal else (part.raw, part.relative)
-        part = replace(part, scans=self._candidates.scans(relative, part.deviations, projected=start.projected))
+        part = replace(
+            part,
+            scans=self._candidates.scans(
+                relative, part.deviations, projected=start.projected, guarded=start.guarded, parted=start.parted
+            ),
+        )
         attempt = self._step.start(poses, relative)
         self._attempt(part, attempt, start)
         accumulate_starts(state, rows, attempt)

@@ -146,7 +146,8 @@ contact seat: plate -z (moving) against base +z (reference), spacing 5 mm
 
 Contact can move any part that is the moving side of a pair, or that has one-sided locators; prevent it with `fixed=True`. A
 part that is only ever a reference stays where its locators put it; let it move with `fixed=False`. All parts that contact can
-move are corrected together, each with six degrees of freedom, including parts that are located on other parts.
+move are corrected together, each with six degrees of freedom, also parts located on others. Other parts that lie in each
+other are named; `may_overlap(part, part)` states that it is meant (see `tolcontact.plausibility`).
 
 ## Forces
 
@@ -249,6 +250,7 @@ model's own, the defaults, or set by options.
 >>> tc.check(clamp)
 ('part "cover" (...): it is not located; call locate(...), or declare it fixed=True to hold it at its nominal place',)
 >>> place = clamp.locate(cover, tc.three_two_one(foot, side, cover.face("-x")), tolerance=0.1, on=plate)
+>>> meant = clamp.may_overlap(cover, plate)
 >>> tc.check(clamp)
 ()
 >>> nothing = tc.Assembly("nothing")
@@ -327,6 +329,7 @@ from tolcontact.declaration.measurement import (
     stations,
 )
 from tolcontact.declaration.mobility import has_supports, is_free, movers
+from tolcontact.declaration.overlap import Overlap
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.size import Size
@@ -336,12 +339,12 @@ from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import degrees
 
 __all__ = [
-    "OUTSIDE", "Angle", "Angularity", "Assembly", "AxisDistance", "Box", "Brep", "CircularRunout", "Clearance",
-    "Coaxiality", "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets", "Difference",
-    "Face", "Facing", "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance", "Geometry", "Inside",
-    "Joint", "Largest", "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean", "MeanGap", "Measure",
-    "Measurement", "Mesh", "Minimum", "Near", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin", "Point",
-    "Population", "Position", "Profile", "Roundness", "Size", "Station", "Straightness", "Sum", "Symmetry", "ThreeTwoOne",
-    "TitleBlock", "Tolerance", "TotalRunout",
-    "Triangles", "Variable", "degrees", "has_supports", "is_free", "movers", "stations", "three_two_one",
+    "OUTSIDE", "Angle", "Angularity", "Assembly", "AxisDistance", "Box", "Brep", "CircularRunout", "Clearance", "Coaxiality",
+    "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets", "Difference", "Face", "Facing",
+    "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance", "Geometry", "Inside", "Joint", "Largest",
+    "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean", "MeanGap", "Measure", "Measurement", "Mesh",
+    "Minimum", "Near", "Overlap", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin", "Point", "Population",
+    "Position", "Profile", "Roundness", "Size", "Station", "Straightness", "Sum", "Symmetry", "ThreeTwoOne", "TitleBlock",
+    "Tolerance", "TotalRunout", "Triangles", "Variable", "degrees", "has_supports", "is_free", "movers", "stations",
+    "three_two_one",
 ]  # fmt: skip

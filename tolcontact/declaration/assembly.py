@@ -18,6 +18,7 @@ from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.joint import Joint
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
+from tolcontact.declaration.overlap import Overlap
 from tolcontact.declaration.part import Feature, Part
 from tolcontact.declaration.sequence import in_order, joined_before, present_parts, sequence_faults, settings_of
 from tolcontact.declaration.size import Size
@@ -41,7 +42,7 @@ T = TypeVar("T")
 CONSTANT_SHARE = 1e-3  # of the widest zone: a narrower one counts as a constant
 MAX_COUNTS = {  # of what an assembly declares
     "parts": 1000, "locations": 1000, "pairs": 5000, "measures": 2000, "forces": 5000, "variables": 5000, "correlations": 5000,
-    "populations": 1000, "stations": 60, "joints": 1000,
+    "populations": 1000, "stations": 60, "joints": 1000, "overlaps": 1000,
 }  # fmt: skip
 
 
@@ -73,6 +74,7 @@ class Assembly(Declarations, Pictured):
     populations = Declared[Population]()
     stations = Declared[Station]()
     joints = Declared[Joint]()
+    overlaps = Declared[Overlap]()
 
     def __init__(
         self, name: str, *, method: Method | None = None, title_block: TitleBlock | None = None, mu: float | None = None
@@ -134,6 +136,12 @@ class Assembly(Declarations, Pictured):
     def population(self, source: Any, columns: Mapping[str, str] | None = None) -> Population:
         """Declare that contributors are drawn from measured rows: a CSV file, a DataFrame, a Dataset (see Population)."""
         return self._add("populations", _population(source, columns, script_line()))
+
+    def may_overlap(self, *parts: Part) -> Overlap:
+        """Declare that parts may lie in each other, any two of them, and are meant to (see Overlap)."""
+        for part in parts:
+            expect("may_overlap: an argument", part, Part, "parts, as in may_overlap(shaft, hub)")
+        return self._add("overlaps", Overlap(parts, script_line()))
 
     def location_of(self, part: Part) -> Location | None:
         """Return the location of `part`; None for a part that is not located."""
@@ -228,6 +236,7 @@ class Assembly(Declarations, Pictured):
             *(("contact pair", pair, pair.parts) for pair in self.pairs),
             *(("force", force, force.parts) for force in self.forces),
             *(("measurement", measure, measure.parts) for measure in self.measures),
+            *(("overlap", overlap, overlap.parts) for overlap in self.overlaps),
             *(("variable", variable, ()) for variable in self.variables),
             *(("correlation", correlation, ()) for correlation in self.correlations),
             *(("population", population, ()) for population in self.populations),
@@ -301,7 +310,7 @@ class Assembly(Declarations, Pictured):
     def __str__(self) -> str:
         causes = *self.variables, *self.correlations, *self.populations
         declared = (row for part in self.parts for row in (*part.toleranced, *part.targets))
-        rows = *self.parts, *declared, *causes, *self.locations, *self.pairs, *self.forces, *self.measures
+        rows = *self.parts, *declared, *causes, *self.locations, *self.pairs, *self.overlaps, *self.forces, *self.measures
         for scene, station in zip(self.scenes, self.stations, strict=False):
             settings = *scene.locations, *scene.pairs, *scene.forces, *scene.measures
             joined = [joint for joint in self.joints if joint.station == station.name]

@@ -39,6 +39,7 @@ from tolcontact.declaration.locator import PLACINGS, USUAL_STIFFNESS, Location, 
 from tolcontact.declaration.measure import Measure, Tape, tape_of
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.measurement_entry import MEASURED
+from tolcontact.declaration.overlap import Overlap
 from tolcontact.declaration.part import ASSOCIATIONS, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.place import EntryError, Place, Sources
 from tolcontact.declaration.size import MOVES, Size
@@ -50,7 +51,8 @@ from tolcontact.method import ACTIVE_SETS, OBJECTIVES, REGULARIZATIONS, RESOLUTI
 from tolcontact.poses import ENTRIES
 
 MAX_FREEDOMS = 7  # of a feature, with its size
-OF_STATIONS = ("stations", "joints")  # lists that a document without stations leaves out
+# Lists that a document leaves out if there is none of what they go with.
+GOES_WITH = {"stations": "stations", "joints": "stations", "overlaps": "overlaps"}
 
 
 class Shape(Choice):
@@ -256,6 +258,7 @@ RECORDS = {
     "populations": DocumentRecord(Population, "values columns source declared_at"),
     "stations": DocumentRecord(Station, "name declared_at"),
     "joints": DocumentRecord(Joint, "name members station declared_at"),
+    "overlaps": DocumentRecord(Overlap, "parts declared_at"),
 }  # fmt: skip
 DOCUMENT = msgspec.defstruct("Document", [
     ("name", str), ("parts", Items(RECORDS["parts"]).wire), ("measures", Items(RECORDS["measures"]).wire),
@@ -273,7 +276,7 @@ def to_document(
     lists = {
         name: [record.encode(thing, writing) for thing in getattr(assembly, name)]
         for name, record in RECORDS.items()
-        if name not in OF_STATIONS or assembly.stations
+        if name not in GOES_WITH or getattr(assembly, GOES_WITH[name])
     }
     titles = {} if assembly.title_block is None else {"title_block": TITLE_BLOCK.encode(assembly.title_block, writing)}
     friction = {} if assembly.mu is None else {"mu": float(assembly.mu)}

@@ -17,6 +17,7 @@ from tolcontact.geometry.kernel import (
     edge_on_edge,
     facet_on_corner,
 )
+from tolcontact.geometry.passed_kernel import drop_passed
 from tolcontact.geometry.vector_kernel import (
     cross,
     dot,
@@ -28,7 +29,6 @@ from tolcontact.geometry.vector_kernel import (
     row,
     row_of,
     turn,
-    turn_back,
 )
 
 MAX_SHEAR = 1.8  # by which a corner's place beside a facet changes with its height, where planes face each other
@@ -96,34 +96,6 @@ def _keep_shallowest(candidates, touching, gaps):  # type: ignore[no-untyped-def
             if candidates.planes[best] < 0:
                 gaps[best] = np.inf
             best = s
-
-
-@uncounted
-def _drop_passed(A, B, candidates, passed, X, touching, gaps, all_places, is_held):  # type: ignore[no-untyped-def]
-    """Drop places that lie nominally deeper than `passed` [mm], where a corner beside them is held: there the body came in.
-
-    Beside a place are the corner itself, and the ends of both edges. `is_held` (corner,) is false before and after, of the
-    corners of the moving and then of the reference body.
-    """
-    places, feet, normals = all_places
-    count = A.vertices.shape[0]
-    for is_first in (True, False):
-        for s in touching:
-            is_edge = candidates.kinds[s] == EDGE_ON_EDGE
-            owner = candidates.firsts[s] if candidates.kinds[s] == CORNER_ON_FACET else count + candidates.seconds[s]
-            n, nominal = row(normals, s), minus(row(places, s), row(feet, s))
-            has_passed = max(dot(n, nominal), dot(turn_back(X, n), nominal)) < -passed  # whichever body the normal belongs to
-            if is_first and not is_edge and not has_passed and gaps[s] <= INSIDE:
-                is_held[owner] = True
-            elif not is_first and has_passed and candidates.planes[s] < 0 and gaps[s] < -INSIDE:
-                if is_edge:
-                    for end in range(2):
-                        is_at_A = is_held[A.ends[candidates.firsts[s], end]]
-                        if is_at_A or is_held[count + B.ends[candidates.seconds[s], end]]:
-                            gaps[s] = np.inf
-                elif is_held[owner]:
-                    gaps[s] = np.inf
-    is_held[:] = False
 
 
 @inlined_uncounted
@@ -231,7 +203,7 @@ def _find_at(A, B, candidates, reach, margins, nearness, retained, X, moved, tou
                 if gaps[s] < np.inf:
                     touching[count], count = s, count + 1
             s += 1
-    _drop_passed(A, B, candidates, reach[2], X, touching[:count], gaps, all_places, is_held)
+    drop_passed(A, B, candidates, reach[2], X, touching[:count], gaps, all_places, is_held)
     _keep_shallowest(candidates, touching[:count], gaps)
     strict = count
     for s in retained:

@@ -57,7 +57,7 @@ class Polyhedron:
 def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
     """Return the polyhedron of a face of a body, both in their nominal places.
 
-    Facets of the body count as a whole, also where the face was cut out of them: the body does not end there. If its file
+    Planes of the body count as a whole, also where the face was cut out of them: the body does not end there. If its file
     rounds coordinates, it is smaller by their error.
     """
     merged = trimesh.Trimesh(body.vertices, body.faces, process=False)
@@ -68,9 +68,6 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
         merged = trimesh.Trimesh(inset(merged, error), merged.faces, process=False)
     vertices, faces = np.asarray(merged.vertices), np.asarray(merged.faces)
     facet_normals = np.asarray(merged.face_normals)
-    chosen = np.unique(numbers)
-    is_chosen = np.zeros(len(faces), dtype=bool)
-    is_chosen[chosen] = True
     outer_ends, edge, triangles_there = edges(faces)
     is_open = triangles_there[edge] == 1
     lone = np.flatnonzero(is_open)[:, None] // 3
@@ -79,6 +76,8 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
     is_sharp = np.concatenate([np.asarray(merged.face_adjacency_angles) > SHARP_ANGLE, np.ones(len(lone), dtype=bool)])
     is_convex = np.concatenate([merged.face_adjacency_convex, np.ones(len(lone), dtype=bool)])
     planes = trimesh.graph.connected_component_labels(neighbours[~is_sharp], node_count=len(faces))
+    is_chosen = np.isin(planes, planes[numbers])
+    chosen = np.flatnonzero(is_chosen)
     is_ours = is_sharp & is_chosen[neighbours].any(axis=1)
     start, end = vertices[ends[:, 0]], vertices[ends[:, 1]]
     along = (end - start) / np.linalg.norm(end - start, axis=1)[:, None]

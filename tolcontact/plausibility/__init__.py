@@ -28,6 +28,7 @@ displacement from the nominal place; absolute=True measures the coordinate
 | `[direction]` | locators whose directions all fit in the assembly frame alone; one-sided ones that point out of their part |
 | `[tolerance]` | zones wider than half of their part; locators that turn their part by more than 45 degrees at three sigma |
 | `[overlap]` | faces of a contact pair, or bodies that are no pair, that lie in each other |
+| `[clash]` | bodies that tolerances put into each other, though no contact is declared that holds them apart there |
 | `[gap]` | faces of a contact pair that are too far apart to touch |
 | `[limits]` | limits that exclude the nominal value, or that are more than 100 sigma away from it |
 | `[reach]` | clearances by triangles whose faces move so far that other triangles may be nearer |
@@ -40,6 +41,42 @@ other contact may push them. Both come from 128 draws without contact. With the 
 is too large. The overlap of two bodies is the diameter of the largest ball that lies in both; it counts from a fiftieth of the
 thinner body on, and beyond the height of round faces over their triangles. Bodies that are not closed are left out, and so is
 an overlap at the wall of a hole in which one of the bodies is located: screws are thicker than their threads.
+
+## Clashes
+
+Contact acts between faces that are declared. A block that is located 0.05 mm from a wall may lie in it in every third
+realization, and nothing pushes it out: what is measured there is not what would be measured. Bodies of the 128 draws are
+tested by their triangles, which is complete, and those that contact may move are resolved before. A pair counts from a depth
+of 1/1000 of the smallest tolerance on, and if it does not lie in each other nominally. The warning names the faces that meet.
+
+>>> nook = tc.Assembly("nook")
+>>> table = nook.part("table", tc.Box(100, 50, 10), fixed=True)
+>>> wall = nook.part("wall", tc.Box(10, 50, 40), at=(-10, 0, 10), fixed=True)
+>>> block = nook.part("block", tc.Box(50, 25, 10), at=(0.05, 12.5, 10))
+>>> location = nook.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("+x")), tolerance=0.6)
+>>> pair = nook.contact("seat", moving=block.face("-z"), reference=table.face("+z"))
+>>> height = nook.measure("height", block.point(50, 0, 10), along="z", tolerance=1)
+>>> with warnings.catch_warnings(record=True) as caught:
+...     program = tc.build(nook)
+>>> print(caught[0].message)
+[clash] part "block" (...): it lies in part "wall" in ... % of 128 draws, up to ... mm, near (...), and no contact holds them
+apart; declare it: assembly.contact("block on wall", moving=block.face("-x"), reference=wall.face("+x")), or say that it is
+meant: assembly.may_overlap(wall, block)
+
+Press fits, welds and parts that are modelled overlapping are meant: `may_overlap(part, part, ...)` says so of any two of its
+parts. Neither a check nor a run watches these bodies, and a contact pair between them holds for its chosen faces alone.
+
+>>> nook.may_overlap(wall, block)
+overlap of wall, block
+>>> with warnings.catch_warnings(record=True) as caught:
+...     program = tc.build(nook)
+>>> caught
+[]
+
+Two bodies whose contact is declared may still meet beyond the chosen faces: the block on one leg of an L, against its other
+one. An exact resolution does not certify such realizations (they are `doubtful`), and the warning names the faces to add.
+A run counts realizations with clashes, and its summary states their share (see
+`tolcontact.archive`).
 
 ## Silence
 

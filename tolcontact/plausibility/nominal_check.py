@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from tolcontact.compilation import Program
 from tolcontact.errors import NominalWarning, shown
 from tolcontact.plausibility.body_overlaps import body_overlaps
+from tolcontact.plausibility.clashes import clashes, clashes_beyond_faces
 from tolcontact.plausibility.declared_points import far_points, unfit_directions
 from tolcontact.plausibility.magnitudes import rotations, wide_tolerances
 from tolcontact.plausibility.measure_limits import measure_limits
@@ -21,6 +22,7 @@ KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
     "direction": (unfit_directions,),
     "tolerance": (wide_tolerances,),
     "overlap": (pair_overlaps, body_overlaps),
+    "clash": (clashes, clashes_beyond_faces),
     "gap": (pair_clearances,),
     "limits": (measure_limits,),
     "reach": (measured_reach,),

@@ -9,6 +9,8 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import Program
 from tolcontact.compilation.bounded_pairs import TRIAL_SEED, push
+from tolcontact.interference import Clash
+from tolcontact.simulation import Block, simulate_block
 
 DRAWS = 128
 POINTS_AT_ONCE = 100_000
@@ -58,6 +60,16 @@ class TrialDraws:
         P_m, P_r, n_r = pair.P_m[chosen_points], pair.P_r[chosen_points], pair.n_r[chosen_points]
         gaps = ((pose.apply(X_RM, P_m) - P_r) * n_r).sum(axis=2) - pair.heights(deviations)[:, None]
         return gaps - pair.form_heights(deviations, chosen_points)
+
+    @cached_property
+    def clashes(self) -> list[Clash]:
+        """Pairs of bodies that lie in each other in some draws."""
+        return list(self.program.watch.clashes(self.poses, self.deviations))
+
+    @cached_property
+    def resolved(self) -> Block:
+        """The same draws with contact."""
+        return simulate_block(self.program, self.deviations)
 
     @cached_property
     def pushes(self) -> list[float]:

@@ -13,6 +13,7 @@ from tolcontact.contact import ContactResolver, Resolved
 from tolcontact.contact.record import Record, join_groups, untouched_numbers
 from tolcontact.mechanics import ENTRIES
 from tolcontact.readable import Readable
+from tolcontact.simulation.bodies import watched_bodies
 from tolcontact.simulation.sequence import Beginning, hand_over, stages
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
@@ -28,6 +29,11 @@ class Block(Record, Readable):
     active        (n, pair): number of active contact points in the raw state
     carrying      (n, pair): number of contact points under load: with more than 1e-4 of the largest reaction
     reaction      (n, pair): sum of their reactions, in the units of the objective
+    clashes       (n,): number of pairs of parts without declared contact that lie in each other in the corrected state; -1 if
+                  they were not tested
+    clash_depth   (n,) [mm]: how deep the parts of the deepest of these pairs do, NaN if that is not measured; clash_part,
+                  clash_other (n,) are their indices among the parts of the assembly, -1 for none. Without such a pair they name
+                  parts with declared contact that make the answer doubtful
     status        (n,), Status: with stations, that of the worst station
     station_status  (n, station), Status
 
@@ -43,6 +49,10 @@ class Block(Record, Readable):
     active: Int[Array, "n pair"] = field(metadata={"variable": terms.ACTIVE})
     carrying: Int[Array, "n pair"] = field(metadata={"variable": terms.CARRYING})
     reaction: Float[Array, "n pair"] = field(metadata={"variable": terms.REACTION})
+    clashes: Int[Array, " n"] = field(metadata={"variable": terms.CLASHES})
+    clash_depth: Float[Array, " n"] = field(metadata={"variable": terms.CLASH_DEPTH})
+    clash_part: Int[Array, " n"] = field(metadata={"variable": terms.CLASH_PART})
+    clash_other: Int[Array, " n"] = field(metadata={"variable": terms.CLASH_OTHER})
     status: Int[Array, " n"] = field(metadata={"variable": terms.STATUS})
     station_status: Int[Array, "n station"]
 
@@ -81,6 +91,10 @@ class Block(Record, Readable):
             active=np.zeros((count, pairs), dtype=int),
             carrying=np.zeros((count, pairs), dtype=int),
             reaction=np.zeros((count, pairs)),
+            clashes=np.full(count, -1),
+            clash_depth=np.zeros(count),
+            clash_part=np.full(count, -1),
+            clash_other=np.full(count, -1),
             status=np.full(count, terms.Status.UNTOUCHED, dtype=np.int8),
             station_status=np.full((count, stations), terms.Status.UNTOUCHED, dtype=np.int8),
         )
@@ -136,6 +150,22 @@ def simulate_block(
             if is_placed_again:
                 _put_raw(block, resolver, changed, raw_relative)
             worst[resolved.touched] = np.maximum(worst[resolved.touched], _outcome(resolved))
+    if program.method.is_bounded:
+        worst = outcomes_by_stage.max(axis=1)
+        bodies = watched_bodies(
+            program,
+            block.poses[:, CORRECTED],
+            deviations,
+            start=start,
+            tested=[pair for resolver in resolvers for pair in resolver.watched],
+            is_doubtful=worst == Outcome.DOUBTFUL,
+            is_certified=worst <= Outcome.RESOLVED,
+        )
+        block.clashes[:], block.clash_depth[:] = bodies.clashes, bodies.depth
+        block.clash_part[:], block.clash_other[:] = bodies.part, bodies.other
+        for station, rows in bodies.withdrawn:
+            worst = outcomes_by_stage[:, station]
+            worst[rows] = np.where(worst[rows] <= Outcome.RESOLVED, Outcome.DOUBTFUL, worst[rows])
     is_unknown |= ~np.isfinite(begin.poses).all(axis=(1, 2))
     outcomes_by_stage[is_unknown], block.kkt_residual[is_unknown] = Outcome.UNSOLVED, np.inf
     worst = outcomes_by_stage.max(axis=1)

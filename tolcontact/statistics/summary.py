@@ -11,6 +11,7 @@ from tolcontact.labelled import Results, Rows, Table
 from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import contact, intervals
 from tolcontact.statistics.checked_surfaces import surface_values
+from tolcontact.statistics.clashes import Clashes
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.measure_statistics import STATISTICS, MeasuredValues, limits, measure_estimates
 from tolcontact.vocabulary import ArchiveVariable
@@ -25,7 +26,7 @@ def summary_table(results: Results) -> Table:
         raise ArchiveError(f"{count} realizations are finished, too few for statistics; continue with --resume")
     rows = results.to_dataset().isel({terms.REALIZATION: slice(count)})
     combinations, smallest, of_measures = contact.combinations(rows), _smallest_range(results, rows), measure_estimates(rows)
-    rigid = _is_rigid(results)
+    rigid, clashes = _is_rigid(results), Clashes(rows)
     values = {
         terms.STATISTIC_VALUE: of_measures.statistics,
         terms.CHANGE: of_measures.changes,
@@ -34,13 +35,15 @@ def summary_table(results: Results) -> Table:
         terms.PAIR_COORDINATES: _stored_coordinates(results, terms.STATED_ERROR_SHARE * smallest),
         terms.STEPS: _steps(rows),
         terms.PENETRATION: _penetration(rows, rigid),
+        **clashes.values(),
         **surface_values(results, terms.NOTICED_SHARE * smallest),
         **_field_values(results),
     }
     units = {terms.PAIR_REACTION: {"units": rows[terms.REACTION.name].attrs.get("units", "1")}}
     return Table(
         {variable.name: variable.entry(array, **units.get(variable, {})) for variable, array in values.items()},
-        _coordinates(rows, combinations) | {terms.MEASURE_STOPS: (terms.MEASURE, of_measures.stops)},
+        _coordinates(rows, combinations)
+        | {terms.MEASURE_STOPS: (terms.MEASURE, of_measures.stops), terms.CLASH: clashes.labels},
         {
             "title": results.attrs.get("title", ""),
             "realizations": count,
@@ -49,6 +52,8 @@ def summary_table(results: Results) -> Table:
             "search": results.attrs.get("search", "fixed"),  # formats 1 and 2 do not say it
             "datum_shifts": ", ".join(_datum_shifts(results)),
             "smallest_range": smallest,
+            terms.INTERFERENCE_DEPTH: float(results.attrs.get(terms.INTERFERENCE_DEPTH, np.nan)),
+            terms.NOT_WATCHED: str(results.attrs.get(terms.NOT_WATCHED, "")),
         },
     )
 

@@ -26,6 +26,10 @@ def summarize(results: Results) -> Summary:
     not_assemblable (interval)                           share of realizations without a pose free of penetration
     conflicts       (pair)                               in how many of these a pair is among those in conflict
     penetration     (state)                              largest true penetration in a pair that does not give way [mm]
+    watched                                              number of realizations whose bodies were tested for interference
+    clash_share     (interval)                           share of these in which parts without contact lie in each other
+    clash_count, clash_largest_depth (clash)             in how many realizations two parts lie deepest, how deep [mm]
+    clash_declared  (clash)                              1: their contact is declared, and these realizations are doubtful
     surface_penetration, beside   largest of the realizations that were checked against the surfaces [mm]: how deep a face lies
                                   in the other body, and how far contact points that touch stand beside the face
     surfaces_checked              number of these realizations

@@ -1,13 +1,14 @@
-"""Assertions for tests of your own models: resolved realizations, correct archived gaps, identical runs.
+"""Assertions for tests of your own models: resolved realizations, no clashes, correct archived gaps, identical runs.
 
 `results` is the tree that `tc.run` or `tc.open_archive` returns, or the path of an archive.
 
     import tolcontact as tc
-    from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
+    from tolcontact.testing import assert_gaps_recompute, assert_no_clashes, assert_resolved, assert_same_run
 
     def test_my_assembly():
         results = tc.run("models/ra1.py", samples=200, seed=1)
         assert_resolved(results)
+        assert_no_clashes(results)
         assert_gaps_recompute(results)
         assert_same_run(results, "expected.nc")
 """
@@ -46,6 +47,25 @@ def assert_resolved(results: Results) -> None:
     if unresolved.any():
         by_status = [f"{_meaning(code)} {_listed(numbers[status == code])}" for code in np.unique(status[unresolved])]
         raise AssertionError(f"{unresolved.sum()} of {status.size} realizations are not resolved: {', '.join(by_status)}")
+
+
+def assert_no_clashes(results: Results) -> None:
+    """Assert that all bodies were tested in every realization, and none without declared contact lie in each other.
+
+    Raises AssertionError with the number of realizations in which parts do, or that were not tested, and the first of them.
+    """
+    with _opened(results) as tree:
+        rows, numbers = _rows(tree), _numbers(tree)
+        if terms.CLASHES.name not in rows:
+            raise AssertionError(f'bodies were not tested: the archive has no variable "{terms.CLASHES.name}"')
+        clashes, names = rows[terms.CLASHES.name].values, [str(name) for name in tree.to_dataset()[terms.PART].values]
+        parts = [rows[variable.name].values for variable in (terms.CLASH_PART, terms.CLASH_OTHER)]
+    if (clashes < 0).any():
+        raise AssertionError(f"bodies were not tested in {_listed(numbers[clashes < 0])} realizations; resolve them exactly")
+    if (clashes > 0).any():
+        first, second = (names[index[clashes > 0][0]] for index in parts)
+        listed = _listed(numbers[clashes > 0])
+        raise AssertionError(f'parts lie in each other in {listed} realizations, first "{first}" and "{second}"')
 
 
 def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) -> None:

@@ -2,6 +2,7 @@
 
 import unicodedata
 
+from tolcontact.vocabulary.clashes import CLASH_DEPTH, CLASH_OTHER, CLASH_PART, CLASHES
 from tolcontact.vocabulary.labels import (
     AXIS,
     BLOCK,
@@ -177,6 +178,10 @@ ROWS = (
     STARTS,
     SECOND_ANSWERS,
     SEARCHED,
+    CLASHES,
+    CLASH_DEPTH,
+    CLASH_PART,
+    CLASH_OTHER,
     STATUS,
 )
 POSES = (TRANSLATION, ROTATION)

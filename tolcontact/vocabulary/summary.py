@@ -31,6 +31,7 @@ EXTREMES = ("least", "largest")
 REACTION_PERCENTILES = (5, 50, 95)
 OF_REACTION, COMBINATION = "of_reaction", "combination"
 REACTION_STATISTICS = (MEAN, *(f"{percent} %" for percent in REACTION_PERCENTILES))  # labels of `of_reaction`
+CLASH = "clash"  # two parts that lie in each other, as "part / part"
 MIDDLES = ("median", "largest")  # labels of `of_iterations`
 MEASURE_LIMITS = (*(f"measure_{bound}" for bound in BOUNDS), "measure_accuracy")  # coordinates: see Limits
 MEASURE_STOPS = "measure_stops"  # coordinate: the sides at which corrected values stop, such as "lower"
@@ -63,6 +64,23 @@ CARRIED_TOGETHER = ArchiveVariable(
     "together", (COMBINATION, INTERVAL), "f8", "share of realizations in which exactly these pairs carry", "1"
 )
 STEPS = ArchiveVariable("iterations", (OF_ITERATIONS,), "f8", "linear steps of the realizations that contact touched", "1")
+WATCHED = ArchiveVariable("watched", (), "i8", "number of realizations in which all bodies were tested for interference", "1")
+CLASH_SHARE = ArchiveVariable(
+    "clash_share",
+    (INTERVAL,),
+    "f8",
+    "share of these realizations in which parts without declared contact lie in each other; NaN: none was tested",
+    "1",
+)
+CLASH_COUNT = ArchiveVariable(
+    "clash_count", (CLASH,), "i8", "number of realizations in which two parts are those that lie deepest in each other", "1"
+)
+CLASH_LARGEST_DEPTH = ArchiveVariable(
+    "clash_largest_depth", (CLASH,), "f8", "how deep they do at most; NaN: not measured", "mm"
+)
+CLASH_DECLARED = ArchiveVariable(
+    "clash_declared", (CLASH,), "i1", "1: their contact is declared, and these realizations are doubtful", "1"
+)
 PENETRATION = ArchiveVariable("penetration", (STATE,), "f8", "largest true penetration of any contact point", "mm")
 DEEPEST_SURFACE = ArchiveVariable(
     "surface_penetration", (), "f8", "largest depth of a face in the other body, of the realizations that were checked", "mm"

@@ -60,6 +60,10 @@ def _sections(summary: Rows) -> Iterator[Text | FigureTable | Padding]:
     yield Text(f"{ESTIMATES_NOTE}.\nChanges are from the same draws.\n")
     yield FigureTable(overview_columns(), overview_rows(summary))
     yield from map(Text, verdict_lines(summary))
+    if (share := summary["clash_share"].values)[0] > 0:
+        yield Text(
+            f"verdicts do not hold in {percent(share)} of realizations: parts without contact lie in each other (see below)"
+        )
     for measure in summary["measure"].values:
         yield from _measure_section(summary.sel(measure=measure))
     magnitudes = int(summary["magnitude_realizations"])
@@ -184,7 +188,8 @@ def contact_lines(summary: Rows, count: int) -> Iterator[str]:
     if unconverged := by_status["not_converged"]:
         yield f"not converged: {unconverged} of {count}; the statistics include their last poses"
     if doubtful := by_status["doubtful"]:
-        yield f"doubtful: {doubtful} of {count} answers lie too far from the pose without contact to be certified"
+        yield from _doubts(summary, int(doubtful), count)
+    yield from _clashes(summary, count)
     raw, corrected = (settled(float(summary["penetration"].sel(state=state))) for state in (RAW, CORRECTED))
     median, largest = summary["iterations"].values
     steps = f", {median:g} steps (median), {largest:g} at most" if summary.attrs["resolution"] == "exact" else ""
@@ -197,6 +202,48 @@ def contact_lines(summary: Rows, count: int) -> Iterator[str]:
     yield f"largest penetration at contact points: {raw:.3g} mm without, {corrected:.3g} mm with contact"
     yield from _between(summary, count)
     yield from _advice(summary, corrected)
+
+
+def _doubts(summary: Rows, doubtful: int, count: int) -> Iterator[str]:
+    """Yield lines about answers that are not certified."""
+    in_bodies = min(int(summary["clash_count"].values[summary["clash_declared"].values == 1].sum()), doubtful)
+    if in_bodies < doubtful:
+        number_far = f"{doubtful - in_bodies} of {count}"
+        yield f"doubtful: {number_far} answers lie too far from the pose without contact to be certified"
+    if in_bodies:
+        parts = ", ".join(_clashes_of(summary, is_declared=True))
+        yield f"doubtful: in {in_bodies} of {count} answers bodies with declared contact still lie in each other: {parts}"
+        yield "advice: they probably meet beyond the chosen faces; tolcontact check names these, and writes the lines to add"
+
+
+def _clashes(summary: Rows, count: int) -> Iterator[str]:
+    """Yield lines about bodies that lie in each other though no contact holds them apart, and about the test of all bodies."""
+    watched, share = int(summary["watched"]), summary["clash_share"].values
+    if not watched:
+        is_linear = summary.attrs["resolution"] == "linearized"
+        reason = "by a linearized resolution" if is_linear else "in this archive"
+        yield f"bodies were not tested for interference {reason}: certificates hold for contact points"
+        return
+    if share[0] > 0:
+        yield f"parts without declared contact lie in each other: {percent(share)} of realizations; verdicts do not hold there"
+        yield f"these parts, where they lie deepest: {', '.join(_clashes_of(summary, is_declared=False))}"
+        yield "advice: declare their contact, or that it is meant: assembly.may_overlap(...); tolcontact check writes the lines"
+    extent = f"all {grouped(watched)}" if watched == count else f"{grouped(watched)} of {grouped(count)}"
+    depth = summary.attrs["interference_depth"]
+    unless = "" if share[0] > 0 else "no bodies lie in each other in certified realizations: "
+    yield f"{unless}complete test of interference to {depth:.2g} mm in {extent} realizations"
+    if summary.attrs["not_watched"]:
+        yield f"not tested for interference: {summary.attrs['not_watched']}"
+
+
+def _clashes_of(summary: Rows, *, is_declared: bool) -> list[str]:
+    """Return the pairs of parts that lie in each other, with the number of realizations and the largest depth."""
+    columns = [summary[name].values for name in ("clash", "clash_count", "clash_largest_depth", "clash_declared")]
+    texts = []
+    for name, count, depth, declared in zip(*columns, strict=True):
+        if bool(declared) == is_declared:
+            texts.append(f"{name} ({grouped(int(count))}{f', up to {depth:.2g} mm' if math.isfinite(depth) else ''})")
+    return texts
 
 
 def _between(summary: Rows, count: int) -> Iterator[str]:

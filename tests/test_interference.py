@@ -1,0 +1,193 @@
+"""The complete test whether bodies lie in each other, against linear programmes and closed forms."""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+import tolcontact as tc
+from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER
+from tolcontact.geometry.meeting import Meeting
+from tolcontact.interference import Neighbours, deviating_solid, solid
+from tolcontact.poses import AT_REST
+
+INSETS = (1e-4, 2e-4)
+BOX = ((0, 0, 0), (10, 10, 10))
+
+
+def body(mesh):
+    closed = solid(mesh)
+    return deviating_solid(closed, [], np.zeros(len(closed.faces)))
+
+
+def box(lower, upper):
+    return trimesh.creation.box(bounds=[lower, upper])
+
+
+def pose(shift=(0, 0, 0), turn=(0, 0, 0)):
+    return np.r_[Rotation.from_rotvec(turn).as_matrix().ravel(), shift]
+
+
+def neighbours(A, B, reach=1.0):
+    return Neighbours(body(A), body(B), INSETS, reach)
+
+
+def common_ball(A, B, X):
+    """The radius of the largest ball in two convex bodies, A at X; negative if they are apart."""
+    rows = []
+    for mesh, R, t in ((A, X[:9].reshape(3, 3), X[9:]), (B, np.eye(3), np.zeros(3))):
+        planes = ConvexHull(mesh.vertices).equations
+        normals = planes[:, :3] @ R.T
+        rows.append(np.c_[normals, np.ones(len(normals)), normals @ t - planes[:, 3]])
+    rows = np.concatenate(rows)
+    bounds = [(None, None)] * 4
+    best = linprog([0, 0, 0, -1], A_ub=rows[:, :4], b_ub=rows[:, 4], bounds=bounds, method="highs")
+    return -best.fun if best.status == 0 else np.nan
+
+
+@pytest.mark.parametrize(
+    "A, B, shift, is_inside",
+    [
+        (BOX, BOX, (0, 0, 0), True),  # equal bodies
+        (BOX, BOX, (0, 0, 9.99), True),  # flush, one sunk into the other
+        (BOX, BOX, (0, 0, 10), False),  # one lies on the other
+        (BOX, BOX, (10, 0, 0), False),  # side by side, flush
+        (BOX, BOX, (10, 10, 0), False),  # edge along edge
+        (BOX, BOX, (10, 10, 10), False),  # corner on corner
+        (((3, 0, 0), (5, 1, 1)), ((0, 0, 0), (10, 1, 1)), (0, 0, 0), True),  # a slab in a bar of its section
+        (((-20, -1, 0), (20, 1, 1)), ((-1, -20, 0), (1, 20, 1)), (0, 0, 0), True),  # bars of one height that cross
+        (((-20, -1, 0), (2, 1, 1)), ((-1, -20, 0), (1, 2, 1)), (0.3, 0.4, 0), True),  # their centres are in neither
+        (((3, 3, 3), (5, 5, 5)), BOX, (0, 0, 0), True),  # inside
+        (((3, 3, 3), (5, 5, 5)), BOX, (40, 0, 0), False),
+        (((33, 3, 3), (35, 5, 5)), BOX, (-30, 0, 0), True),  # moved inside
+        (((0, 0, 10), (10, 10, 10.1)), BOX, (0, 0, -5), True),  # a sheet
+        (((0, 0, 10), (10, 10, 10.1)), BOX, (0, 0, -10.2), False),  # a sheet that passed through
+    ],
+)
+@pytest.mark.parametrize("turn", [(0, 0, 0), (0.3, -1.1, 0.7)])
+def test_flush_bodies(A, B, shift, is_inside, turn):
+    R, moved = Rotation.from_rotvec(turn).as_matrix(), [box(*A), box(*B)]
+    for mesh in moved:
+        mesh.vertices = mesh.vertices @ R.T
+    for first, second, way in ((*moved, R @ shift), (*moved[::-1], -R @ np.array(shift))):
+        assert neighbours(first, second).interfere(pose(way)[None])[0] == is_inside
+
+
+def test_bodies_of_cubes_and_octahedra_share_their_middle_though_no_edge_enters_the_other():
+    cube, octahedron = box((-1, -1, -1), (1, 1, 1)), trimesh.convex.convex_hull(np.vstack([2 * np.eye(3), -2 * np.eye(3)]))
+    assert neighbours(cube, octahedron).interfere(AT_REST[None])[0]
+
+
+def test_random_convex_bodies_are_judged_as_a_linear_programme_judges_them():
+    rng, judged, inside = np.random.default_rng(0), 0, 0
+    for _ in range(60):
+        points = [rng.choice([-10.0, -5.0, 0.0, 5.0, 10.0], size=(rng.integers(5, 9), 3)) for _ in range(2)]
+        if any(np.linalg.matrix_rank(corners - corners[0]) < 3 for corners in points):
+            continue
+        A, B = (trimesh.convex.convex_hull(corners) for corners in points)
+        pair = neighbours(A, B, reach=float(rng.choice([0.1, 5.0, 50.0])))
+        shifts = rng.random((12, 1)) * (0, 0, 20) + rng.normal(size=(12, 3)) * rng.integers(0, 2)
+        poses = np.array([pose(shift, rng.normal(size=3) * 0.1 * rng.integers(0, 2)) for shift in shifts])
+        found, radii = pair.interfere(poses), np.array([common_ball(A, B, X) for X in poses])
+        sure = (radii < INSETS[0]) | (radii > 2 * sum(INSETS))  # radii of balls in between depend on the corner
+        np.testing.assert_array_equal(found[sure], radii[sure] > INSETS[0])
+        depths = pair.measured(poses[found]).depths
+        assert (depths > 0.5 * radii[found]).all()
+        judged, inside = judged + sure.sum(), inside + found.sum()
+    assert judged > 400 and 100 < inside < judged - 100
+
+
+def test_bodies_part_along_the_direction_in_which_they_share_least():
+    pair = neighbours(box((0, 0, 10), (10, 10, 20)), box((-5, -5, 0), (15, 15, 10)))
+    X = pose((0, 0, -0.3), (0.001, 0, 0))[None]
+    way = pair.ways_out(X)
+    np.testing.assert_allclose(way.normals[0], (0, 0, 1), atol=2e-3)
+    np.testing.assert_allclose(way.widths[0], 0.3, atol=2e-3)
+    moved = X + np.r_[np.zeros(9), way.widths[0] * way.normals[0]]
+    assert pair.interfere(X)[0] and not pair.interfere(moved)[0]
+
+
+def test_vertices_stay_on_planes_that_deviate():
+    closed = solid(box(*BOX))
+    top = np.flatnonzero(closed.normals[:, 2] > 0.5)
+    side = np.flatnonzero(closed.normals[:, 0] > 0.5)
+    heights = [np.full((2, 3, 1), 1.0), np.full((2, 3, 1), 1.0)]
+    faces = [(top, np.array([0]), heights[0]), (side, np.array([2]), heights[1])]
+    vertices, shifts = deviating_solid(closed, faces, np.zeros(12)).shifts(np.array([[0.3, 9.0, -0.2]]))
+    expected = np.zeros((8, 3))
+    expected[closed.vertices[:, 2] > 5, 2], expected[closed.vertices[:, 0] > 5, 0] = 0.3, -0.2
+    moved = np.zeros((8, 3))
+    moved[vertices] = shifts[0]
+    np.testing.assert_allclose(moved, expected, atol=1e-12)
+
+
+ROOF = [(-12, 0, 0), (5, 0, 0), *[(x, y, -10) for x in (-12, 12) for y in (-10, 10)]]  # its ridge ends below the plate
+PLATE = [(x, y, z) for x in (-10, 10) for y in (-10, 10) for z in (0, 8)]
+PYRAMID = [(0, 0, 0), *[(x, y, 8) for x in (-10, 10) for y in (-10, 10)]]
+POST = [(x, y, z) for x in (-0.2, 12) for y in (-12, 12) for z in (-10, 0)]  # its rim is below the tip of the pyramid
+SPIRE = [(-9.9, 0, 0), *[(x, y, -10) for x in (-12, 12) for y in (-10, 10)]]
+
+
+@dataclass(frozen=True, eq=False)
+class LackingMeeting(Meeting):
+    """A list of places without those of one kind."""
+
+    lacks: int
+
+    def at(self, *arguments, **options):
+        places = super().at(*arguments, **options)
+        is_left_out = (places.labels >= 0) & (self.kinds[np.maximum(places.labels, 0)] == self.lacks)
+        places.gaps[is_left_out], places.labels[is_left_out] = np.inf, -1
+        return places
+
+
+def set_down(moving, fixed):
+    """A convex body on another one, of these corners."""
+    model = tc.Assembly("set down")
+    bodies = [trimesh.convex.convex_hull(np.array(corners, dtype=float)) for corners in (moving, fixed)]
+    upper, lower = model.part("upper", tc.Mesh(bodies[0])), model.part("lower", tc.Mesh(bodies[1]), fixed=True)
+    feet = [tc.Locator(f"A{k}", foot, "z") for k, foot in enumerate([(-8, -8, 8), (8, -8, 8), (0, 8, 8)])]
+    sides = [tc.Locator("B1", (-8, 0, 8), "y"), tc.Locator("B2", (8, 0, 8), "y"), tc.Locator("C", (0, 0, 8), "x")]
+    model.locate(upper, [*feet, *sides], tolerance=1)
+    model.contact("seat", moving=upper.face(), reference=lower.face())
+    model.measure("z", upper.point(0, 0, 8), along="z", tolerance=1)
+    return model, bodies
+
+
+def simulated(model, samples):
+    return tc.run(model, samples=samples, seed=1, fields="none", surfaces=0)
+
+
+def radii(run, bodies, part="upper"):
+    """The radii of the largest balls that the bodies share in certified realizations."""
+    certified = np.flatnonzero(np.isin(run.status, [0, 1]))
+    R = run.rotation.sel(state="corrected", part=part).values[certified].reshape(-1, 9)
+    t = run.translation.sel(state="corrected", part=part).values[certified]
+    return np.array([common_ball(*bodies, X) for X in np.hstack([R, t])])
+
+
+@pytest.mark.parametrize("start", [-10, -12])
+def test_a_ridge_that_ends_below_a_plate_is_in_no_certified_plate(start):
+    model, bodies = set_down(PLATE, [(start, 0, 0), *ROOF[1:]])
+    depths = radii(simulated(tc.build(model, solver="daqp"), 150), bodies)
+    assert len(depths) == 150 and np.nanmax(depths) < 1e-6
+
+
+@pytest.mark.parametrize(
+    "kind, moving, fixed",
+    [(CORNER_ON_FACET, PYRAMID, POST), (FACET_ON_CORNER, PLATE, SPIRE), (EDGE_ON_EDGE, PLATE, ROOF)],
+    ids=["corner on facet", "facet on corner", "edge across edge"],
+)
+def test_a_kind_of_place_that_the_search_lacks_is_noticed(kind, moving, fixed, monkeypatch):
+    model, bodies = set_down(moving, fixed)
+    program = tc.build(model, solver="daqp")
+    meeting = program.meetings[0]
+    lacking = LackingMeeting(*(getattr(meeting, name.name) for name in fields(Meeting)), kind)
+    program = replace(program, meetings={0: lacking})
+    assert np.nanmax(radii(simulated(program, 100), bodies), initial=0) < 5e-4  # what is certified is true
+    untested = replace(program, watch=replace(program.watch, allowed={(0, 1): np.inf}))
+    assert (radii(simulated(untested, 100), bodies) > 0.01).sum() > 5  # without the test it would not be

@@ -1,0 +1,32 @@
+"""Where steps start, and what they hold bodies apart with."""
+
+from typing import NamedTuple
+
+STRIDE, SMALL_STRIDE = 0.5, 0.05  # rad: the largest turn of a part in one step; linear rows are wrong long before
+
+
+class Start(NamedTuple):
+    """Where steps start, and how large they may be.
+
+    at_nominal   whether they start from the nominal instead of the raw place
+    projected    whether contact points are projected again, before every step, onto curved faces
+    stride       the largest turn of a part in one step [rad]
+    balances     whether steps end where they are rounding, though they may grow from there
+    guarded      whether bodies that lie in each other, where no place of contact shows it, get one (see Guard)
+    parted       whether convex bodies are held apart only in the direction in which they part best (see Parting)
+    """
+
+    at_nominal: bool = False
+    projected: bool = False
+    stride: float = STRIDE
+    balances: bool = False
+    guarded: bool = False
+    parted: bool = False
+
+
+OTHER_STARTS = (Start(at_nominal=True), Start(stride=SMALL_STRIDE))  # if no face is curved
+OTHER_STARTS_CURVED = (Start(projected=True), Start(projected=True, at_nominal=True))
+# Planes at fixed points of a shaft leave it as it spins. If its spin is free, rounding grows until it falls through them.
+BALANCE = Start(balances=True)
+GUARDED = (Start(guarded=True), Start(guarded=True, stride=SMALL_STRIDE))
+PARTED = (Start(parted=True), Start(parted=True, stride=SMALL_STRIDE))

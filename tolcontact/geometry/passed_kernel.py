@@ -1,0 +1,56 @@
+"""Compiled look at places through which bodies have not come into each other: there they pass nominally."""
+
+import numpy as np
+
+from tolcontact.compiled import inlined_uncounted, uncounted
+from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, INSIDE
+from tolcontact.geometry.vector_kernel import along, dot, minus, row, row_of, turn_back
+
+NEARLY_PARALLEL = 1e-3  # sine of the angle between edges whose common normal does not tell how far they are apart
+
+
+@inlined_uncounted
+def _nominal_height(A, B, candidates, s, X, n, place, foot):  # type: ignore[no-untyped-def]
+    """Return the height of candidate s in the nominal assembly: that of its place over its foot along n, or along R'n.
+
+    Two edges have shifted along each other since: their height is that of the lines on which they lie.
+    """
+    arm = minus(place, foot)
+    if candidates.kinds[s] == EDGE_ON_EDGE:
+        start_A, start_B = row_of(A.edges, candidates.firsts[s], 0), row_of(B.edges, candidates.seconds[s], 0)
+        d = minus(row_of(A.edges, candidates.firsts[s], 1), start_A)
+        e = minus(row_of(B.edges, candidates.seconds[s], 1), start_B)
+        arm = minus(start_A, start_B)
+        arm = along(arm, -dot(arm, e) / dot(e, e), e)
+        across = along(d, -dot(d, e) / dot(e, e), e)
+        if dot(across, across) > NEARLY_PARALLEL * NEARLY_PARALLEL * dot(d, d):
+            arm = along(arm, -dot(arm, across) / dot(across, across), across)
+    return max(dot(n, arm), dot(turn_back(X, n), arm))  # whichever body the normal belongs to
+
+
+@uncounted
+def drop_passed(A, B, candidates, passed, X, touching, gaps, all_places, is_held):  # type: ignore[no-untyped-def]
+    """Drop places that lie nominally deeper than `passed` [mm], where a corner beside them is held: there the body came in.
+
+    Beside a place are the corner itself, and the ends of both edges. `is_held` (corner,) is false before and after, of the
+    corners of the moving and then of the reference body.
+    """
+    places, feet, normals = all_places
+    count = A.vertices.shape[0]
+    for is_first in (True, False):
+        for s in touching:
+            is_edge = candidates.kinds[s] == EDGE_ON_EDGE
+            owner = candidates.firsts[s] if candidates.kinds[s] == CORNER_ON_FACET else count + candidates.seconds[s]
+            height = _nominal_height(A, B, candidates, s, X, row(normals, s), row(places, s), row(feet, s))
+            has_passed = height < -passed
+            if is_first and not is_edge and not has_passed and gaps[s] <= INSIDE:
+                is_held[owner] = True
+            elif not is_first and has_passed and candidates.planes[s] < 0 and gaps[s] < -INSIDE:
+                if is_edge:
+                    for end in range(2):
+                        is_at_A = is_held[A.ends[candidates.firsts[s], end]]
+                        if is_at_A or is_held[count + B.ends[candidates.seconds[s], end]]:
+                            gaps[s] = np.inf
+                elif is_held[owner]:
+                    gaps[s] = np.inf
+    is_held[:] = False

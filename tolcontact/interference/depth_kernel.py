@@ -1,0 +1,186 @@
+"""Compiled depths of bodies that interfere: how far edges and triangles of one lie below the surface of the other."""
+
+import math
+
+import numpy as np
+
+from tolcontact.compiled import compiled, inlined_uncounted, uncounted
+from tolcontact.geometry.vector_kernel import along, dot, minus, move, move_back, scaled
+from tolcontact.interference.kernel import LEAF, corners_of, is_beyond, is_within, motion_of, near_count, passes, vertex
+
+SAMPLES = 4  # of a piece of an edge inside the other body
+MAX_PASSES = 64  # of one edge
+RAY = (1.0, 0.01307, 0.00713)  # a direction that few edges have, and in which few boxes are passed
+
+
+@inlined_uncounted
+def _nearest_on_triangle(p, a, b, c):  # type: ignore[no-untyped-def]  # noqa: PLR0911
+    """Return the place on a triangle that is nearest to p (Ericson, Real-Time Collision Detection, 5.1.5)."""
+    ab, ac, ap, bp, cp = minus(b, a), minus(c, a), minus(p, a), minus(p, b), minus(p, c)
+    d1, d2, d3, d4, d5, d6 = dot(ab, ap), dot(ac, ap), dot(ab, bp), dot(ac, bp), dot(ab, cp), dot(ac, cp)
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    if d1 <= 0.0 and d2 <= 0.0:
+        return a
+    if d3 >= 0.0 and d4 <= d3:
+        return b
+    if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        return along(a, d1 / (d1 - d3), ab)
+    if d6 >= 0.0 and d5 <= d6:
+        return c
+    if vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        return along(a, d2 / (d2 - d6), ac)
+    if va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
+        return along(b, (d4 - d3) / ((d4 - d3) + (d5 - d6)), minus(c, b))
+    total = va + vb + vc
+    return along(along(a, vb / total, ab), vc / total, ac)
+
+
+@inlined_uncounted
+def _box_distance(boxes, node, p):  # type: ignore[no-untyped-def]
+    """Return the squared distance of p from the box of a node."""
+    x = max(boxes[node, 0] - p[0], 0.0, p[0] - boxes[node, 3])
+    y = max(boxes[node, 1] - p[1], 0.0, p[1] - boxes[node, 4])
+    z = max(boxes[node, 2] - p[2], 0.0, p[2] - boxes[node, 5])
+    return x * x + y * y + z * z
+
+
+@uncounted
+def _seems_within(side, k, p, shares, senses):  # type: ignore[no-untyped-def]
+    """Return whether a ray from p leaves a body where it first passes the surface; a ray along an edge may be wrong."""
+    boxes = side.boxes
+    reach = 2.0 * (boxes[0, 3] - boxes[0, 0] + boxes[0, 4] - boxes[0, 1] + boxes[0, 5] - boxes[0, 2])
+    return passes(side, k, p, along(p, reach, RAY), shares, senses) > 0 and senses[0] > 0
+
+
+@uncounted
+def _near_leaf(side, k, p):  # type: ignore[no-untyped-def]
+    """Return a bound from above of the squared distance of p from the surface: that from a leaf with a near box."""
+    node, inner, square = 0, side.next.size // 2, np.inf
+    while node < inner:
+        left, right = 2 * node + 1, 2 * node + 2
+        node = left if _box_distance(side.boxes, left, p) <= _box_distance(side.boxes, right, p) else right
+    for j in range(LEAF):
+        triangle = side.triangles[node - inner, j]
+        if triangle < 0:
+            break
+        a, b, c = corners_of(side, k, triangle)
+        arm = minus(p, _nearest_on_triangle(p, a, b, c))
+        square = min(square, dot(arm, arm))
+    return square * (1.0 + 1e-12)
+
+
+@uncounted
+def _nearest(side, k, p, enough):  # type: ignore[no-untyped-def]
+    """Return the distance of p from the surface, the triangle and the place there; any if the distance is below `enough`."""
+    node, inner, best, foot, square = 0, side.next.size // 2, -1, p, np.inf
+    bound = _near_leaf(side, k, p)
+    while node < side.next.size:
+        if _box_distance(side.boxes, node, p) > min(square, bound):
+            node = side.next[node]
+            continue
+        if node < inner:
+            node = 2 * node + 1
+            continue
+        for j in range(LEAF):
+            triangle = side.triangles[node - inner, j]
+            if triangle < 0:
+                break
+            a, b, c = corners_of(side, k, triangle)
+            place = _nearest_on_triangle(p, a, b, c)
+            arm = minus(p, place)
+            if dot(arm, arm) < square:
+                square, best, foot = dot(arm, arm), triangle, place
+        if square < enough * enough:
+            break
+        node = side.next[node]
+    return math.sqrt(square), best, foot
+
+
+@uncounted
+def _sound(target, k, X, is_forward, p, q, edge, depths, triangles, places):  # type: ignore[no-untyped-def]
+    """Raise the depth of realization k to that of a piece of an edge from p to q, which lies in the other body."""
+    for j in range(SAMPLES + 1):
+        place = along(p, j / SAMPLES, minus(q, p))
+        depth, triangle, foot = _nearest(target, k, place, depths[k])
+        if depth > depths[k]:
+            depths[k] = depth
+            place_A, place_B = (place, foot) if is_forward else (move(X, foot), move(X, place))
+            triangles[k, 0], triangles[k, 1] = (-1 - edge, triangle) if is_forward else (triangle, -1 - edge)
+            for i in range(3):
+                places[k, 0, i], places[k, 1, i] = place_A[i], place_B[i]
+
+
+@uncounted
+def _sound_edges(owner, target, k, X, is_forward, motion, is_in, shares, senses, depths, triangles, places):  # type: ignore
+    """Raise the depth of realization k to that of the edges of a body in the other one; `is_in` (v,) is false before."""
+    for is_first in (True, False):
+        changes = True
+        while changes:
+            changes = False
+            for j in range(near_count(owner.distances, motion) if is_first else owner.edges.shape[0]):
+                i, m = owner.edges[j, 0], owner.edges[j, 1]
+                if not is_first and is_in[i] == is_in[m]:
+                    continue
+                p, q = vertex(owner, k, i), vertex(owner, k, m)
+                p, q = (move(X, p), move(X, q)) if is_forward else (move_back(X, p), move_back(X, q))
+                count = passes(target, k, p, q, shares, senses)
+                if is_first and count > 0:
+                    start, was_in = 0.0, senses[0] > 0
+                    is_in[i] = is_in[i] or was_in
+                    for place in range(count):
+                        if was_in:
+                            _sound(
+                                target, k, X, is_forward, along(p, start, minus(q, p)),
+                                along(p, shares[place], minus(q, p)), j, depths, triangles, places,
+                            )  # fmt: skip
+                        start, was_in = shares[place], senses[place] < 0
+                    if was_in:
+                        _sound(target, k, X, is_forward, along(p, start, minus(q, p)), q, j, depths, triangles, places)
+                    is_in[m] = is_in[m] or was_in
+                elif not is_first and count == 0:
+                    is_in[i], is_in[m], changes = True, True, True
+                    _sound(target, k, X, is_forward, p, q, j, depths, triangles, places)
+
+
+@uncounted
+def _sound_centres(owner, target, k, X, is_forward, shares, senses, depths, triangles, places):  # type: ignore[no-untyped-def]
+    """Raise the depth of realization k to that of centres of triangles of a body that lie in the other one, deeper than edges.
+
+    Where faces are flush, edges lie on the surface, and only what is between them is inside.
+    """
+    for t in range(owner.faces.shape[0]):
+        a, b, c = corners_of(owner, k, t)
+        p = scaled(1.0 / 3.0, along(along(a, 1.0, b), 1.0, c))
+        p = move(X, p) if is_forward else move_back(X, p)
+        if is_beyond(target, p) or not _seems_within(target, k, p, shares, senses):
+            continue
+        depth, triangle, foot = _nearest(target, k, p, depths[k])
+        if depth > depths[k] and is_within(target, k, p):
+            depths[k] = depth
+            place_A, place_B = (p, foot) if is_forward else (move(X, foot), move(X, p))
+            triangles[k, 0], triangles[k, 1] = (t, triangle) if is_forward else (triangle, t)
+            for i in range(3):
+                places[k, 0, i], places[k, 1, i] = place_A[i], place_B[i]
+
+
+@compiled
+def sound(A, B, poses, depths, triangles, places):  # type: ignore[no-untyped-def]
+    """Write how deep bodies lie in each other at poses X_BA (n, 12) of realizations that interfere.
+
+    The depth is that of the deepest of some places, on edges and in the middle of triangles of one body, below the surface of
+    the other.
+
+    depths      (n,) [mm]
+    triangles   (n, 2): of A and of B, the triangle nearest to that place, or on which it lies; -1 minus an edge
+    places      (n, 2, 3) [mm], in the frame of B: of A and of B, the place on the edge and the nearest one on the surface
+    """
+    shares, senses = np.empty(MAX_PASSES), np.empty(MAX_PASSES, dtype=np.int64)
+    for k in range(poses.shape[0]):
+        depths[k], triangles[k, :], places[k] = 0.0, 0, 0.0
+        X = poses[k]
+        motion = motion_of(X, A.bounds) + 2.0 * (A.spare + B.spare)
+        in_B, in_A = np.zeros(A.vertices.shape[0], dtype=np.bool_), np.zeros(B.vertices.shape[0], dtype=np.bool_)
+        _sound_edges(A, B, k, X, True, motion, in_B, shares, senses, depths, triangles, places)
+        _sound_edges(B, A, k, X, False, motion, in_A, shares, senses, depths, triangles, places)
+        _sound_centres(A, B, k, X, True, shares, senses, depths, triangles, places)
+        _sound_centres(B, A, k, X, False, shares, senses, depths, triangles, places)

@@ -1,0 +1,87 @@
+"""A body whose faces deviate: its vertices stay on all planes that meet in them, wherever these planes go."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import trimesh
+
+from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.interference.solid import Solid
+
+
+@dataclass(frozen=True, eq=False)
+class DeviatingSolid:
+    """A solid and what moves its faces.
+
+    solid      without deviations
+    columns    (k,) of the deviations that move its faces
+    outward    (t, 3, k) [mm]: how far the plane of each triangle moves outwards at each of its corners for unit deviations
+    bulges     (t,) [mm]: how far triangles of hollow round faces stand in the hollow
+    """
+
+    solid: Solid
+    columns: Int[Array, " k"]
+    outward: Float[Array, "t 3 k"]
+    bulges: Float[Array, " t"]
+
+    @property
+    def varies(self) -> bool:
+        """Whether faces deviate."""
+        return bool(self.columns.size)
+
+    @cached_property
+    def moves(self) -> Bool[Array, " t"]:
+        """Whether deviations move a corner of each triangle (t,)."""
+        moved = np.zeros(len(self.solid.vertices), dtype=bool)
+        moved[self._motions[0]] = True
+        return moved[self.solid.faces].any(axis=1)
+
+    @cached_property
+    def facet_of(self) -> Int[Array, " t"]:
+        """The facet of each triangle (t,): neighbours in one plane are one facet, unless deviations move their corners."""
+        pairs = self.solid.flat[~self.moves[self.solid.flat].any(axis=1)]
+        return np.asarray(trimesh.graph.connected_component_labels(pairs, node_count=len(self.solid.faces)), dtype=np.int64)
+
+    @cached_property
+    def first_of_facet(self) -> Int[Array, " f"]:
+        """A triangle of each facet."""
+        return np.unique(self.facet_of, return_index=True)[1]
+
+    @cached_property
+    def _motions(self) -> tuple[np.ndarray, np.ndarray]:
+        """The vertices that deviations move (m,), and how far (m, 3, k) [mm] for unit deviations."""
+        if not self.varies:
+            return np.zeros(0, dtype=int), np.zeros((0, 3, 0))
+        shifts = self.solid.shifts(self.outward)
+        moved = np.flatnonzero(np.abs(shifts).max(axis=(1, 2), initial=0) > 0)
+        return moved, shifts[moved]
+
+    def shifts(self, deviations: Float[Array, "n contributor"]) -> tuple[Int[Array, " m"], Float[Array, "n m 3"]]:
+        """Return the vertices (m,) that deviations (n, contributor) move, and how far (n, m, 3) [mm]."""
+        moved, motions = self._motions
+        shifts = deviations[:, self.columns] @ motions.reshape(-1, len(self.columns)).T
+        return moved, np.ascontiguousarray(shifts.reshape(len(deviations), len(moved), 3))
+
+    def growth(self, deviations: Float[Array, "n contributor"]) -> float:
+        """Return how far [mm] deviations (n, contributor) move any vertex at most."""
+        if not self.varies:
+            return 0.0
+        lengths = np.linalg.norm(self._motions[1], axis=1).max(axis=0, initial=0)
+        return float((np.abs(deviations[:, self.columns]) @ lengths).max(initial=0))
+
+    def inset(self, depth: float) -> Float[Array, "v 3"]:
+        """Return the vertices (v, 3) [mm] of a body whose surface lies `depth` [mm] deeper, and inside round faces."""
+        return np.ascontiguousarray(self.solid.vertices + self.solid.inset(depth + self.bulges))
+
+
+def deviating_solid(
+    solid: Solid, faces: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], bulges: np.ndarray
+) -> DeviatingSolid:
+    """Return a solid whose faces deviate: triangles (m,), columns (k,) and outward (m, 3, k) of each face."""
+    columns = np.unique(np.concatenate([np.zeros(0, dtype=int), *(face[1] for face in faces)]))
+    outward = np.zeros((len(solid.faces), 3, len(columns)))
+    for triangles, of_face, motion in faces:
+        outward[np.ix_(triangles, np.arange(3), np.searchsorted(columns, of_face))] += motion
+    return DeviatingSolid(solid, columns, outward, bulges)

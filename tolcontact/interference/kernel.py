@@ -1,0 +1,271 @@
+"""Compiled test whether closed bodies interfere: edges of one that pass triangles of the other, and how deep they do."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from tolcontact.compiled import compiled, inlined_uncounted, uncounted
+from tolcontact.geometry.vector_kernel import along, cross, dot, minus, move, move_back, row, row_of
+
+LEAF = 4
+
+
+class Side(NamedTuple):
+    """A body of a pair.
+
+    vertices    (v, 3) [mm], without deviations
+    moved       (v,): index of each vertex among those that deviations move, -1 for others
+    shifts      (n, m, 3) [mm]: how far deviations move these, in each realization
+    faces       (t, 3)
+    planes      (t, 4): outward normal n and level n . x of each triangle; NaN for triangles that deviations move
+    edges       (e, 2), those nominally nearest to the other body first
+    outward     (e, 3): sums of the outward normals of the facets that meet at each edge
+    distances   (e,) [mm]: bounds from below of their nominal distances from it
+    facets      (f, 10): of each facet, triangles in one plane, its box (6), normal n and level n . x
+    members, first_members   the triangles of each facet, as in a CSR matrix
+    vertices_of_facets   (f, 3): three vertices of facets that deviations move, -1 for others
+    starts, listed, reaches   the facets near each edge, as in a CSR matrix, the nearest first, with their nominal distances
+    reach       [mm] up to which facets are near
+    triangles, boxes, next   its BoxTree
+    spare       [mm] by which deviations move a vertex at most
+    bounds      (8, 3) [mm]: corners of a box that holds the body
+    witnesses   (c,): a vertex of each connected component, nominally far from the surface of the other body
+    clearances  (c,) [mm]: bounds from below of that distance
+    is_in       (c,): whether that vertex lies nominally in the other body
+    """
+
+    vertices: np.ndarray
+    moved: np.ndarray
+    shifts: np.ndarray
+    faces: np.ndarray
+    planes: np.ndarray
+    edges: np.ndarray
+    outward: np.ndarray
+    distances: np.ndarray
+    facets: np.ndarray
+    members: np.ndarray
+    first_members: np.ndarray
+    vertices_of_facets: np.ndarray
+    starts: np.ndarray
+    listed: np.ndarray
+    reaches: np.ndarray
+    reach: float
+    triangles: np.ndarray
+    boxes: np.ndarray
+    next: np.ndarray
+    spare: float
+    bounds: np.ndarray
+    witnesses: np.ndarray
+    clearances: np.ndarray
+    is_in: np.ndarray
+
+
+@inlined_uncounted
+def vertex(side, k, number):  # type: ignore[no-untyped-def]
+    """Return a vertex of a body in realization k."""
+    m, x = side.moved[number], row(side.vertices, number)
+    return x if m < 0 else along(x, 1.0, row_of(side.shifts, k, m))
+
+
+@inlined_uncounted
+def corners_of(side, k, triangle):  # type: ignore[no-untyped-def]
+    """Return the corners of a triangle in realization k."""
+    faces = side.faces
+    return (
+        vertex(side, k, faces[triangle, 0]), vertex(side, k, faces[triangle, 1]), vertex(side, k, faces[triangle, 2]),
+    )  # fmt: skip
+
+
+@inlined_uncounted
+def crossing(side, k, triangle, p, q):  # type: ignore[no-untyped-def]
+    """Return the share of the segment from p to q at which it passes a triangle, and its sense: -1 inwards, 1 outwards, 0 none.
+
+    Places on the edges of the triangle count, so that none gets through between two triangles.
+    """
+    planes, is_known = side.planes, side.planes[triangle, 3] == side.planes[triangle, 3]
+    if is_known:
+        n = (planes[triangle, 0], planes[triangle, 1], planes[triangle, 2])
+        start, end = dot(n, p) - planes[triangle, 3], dot(n, q) - planes[triangle, 3]
+        if start * end > 0.0 or start == end:
+            return 0.0, 0
+    a, b, c = corners_of(side, k, triangle)
+    if not is_known:
+        n = cross(minus(b, a), minus(c, a))
+        start, end = dot(n, minus(p, a)), dot(n, minus(q, a))
+        if start * end > 0.0 or start == end:
+            return 0.0, 0
+    d, u, v, w = minus(q, p), minus(a, p), minus(b, p), minus(c, p)
+    volume_1, volume_2, volume_3 = dot(d, cross(u, v)), dot(d, cross(v, w)), dot(d, cross(w, u))
+    is_through = (volume_1 >= 0.0 and volume_2 >= 0.0 and volume_3 >= 0.0) or (
+        volume_1 <= 0.0 and volume_2 <= 0.0 and volume_3 <= 0.0
+    )
+    return start / (start - end), 0 if not is_through else (-1 if end < start else 1)
+
+
+@inlined_uncounted
+def passes(side, k, p, q, shares, senses):  # type: ignore[no-untyped-def]
+    """Write at which shares, in order, and in which senses the segment from p to q passes the surface; return how often."""
+    count, node, inner = 0, 0, side.next.size // 2
+    low_x, low_y, low_z = min(p[0], q[0]), min(p[1], q[1]), min(p[2], q[2])
+    high_x, high_y, high_z = max(p[0], q[0]), max(p[1], q[1]), max(p[2], q[2])
+    boxes = side.boxes
+    while node < side.next.size:
+        if (
+            boxes[node, 0] > high_x or boxes[node, 1] > high_y or boxes[node, 2] > high_z
+            or boxes[node, 3] < low_x or boxes[node, 4] < low_y or boxes[node, 5] < low_z
+        ):  # fmt: skip
+            node = side.next[node]
+            continue
+        if node < inner:
+            node = 2 * node + 1
+            continue
+        for j in range(LEAF):
+            triangle = side.triangles[node - inner, j]
+            if triangle < 0:
+                break
+            share, sense = crossing(side, k, triangle, p, q)
+            if sense != 0 and count < shares.size:
+                place = count
+                while place > 0 and shares[place - 1] > share:
+                    shares[place], senses[place], place = shares[place - 1], senses[place - 1], place - 1
+                shares[place], senses[place], count = share, sense, count + 1
+        node = side.next[node]
+    return count
+
+
+@uncounted
+def near_count(distances, motion):  # type: ignore[no-untyped-def]
+    """Return how many of the edges, at `distances` (e,) that ascend, may reach a body that moves by `motion` [mm] at most."""
+    low, high = 0, distances.size
+    while low < high:
+        middle = (low + high) // 2
+        if distances[middle] <= motion:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@uncounted
+def _holds(owner, target, k, X, is_forward, motion):  # type: ignore[no-untyped-def]
+    """Return whether a component of a body lies in the other one, if its surface passes that one's nowhere."""
+    for c in range(owner.witnesses.size):
+        if owner.clearances[c] > motion:
+            if owner.is_in[c]:
+                return True
+            continue
+        p = vertex(owner, k, owner.witnesses[c])
+        p = move(X, p) if is_forward else move_back(X, p)
+        if is_beyond(target, p):
+            continue
+        if is_within(target, k, p):
+            return True
+    return False
+
+
+@uncounted
+def is_within(side, k, p):  # type: ignore[no-untyped-def]
+    """Return whether p lies in a body: its triangles fill all solid angles (van Oosterom and Strackee, 1983)."""
+    total = 0.0
+    for t in range(side.faces.shape[0]):
+        a, b, c = corners_of(side, k, t)
+        a, b, c = minus(a, p), minus(b, p), minus(c, p)
+        length_a, length_b, length_c = math.sqrt(dot(a, a)), math.sqrt(dot(b, b)), math.sqrt(dot(c, c))
+        near = length_a * length_b * length_c + dot(a, b) * length_c + dot(b, c) * length_a + dot(c, a) * length_b
+        total += math.atan2(dot(a, cross(b, c)), near)
+    return total > math.pi
+
+
+@inlined_uncounted
+def is_beyond(side, p):  # type: ignore[no-untyped-def]
+    """Return whether p lies outside of the box of a body."""
+    boxes = side.boxes
+    return (
+        p[0] < boxes[0, 0] or p[1] < boxes[0, 1] or p[2] < boxes[0, 2]
+        or p[0] > boxes[0, 3] or p[1] > boxes[0, 4] or p[2] > boxes[0, 5]
+    )  # fmt: skip
+
+
+@uncounted
+def motion_of(X, bounds):  # type: ignore[no-untyped-def]
+    """Return how far a pose X (12,) moves any point of a box with corners `bounds` (8, 3) at most."""
+    largest = 0.0
+    for j in range(bounds.shape[0]):
+        arm = minus(move(X, row(bounds, j)), row(bounds, j))
+        largest = max(largest, dot(arm, arm))
+    return math.sqrt(largest)
+
+
+@inlined_uncounted
+def _may_pass(facets, f, p, q):  # type: ignore[no-untyped-def]
+    """Return whether the segment from p to q reaches the box of a facet, and passes its plane."""
+    if (
+        facets[f, 0] > max(p[0], q[0]) or facets[f, 3] < min(p[0], q[0]) or facets[f, 1] > max(p[1], q[1])
+        or facets[f, 4] < min(p[1], q[1]) or facets[f, 2] > max(p[2], q[2]) or facets[f, 5] < min(p[2], q[2])
+    ):  # fmt: skip
+        return False
+    n = (facets[f, 6], facets[f, 7], facets[f, 8])
+    return not (dot(n, p) - facets[f, 9]) * (dot(n, q) - facets[f, 9]) > 0.0
+
+
+@uncounted
+def _put_planes(side, k, facets):  # type: ignore[no-untyped-def]
+    """Write the planes of the facets that deviations move in realization k."""
+    for f in range(facets.shape[0]):
+        if side.vertices_of_facets[f, 0] >= 0:
+            a = vertex(side, k, side.vertices_of_facets[f, 0])
+            b, c = vertex(side, k, side.vertices_of_facets[f, 1]), vertex(side, k, side.vertices_of_facets[f, 2])
+            n = cross(minus(b, a), minus(c, a))
+            facets[f, 6], facets[f, 7], facets[f, 8], facets[f, 9] = n[0], n[1], n[2], dot(n, a)
+
+
+@uncounted
+def _passes_any(owner, target, facets, k, X, is_forward, motion, shares, senses):  # type: ignore[no-untyped-def]
+    """Return whether an edge of a body passes the surface of the other one, whose `facets` are those of realization k."""
+    is_listed, boxes = motion <= owner.reach, target.boxes
+    for j in range(near_count(owner.distances, motion)):
+        p, q = vertex(owner, k, owner.edges[j, 0]), vertex(owner, k, owner.edges[j, 1])
+        p, q = (move(X, p), move(X, q)) if is_forward else (move_back(X, p), move_back(X, q))
+        if (
+            boxes[0, 0] > max(p[0], q[0]) or boxes[0, 3] < min(p[0], q[0]) or boxes[0, 1] > max(p[1], q[1])
+            or boxes[0, 4] < min(p[1], q[1]) or boxes[0, 2] > max(p[2], q[2]) or boxes[0, 5] < min(p[2], q[2])
+        ):  # fmt: skip
+            continue
+        if not is_listed:
+            if passes(target, k, p, q, shares, senses) > 0:
+                return True
+            continue
+        for m in range(owner.starts[j], owner.starts[j + 1]):
+            if owner.reaches[m] > motion:
+                break
+            facet = owner.listed[m]
+            if _may_pass(facets, facet, p, q):
+                for place in range(target.first_members[facet], target.first_members[facet + 1]):
+                    _, sense = crossing(target, k, target.members[place], p, q)
+                    if sense != 0:
+                        return True
+    return False
+
+
+@compiled
+def interfere(A, B, poses, interferes):  # type: ignore[no-untyped-def]
+    """Write whether (n,) body A interferes with body B at its poses X_BA (n, 12) in the frame of B.
+
+    It does if an edge of one passes a triangle of the other, or else if one holds a component of the other.
+    """
+    shares, senses = np.empty(1), np.empty(1, dtype=np.int64)
+    facets_of_A, facets_of_B = A.facets.copy(), B.facets.copy()
+    for k in range(poses.shape[0]):
+        X = poses[k]
+        motion = motion_of(X, A.bounds) + 2.0 * (A.spare + B.spare)
+        if A.spare > 0.0:
+            _put_planes(A, k, facets_of_A)
+        if B.spare > 0.0:
+            _put_planes(B, k, facets_of_B)
+        interferes[k] = (
+            _passes_any(A, B, facets_of_B, k, X, True, motion, shares, senses)
+            or _passes_any(B, A, facets_of_A, k, X, False, motion, shares, senses)
+            or _holds(A, B, k, X, True, motion)
+            or _holds(B, A, k, X, False, motion)
+        )

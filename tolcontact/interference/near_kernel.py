@@ -1,0 +1,76 @@
+"""Compiled search for what is nominally near an edge."""
+
+import math
+
+import numpy as np
+
+from tolcontact.compiled import compiled, uncounted
+from tolcontact.geometry.vector_kernel import row
+from tolcontact.interference.kernel import LEAF
+
+
+@uncounted
+def _distance_of_boxes(boxes, node, low, high):  # type: ignore[no-untyped-def]
+    """Return the squared distance between the box of a node and a box."""
+    square = 0.0
+    for i in range(3):
+        away = max(boxes[node, i] - high[i], 0.0, low[i] - boxes[node, 3 + i])
+        square += away * away
+    return square
+
+
+@compiled
+def distances(lower, upper, boxes, successors, result):  # type: ignore[no-untyped-def]
+    """Write how far (n,) [mm] boxes from `lower` to `upper` (n, 3) are from the nearest leaf of a BoxTree."""
+    inner = successors.size // 2
+    for k in range(lower.shape[0]):
+        low, high, min_square, node = row(lower, k), row(upper, k), np.inf, 0
+        while node < successors.size:
+            square = _distance_of_boxes(boxes, node, low, high)
+            if not square < min_square:
+                node = successors[node]
+            elif node < inner:
+                node = 2 * node + 1
+            else:
+                min_square, node = square, successors[node]
+        result[k] = math.sqrt(min_square)
+
+
+@compiled
+def near_facets(lower, upper, tree, around, facet_of, reach, is_written, starts, listed, reaches):  # type: ignore[no-untyped-def]
+    """Count, or write, the facets that are no farther than `reach` [mm] from each box from `lower` to `upper` (n, 3).
+
+    tree        triangles, boxes, next of a BoxTree
+    around      (t, 6) [mm]: boxes of the triangles
+    facet_of    (t,): the facet of each triangle
+    starts      (n + 1,): written if not `is_written`, else read; listed, reaches (m,): the facets, and their distances [mm]
+    """
+    triangles, boxes, successors = tree
+    inner, nearest = successors.size // 2, np.full(facet_of.max() + 1, np.inf)
+    candidates = np.empty(nearest.size, dtype=np.int64)
+    for k in range(lower.shape[0]):
+        low, high, node, count = row(lower, k), row(upper, k), 0, 0
+        while node < successors.size:
+            square = _distance_of_boxes(boxes, node, low, high)
+            if square > reach * reach:
+                node = successors[node]
+            elif node < inner:
+                node = 2 * node + 1
+            else:
+                for j in range(LEAF):
+                    triangle = triangles[node - inner, j]
+                    if triangle >= 0:
+                        facet, distance = facet_of[triangle], math.sqrt(_distance_of_boxes(around, triangle, low, high))
+                        if distance <= reach:
+                            if nearest[facet] == np.inf:
+                                candidates[count], count = facet, count + 1
+                            nearest[facet] = min(nearest[facet], distance)
+                node = successors[node]
+        if is_written:
+            order = np.argsort(nearest[candidates[:count]])
+            for j in range(count):
+                facet = candidates[order[j]]
+                listed[starts[k] + j], reaches[starts[k] + j] = facet, nearest[facet]
+        else:
+            starts[k + 1] = starts[k] + count
+        nearest[candidates[:count]] = np.inf

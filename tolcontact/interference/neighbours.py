@@ -1,0 +1,203 @@
+"""Two bodies near each other: whether, and how deep, they lie in each other at any poses."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import igl
+import numpy as np
+
+from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.interference import depth_kernel, kernel, near_kernel, parting_kernel
+from tolcontact.interference.box_tree import BoxTree, box_tree, inflated
+from tolcontact.interference.deviating_solid import DeviatingSolid
+
+CORNERS = np.array(np.meshgrid(*[(0, 1)] * 3)).reshape(3, -1).T
+
+
+class Interference(NamedTuple):
+    """How bodies A and B lie in each other, in n realizations.
+
+    depths      (n,) [mm]: how deep the deepest of some places on edges of one lies below the surface of the other
+    triangles   (n, 2): of A and of B, the triangle of its solid nearest to that place, or -1 minus the edge on which it lies
+    places      (n, 2, 3) [mm], in the frame of B: of A and of B, the place on the edge and the nearest one on the surface
+    """
+
+    depths: Float[Array, " n"]
+    triangles: Int[Array, "n 2"]
+    places: Float[Array, "n 2 3"]
+
+
+class WayOut(NamedTuple):
+    """How bodies A and B part with the least motion, in n realizations.
+
+    places      (n, 3) [mm] of A: its lowest point in B, in the frame of A
+    feet        (n, 3) [mm] of B: its highest point in A, in the frame of B
+    normals     (n, 3): the direction in which A moves against B, in the frame of B
+    widths      (n,) [mm] by which it does; 0 if no edge shows one
+    """
+
+    places: Float[Array, "n 3"]
+    feet: Float[Array, "n 3"]
+    normals: Float[Array, "n 3"]
+    widths: Float[Array, " n"]
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """Two bodies, which count as a little smaller than they are.
+
+    insets   [mm] by which the surfaces of A and of B lie inside the bodies: touching bodies are apart by their sum, and faces
+             that are flush are not, since the insets differ
+    reach    [mm]: how far A usually moves against B, with deviations; beyond, tests take longer
+    """
+
+    A: DeviatingSolid
+    B: DeviatingSolid
+    insets: tuple[float, float]
+    reach: float
+
+    @cached_property
+    def _nominal(self) -> tuple[kernel.Side, kernel.Side]:
+        """Both bodies without deviations."""
+        vertices_A, vertices_B = (body.inset(depth) for body, depth in zip((self.A, self.B), self.insets, strict=True))
+        return _side(self.A, vertices_A, self.B, vertices_B, self.reach), _side(
+            self.B, vertices_B, self.A, vertices_A, self.reach
+        )
+
+    @property
+    def varies(self) -> bool:
+        """Whether faces of a body deviate."""
+        return self.A.varies or self.B.varies
+
+    def _sides(self, deviations: np.ndarray | None) -> tuple[kernel.Side, kernel.Side]:
+        if deviations is None:
+            return self._nominal
+        side_A, side_B = (
+            nominal if not body.varies else _deviating(nominal, body, deviations)
+            for body, nominal in zip((self.A, self.B), self._nominal, strict=True)
+        )
+        return side_A, side_B
+
+    def interfere(
+        self, X_BA: Float[Array, "n 12"], deviations: Float[Array, "n contributor"] | None = None
+    ) -> Bool[Array, " n"]:
+        """Return whether (n,) the bodies lie in each other by more than both insets at X_BA, the pose of A in the frame of B.
+
+        Without `deviations`, faces are as they are nominally.
+        """
+        interferes = np.zeros(len(X_BA), dtype=bool)
+        kernel.interfere(*self._sides(deviations), np.ascontiguousarray(X_BA), interferes)
+        return interferes
+
+    def ways_out(self, X_BA: Float[Array, "n 12"]) -> WayOut:
+        """Return how bodies without deviations part at poses X_BA (n, 12) at which they interfere."""
+        places, feet, normals = np.zeros((3, len(X_BA), 3))
+        way = WayOut(places, feet, normals, np.zeros(len(X_BA)))
+        parting_kernel.ways_out(*self._nominal, np.ascontiguousarray(X_BA), sum(self.insets), *way)
+        return way
+
+    def measured(self, X_BA: Float[Array, "n 12"], deviations: Float[Array, "n contributor"] | None = None) -> Interference:
+        """Return how deep bodies lie in each other at poses X_BA at which they interfere."""
+        result = Interference(np.empty(len(X_BA)), np.empty((len(X_BA), 2), dtype=np.int64), np.empty((len(X_BA), 2, 3)))
+        depth_kernel.sound(*self._sides(deviations), np.ascontiguousarray(X_BA), *result)
+        for solid, side, triangles in zip((self.A.solid, self.B.solid), self._nominal, result.triangles.T, strict=True):
+            for row in np.flatnonzero(triangles < 0):
+                is_edge = (solid.edges == side.edges[-1 - triangles[row]]).all(axis=1)
+                triangles[row] = -1 - int(is_edge.argmax())
+        return result._replace(depths=result.depths + sum(self.insets))
+
+
+def _side(
+    body: DeviatingSolid, vertices: np.ndarray, target: DeviatingSolid, vertices_of_target: np.ndarray, reach: float
+) -> kernel.Side:
+    """Return a body with inset vertices (v, 3) as compiled passes take it, with what its other body decides."""
+    solid, tree, tree_of_target = (
+        body.solid,
+        box_tree(vertices[body.solid.faces]),
+        box_tree(vertices_of_target[target.solid.faces]),
+    )
+    ends, distances = vertices[solid.edges], np.empty(len(solid.edges))
+    near_kernel.distances(ends.min(axis=1), ends.max(axis=1), tree_of_target.boxes, tree_of_target.next, distances)
+    order = np.argsort(distances, kind="stable")
+    squares, _, _ = igl.point_mesh_squared_distance(vertices, vertices_of_target, target.solid.faces)
+    witnesses = np.array([rows[np.argmax(squares[rows])] for rows in solid.components])
+    turns = igl.winding_number(vertices_of_target, target.solid.faces, np.ascontiguousarray(vertices[witnesses]))
+    corners = vertices[solid.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    planes = np.column_stack([normals, (normals * corners[:, 0]).sum(axis=1)])
+    lists = _near_facets(ends[order], tree_of_target, vertices_of_target[target.solid.faces], target.facet_of, reach)
+    return kernel.Side(
+        vertices=vertices,
+        moved=np.full(len(vertices), -1),
+        shifts=np.zeros((1, 0, 3)),
+        faces=solid.faces,
+        planes=planes,
+        edges=np.ascontiguousarray(solid.edges[order]),
+        outward=np.ascontiguousarray(solid.outward[order]),
+        distances=distances[order],
+        facets=_facets(body, corners, planes),
+        members=np.argsort(body.facet_of, kind="stable"),
+        first_members=np.cumsum([0, *np.bincount(body.facet_of)]),
+        vertices_of_facets=np.where(body.moves[body.first_of_facet][:, None], solid.faces[body.first_of_facet], -1),
+        **lists._asdict(),
+        reach=reach,
+        triangles=tree.triangles,
+        boxes=tree.boxes,
+        next=tree.next,
+        spare=0.0,
+        bounds=np.where(CORNERS == 0, vertices.min(axis=0), vertices.max(axis=0)),
+        witnesses=witnesses,
+        clearances=np.sqrt(squares[witnesses]),
+        is_in=np.atleast_1d(turns) > 0.5,
+    )
+
+
+class _NearFacets(NamedTuple):
+    """See kernel.Side."""
+
+    starts: np.ndarray
+    listed: np.ndarray
+    reaches: np.ndarray
+
+
+def _near_facets(edges: np.ndarray, tree: BoxTree, corners: np.ndarray, facets: np.ndarray, reach: float) -> _NearFacets:
+    """Return the facets no farther than `reach` [mm] from edges (e, 2, 3); triangles have `corners` (t, 3, 3)."""
+    boxes = np.ascontiguousarray(edges.min(axis=1)), np.ascontiguousarray(edges.max(axis=1))
+    around = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
+    lists = _NearFacets(np.zeros(len(edges) + 1, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0))
+    near_kernel.near_facets(*boxes, tree, around, facets, reach, False, *lists)
+    count = int(lists.starts[-1])
+    lists = lists._replace(listed=np.empty(count, dtype=np.int64), reaches=np.empty(count))
+    near_kernel.near_facets(*boxes, tree, around, facets, reach, True, *lists)
+    return lists
+
+
+def _facets(body: DeviatingSolid, corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
+    """Return box and plane (f, 10) of each facet, from corners (t, 3, 3) and planes (t, 4) of the triangles."""
+    facets = np.concatenate(
+        [np.full((len(body.first_of_facet), 3), np.inf), np.full((len(body.first_of_facet), 3), -np.inf)], axis=1
+    )
+    np.minimum.at(facets[:, :3], body.facet_of, corners.min(axis=1))
+    np.maximum.at(facets[:, 3:], body.facet_of, corners.max(axis=1))
+    return np.concatenate([facets, planes[body.first_of_facet]], axis=1)
+
+
+def _deviating(side: kernel.Side, body: DeviatingSolid, deviations: np.ndarray) -> kernel.Side:
+    """Return a body with the deviations (n, contributor) of some realizations."""
+    vertices, shifts = body.shifts(deviations)
+    moved = side.moved.copy()
+    moved[vertices] = np.arange(len(vertices))
+    lengths = np.zeros(len(moved))
+    lengths[vertices] = np.linalg.norm(shifts, axis=2).max(axis=0, initial=0)
+    of_triangles = lengths[side.faces].max(axis=1)
+    planes = np.where((of_triangles > 0)[:, None], np.nan, side.planes)
+    boxes = inflated(BoxTree(side.triangles, side.boxes, side.next), of_triangles)
+    spare = np.zeros(len(side.facets))
+    np.maximum.at(spare, body.facet_of, of_triangles)
+    facets = side.facets.copy()
+    facets[:, :3] -= spare[:, None]
+    facets[:, 3:6] += spare[:, None]
+    return side._replace(
+        facets=facets, moved=moved, shifts=shifts, planes=planes, boxes=boxes, spare=float(lengths.max(initial=0))
+    )

@@ -1,0 +1,85 @@
+"""The solid of each part, with the features that move its faces."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import trimesh
+
+from tolcontact.discretization import Nominal, NominalPart
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane
+from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.surface_recognition import known_surfaces
+from tolcontact.interference.deviating_solid import DeviatingSolid, deviating_solid
+from tolcontact.interference.solid import Solid, solid
+from tolcontact.vocabulary import ROUNDED
+
+
+def part_solid(nominal: Nominal, index: int) -> DeviatingSolid | None:
+    """Return the solid of a part of the nominal assembly; None if it is not closed.
+
+    Faces of features deviate, without their forms. Triangles of hollow round faces stand in the hollow, and the solid
+    does not.
+    """
+    body = solid(nominal.parts[index].body)
+    if body is None:
+        return None
+    surface_of_body = Surface(trimesh.Trimesh(body.vertices, body.faces, process=False))
+    faces = list(_deviating_faces(nominal, index, body, surface_of_body))
+    return deviating_solid(body, faces, _bulges(nominal, index, body, surface_of_body))
+
+
+def _deviating_faces(
+    nominal: Nominal, index: int, body: Solid, surface_of_body: Surface
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield triangles (m,) of each face that deviates, columns (k,), and how far its corners move outwards (m, 3, k)."""
+    part = nominal.parts[index]
+    for feature in nominal.features:
+        if nominal.parts[feature.part].part is not part.part or not feature.varies:
+            continue
+        for number, surface in enumerate(feature.surfaces):
+            face = feature.deviation(number, part.placement)
+            columns = np.setdiff1d(np.arange(len(face.columns)), face.modes)
+            triangles = _triangles(surface_of_body, surface.placed(*part.placement))
+            corners = body.vertices[body.faces[triangles]].reshape(-1, 3)
+            normals = body.normals[triangles].repeat(3, axis=0)
+            motion = np.hstack([normals, np.cross(corners - face.centre, normals)]) @ face.twist + face.height
+            yield triangles, face.columns[columns], motion[:, columns].reshape(len(triangles), 3, -1)
+
+
+def _bulges(nominal: Nominal, index: int, body: Solid, surface_of_body: Surface) -> np.ndarray:
+    """Return how far (t,) [mm] triangles stand out of the round faces for which they stand, mostly into hollow ones."""
+    part, bulges = nominal.parts[index], np.zeros(len(body.faces))
+    corners = body.vertices[body.faces]
+    points = np.concatenate(
+        [corners, (corners + np.roll(corners, -1, axis=1)) / 2, corners.mean(axis=1, keepdims=True)], axis=1
+    )
+    for surface, rows in _round_faces(nominal, part, body, surface_of_body):
+        distance, _ = surface.distance(points[rows].reshape(-1, 3))
+        _, slope = surface.distance(points[rows, -1])
+        outward = np.where((slope * body.normals[rows]).sum(axis=1) < 0, -1.0, 1.0)
+        height = (distance.reshape(len(rows), -1) * outward[:, None]).max(axis=1)
+        bulges[rows] = np.maximum(bulges[rows], np.where(height > ROUNDED, height, 0.0))
+    return bulges
+
+
+def _round_faces(
+    nominal: Nominal, part: NominalPart, body: Solid, surface_of_body: Surface
+) -> Iterator[tuple[AnalyticSurface, np.ndarray]]:
+    """Yield the round surfaces of a part in the nominal assembly, and the triangles (m,) of its solid that stand for them."""
+    faces_of_file = known_surfaces(part.mesh)
+    if faces_of_file is not None:
+        numbers, surfaces, _ = faces_of_file
+        for number, surface in enumerate(surfaces):
+            if surface is not None and not isinstance(surface, Plane):
+                yield surface.placed(*part.placement), np.flatnonzero(numbers[body.sources] == number)
+    for pair in nominal.pairs:
+        for body_of_face, face in ((pair.moving, pair.moving_face), (pair.reference, pair.reference_face)):
+            if face is not None and body_of_face is not None and nominal.parts[body_of_face].part is part.part:
+                for piece in face.pieces:
+                    if piece.surface.is_fitted and not isinstance(piece.surface, Plane):
+                        yield piece.surface, _triangles(surface_of_body, piece.face)
+
+
+def _triangles(surface_of_body: Surface, face: Surface) -> np.ndarray:
+    """Return the triangles (m,) of a body on which a face of it lies."""
+    return np.unique(surface_of_body.nearest(np.asarray(face.mesh.triangles_center))[0])

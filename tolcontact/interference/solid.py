@@ -1,0 +1,94 @@
+"""A body as the test of interference sees it: its triangles a little inside its surface, and the edges between its planes."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import trimesh
+
+from tolcontact.arrays import Array, Float, Int
+
+MERGE_SHARE = 1e-9  # of the size: vertices that are no farther apart are one
+SAME_PLANE = 1e-5  # rad: facets whose normals differ by less are one plane
+MIN_SINGULAR = 0.05  # of the planes around a vertex: a direction that they determine worse is left alone
+TINY = 1e-300
+MAX_SHIFT = 8.0  # insets: a vertex of a needle moves no farther
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A closed body in its nominal place.
+
+    vertices    (v, 3) [mm]
+    faces       (t, 3): triangles
+    edges       (e, 2): edges between different planes
+    outward     (e, 3): sums of the outward normals of the two triangles at each edge
+    flat        (n, 2): triangles that share an edge and lie in one plane
+    sources     (t,): the triangle of the part's mesh that each triangle is
+    """
+
+    vertices: Float[Array, "v 3"]
+    faces: Int[Array, "t 3"]
+    edges: Int[Array, "e 2"]
+    outward: Float[Array, "e 3"]
+    flat: Int[Array, "n 2"]
+    sources: Int[Array, " t"]
+
+    @cached_property
+    def normals(self) -> Float[Array, "t 3"]:
+        """The outward unit normals of the triangles."""
+        a, b, c = self.vertices[self.faces].swapaxes(0, 1)
+        normals = np.cross(b - a, c - a)
+        return normals / np.linalg.norm(normals, axis=1)[:, None]
+
+    @cached_property
+    def components(self) -> list[Int[Array, " _"]]:
+        """The vertices of each connected component."""
+        sides = self.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
+        labels = np.asarray(trimesh.graph.connected_component_labels(sides, node_count=len(self.vertices)))
+        used = np.unique(self.faces)
+        order = used[np.argsort(labels[used], kind="stable")]
+        return np.split(order, np.flatnonzero(np.diff(labels[order])) + 1)
+
+    def shifts(self, outward: Float[Array, "t 3 k"]) -> Float[Array, "v 3 k"]:
+        """Return how vertices move if the plane of each triangle moves out of the body by `outward` at its corners.
+
+        A vertex stays on all planes around it: N u = h, of which this is the shortest solution in the sense of least squares.
+        Each of the k columns is a case of its own.
+        """
+        corners = self.faces.ravel()
+        N = self.normals.repeat(3, axis=0)
+        squares, sides = np.zeros((len(self.vertices), 3, 3)), np.zeros((len(self.vertices), 3, outward.shape[2]))
+        np.add.at(squares, corners, N[:, :, None] * N[:, None])
+        np.add.at(sides, corners, N[:, :, None] * outward.reshape(-1, 1, outward.shape[2]))
+        values, vectors = np.linalg.eigh(squares)
+        determined = values > MIN_SINGULAR**2 * values.max(axis=1, initial=TINY, keepdims=True)
+        inverse = np.where(determined, 1 / np.maximum(values, TINY), 0.0)
+        return np.asarray(vectors @ (inverse[..., None] * (vectors.swapaxes(1, 2) @ sides)))
+
+    def inset(self, depths: Float[Array, " t"]) -> Float[Array, "v 3"]:
+        """Return the shifts (v, 3) [mm] of the vertices that put the planes of triangles `depths` (t,) [mm] deeper."""
+        shifts = self.shifts(np.broadcast_to(-depths[:, None, None], (len(self.faces), 3, 1)))[..., 0]
+        length = np.linalg.norm(shifts, axis=1)
+        most = MAX_SHIFT * float(depths.max(initial=0.0))
+        return shifts * np.minimum(1.0, most / np.maximum(length, 1e-300))[:, None]
+
+
+def solid(body: trimesh.Trimesh) -> Solid | None:
+    """Return a body in its nominal place; None if it is not closed, and so has no inside."""
+    if not body.is_watertight or body.volume <= 0:
+        return None
+    merged = trimesh.Trimesh(body.vertices, body.faces, process=False)
+    merged.merge_vertices(digits_vertex=int(np.ceil(-np.log10(MERGE_SHARE * max(merged.scale, 1e-9)))))
+    kept = np.flatnonzero(np.asarray(merged.area_faces) > 0)
+    merged.update_faces(kept)
+    sharp = np.asarray(merged.face_adjacency_angles) > SAME_PLANE
+    edges = np.asarray(merged.face_adjacency_edges)[sharp]
+    return Solid(
+        np.ascontiguousarray(merged.vertices, dtype=np.float64),
+        np.ascontiguousarray(merged.faces, dtype=np.int64),
+        np.ascontiguousarray(edges, dtype=np.int64),
+        np.asarray(merged.face_normals)[np.asarray(merged.face_adjacency)[sharp]].sum(axis=1),
+        np.asarray(merged.face_adjacency)[~sharp],
+        kept,
+    )

@@ -1,0 +1,146 @@
+"""Bodies that tolerances put into each other, though no declared contact holds them apart."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tolcontact.arrays import Array, Float, Int
+from tolcontact.declaration import Part
+from tolcontact.discretization import Nominal
+from tolcontact.errors import designation
+from tolcontact.interference import Clash
+from tolcontact.plausibility.suggested_lines import ClashPlace, contact_line, moving_first, overlap_line
+from tolcontact.plausibility.trial_draws import TrialDraws
+from tolcontact.vocabulary import CORRECTED, Status
+
+MIN_SHARE = 0.005  # of the draws
+MIN_MEASURED = 8  # draws in which the depth of a clash is measured
+MAX_TRIANGLES = 20_000  # of both bodies, in all of these draws, if there are more of them
+MAX_CLASHES = 20  # pairs of parts that are named
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredClash:
+    """Two bodies that lie in each other in some draws.
+
+    pair     numbers of the bodies
+    share    of the draws
+    depths   (m,) [mm], of some of these draws, the deepest one first
+    places   of these draws
+    """
+
+    pair: tuple[int, int]
+    share: float
+    depths: Float[Array, " m"]
+    places: list[ClashPlace]
+
+
+def clashes(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each two parts without declared contact that lie in each other in some draws.
+
+    Parts that contact moves are judged where it puts them.
+    """
+    nominal, watch = draws.program.nominal, draws.program.watch
+    declared = {_parts(nominal, pair) for pair in watch.declared}
+    told = set[frozenset[Part]]()
+    for clash in draws.clashes:
+        parts = _parts(nominal, clash.pair)
+        if parts in told or parts in declared or clash.pair in watch.overlapping or _is_carried(nominal, clash.pair):
+            continue
+        if any(nominal.may_differ(body) for body in clash.pair):
+            measured = _measured(draws, clash.pair, _rows_with_contact(draws, clash.pair), draws.resolved.poses[:, CORRECTED])
+        else:
+            measured = _measured(draws, clash.pair, clash.rows, draws.poses)
+        if measured.share <= MIN_SHARE:
+            continue
+        told.add(parts)
+        if len(told) > MAX_CLASHES:
+            yield f"more than {MAX_CLASHES} pairs of parts lie in each other without contact; declare that of these first"
+            return
+        moving, reference = moving_first(nominal, clash.pair)
+        location = nominal.assembly.location_of(moving.part)
+        basis = ", on which it is located," if location is not None and location.parent is reference.part else ""
+        yield (
+            f'{designation("part", moving.part)}: it lies in part "{reference.name}"{basis} in {_extent(draws, measured, 0)}, '
+            f"and no contact holds them apart; declare it: {contact_line(nominal, clash.pair, measured.places[0])}, "
+            f"or say that it is meant: {overlap_line(nominal, clash.pair)}"
+        )
+
+
+def clashes_beyond_faces(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each two parts with declared contact that it leaves in each other, beyond the chosen faces."""
+    nominal, watch = draws.program.nominal, draws.program.watch
+    if not draws.program.method.is_bounded:
+        return
+    for clash in draws.clashes:
+        if clash.pair not in watch.declared or clash.pair in watch.overlapping:
+            continue
+        faces = _chosen_faces(nominal, clash.pair)
+        if not any(place.is_beyond(faces) for place in _measured(draws, clash.pair, clash.rows, draws.poses).places):
+            continue
+        rows = _rows_with_contact(draws, clash.pair)
+        rows = rows[draws.resolved.status[rows] == Status.DOUBTFUL]
+        measured = _measured(draws, clash.pair, rows, draws.resolved.poses[:, CORRECTED])
+        beyond = [k for k, place in enumerate(measured.places) if place.is_beyond(faces)]
+        if measured.share > MIN_SHARE and beyond:
+            parts = _parts(nominal, clash.pair)
+            pair = next(pair for pair in nominal.assembly.pairs if {pair.moving.part, pair.reference.part} == parts)
+            moving, reference = moving_first(nominal, clash.pair)
+            yield (
+                f'{designation("contact pair", pair)}: part "{moving.name}" still lies in part "{reference.name}" beyond the '
+                f"chosen faces in {_extent(draws, measured, beyond[0])}; declare their contact there, too: "
+                f"{contact_line(nominal, clash.pair, measured.places[beyond[0]])}, or say that it is meant: "
+                f"{overlap_line(nominal, clash.pair)}"
+            )
+
+
+def _parts(nominal: Nominal, pair: tuple[int, int]) -> frozenset[Part]:
+    return frozenset(nominal.parts[body].part for body in pair)
+
+
+def _is_carried(nominal: Nominal, pair: tuple[int, int]) -> bool:
+    """Return whether two bodies are of one joint, so that an earlier station decides how they lie to each other."""
+    carriers = [part.parent if part.carried is not None else number for number, part in ((k, nominal.parts[k]) for k in pair)]
+    return carriers[0] == carriers[1]
+
+
+def _rows_with_contact(draws: TrialDraws, pair: tuple[int, int]) -> Int[Array, " k"]:
+    """Return the draws (k,) in which two bodies lie in each other after contact has moved them."""
+    clashes = draws.program.watch.clashes(draws.resolved.poses[:, CORRECTED], draws.deviations, among=[pair])
+    return next((clash.rows for clash in clashes), np.zeros(0, dtype=int))
+
+
+def _measured(
+    draws: TrialDraws, pair: tuple[int, int], rows: Int[Array, " k"], poses: Float[Array, "n part 12"]
+) -> MeasuredClash:
+    """Return where two bodies lie in each other at poses (n, part, 12) of draws, rows (k,), and how deep in some of them."""
+    watch = draws.program.watch
+    triangles = sum(len(draws.program.nominal.parts[body].mesh.faces) for body in pair)
+    count = min(len(rows), max(MIN_MEASURED, MAX_TRIANGLES // triangles))
+    chosen = rows[np.linspace(0, len(rows) - 1, count).round().astype(int)]
+    interference = watch.measured(Clash(pair, chosen), poses, draws.deviations)
+    order = np.argsort(-interference.depths, kind="stable")
+    places = [ClashPlace.of(watch, pair, interference, row) for row in order]
+    return MeasuredClash(pair, len(rows) / max(len(draws.deviations), 1), interference.depths[order], places)
+
+
+def _chosen_faces(nominal: Nominal, pair: tuple[int, int]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return the triangles of both bodies that each of their contact pairs chose."""
+    faces = []
+    for declared in nominal.assembly.pairs:
+        of_part = {face.part: np.array(nominal.triangles(face)) for face in (declared.moving, declared.reference)}
+        first, second = (of_part.get(nominal.parts[body].part) for body in pair)
+        if first is not None and second is not None:
+            faces.append((first, second))
+    return faces
+
+
+def _extent(draws: TrialDraws, measured: MeasuredClash, row: int) -> str:
+    """Return in how many draws bodies lie in each other, how deep, and where."""
+    place = ", ".join(f"{c + 0.0:.4g}" for c in measured.places[row].position.round(6))
+    return f"{_percent(measured.share)} of {len(draws.deviations)} draws, up to {measured.depths[row]:.2g} mm, near ({place})"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %" if share < 1 else "all"
