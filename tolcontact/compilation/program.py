@@ -237,7 +237,8 @@ def _allowed_depths(
     """Return how deep [mm] bodies of contact pairs may lie in each other, where that is more than usual.
 
     Fixed planes err by what was allowed in their trial, of raw poses; other contact tilts parts more. Springs let faces into
-    each other, and form is not part of a solid. Parts that are declared to overlap may lie in each other at any depth.
+    each other, and form is not part of a solid. Parts that are declared to overlap may lie in each other at any depth. Bodies
+    in the watch have flat planes; where contact points are fixed, they lie on triangles as files round them.
     """
     depths = dict[tuple[int, int], float]()
     for k, pair in enumerate(nominal.pairs):
@@ -249,7 +250,8 @@ def _allowed_depths(
                 if k in trials and k not in meetings and np.isfinite(trials[k].allowed)
                 else 0.0
             )
-            depths[bodies] = max(depths.get(bodies, 0.0), np.inf if is_free else planes)
+            rounding = 0.0 if k in meetings else pair.coordinates.error
+            depths[bodies] = max(depths.get(bodies, 0.0), np.inf if is_free else planes + rounding)
     return depths | dict.fromkeys(_meant_overlaps(nominal), np.inf)
 
 

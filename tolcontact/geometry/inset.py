@@ -9,14 +9,14 @@ from typing import NamedTuple
 import numpy as np
 import trimesh
 
-from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.arrays import Array, Float, Int
+from tolcontact.geometry.vertex_displacements import TINY, capped, displacements
 
 MIN_ANGLE, MAX_ANGLE = 1e-6, 0.01  # rad: triangles at a smaller angle may always be one plane, at a larger one never
 MAX_ERRORS = 2.0  # errors of coordinates: distance of a vertex from a plane that is fitted to it
 MAX_DISPLACEMENT = 20.0  # errors, by which a vertex moves at most: where faces meet at sharp angles
 MIN_CROSSING = 1e-3  # smallest singular value of the normals of planes that meet in a line or a corner
-ROUNDED = 1e-9  # entries of a projection below are 0
-TINY = 1e-300
+ROUNDED = 1e-9  # parts of normals below are 0
 
 
 class Planes(NamedTuple):
@@ -31,6 +31,14 @@ class Planes(NamedTuple):
     vertex: Int[Array, " pair"]
     normals: Float[Array, "pair 3"]
     heights: Float[Array, " pair"]
+
+
+def smaller(body: trimesh.Trimesh, error: float) -> trimesh.Trimesh:
+    """Return a body with flat planes, all faces of which lie inside by an `error` [mm]; the body itself if that is 0."""
+    if not error:
+        return body
+    whole = trimesh.Trimesh(body.vertices, np.asarray(body.faces)[np.asarray(body.area_faces) > 0], process=False)
+    return trimesh.Trimesh(inset(whole, error), body.faces, process=False)
 
 
 def inset(mesh: trimesh.Trimesh, error: float) -> Float[Array, "vertex 3"]:
@@ -49,18 +57,16 @@ def inset(mesh: trimesh.Trimesh, error: float) -> Float[Array, "vertex 3"]:
         label = np.unique(label, return_inverse=True)[1]
         planes = _fitted(mesh, label)
     is_joint = (np.bincount(label) > 1)[planes.number]
-    heights, count = planes.heights - error, len(mesh.vertices)
-    A, b = _equations(planes, heights, is_joint, count)
-    inverse = np.linalg.pinv(A, rcond=MIN_CROSSING)
-    displacements = inverse @ b
-    free = np.eye(3) - inverse @ A  # onto the displacements that these planes leave open
-    free[np.abs(free) < ROUNDED] = 0
-    A, b = _equations(planes, heights, ~is_joint, count)
-    displacements += free @ np.linalg.pinv(A @ free, rcond=MIN_CROSSING) @ (b - A @ displacements)
-    displacements = displacements[..., 0]
-    lengths = np.linalg.norm(displacements, axis=1, keepdims=True)
-    displacements *= np.minimum(MAX_DISPLACEMENT * error / np.maximum(lengths, TINY), 1)
-    return np.asarray(mesh.vertices) + displacements
+    N, heights, count = planes.normals, planes.heights - error, len(mesh.vertices)
+    vertex, joint = planes.vertex[is_joint], N[is_joint]
+    moved = displacements(vertex, joint, np.column_stack([heights[is_joint], joint]), count, MIN_CROSSING)
+    motions, free = moved[..., 0], np.eye(3) - moved[..., 1:]  # free: onto the directions that these planes leave open
+    vertex, lone = planes.vertex[~is_joint], N[~is_joint]
+    rest = heights[~is_joint] - (lone * motions[vertex]).sum(axis=1)
+    lone = (lone[:, None] @ free[vertex])[:, 0]
+    lone[np.abs(lone) < ROUNDED] = 0
+    motions = motions + displacements(vertex, lone, rest[:, None], count, MIN_CROSSING)[..., 0]
+    return np.asarray(mesh.vertices) + capped(motions, MAX_DISPLACEMENT * error)
 
 
 def _coplanar(mesh: trimesh.Trimesh, error: float) -> Int[Array, " face"]:
@@ -88,16 +94,3 @@ def _fitted(mesh: trimesh.Trimesh, label: np.ndarray) -> Planes:
 def _sums(group: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return the sums (group, column) of values (row, column) of each group (row,)."""
     return np.column_stack([np.bincount(group, column) for column in values.T])
-
-
-def _equations(
-    planes: Planes, heights: np.ndarray, chosen: Bool[Array, " pair"], count: int
-) -> tuple[Float[Array, "vertex plane 3"], Float[Array, "vertex plane 1"]]:
-    """Return normals and heights of the chosen planes around each of `count` vertices; zeros where it has fewer than others."""
-    order = np.flatnonzero(chosen)[np.argsort(planes.vertex[chosen], kind="stable")]
-    vertex = planes.vertex[order]
-    rank = np.arange(len(order)) - np.searchsorted(vertex, vertex)
-    room = int(rank.max(initial=0)) + 1
-    A, b = np.zeros((count, room, 3)), np.zeros((count, room, 1))
-    A[vertex, rank], b[vertex, rank, 0] = planes.normals[order], heights[order]
-    return A, b

@@ -8,7 +8,7 @@ import trimesh
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.geometry.coordinate_error import coordinate_error
 from tolcontact.geometry.edges import edges
-from tolcontact.geometry.inset import inset
+from tolcontact.geometry.inset import smaller
 from tolcontact.geometry.surface import Surface
 
 SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
@@ -64,8 +64,7 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
     merged.merge_vertices(digits_vertex=int(np.ceil(-np.log10(MERGE_SHARE * max(merged.scale, 1e-9)))))
     merged.update_faces(merged.area_faces > 0)
     numbers, _ = Surface(merged).nearest(np.asarray(face.mesh.triangles_center))
-    if error := coordinate_error(body):
-        merged = trimesh.Trimesh(inset(merged, error), merged.faces, process=False)
+    merged = smaller(merged, coordinate_error(body))
     vertices, faces = np.asarray(merged.vertices), np.asarray(merged.faces)
     facet_normals = np.asarray(merged.face_normals)
     outer_ends, edge, triangles_there = edges(faces)

@@ -23,7 +23,8 @@ def part_solid(nominal: Nominal, index: int) -> DeviatingSolid | None:
     body = solid(nominal.parts[index].body)
     if body is None:
         return None
-    surface_of_body = Surface(trimesh.Trimesh(body.vertices, body.faces, process=False))
+    stored = nominal.parts[index].body
+    surface_of_body = Surface(trimesh.Trimesh(stored.vertices, np.asarray(stored.faces)[body.sources], process=False))
     faces = list(_deviating_faces(nominal, index, body, surface_of_body))
     return deviating_solid(body, faces, _bulges(nominal, index, body, surface_of_body))
 
@@ -49,7 +50,7 @@ def _deviating_faces(
 def _bulges(nominal: Nominal, index: int, body: Solid, surface_of_body: Surface) -> np.ndarray:
     """Return how far (t,) [mm] triangles stand out of the round faces for which they stand, mostly into hollow ones."""
     part, bulges = nominal.parts[index], np.zeros(len(body.faces))
-    corners = body.vertices[body.faces]
+    corners = np.asarray(surface_of_body.mesh.triangles)
     points = np.concatenate(
         [corners, (corners + np.roll(corners, -1, axis=1)) / 2, corners.mean(axis=1, keepdims=True)], axis=1
     )
