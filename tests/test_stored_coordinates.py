@@ -72,8 +72,8 @@ def test_a_ball_rests_lower_by_the_rounding_of_its_file(tmp_path):
 
 def test_exact_coordinates_have_no_error():
     program = tc.build(stored_case("key", None))
-    assert program.nominal.pairs[0].coordinates.error == 0
-    assert program.stored_coordinates == ()
+    assert program.nominal.pairs[0].coordinate_error == 0
+    assert program.stored_coordinates == ""
     assert "coordinate_error" not in tc.run(program, **QUICK)["contact"]
 
 
@@ -97,7 +97,7 @@ def test_the_summary_and_the_check_say_what_contact_allows(tmp_path):
         "from pathlib import Path\nfrom tests.cases.stored import stored_case\n"
         "def assembly():\n    return stored_case('key', Path(__file__).parent)\n"
     )
-    line = 'contact pair "key": coordinates in key.stl and block.stl are stored to 0.00024 mm; contact allows 0.00028 mm'
+    line = 'coordinates of "key" and "block" are stored to 0.00024 mm; contact allows 0.00028 mm'
     assert line in call(tmp_path, "check", "model.py").stdout
     assert line in " ".join(call(tmp_path, "run", "model.py", "--samples", 10).stdout.split())
 

@@ -44,6 +44,9 @@ The attribute `not_watched` names what the test leaves out: parts that are not c
 form, and overlaps that are declared. Where `clashes` is 0 and `clash_part` is not -1, parts with declared contact lie in each
 other, and the realization is `doubtful`. Linearized runs, and archives before these variables, were not tested.
 
+Where files round coordinates noticeably, the attribute `stored_coordinates` says to what, and what contact allows;
+`coordinate_error` in the group `contact` states the amount for each pair [mm].
+
 With stations (format 6) `measure_station`, `pair_station` and `part_station` state what belongs to which; the pose of a part is
 that in the last station that holds it, and the status is that of the worst station. Groups `station/<name>` hold the poses of
 all its parts (`station_part`), `station_translation` and `station_rotation`, and `station_status`.

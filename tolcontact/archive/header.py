@@ -242,13 +242,8 @@ def _bounded_values(program: Program) -> dict[ArchiveVariable, Any]:
 
 def _coordinate_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
     """Return the errors of coordinates in files, by which gaps count larger; none unless a file rounds coordinates."""
-    coordinates = [pair.coordinates for pair in nominal.pairs]
-    if not any(stored.error for stored in coordinates):
-        return {}
-    return {
-        terms.COORDINATE_ERROR: [stored.error for stored in coordinates],
-        terms.COORDINATES_STORED: [stored.in_words for stored in coordinates],
-    }
+    errors = [pair.coordinate_error for pair in nominal.pairs]
+    return {terms.COORDINATE_ERROR: errors} if any(errors) else {}
 
 
 def _face_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:

@@ -20,8 +20,8 @@ from tolcontact.compilation.plugins import Plugin, plugin
 from tolcontact.compilation.station_program import StationProgram, station_programs
 from tolcontact.declaration.locator import FIRST_ORDER
 from tolcontact.declaration.measure import Tape
-from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
-from tolcontact.errors import ModelError, shown
+from tolcontact.discretization import ContactPoints, Nominal, RoundPoints, coordinates_in_words
+from tolcontact.errors import ModelError
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.interference import Watch, ordered
 from tolcontact.limits import Limits
@@ -38,7 +38,6 @@ from tolcontact.method import Method
 from tolcontact.poses import AT_REST
 from tolcontact.readable import Pictured
 from tolcontact.variation import Draws
-from tolcontact.vocabulary import STATED_ERROR_SHARE
 
 log = logging.getLogger(__name__)
 WATCH_DRAWS = 64  # that tell how far bodies move
@@ -99,7 +98,7 @@ class Program(Pictured):
             for part in nominal.parts
         ]
         rows += [f"  contact {pair.name}: {self.contact_in_words(k)}" for k, pair in enumerate(nominal.pairs)]
-        rows += [f"  {line}" for line in self.stored_coordinates]
+        rows += [f"  {self.stored_coordinates}"] * bool(self.stored_coordinates)
         rows += [
             f"  measurement {measure.name}: nominally {value:.6g} {measure.units}"
             for measure, value in zip(nominal.measures, self.nominal_measures, strict=True)
@@ -107,14 +106,9 @@ class Program(Pictured):
         return "\n".join(rows)
 
     @property
-    def stored_coordinates(self) -> tuple[str, ...]:
-        """A line for each pair whose gaps count noticeably larger, by the error of coordinates in files."""
-        limit = STATED_ERROR_SHARE * self.nominal.assembly.smallest_zone()
-        return tuple(
-            f'contact pair "{shown(pair.name)}": {pair.coordinates.in_words}'
-            for pair in self.nominal.pairs
-            if pair.coordinates.error > limit
-        )
+    def stored_coordinates(self) -> str:
+        """How exactly files store the coordinates of parts in contact, and what contact allows; empty if it hardly matters."""
+        return coordinates_in_words(self.nominal)
 
     def limits(self, measure: int) -> Limits:
         """Return the limits of a measure, given by number, with its accuracy."""
@@ -250,7 +244,7 @@ def _allowed_depths(
                 if k in trials and k not in meetings and np.isfinite(trials[k].allowed)
                 else 0.0
             )
-            rounding = 0.0 if k in meetings else pair.coordinates.error
+            rounding = 0.0 if k in meetings else pair.coordinate_error
             depths[bodies] = max(depths.get(bodies, 0.0), np.inf if is_free else planes + rounding)
     return depths | dict.fromkeys(_meant_overlaps(nominal), np.inf)
 

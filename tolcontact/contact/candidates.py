@@ -71,8 +71,8 @@ def project(scan: PairScan, pair: ContactPoints, relative: Float[Array, "realiza
         return scan
     shape = (len(relative), len(scan.P_m), 3)
     feet, normals, over = surface.project(pose.apply(relative, scan.P_m).reshape(-1, 3), margin=margin)
-    if pair.coordinates.error:
-        feet = feet - pair.coordinates.error * normals
+    if pair.coordinate_error:
+        feet = feet - pair.coordinate_error * normals
     return ProjectedScan(
         **{name: getattr(scan, name) for name in PairScan.__dataclass_fields__},
         feet=feet.reshape(shape),

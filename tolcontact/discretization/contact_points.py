@@ -21,12 +21,12 @@ from tolcontact.discretization.form_points import (
 )
 from tolcontact.discretization.nominal import ContactPoints, Offsets
 from tolcontact.discretization.nominal_part import NominalPart
-from tolcontact.discretization.pair_coordinates import pair_coordinates
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.scenes import Scene
 from tolcontact.errors import ContactWarning, GeometryFault, designation
 from tolcontact.features import FaceDeviation, Features
+from tolcontact.geometry.coordinate_error import coordinate_error
 from tolcontact.geometry.curvature import CHORD_SHARE, curvature_points, distinct, facet_error, is_flat, sampling_error
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.overlap import overlap_corners, rim_points
@@ -53,7 +53,7 @@ def contact_points(
     reference_face = patch(pair.reference, meshes).placed(*reference.placement)
     reach = pair.within if pair.within is not None else DEFAULT_REACH * moving.mesh.scale
     deviating = _deviation(pair.moving, moving, meshes, features), _deviation(pair.reference, reference, meshes, features)
-    lengths, coordinates = form_lengths(deviating), pair_coordinates(moving, reference)
+    lengths, rounding = form_lengths(deviating), coordinate_error(moving.mesh) + coordinate_error(reference.mesh)
     if lengths:
         check_facing(moving_face, reference_face, deviating)
     balls_and_shafts = round_points(moving_face, reference_face, reach) if _is_open(pair) and not lengths else []
@@ -62,7 +62,7 @@ def contact_points(
     else:
         candidates = coaxial_points(moving_face, reference_face, deviating) if _is_open(pair) and lengths else None
         if candidates is None:
-            faces, rounding = (moving_face, reference_face), coordinates.error
+            faces = moving_face, reference_face
             candidates = _candidates(scene.assembly, pair, moving, unplaced.mesh, faces, reach, lengths, rounding)
         P_m, P_r, n_r = _touching(pair, candidates, moving_face, reference_face, reach)
     points = ContactPoints(
@@ -70,12 +70,12 @@ def contact_points(
         moving=scene.index(moving.part),
         reference=scene.index(reference.part),
         P_m=P_m,
-        P_r=P_r - coordinates.error * n_r if coordinates.error else P_r,
+        P_r=P_r - rounding * n_r if rounding else P_r,
         n_r=n_r,
         offsets=Offsets.none(len(P_m)),
         reference_face=reference_face,
         moving_face=moving_face,
-        coordinates=coordinates,
+        coordinate_error=rounding,
         facets=facet_error(moving_face, reference_face, reach),
         round=RoundPoints.of(balls_and_shafts) if balls_and_shafts else None,
         deviating=deviating,

@@ -13,7 +13,6 @@ from tolcontact.discretization.form_points import form_lengths, form_spacing
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.measured_geometry import NominalMeasurement
 from tolcontact.discretization.nominal_part import NominalPart
-from tolcontact.discretization.pair_coordinates import EXACT, PairCoordinates
 from tolcontact.discretization.pair_form import PairForm
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
@@ -76,7 +75,7 @@ class ContactPoints:
     reference is the part that they are on, or None for the ground. They have no faces; their offsets are the deviations.
 
     moving_face, reference_face   in their nominal places
-    coordinates how files store the coordinates of both faces; P_r lie below the reference face by their error
+    coordinate_error   [mm] of both bodies, as their files store them: P_r lie below the reference face by it
     facets      [mm] largest distance between their triangles and the round faces that these approximate
     round       the balls and shafts beside walls from which gaps follow at any pose; None if the contact points are fixed
     deviating   deviations of the moving and the reference face, if these belong to features; their heights at fixed points are
@@ -95,7 +94,7 @@ class ContactPoints:
     offsets: Offsets
     reference_face: Surface | None = None
     moving_face: Surface | None = None
-    coordinates: PairCoordinates = EXACT
+    coordinate_error: float = 0.0
     facets: float = 0.0
     round: RoundPoints | None = None
     deviating: tuple[FaceDeviation | None, FaceDeviation | None] = (None, None)
@@ -237,7 +236,7 @@ class Nominal:
             self._face_pairs[index] = FacePair(
                 body_face(pair.moving_face, self.parts[pair.moving].body, len(pair.P_m)),
                 body_face(pair.reference_face, self.parts[pair.reference].body, len(pair.P_m)),
-                FITTED_ERRORS * pair.coordinates.error,
+                FITTED_ERRORS * pair.coordinate_error,
             )
         return self._face_pairs[index]
 

@@ -32,7 +32,6 @@ def summary_table(results: Results) -> Table:
         terms.CHANGE: of_measures.changes,
         **_status_values(rows, rigid),
         **_contact_values(rows, combinations),
-        terms.PAIR_COORDINATES: _stored_coordinates(results, terms.STATED_ERROR_SHARE * smallest),
         terms.STEPS: _steps(rows),
         terms.PENETRATION: _penetration(rows, rigid),
         **clashes.values(),
@@ -54,6 +53,7 @@ def summary_table(results: Results) -> Table:
             "smallest_range": smallest,
             terms.INTERFERENCE_DEPTH: float(results.attrs.get(terms.INTERFERENCE_DEPTH, np.nan)),
             terms.NOT_WATCHED: str(results.attrs.get(terms.NOT_WATCHED, "")),
+            terms.STORED_COORDINATES: str(results.attrs.get(terms.STORED_COORDINATES, "")),
         },
     )
 
@@ -141,15 +141,6 @@ def _is_rigid(results: Results) -> np.ndarray:
         gives = np.isfinite(contact[terms.POINT_STIFFNESS.name].values)
         rigid[contact[terms.PAIR_OF_POINT.name].values[gives]] = False
     return rigid
-
-
-def _stored_coordinates(results: Results, limit: float) -> np.ndarray:
-    """Return how files store the coordinates of each pair (pair,), where their error is above a `limit` [mm]."""
-    words = np.full(results.to_dataset().sizes[terms.PAIR], "", dtype=object)
-    if terms.COORDINATE_ERROR.name in (contact := results["contact"].to_dataset()):
-        is_stated = contact[terms.COORDINATE_ERROR.name].values > limit
-        words[is_stated] = contact[terms.COORDINATES_STORED.name].values[is_stated]
-    return words
 
 
 def _penetration(rows: Rows, rigid: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from tolcontact.vocabulary.labels import AXIS, PAIR, ArchiveVariable
 
+STORED_COORDINATES = "stored_coordinates"  # attribute of archives and summaries: how exactly files store which parts
 STATED_ERROR_SHARE = 1e-4  # of the smallest tolerance range: a larger error of coordinates in files is told
 
 COORDINATE_SPACING = ArchiveVariable(
@@ -13,7 +14,4 @@ COORDINATE_ERROR = ArchiveVariable(
     "f8",
     "error of coordinates in the files of a pair, by which its gaps count larger, also in gap_min and in reference_point",
     "mm",
-)
-COORDINATES_STORED = ArchiveVariable(
-    "coordinates_stored", (PAIR,), str, "how exactly which files store coordinates; empty: without error"
 )

@@ -95,9 +95,6 @@ DEEPEST_FALSE_CONTACT = ArchiveVariable(
     "largest depth of contact points in the raw state where the surfaces were apart, of the realizations that were checked",
     "mm",
 )
-PAIR_COORDINATES = ArchiveVariable(
-    "coordinates_stored", (PAIR,), str, "how exactly which files store coordinates, and what contact allows; empty: no matter"
-)
 PENETRATING_SHARE = ArchiveVariable(
     "penetrating_share",
     (INTERVAL,),

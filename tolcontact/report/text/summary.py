@@ -196,9 +196,8 @@ def contact_lines(summary: Rows, count: int) -> Iterator[str]:
     yield f"resolution: {summary.attrs['resolution']}{steps}; objective: {summary.attrs['objective']}"
     if shifted := summary.attrs["datum_shifts"]:
         yield f"datum shift of {shifted}: not drawn; contact of the datum features determines it"
-    for pair, words in zip(summary["pair"].values, summary["coordinates_stored"].values, strict=True):
-        if words:
-            yield f'contact pair "{pair}": {words}'
+    if stored := summary.attrs["stored_coordinates"]:
+        yield stored
     yield f"largest penetration at contact points: {raw:.3g} mm without, {corrected:.3g} mm with contact"
     yield from _between(summary, count)
     yield from _advice(summary, corrected)
