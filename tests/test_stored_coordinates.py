@@ -17,6 +17,8 @@ QUICK = {"samples": 60, "surfaces": 0, "fields": "none"}
 BOX = trimesh.creation.box(bounds=[(0, 0, 0), (20, 12.5, 8)])
 TURNED = trimesh.Trimesh(BOX.vertices, BOX.faces).apply_transform(trimesh.transformations.euler_matrix(0.3, 0.5, 1.1))
 ABROAD = TURNED.copy().apply_translation(FAR)
+WHOLE = trimesh.Trimesh(np.arange(30).reshape(-1, 3) + 101, [(k, k + 1, k + 2) for k in range(8)], process=False)
+INCHES = trimesh.Trimesh(25.4 * (WHOLE.vertices - 100), WHOLE.faces, process=False)
 SINGLE = trimesh.Trimesh(ABROAD.vertices.astype(np.float32).astype(float), ABROAD.faces, process=False)
 
 
@@ -106,7 +108,8 @@ def test_the_summary_and_the_check_say_what_contact_allows(tmp_path):
     "mesh, number, spacing",
     [
         (BOX, "%.6f", 0), (BOX, "%g", 0), (BOX, "%r", 0),  # design dimensions
-        (TURNED, "%.6f", 1e-6), (TURNED, "%.3f", 1e-3), (TURNED, "%g", 1e-4), (TURNED, "%r", 0),
+        (WHOLE, "%g", 0), (INCHES, "%g", 0),
+        (TURNED, "%.6f", 1e-6), (TURNED, "%.3f", 1e-3), (TURNED, "%g", 1e-4), (TURNED, "%.4e", 1e-3), (TURNED, "%r", 0),
         (ABROAD, "%.6f", 1e-6), (ABROAD, "%g", 1e-2), (ABROAD, "%e", 1e-3), (ABROAD, "%r", 0),
         (SINGLE, "%.6f", 2.0**-12), (SINGLE, "%r", 2.0**-12), (SINGLE, "%.2f", 1e-2),
     ],

@@ -12,7 +12,8 @@ import numpy as np
 
 MIN_DIGITS = 6  # that programs print by default: if all numbers of a text are shorter, they are most probably exact
 DOUBLE_DIGITS = 15  # or more: a text of double precision
-MIN_NUMBERS, MIN_SHARE = 16, 0.6  # different shorter numbers, and the share with all decimals, from which they are rounded
+MIN_NUMBERS, MIN_SHARE = 16, 0.6  # different shorter numbers, and the share with all decimals, or digits: they are rounded
+FEWEST_DIGITS = 4  # of rounded numbers; 5 with a single decimal, which designs in whole inches have, too
 HALF_UNIT = 0.6  # of the last digit: as far a printed number is from the stored one, and rounding
 MAX_VERTICES = 20_000  # the first ones, which tell how a text prints numbers
 _PLY_TYPE = re.compile(rb"^property\s+(\w+)\s+x\s*$", re.MULTILINE)
@@ -58,13 +59,12 @@ def printed_spacing(content: bytes, kind: str) -> float:
         return 0.0
     digits, decimals = np.array([_digits_and_decimals(number) for number in numbers]).T
     most = int(digits.max())
-    is_rounded = len(numbers) >= MIN_NUMBERS and (decimals == decimals.max()).mean() >= MIN_SHARE
+    share = max((decimals == decimals.max()).mean(), (digits == most).mean())
+    is_rounded = len(numbers) >= MIN_NUMBERS and share >= MIN_SHARE and most >= FEWEST_DIGITS + (decimals.max() < 2)
     if most < MIN_DIGITS and not is_rounded:
         return 0.0
     magnitude = int(np.floor(np.log10(values.max())))
-    last = int(decimals[values >= 10.0**magnitude].max())
-    if most >= MIN_DIGITS:
-        last = max(last, most - 1 - magnitude)
+    last = max(int(decimals[values >= 10.0**magnitude].max()), most - 1 - magnitude)
     unit, single = 10.0**-last, float(single_spacing(values[:, None])[0])
     if single > unit and (np.abs(values.astype(np.float32) - values) <= HALF_UNIT * unit).all():
         return single
