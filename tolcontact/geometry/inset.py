@@ -12,7 +12,7 @@ import trimesh
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.geometry.vertex_displacements import TINY, capped, displacements
 
-MIN_ANGLE, MAX_ANGLE = 1e-6, 0.01  # rad: triangles at a smaller angle may always be one plane, at a larger one never
+MIN_ANGLE, MAX_ANGLE = 1e-6, 0.05  # rad: triangles at a smaller angle may always be one plane, at a larger one never
 MAX_ERRORS = 2.0  # errors of coordinates: distance of a vertex from a plane that is fitted to it
 MAX_DISPLACEMENT = 20.0  # errors, by which a vertex moves at most: where faces meet at sharp angles
 MIN_CROSSING = 1e-3  # smallest singular value of the normals of planes that meet in a line or a corner
