@@ -10,7 +10,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.archive.datum_values import datum_sizes, datum_values
 from tolcontact.archive.form_values import form_sizes, form_values
 from tolcontact.archive.rows import Row, kept_rows
-from tolcontact.archive.settings import Run, declaration, format_of, now, run_settings, versions, watch_settings
+from tolcontact.archive.settings import Run, declaration, now, run_settings, versions, watch_settings
 from tolcontact.archive.station_header import write_stations
 from tolcontact.archive.stored_rows import empty_checks
 from tolcontact.archive.variables import Contents, define, labels_of_rows, units_of_rows
@@ -32,7 +32,7 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
     file.setncatts(
         {
             "Conventions": terms.CONVENTIONS,
-            "format": np.int64(format_of(program)),
+            "format": np.int64(terms.FORMAT),
             "title": f"variation simulation of {nominal.assembly.name}",
             "source": "Monte-Carlo variation simulation of a rigid-body assembly with contact",
             "references": "Sadeghi Tabar, Lindkvist, Wärmefjord, Söderberg: "

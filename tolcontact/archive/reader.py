@@ -20,6 +20,7 @@ from tolcontact.geometry import surfaces_of, with_known_surfaces
 from tolcontact.method import Method
 
 FIRST_WITH_FORM = 5  # the first format of archives with faces that are not flat
+FIRST_WITH_SPRINGS = 7  # and with locators that give way
 FORM_KINDS = [kind for kind, tolerance in KINDS.items() if tolerance.is_form]
 
 
@@ -53,7 +54,7 @@ def model_of(results: xr.DataTree) -> Assembly:
     number = int(results.attrs.get("format", 1))
     if number < FIRST_WITH_FORM:
         _state_form_alone(document)
-    if number < terms.SPRINGS_FORMAT:
+    if number < FIRST_WITH_SPRINGS:
         _leave_locators_rigid(document, presses=method_of_run(results).minimizes.presses)
     meshes = {}
     if "mesh" in results["model"].children:

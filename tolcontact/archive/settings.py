@@ -98,13 +98,6 @@ def _method_origin(program: Program) -> str:
     return "options"
 
 
-def format_of(program: Program) -> int:
-    """Return the format number of an archive of a program."""
-    if any(pair.is_springy for pair in program.nominal.pairs):
-        return terms.SPRINGS_FORMAT
-    return terms.STATIONS_FORMAT if program.stations else terms.FORMAT
-
-
 def declaration(program: Program) -> str:
     """Return the declared model as JSON."""
     return json.dumps(to_document(program.nominal.assembly, program.nominal.triangles, program.tapes))

@@ -229,8 +229,8 @@ def _clashes(summary: Rows, count: int) -> Iterator[str]:
         yield "advice: declare their contact, or that it is meant: assembly.may_overlap(...); tolcontact check writes the lines"
     extent = f"all {grouped(watched)}" if watched == count else f"{grouped(watched)} of {grouped(count)}"
     depth = summary.attrs["interference_depth"]
-    unless = "" if share[0] > 0 else "no bodies lie in each other in certified realizations: "
-    yield f"{unless}complete test of interference to {depth:.2g} mm in {extent} realizations"
+    found = "see above" if share[0] > 0 else "none where certified"
+    yield f"interference of bodies from {depth:.2g} mm: {found} ({extent} tested)"
     if summary.attrs["not_watched"]:
         yield f"not tested for interference: {summary.attrs['not_watched']}"
 
