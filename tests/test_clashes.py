@@ -119,9 +119,7 @@ def test_the_suggested_contact_ends_the_clash():
     assert_no_clashes(results)
     assert_resolved(results)
     lines = "\n".join(contact_lines(tc.summarize(results), 200))
-    assert (
-        "interference of bodies from 0.0009 mm: none where certified (all 200 tested)" in lines
-    )
+    assert "interference of bodies from 0.0009 mm: none where certified (all 200 tested)" in lines
 
 
 def test_overlaps_that_are_meant_are_not_told(tmp_path):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests.cases.stored import FAR, SCENES, ascii_stl, stored, stored_case
@@ -10,6 +11,8 @@ from tests.helpers import FIXED, call, nightly
 from tolcontact.geometry.coordinate_error import coordinate_error
 from tolcontact.geometry.inset import inset
 from tolcontact.geometry.shapes import shape
+from tolcontact.interference import Neighbours, deviating_solid, solid
+from tolcontact.poses import AT_REST
 from tolcontact.stored_coordinates import printed_spacing
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
 
@@ -70,6 +73,39 @@ def test_a_ball_rests_lower_by_the_rounding_of_its_file(tmp_path):
     lower = exact.measured.sel(state="corrected") - rounded.measured.sel(state="corrected")
     assert 1e-5 < error < 4e-5
     assert float(lower.max()) == pytest.approx(error, rel=0.5)
+
+
+@pytest.mark.parametrize("at", [(0, 0, 0), FAR])
+def test_a_pin_without_clearance_fits_as_its_fitted_cylinder_does(at, tmp_path):
+    R, a = Rotation.random(random_state=5).as_matrix(), tc.Assembly("pin")
+    geometries = []
+    for name, mesh in (
+        ("plate", trimesh.creation.annulus(5, 20, 10, sections=64)),
+        ("pin", trimesh.creation.cylinder(5, 20, sections=64)),
+    ):
+        turned = trimesh.Trimesh(mesh.vertices @ R.T + at, mesh.faces, process=False)
+        geometries.append(stored(turned, tmp_path / f"{name}.stl"))
+    plate, pin = a.part("plate", geometries[0], fixed=True), a.part("pin", geometries[1])
+    rows = [((5, 0, 0), 2), ((-5, 0, 0), 2), ((0, 5, 0), 2), ((0, 0, 0), 1), ((5, 0, 0), 1), ((0, 0, 0), 0)]
+    locators = [tc.Locator(f"L{k}", tuple(R @ p + at), tuple(R[:, axis])) for k, (p, axis) in enumerate(rows)]
+    a.locate(pin, locators, tolerance=0.1)
+    a.contact("fit", moving=pin.face(tc.Cylinder()), reference=plate.face(tc.Cylinder(inner=True, radius=5)))
+    a.measure("place", pin.point(*at), along="z", tolerance=1)
+    run = tc.run(a, keep="all", **QUICK)
+    assert_resolved(run)
+    assert_gaps_recompute(run)
+
+
+def test_the_test_of_interference_allows_the_error_and_no_more(tmp_path):
+    lower, upper = (trimesh.creation.box(bounds=[(0, 0, z), (10, 10, z + 10)]).apply_translation(FAR) for z in (0, 10))
+    solids = [
+        deviating_solid(solid(shape(stored(mesh, tmp_path / f"{name}.stl")).mesh), [], np.zeros(12))
+        for name, mesh in (("lower", lower), ("upper", upper))
+    ]
+    error = sum(coordinate_error(shape(tc.Mesh(tmp_path / f"{name}.stl")).mesh) for name in ("lower", "upper"))
+    X_BA = np.repeat(AT_REST[None], 3, axis=0)
+    X_BA[:, 11] = [0.0, 0.9 * error, 2.5 * error]
+    assert Neighbours(*solids, insets=(4e-6, 6e-6), reach=1.0).interfere(X_BA).tolist() == [False, False, True]
 
 
 def test_exact_coordinates_have_no_error():

@@ -53,10 +53,13 @@ def contact_points(
     reference_face = patch(pair.reference, meshes).placed(*reference.placement)
     reach = pair.within if pair.within is not None else DEFAULT_REACH * moving.mesh.scale
     deviating = _deviation(pair.moving, moving, meshes, features), _deviation(pair.reference, reference, meshes, features)
-    lengths, rounding = form_lengths(deviating), coordinate_error(moving.mesh) + coordinate_error(reference.mesh)
+    lengths = form_lengths(deviating)
     if lengths:
         check_facing(moving_face, reference_face, deviating)
     balls_and_shafts = round_points(moving_face, reference_face, reach) if _is_open(pair) and not lengths else []
+    # A hollow wall is fitted to many vertices: rounding hardly moves it.
+    is_rounded = not any(point.is_hollow for point in balls_and_shafts)
+    rounding = coordinate_error(moving.mesh) + coordinate_error(reference.mesh) if is_rounded else 0.0
     if balls_and_shafts:
         P_m, P_r, n_r = (np.array(rows) for rows in zip(*(point.nominal() for point in balls_and_shafts), strict=True))
     else:
