@@ -192,7 +192,7 @@ def scene(seed: int, family: str, objective: str, *, omits: bool = False) -> Sce
                 assembly.force(f"weight {k}", at=part.point(0, 0, 0), vector=tuple(frame.turn.apply((0.05, -0.02, -1))))
     if omits:
         left_out = int(rng.integers(len(stack.pairs)))
-        stack = replace(stack, pairs=[pair for k, pair in enumerate(stack.pairs) if k != left_out])
+        stack = replace(stack, pairs=stack.pairs[:left_out] + stack.pairs[left_out + 1 :])
     contacts = declare_contacts(assembly, parts, stack, frame, rng)
     up = frame.turn.apply((0, 0, 1))
     assembly.measure("height", parts[-1].point(0, 0, 0), along=tuple(up))
