@@ -191,3 +191,16 @@ def test_a_kind_of_place_that_the_search_lacks_is_noticed(kind, moving, fixed, m
     assert np.nanmax(radii(simulated(program, 100), bodies), initial=0) < 5e-4  # what is certified is true
     untested = replace(program, watch=replace(program.watch, allowed={(0, 1): np.inf}))
     assert (radii(simulated(untested, 100), bodies) > 0.01).sum() > 5  # without the test it would not be
+
+
+@pytest.mark.parametrize("at", [(10, 10, 0), (10, 10, 10), (10, 0, 0)], ids=["edge", "corner", "face"])
+def test_blocks_that_touch_are_one_closed_body(at):
+    """Where they touch, an edge has four triangles, or a corner two fans."""
+    both = trimesh.util.concatenate([box(*BOX), box(at, np.add(at, 10))])
+    both.merge_vertices()
+    touching = solid(both)
+    assert touching is not None and len(touching.components) == 2 and len(touching.edges) == 24
+    X = np.array([pose((-4, 0, 0)), pose((-3, 0, 0)), pose((12, 12, 2))])  # beside a block, touching it, in another one's place
+    cube = body(box((0, 0, 0), (3, 3, 3)))
+    found = Neighbours(cube, deviating_solid(touching, [], np.zeros(len(touching.faces))), INSETS, 1.0).interfere(X)
+    assert found.tolist() == [False, False, at == (10, 10, 0)]

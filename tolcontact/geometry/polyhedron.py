@@ -9,10 +9,10 @@ from tolcontact.arrays import Array, Float, Int
 from tolcontact.geometry.coordinate_error import coordinate_error
 from tolcontact.geometry.edges import edges
 from tolcontact.geometry.inset import smaller
+from tolcontact.geometry.merged_surface import merged_surface
 from tolcontact.geometry.surface import Surface
 
 SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
-MERGE_SHARE = 1e-9  # of the body's size: vertices that are no farther apart are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +60,7 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
     Planes of the body count as a whole, also where the face was cut out of them: the body does not end there. If its file
     rounds coordinates, it is smaller by their error.
     """
-    merged = trimesh.Trimesh(body.vertices, body.faces, process=False)
-    merged.merge_vertices(digits_vertex=int(np.ceil(-np.log10(MERGE_SHARE * max(merged.scale, 1e-9)))))
-    merged.update_faces(merged.area_faces > 0)
+    merged, _, is_closed = merged_surface(body)
     numbers, _ = Surface(merged).nearest(np.asarray(face.mesh.triangles_center))
     merged = smaller(merged, coordinate_error(body))
     vertices, faces = np.asarray(merged.vertices), np.asarray(merged.faces)
@@ -105,7 +103,7 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
         facet_planes=planes[chosen],
         vertex_planes=_planes_around(corners, faces[chosen], planes[chosen]),
         edge_planes=edge_planes[is_ours],
-        body=vertices[faces] if body.is_watertight else np.zeros((0, 3, 3)),
+        body=vertices[faces] if is_closed else np.zeros((0, 3, 3)),
     )
 
 

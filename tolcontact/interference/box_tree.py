@@ -32,25 +32,21 @@ def box_tree(corners: Float[Array, "t 3 3"]) -> BoxTree:
     # Triangles are spread over all leaves, so that none is much fuller than another.
     leaf = np.arange(len(corners)) * leaves // max(len(corners), 1)
     places[leaf * LEAF + np.arange(len(corners)) - np.searchsorted(leaf, leaf)] = order
-    boxes = np.concatenate([np.full((leaves * LEAF, 3), np.inf), np.full((leaves * LEAF, 3), -np.inf)], axis=1)
-    boxes[places >= 0] = np.concatenate([lower, upper], axis=1)[order]
+    triangles = places.reshape(leaves, LEAF)
+    return BoxTree(triangles, boxes_of_nodes(triangles, lower, upper), _successors(2 * leaves - 1))
+
+
+def boxes_of_nodes(triangles: Int[Array, "l 4"], lower: Float[Array, "t 3"], upper: Float[Array, "t 3"]) -> Float[Array, "n 6"]:
+    """Return the boxes of the nodes of a tree with `triangles` in its leaves, whose own boxes are `lower` to `upper`."""
+    places = triangles.ravel()
+    boxes = np.concatenate([np.full((places.size, 3), np.inf), np.full((places.size, 3), -np.inf)], axis=1)
+    boxes[places >= 0] = np.concatenate([lower, upper], axis=1)[places[places >= 0]]
     level = _joined(boxes, LEAF)
     levels = [level]
     while len(level) > 1:
         level = _joined(level, 2)
         levels.insert(0, level)
-    return BoxTree(places.reshape(leaves, LEAF), np.concatenate(levels), _successors(2 * leaves - 1))
-
-
-def inflated(tree: BoxTree, margins: Float[Array, " t"]) -> Float[Array, "n 6"]:
-    """Return boxes that hold triangles which move by no more than `margins` (t,) [mm]."""
-    level = np.where(tree.triangles >= 0, margins[tree.triangles], 0.0).max(axis=1)
-    levels = [level]
-    while len(level) > 1:
-        level = level.reshape(-1, 2).max(axis=1)
-        levels.insert(0, level)
-    spare = np.concatenate(levels)[:, None]
-    return np.concatenate([tree.boxes[:, :3] - spare, tree.boxes[:, 3:] + spare], axis=1)
+    return np.concatenate(levels)
 
 
 def _joined(boxes: np.ndarray, count: int) -> np.ndarray:

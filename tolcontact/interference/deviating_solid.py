@@ -10,6 +10,8 @@ import trimesh
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.interference.solid import Solid
 
+IN_PLANE = 1e-9  # of the largest motion of a vertex: a motion along the normal that is rounding
+
 
 @dataclass(frozen=True, eq=False)
 class DeviatingSolid:
@@ -33,14 +35,16 @@ class DeviatingSolid:
 
     @cached_property
     def moves(self) -> Bool[Array, " t"]:
-        """Whether deviations move a corner of each triangle (t,)."""
-        moved = np.zeros(len(self.solid.vertices), dtype=bool)
-        moved[self._motions[0]] = True
-        return moved[self.solid.faces].any(axis=1)
+        """Whether deviations move the plane of each triangle (t,); corners may move in it."""
+        vertices, motions = self._motions
+        of_vertices = np.zeros((len(self.solid.vertices), 3, len(self.columns)))
+        of_vertices[vertices] = motions
+        heights = np.abs(np.einsum("tj,tcjk->tck", self.solid.normals, of_vertices[self.solid.faces]))
+        return np.asarray((heights > IN_PLANE * np.abs(motions).max(initial=0)).any(axis=(1, 2)))
 
     @cached_property
     def facet_of(self) -> Int[Array, " t"]:
-        """The facet of each triangle (t,): neighbours in one plane are one facet, unless deviations move their corners."""
+        """The facet of each triangle (t,): neighbours in one plane are one facet, unless deviations move their planes."""
         pairs = self.solid.flat[~self.moves[self.solid.flat].any(axis=1)]
         return np.asarray(trimesh.graph.connected_component_labels(pairs, node_count=len(self.solid.faces)), dtype=np.int64)
 

@@ -9,6 +9,8 @@ from tolcontact.compiled import compiled, inlined_uncounted, uncounted
 from tolcontact.geometry.vector_kernel import along, cross, dot, minus, move, move_back, row, row_of
 
 LEAF = 4
+MANY = 8  # triangles of a facet: of more, only those are looked at that lie where an edge passes their plane
+ROUNDED = 1e-9  # of coordinates: how far a place may be off
 
 
 class Side(NamedTuple):
@@ -106,14 +108,19 @@ def crossing(side, k, triangle, p, q):  # type: ignore[no-untyped-def]
 @inlined_uncounted
 def passes(side, k, p, q, shares, senses):  # type: ignore[no-untyped-def]
     """Write at which shares, in order, and in which senses the segment from p to q passes the surface; return how often."""
+    low, high = (min(p[0], q[0]), min(p[1], q[1]), min(p[2], q[2])), (max(p[0], q[0]), max(p[1], q[1]), max(p[2], q[2]))
+    return passes_in(side, k, low, high, p, q, shares, senses)
+
+
+@uncounted
+def passes_in(side, k, low, high, p, q, shares, senses):  # type: ignore[no-untyped-def]
+    """Write and return what `passes` does, of triangles whose boxes reach into a box from `low` to `high`."""
     count, node, inner = 0, 0, side.next.size // 2
-    low_x, low_y, low_z = min(p[0], q[0]), min(p[1], q[1]), min(p[2], q[2])
-    high_x, high_y, high_z = max(p[0], q[0]), max(p[1], q[1]), max(p[2], q[2])
     boxes = side.boxes
     while node < side.next.size:
         if (
-            boxes[node, 0] > high_x or boxes[node, 1] > high_y or boxes[node, 2] > high_z
-            or boxes[node, 3] < low_x or boxes[node, 4] < low_y or boxes[node, 5] < low_z
+            boxes[node, 0] > high[0] or boxes[node, 1] > high[1] or boxes[node, 2] > high[2]
+            or boxes[node, 3] < low[0] or boxes[node, 4] < low[1] or boxes[node, 5] < low[2]
         ):  # fmt: skip
             node = side.next[node]
             continue
@@ -198,31 +205,35 @@ def motion_of(X, bounds):  # type: ignore[no-untyped-def]
 
 
 @inlined_uncounted
-def _may_pass(facets, f, p, q):  # type: ignore[no-untyped-def]
-    """Return whether the segment from p to q reaches the box of a facet, and passes its plane."""
+def _heights(side, k, f, p, q):  # type: ignore[no-untyped-def]
+    """Return heights of p and q over the plane of a facet in realization k: both 1 if their segment misses its box."""
+    facets = side.facets
     if (
         facets[f, 0] > max(p[0], q[0]) or facets[f, 3] < min(p[0], q[0]) or facets[f, 1] > max(p[1], q[1])
         or facets[f, 4] < min(p[1], q[1]) or facets[f, 2] > max(p[2], q[2]) or facets[f, 5] < min(p[2], q[2])
     ):  # fmt: skip
-        return False
+        return 1.0, 1.0
+    if side.vertices_of_facets[f, 0] >= 0:
+        a = vertex(side, k, side.vertices_of_facets[f, 0])
+        b, c = vertex(side, k, side.vertices_of_facets[f, 1]), vertex(side, k, side.vertices_of_facets[f, 2])
+        n = cross(minus(b, a), minus(c, a))
+        return dot(n, minus(p, a)), dot(n, minus(q, a))
     n = (facets[f, 6], facets[f, 7], facets[f, 8])
-    return not (dot(n, p) - facets[f, 9]) * (dot(n, q) - facets[f, 9]) > 0.0
+    return dot(n, p) - facets[f, 9], dot(n, q) - facets[f, 9]
 
 
 @uncounted
-def _put_planes(side, k, facets):  # type: ignore[no-untyped-def]
-    """Write the planes of the facets that deviations move in realization k."""
-    for f in range(facets.shape[0]):
-        if side.vertices_of_facets[f, 0] >= 0:
-            a = vertex(side, k, side.vertices_of_facets[f, 0])
-            b, c = vertex(side, k, side.vertices_of_facets[f, 1]), vertex(side, k, side.vertices_of_facets[f, 2])
-            n = cross(minus(b, a), minus(c, a))
-            facets[f, 6], facets[f, 7], facets[f, 8], facets[f, 9] = n[0], n[1], n[2], dot(n, a)
+def _passes_facet(side, k, p, q, share, shares, senses):  # type: ignore[no-untyped-def]
+    """Return whether the segment from p to q passes a triangle near where it passes, at a share, the plane of a facet."""
+    x = along(p, share, minus(q, p))
+    margin = ROUNDED * (1.0 + max(abs(x[0]), abs(x[1]), abs(x[2])))
+    low, high = (x[0] - margin, x[1] - margin, x[2] - margin), (x[0] + margin, x[1] + margin, x[2] + margin)
+    return passes_in(side, k, low, high, p, q, shares, senses) > 0
 
 
 @uncounted
-def _passes_any(owner, target, facets, k, X, is_forward, motion, shares, senses):  # type: ignore[no-untyped-def]
-    """Return whether an edge of a body passes the surface of the other one, whose `facets` are those of realization k."""
+def _passes_any(owner, target, k, X, is_forward, motion, shares, senses):  # type: ignore[no-untyped-def]
+    """Return whether an edge of a body passes the surface of the other one in realization k."""
     is_listed, boxes = motion <= owner.reach, target.boxes
     for j in range(near_count(owner.distances, motion)):
         p, q = vertex(owner, k, owner.edges[j, 0]), vertex(owner, k, owner.edges[j, 1])
@@ -240,8 +251,14 @@ def _passes_any(owner, target, facets, k, X, is_forward, motion, shares, senses)
             if owner.reaches[m] > motion:
                 break
             facet = owner.listed[m]
-            if _may_pass(facets, facet, p, q):
-                for place in range(target.first_members[facet], target.first_members[facet + 1]):
+            start, end = _heights(target, k, facet, p, q)
+            if start * end <= 0.0 and start != end:
+                first, last = target.first_members[facet], target.first_members[facet + 1]
+                if last - first > MANY:
+                    if _passes_facet(target, k, p, q, start / (start - end), shares, senses):
+                        return True
+                    continue
+                for place in range(first, last):
                     _, sense = crossing(target, k, target.members[place], p, q)
                     if sense != 0:
                         return True
@@ -255,17 +272,12 @@ def interfere(A, B, poses, interferes):  # type: ignore[no-untyped-def]
     It does if an edge of one passes a triangle of the other, or else if one holds a component of the other.
     """
     shares, senses = np.empty(1), np.empty(1, dtype=np.int64)
-    facets_of_A, facets_of_B = A.facets.copy(), B.facets.copy()
     for k in range(poses.shape[0]):
         X = poses[k]
         motion = motion_of(X, A.bounds) + 2.0 * (A.spare + B.spare)
-        if A.spare > 0.0:
-            _put_planes(A, k, facets_of_A)
-        if B.spare > 0.0:
-            _put_planes(B, k, facets_of_B)
         interferes[k] = (
-            _passes_any(A, B, facets_of_B, k, X, True, motion, shares, senses)
-            or _passes_any(B, A, facets_of_A, k, X, False, motion, shares, senses)
+            _passes_any(A, B, k, X, True, motion, shares, senses)
+            or _passes_any(B, A, k, X, False, motion, shares, senses)
             or _holds(A, B, k, X, True, motion)
             or _holds(B, A, k, X, False, motion)
         )

@@ -9,7 +9,7 @@ import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.interference import depth_kernel, kernel, near_kernel, parting_kernel
-from tolcontact.interference.box_tree import BoxTree, box_tree, inflated
+from tolcontact.interference.box_tree import BoxTree, box_tree, boxes_of_nodes
 from tolcontact.interference.deviating_solid import DeviatingSolid
 
 CORNERS = np.array(np.meshgrid(*[(0, 1)] * 3)).reshape(3, -1).T
@@ -50,19 +50,26 @@ class Neighbours:
     insets   [mm] by which the surfaces of A and of B lie inside the bodies: touching bodies are apart by their sum, and faces
              that are flush are not, since the insets differ
     reach    [mm]: how far A usually moves against B, with deviations; beyond, tests take longer
+    round_faces    (t,) of the triangles of A and of B: the number of the round face for which each stands, -1 for none. Two
+                   faces of one number touch by their exact gaps (see `tolcontact.discretization.round_contact`), and their
+                   triangles are not compared
     """
 
     A: DeviatingSolid
     B: DeviatingSolid
     insets: tuple[float, float]
     reach: float
+    round_faces: tuple[Int[Array, " t_A"], Int[Array, " t_B"]] | None = None
 
     @cached_property
     def _nominal(self) -> tuple[kernel.Side, kernel.Side]:
         """Both bodies without deviations."""
         vertices_A, vertices_B = (body.inset(depth) for body, depth in zip((self.A, self.B), self.insets, strict=True))
-        return _side(self.A, vertices_A, self.B, vertices_B, self.reach), _side(
-            self.B, vertices_B, self.A, vertices_A, self.reach
+        none = (np.full(len(body.solid.faces), -1) for body in (self.A, self.B))
+        round_A, round_B = self.round_faces or none
+        return (
+            _side(self.A, vertices_A, round_A, self.B, vertices_B, round_B, self.reach),
+            _side(self.B, vertices_B, round_B, self.A, vertices_A, round_A, self.reach),
         )
 
     @property
@@ -109,7 +116,13 @@ class Neighbours:
 
 
 def _side(
-    body: DeviatingSolid, vertices: np.ndarray, target: DeviatingSolid, vertices_of_target: np.ndarray, reach: float
+    body: DeviatingSolid,
+    vertices: np.ndarray,
+    round_faces: np.ndarray,
+    target: DeviatingSolid,
+    vertices_of_target: np.ndarray,
+    round_faces_of_target: np.ndarray,
+    reach: float,
 ) -> kernel.Side:
     """Return a body with inset vertices (v, 3) as compiled passes take it, with what its other body decides."""
     solid, tree, tree_of_target = (
@@ -127,6 +140,8 @@ def _side(
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     planes = np.column_stack([normals, (normals * corners[:, 0]).sum(axis=1)])
     lists = _near_facets(ends[order], tree_of_target, vertices_of_target[target.solid.faces], target.facet_of, reach)
+    round_edges, round_facets = round_faces[solid.sides].max(axis=1), round_faces_of_target[target.first_of_facet]
+    lists = lists.without(round_edges[order], round_facets)
     return kernel.Side(
         vertices=vertices,
         moved=np.full(len(vertices), -1),
@@ -134,9 +149,11 @@ def _side(
         faces=solid.faces,
         planes=planes,
         edges=np.ascontiguousarray(solid.edges[order]),
-        outward=np.ascontiguousarray(solid.outward[order]),
+        outward=np.ascontiguousarray(solid.normals[solid.sides[order]].sum(axis=1)),
         distances=distances[order],
-        facets=_facets(body, corners, planes),
+        facets=np.concatenate(
+            [_boxes_of_facets(body, corners.min(axis=1), corners.max(axis=1)), planes[body.first_of_facet]], axis=1
+        ),
         members=np.argsort(body.facet_of, kind="stable"),
         first_members=np.cumsum([0, *np.bincount(body.facet_of)]),
         vertices_of_facets=np.where(body.moves[body.first_of_facet][:, None], solid.faces[body.first_of_facet], -1),
@@ -160,6 +177,13 @@ class _NearFacets(NamedTuple):
     listed: np.ndarray
     reaches: np.ndarray
 
+    def without(self, round_edges: np.ndarray, round_facets: np.ndarray) -> "_NearFacets":
+        """Return the lists without facets (f,) of the same number of a round face as the edge (e,)."""
+        edge = np.repeat(np.arange(len(round_edges)), np.diff(self.starts))
+        kept = (round_edges[edge] < 0) | (round_edges[edge] != round_facets[self.listed])
+        starts = np.cumsum([0, *np.bincount(edge[kept], minlength=len(round_edges))])
+        return _NearFacets(starts, self.listed[kept], self.reaches[kept])
+
 
 def _near_facets(edges: np.ndarray, tree: BoxTree, corners: np.ndarray, facets: np.ndarray, reach: float) -> _NearFacets:
     """Return the facets no farther than `reach` [mm] from edges (e, 2, 3); triangles have `corners` (t, 3, 3)."""
@@ -173,14 +197,13 @@ def _near_facets(edges: np.ndarray, tree: BoxTree, corners: np.ndarray, facets: 
     return lists
 
 
-def _facets(body: DeviatingSolid, corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
-    """Return box and plane (f, 10) of each facet, from corners (t, 3, 3) and planes (t, 4) of the triangles."""
-    facets = np.concatenate(
-        [np.full((len(body.first_of_facet), 3), np.inf), np.full((len(body.first_of_facet), 3), -np.inf)], axis=1
-    )
-    np.minimum.at(facets[:, :3], body.facet_of, corners.min(axis=1))
-    np.maximum.at(facets[:, 3:], body.facet_of, corners.max(axis=1))
-    return np.concatenate([facets, planes[body.first_of_facet]], axis=1)
+def _boxes_of_facets(body: DeviatingSolid, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Return the boxes (f, 6) of the facets, from those of the triangles, `lower` to `upper` (t, 3)."""
+    count = len(body.first_of_facet)
+    boxes = np.concatenate([np.full((count, 3), np.inf), np.full((count, 3), -np.inf)], axis=1)
+    np.minimum.at(boxes[:, :3], body.facet_of, lower)
+    np.maximum.at(boxes[:, 3:], body.facet_of, upper)
+    return boxes
 
 
 def _deviating(side: kernel.Side, body: DeviatingSolid, deviations: np.ndarray) -> kernel.Side:
@@ -188,16 +211,17 @@ def _deviating(side: kernel.Side, body: DeviatingSolid, deviations: np.ndarray) 
     vertices, shifts = body.shifts(deviations)
     moved = side.moved.copy()
     moved[vertices] = np.arange(len(vertices))
-    lengths = np.zeros(len(moved))
-    lengths[vertices] = np.linalg.norm(shifts, axis=2).max(axis=0, initial=0)
-    of_triangles = lengths[side.faces].max(axis=1)
-    planes = np.where((of_triangles > 0)[:, None], np.nan, side.planes)
-    boxes = inflated(BoxTree(side.triangles, side.boxes, side.next), of_triangles)
-    spare = np.zeros(len(side.facets))
-    np.maximum.at(spare, body.facet_of, of_triangles)
+    low, high = side.vertices.copy(), side.vertices.copy()
+    low[vertices] += shifts.min(axis=0, initial=0)
+    high[vertices] += shifts.max(axis=0, initial=0)
+    lower, upper = low[side.faces].min(axis=1), high[side.faces].max(axis=1)
     facets = side.facets.copy()
-    facets[:, :3] -= spare[:, None]
-    facets[:, 3:6] += spare[:, None]
+    facets[:, :6] = _boxes_of_facets(body, lower, upper)
     return side._replace(
-        facets=facets, moved=moved, shifts=shifts, planes=planes, boxes=boxes, spare=float(lengths.max(initial=0))
+        facets=facets,
+        moved=moved,
+        shifts=shifts,
+        planes=np.where(body.moves[:, None], np.nan, side.planes),
+        boxes=boxes_of_nodes(side.triangles, lower, upper),
+        spare=float(np.linalg.norm(shifts, axis=2).max(initial=0)),
     )

@@ -89,6 +89,13 @@ def _round_faces(
                         yield piece.surface, _triangles(surface_of_body, piece.face)
 
 
+def curved_triangles(body: Solid, face: Surface) -> np.ndarray:
+    """Return the triangles (m,) of a body on which the round surfaces of a face lie."""
+    surface_of_body = Surface(trimesh.Trimesh(body.vertices, body.faces, process=False))
+    pieces = [piece for piece in face.pieces if not isinstance(piece.surface, Plane)]
+    return np.concatenate([np.zeros(0, dtype=int), *(_triangles(surface_of_body, piece.face) for piece in pieces)])
+
+
 def _triangles(surface_of_body: Surface, face: Surface) -> np.ndarray:
     """Return the triangles (m,) of a body on which a face of it lies."""
     return np.unique(surface_of_body.nearest(np.asarray(face.mesh.triangles_center))[0])

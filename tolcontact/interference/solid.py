@@ -8,10 +8,11 @@ import trimesh
 
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.geometry.coordinate_error import coordinate_error
+from tolcontact.geometry.edges import edges
 from tolcontact.geometry.inset import smaller
+from tolcontact.geometry.merged_surface import merged_surface
 from tolcontact.geometry.vertex_displacements import capped, displacements
 
-MERGE_SHARE = 1e-9  # of the size: vertices that are no farther apart are one
 SAME_PLANE = 1e-5  # rad: facets whose normals differ by less are one plane
 MIN_SINGULAR = 0.05  # of the planes around a vertex: a direction that they determine worse is left alone
 MAX_SHIFT = 8.0  # insets: a vertex of a needle moves no farther
@@ -24,7 +25,7 @@ class Solid:
     vertices    (v, 3) [mm]
     faces       (t, 3): triangles
     edges       (e, 2): edges between different planes
-    outward     (e, 3): sums of the outward normals of the two triangles at each edge
+    sides       (e, 2): the triangles at each edge, twice the same where the other one has no area
     flat        (n, 2): triangles that share an edge and lie in one plane
     sources     (t,): the triangle of the part's mesh that each triangle is
     """
@@ -32,7 +33,7 @@ class Solid:
     vertices: Float[Array, "v 3"]
     faces: Int[Array, "t 3"]
     edges: Int[Array, "e 2"]
-    outward: Float[Array, "e 3"]
+    sides: Int[Array, "e 2"]
     flat: Int[Array, "n 2"]
     sources: Int[Array, " t"]
 
@@ -71,20 +72,18 @@ def solid(body: trimesh.Trimesh) -> Solid | None:
 
     If its file rounds coordinates, it is smaller by their error.
     """
-    if not body.is_watertight or body.volume <= 0:
+    merged, sources, is_closed = merged_surface(body)
+    if not is_closed or body.volume <= 0:
         return None
-    merged = trimesh.Trimesh(body.vertices, body.faces, process=False)
-    merged.merge_vertices(digits_vertex=int(np.ceil(-np.log10(MERGE_SHARE * max(merged.scale, 1e-9)))))
-    kept = np.flatnonzero(np.asarray(merged.area_faces) > 0)
-    merged.update_faces(kept)
     merged = smaller(merged, coordinate_error(body))
+    ends, edge, triangles_there = edges(merged.faces)
+    lone = np.flatnonzero(triangles_there[edge] == 1)
     sharp = np.asarray(merged.face_adjacency_angles) > SAME_PLANE
-    edges = np.asarray(merged.face_adjacency_edges)[sharp]
     return Solid(
         np.ascontiguousarray(merged.vertices, dtype=np.float64),
         np.ascontiguousarray(merged.faces, dtype=np.int64),
-        np.ascontiguousarray(edges, dtype=np.int64),
-        np.asarray(merged.face_normals)[np.asarray(merged.face_adjacency)[sharp]].sum(axis=1),
+        np.concatenate([merged.face_adjacency_edges[sharp], ends[lone]]).astype(np.int64),
+        np.concatenate([merged.face_adjacency[sharp], lone[:, None].repeat(2, axis=1) // 3]).astype(np.int64),
         np.asarray(merged.face_adjacency)[~sharp],
-        kept,
+        sources,
     )

@@ -12,7 +12,7 @@ from tolcontact.arrays import Array, Float, Int
 from tolcontact.discretization import Nominal
 from tolcontact.interference.deviating_solid import DeviatingSolid
 from tolcontact.interference.neighbours import CORNERS, Interference, Neighbours
-from tolcontact.interference.part_solid import part_solid
+from tolcontact.interference.part_solid import curved_triangles, part_solid
 
 # Of the smallest tolerance range, twice the radius of a ball in both bodies: the depth from which on these lie in each other.
 ALLOWED_SHARE = 1 / 1000
@@ -107,9 +107,22 @@ class Watch:
         if pair not in self._neighbours:
             A, B, depth, neighbours = self.solid(pair[0]), self.solid(pair[1]), self.depth(pair), None
             if A is not None and B is not None and np.isfinite(depth):
-                neighbours = Neighbours(A, B, (SHARES[0] * depth, SHARES[1] * depth), self._reach(pair))
+                insets = SHARES[0] * depth, SHARES[1] * depth
+                neighbours = Neighbours(A, B, insets, self._reach(pair), self._round_faces(pair))
             self._neighbours[pair] = neighbours
         return self._neighbours[pair]
+
+    def _round_faces(self, pair: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+        """Return the numbers (t,) of the pairs of round faces for which the triangles of both bodies stand, -1 for none."""
+        numbers = [np.full(len(body.solid.faces), -1) for body in map(self.solid, pair) if body is not None]
+        for k, points in enumerate(self.nominal.pairs):
+            if points.round is None or points.reference is None or ordered(points.moving, points.reference) != pair:
+                continue
+            for part, face in ((points.moving, points.moving_face), (points.reference, points.reference_face)):
+                body = self.solid(part)
+                assert face is not None and body is not None
+                numbers[pair.index(part)][curved_triangles(body.solid, face)] = k
+        return numbers[0], numbers[1]
 
     def solid(self, number: int) -> DeviatingSolid | None:
         """Return the solid of a part; None if it is not closed."""

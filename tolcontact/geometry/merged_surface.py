@@ -1,0 +1,102 @@
+"""A mesh whose vertices are merged where they are one, and apart where different parts of a surface touch."""
+
+from typing import NamedTuple
+
+import numpy as np
+import trimesh
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from tolcontact.arrays import Array, Int
+
+MERGE_SHARE = 1e-9  # of the size: vertices that are no farther apart are one
+
+
+class MergedSurface(NamedTuple):
+    """The triangles of a body that have an area, with merged vertices.
+
+    sources    (t,): which of the triangles of the body these are
+    is_closed  whether each triangle of the body continues into others along all its edges
+    """
+
+    mesh: trimesh.Trimesh
+    sources: Int[Array, " t"]
+    is_closed: bool
+
+
+def merged_surface(body: trimesh.Trimesh) -> MergedSurface:
+    """Return the triangles of a body that have an area, with merged vertices.
+
+    Two blocks that touch along an edge, or in a corner, have an edge of four triangles, or a corner of two fans. They are
+    closed all the same: each triangle continues into the one on the other side of its material, and each fan has a vertex.
+    """
+    surface = trimesh.Trimesh(body.vertices, body.faces, process=False)
+    surface.merge_vertices(digits_vertex=int(np.ceil(-np.log10(MERGE_SHARE * max(surface.scale, 1e-9)))))
+    kept = np.flatnonzero((np.diff(np.sort(surface.faces, axis=1), axis=1) > 0).all(axis=1))
+    twins = _twins(np.asarray(surface.vertices), np.asarray(surface.faces)[kept])
+    if twins is not None:
+        surface = _apart(np.asarray(surface.vertices), np.asarray(surface.faces)[kept], twins)
+    else:
+        surface.update_faces(kept)
+    has_area = np.asarray(surface.area_faces) > 0
+    surface.update_faces(has_area)
+    return MergedSurface(surface, kept[has_area], twins is not None)
+
+
+def _twins(vertices: np.ndarray, faces: np.ndarray) -> Int[Array, " h"] | None:
+    """Return the half-edge that each half-edge (3 t,) of closed faces (t, 3) continues into; None if the faces are not closed.
+
+    Half-edge 3 f + k leads from corner k of face f to the next one.
+    """
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    is_forward = start < end
+    key = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
+    order = np.lexsort([is_forward, key])
+    first = np.flatnonzero(np.append(True, np.diff(key[order]) > 0))
+    counts = np.diff(np.append(first, len(order)))
+    if (np.add.reduceat(np.where(is_forward, 1, -1)[order], first) != 0).any():
+        return None
+    twins = np.empty(len(order), dtype=np.int64)
+    pairs = order[first[counts == 2][:, None] + np.arange(2)]
+    twins[pairs] = pairs[:, ::-1]
+    for place, count in zip(first[counts > 2], counts[counts > 2], strict=True):
+        edge = order[place : place + count]
+        for back, forth in _across_material(vertices, faces, edge, is_forward[edge]):
+            twins[back], twins[forth] = forth, back
+    return twins
+
+
+def _across_material(
+    vertices: np.ndarray, faces: np.ndarray, edge: np.ndarray, is_forward: np.ndarray
+) -> list[tuple[int, int]]:
+    """Return half-edges of one edge in pairs: around the edge, material lies between a backward and a forward one."""
+    face, corner = edge // 3, edge % 3
+    low = vertices[np.minimum(faces[face[0], corner[0]], faces[face[0], (corner[0] + 1) % 3])]
+    high = vertices[np.maximum(faces[face[0], corner[0]], faces[face[0], (corner[0] + 1) % 3])]
+    along = (high - low) / np.linalg.norm(high - low)
+    arms = vertices[faces[face, (corner + 2) % 3]] - low
+    arms -= np.outer(arms @ along, along)
+    u = arms[np.argmax(np.linalg.norm(arms, axis=1))]
+    angles = np.arctan2(arms @ np.cross(along, u), arms @ u)
+    order = np.lexsort([is_forward, angles])
+    opened, pairs = list[int](), list[tuple[int, int]]()
+    for place in [*order, *order]:  # twice around
+        if not is_forward[place] and edge[place] not in [back for back, _ in pairs] and place not in opened:
+            opened.append(place)
+        elif is_forward[place] and opened and edge[place] not in [forth for _, forth in pairs]:
+            pairs.append((int(edge[opened.pop()]), int(edge[place])))
+    return pairs
+
+
+def _apart(vertices: np.ndarray, faces: np.ndarray, twins: np.ndarray) -> trimesh.Trimesh:
+    """Return closed faces in which corners are one vertex if a chain of twins connects their triangles."""
+    half_edges = np.arange(len(twins))
+    ends = half_edges - half_edges % 3 + (half_edges + 1) % 3
+    ones = np.ones(len(twins), dtype=bool)
+    graph = coo_array((ones, (half_edges, ends[twins])), shape=(len(twins), len(twins)))
+    count, label = connected_components(graph, directed=False)
+    if count == len(np.unique(faces)):
+        return trimesh.Trimesh(vertices, faces, process=False)
+    corner = np.empty(count, dtype=np.int64)
+    corner[label] = faces.ravel()
+    return trimesh.Trimesh(vertices[corner], label.reshape(-1, 3), process=False)
