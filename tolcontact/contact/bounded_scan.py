@@ -101,12 +101,12 @@ def bounded_scan(
     depth: float = np.inf,
     guard: Guard | None = None,
     parting: Parting | None = None,
-    carried: Int[Array, "n k"] | None = None,
+    carried: Int[Array, "n slot"] | None = None,
 ) -> BoundedScan:
     """Return the places at which a pair can touch at X_RM (n, 12); see raised_places for the other arguments.
 
     Where no place shows penetration, a `guard` adds one if bodies lie in each other. A `parting` leaves out places that hold
-    bodies apart in other directions than the one in which they part best, and adds the place that does; `carried` (n, k) are
+    bodies apart in other directions than the one in which they part best, and adds the place that does; `carried` (n, slot) are
     the labels of places that carried before, -1 for none.
     """
     found, heights = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness, depth)

@@ -216,7 +216,18 @@ class Candidates:
             depth = self._bulge if k in self._with_minima else np.inf
             parting = self.partings.get(k) if parted else None
             scans[k] = bounded_scan(
-                scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness, depth, guard, parting, carried
+                scans[k],
+                self._pairs[k],
+                places,
+                relative[:, k],
+                deviations,
+                kept,
+                error,
+                nearness,
+                depth,
+                guard,
+                parting,
+                carried,
             )
         return scans
 
@@ -226,7 +237,7 @@ class Candidates:
         return bool(self.bounded or self._with_minima)
 
     def bulge(self, scans: Sequence[Scan], relative: Float[Array, "realization pair 12"]) -> Bool[Array, " realization"]:
-        """Return whether planes with form lie in each other between contact points (realization,), by more than bodies may."""
+        """Return whether planes with form lie in each other between contact points, by more than bodies may (realization,)."""
         found = np.zeros(len(relative), dtype=bool)
         for k in self._with_minima:
             found |= scans[k].depth_between(relative[:, k]) > self._allowed_bulge
@@ -252,7 +263,9 @@ class Candidates:
 
     def hold(self, task: Task, state: State, *, guarded: bool = False, parted: bool = False) -> Bool[Array, " n"]:
         """Return whether the places that carry are as near to their faces as they may be in an answer (n,)."""
-        scans = self.scans(state.relative, task.deviations, slots=state.slots, earlier=task.scans, guarded=guarded, parted=parted)
+        scans = self.scans(
+            state.relative, task.deviations, slots=state.slots, earlier=task.scans, guarded=guarded, parted=parted
+        )
         held = np.ones(len(state), dtype=bool)
         for k in self.bounded:
             slots = state.slots[self._varying.index(k)]

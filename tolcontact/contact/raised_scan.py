@@ -147,9 +147,7 @@ class RaisedScan(CompiledScan):
         return replace(self, minima=minima)
 
 
-def raised_scan(
-    scan: PairScan, deviations: Float[Array, "realization contributor"], *, always: bool = False
-) -> PairScan:
+def raised_scan(scan: PairScan, deviations: Float[Array, "realization contributor"], *, always: bool = False) -> PairScan:
     """Return the scan of realizations with deviations; without many heights the same one, unless `always`."""
     if not isinstance(scan, CompiledScan) or (len(scan.columns) < MIN_HEIGHTS and not always):
         return scan

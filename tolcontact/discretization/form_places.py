@@ -144,4 +144,5 @@ def _points(
 def _exact(gaps: np.ndarray, bulge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return row and place (k,) of gaps (n, place) [mm] that may touch, or be the least: their heights have to be exact."""
     least = np.maximum(gaps.min(axis=1, initial=np.inf), 0)
-    return np.nonzero((gaps <= (least + EXACT_SHARE * bulge)[:, None]) & np.isfinite(gaps))
+    row, place = np.nonzero((gaps <= (least + EXACT_SHARE * bulge)[:, None]) & np.isfinite(gaps))
+    return row, place

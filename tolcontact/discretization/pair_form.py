@@ -27,7 +27,7 @@ class PairForm:
         return np.add(*(self.at_face(k, row, places) for k, places in enumerate((P_m, P_r))))
 
     def at_face(self, k: int, row: Int[Array, " k"], places: Float[Array, "k 3"]) -> Float[Array, " k"]:
-        """Return the heights (k,) [mm] of one face at its `places` (k, 3), each of its own row: 0 the moving face, 1 the other."""
+        """Return the heights (k,) [mm] of one face at its `places` (k, 3), each of its own row; face 0 is the moving one."""
         face = self.deviating[k]
         if face is None or face.form is None:
             return np.zeros(len(row))
@@ -36,8 +36,8 @@ class PairForm:
     def highest(self) -> Float[Array, "face row"]:
         """Return bounds [mm] of the heights of the moving and the reference face, from the heights at many places of each."""
         bounds = np.zeros((2, len(self.deviations)))
-        for bound, face in zip(bounds, self.deviating, strict=True):
+        for k, face in enumerate(self.deviating):
             if face is not None and face.form is not None:
                 heights = self.deviations[:, face.form_columns] @ face.form.place_heights
-                bound += heights.max(axis=1) + MARGIN_SHARE * np.ptp(heights, axis=1)
+                bounds[k] = heights.max(axis=1) + MARGIN_SHARE * np.ptp(heights, axis=1)
         return bounds

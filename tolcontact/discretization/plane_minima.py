@@ -13,7 +13,7 @@ import numpy as np
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
-from tolcontact.features import FaceDeviation
+from tolcontact.features import FaceDeviation, FormField
 from tolcontact.geometry import height_kernel
 from tolcontact.geometry.edges import on_rim
 from tolcontact.geometry.face_frame import face_frame
@@ -92,9 +92,9 @@ class PlaneMinima:
     def _spreads(self, deviations: np.ndarray) -> np.ndarray:
         """Return the root mean square heights (face, n) [mm] of both faces, whose modes are orthogonal."""
         spreads = np.zeros((2, len(deviations)))
-        for spread, face, squares in zip(spreads, self.deviating, self._squares, strict=True):
+        for k, (face, squares) in enumerate(zip(self.deviating, self._squares, strict=True)):
             if face is not None:
-                spread += np.sqrt(deviations[:, face.form_columns] ** 2 @ squares)
+                spreads[k] = np.sqrt(deviations[:, face.form_columns] ** 2 @ squares)
         return spreads
 
     @cached_property
@@ -167,8 +167,9 @@ def _plane(face: Surface, deviation: FaceDeviation | None) -> Plane:
     axes, origin = np.ascontiguousarray(frame.axes[:, :2].T), np.asarray(frame.centre)
     vertices = (np.asarray(face.mesh.vertices) - origin) @ axes.T
     corners = np.array([vertices.min(axis=0), vertices.max(axis=0)])
-    has_form = deviation is not None and deviation.form is not None
-    table = _table(deviation, origin, axes, corners) if has_form else HeightTable(np.zeros(2), 1.0, np.zeros((0, 0, 0)))
+    form = None if deviation is None else deviation.form
+    no_table = HeightTable(np.zeros(2), 1.0, np.zeros((0, 0, 0)))
+    table = no_table if form is None else _table(form, origin, axes, corners)
     return Plane(origin, axes, np.array(face.corner_normals[0, 0]), _edges(face, vertices), corners, table)
 
 
@@ -184,17 +185,17 @@ def _edges(face: Surface, vertices: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(np.hstack([start, direction, length, inward]))
 
 
-def _table(deviation: FaceDeviation, origin: np.ndarray, axes: np.ndarray, corners: np.ndarray) -> HeightTable:
+def _table(form: FormField, origin: np.ndarray, axes: np.ndarray, corners: np.ndarray) -> HeightTable:
     """Return the table of the modes of a form over the rectangle between two corners (2, 2) [mm]."""
-    assert deviation.form is not None
     extent = corners[1] - corners[0]
-    step = max(STEP_SHARE * min(deviation.form.scales), float(np.sqrt(extent.prod() / MAX_NODES)))
+    step = max(STEP_SHARE * min(form.scales), float(np.sqrt(extent.prod() / MAX_NODES)))
     counts = np.ceil(extent / step).astype(int) + 1 + 2 * PADDING
     along = [low + step * (np.arange(count) - PADDING) for low, count in zip(corners[0], counts, strict=True)]
     u, v = np.meshgrid(*along, indexing="ij")
-    nodes = deviation.form.heights(origin + u[..., None] * axes[0] + v[..., None] * axes[1])
+    nodes = form.heights(origin + u[..., None] * axes[0] + v[..., None] * axes[1])
     for axis, count in enumerate(counts):
-        splines = np.diag(np.full(count, 2 / 3)) + np.diag(np.full(count - 1, 1 / 6), 1) + np.diag(np.full(count - 1, 1 / 6), -1)
+        beside = np.full(count - 1, 1 / 6)
+        splines = np.diag(np.full(count, 2 / 3)) + np.diag(beside, 1) + np.diag(beside, -1)
         nodes = np.moveaxis(np.tensordot(np.linalg.inv(splines), nodes, axes=(1, axis)), 0, axis)
     kept = slice(PADDING - 2, 1 - PADDING)  # a node before and two after each interval
     return HeightTable(corners[0] - step, step, np.ascontiguousarray(nodes[kept, kept]))

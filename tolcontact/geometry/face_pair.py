@@ -167,7 +167,7 @@ class PairForm(Protocol):
         """Return the forms of some rows."""
 
     def at_face(self, k: int, row: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """Return the heights (k,) [mm] of one face at its `places` (k, 3), each of its own row: 0 the moving face, 1 the other."""
+        """Return the heights (k,) [mm] of one face at its `places` (k, 3), each of its own row; face 0 is the moving one."""
 
     def highest(self) -> np.ndarray:
         """Return bounds (face, row) [mm] of the heights of both faces."""

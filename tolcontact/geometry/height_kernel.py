@@ -69,7 +69,7 @@ def height(table, factors, u, v, weights):  # type: ignore[no-untyped-def]
     if nodes.shape[0] == 0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     x, y = (u - table.low[0]) / table.step, (v - table.low[1]) / table.step
-    i, j = min(max(int(math.floor(x)), 0), nodes.shape[0] - 4), min(max(int(math.floor(y)), 0), nodes.shape[1] - 4)
+    i, j = min(max(math.floor(x), 0), nodes.shape[0] - 4), min(max(math.floor(y), 0), nodes.shape[1] - 4)
     _weights(x - i, weights[0], weights[1], weights[2])
     _weights(y - j, weights[3], weights[4], weights[5])
     h, h_u, h_v, h_uu, h_uv, h_vv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -224,7 +224,7 @@ def _descend(moving, reference, factors_m, factors_r, along, edges, u, v, reach,
 
 @inner
 def _is_over(edges, first, end, u, v, slack):  # type: ignore[no-untyped-def]
-    """Return whether coordinates lie within the rim of the edges from `first` to `end`, or beside it by no more than a slack."""
+    """Return whether coordinates lie within the rim of the edges from `first` to `end`, or beside it by at most a slack."""
     is_inside = False
     for e in range(first, end):
         x, y = u - edges[e, 0], v - edges[e, 1]
