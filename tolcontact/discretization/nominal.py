@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
@@ -133,7 +134,9 @@ class ContactPoints:
             return None
         if not (is_flat(self.moving_face) and is_flat(self.reference_face)):
             return None
-        return PlaneMinima.of((self.moving_face, self.reference_face), self.deviating, self.form_spacing / COVER_SHARE)
+        distance = np.quantile(KDTree(self.P_m).query(self.P_m, k=2)[0][:, 1], 0.9) if len(self.P_m) > 1 else 0.0
+        reach = max(self.form_spacing / COVER_SHARE, float(distance))
+        return PlaneMinima.of((self.moving_face, self.reference_face), self.deviating, reach)
 
     @cached_property
     def reference_rim(self) -> np.ndarray:

@@ -6,6 +6,7 @@ along their rims, and at corners. The heights follow from splines. A minimum is 
 its label alone tells where it is.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,17 +18,18 @@ from tolcontact.features import FaceDeviation, FormField
 from tolcontact.geometry import height_kernel
 from tolcontact.geometry.edges import on_rim
 from tolcontact.geometry.face_frame import face_frame
-from tolcontact.geometry.height_kernel import FIRST_PLACE, HeightTable, Plane
+from tolcontact.geometry.height_kernel import FIRST_PLACE, HeightSums, HeightTable, Plane
 from tolcontact.geometry.meeting import Places
 from tolcontact.geometry.surface import RIM_TOLERANCE, Surface
 
 STEP_SHARE = 1 / 10  # of the length over which heights change: the distance of two nodes
 PADDING = 10  # nodes around a face, beyond which the ends of splines are not felt
 MAX_NODES = 60_000
-MAX_STARTS = 12  # of searches at a pose
-START_DISTANCE = 1.6  # times the reach: how far starts are from each other
+MAX_STARTS = 16  # of searches at a pose
+START_DISTANCE = 0.9  # times the reach: how far starts are from each other
 MAX_MINIMA = 6  # of a pair that are added at a pose
 MAX_FORMER = 24  # that stay from one pose to the next
+BEND_FACTOR = 1.6  # times the root mean square second difference over the reach: how far gaps fall between points
 EXTREME = 5.0  # times the root mean square height: the largest height, and over the length of its changes the largest slope
 
 
@@ -72,12 +74,11 @@ class PlaneMinima:
 
     def bulge(self, deviations: Float[Array, "n contributor"]) -> Float[Array, " n"]:
         """Return how far [mm] the gap may fall between contact points, at most."""
-        lengths = [np.inf if face is None or face.form is None else min(face.form.scales) for face in self.deviating]
-        return EXTREME / 2 * (self.reach / np.array(lengths)) ** 2 @ self._spreads(deviations)
+        return BEND_FACTOR * self._root_sums(self._bends, deviations).sum(axis=0)
 
     def bound(self, deviations: Float[Array, "n contributor"]) -> Float[Array, " n"]:
         """Return a bound [mm] of the sum of both heights, up or down."""
-        return EXTREME * self._spreads(deviations).sum(axis=0)
+        return EXTREME * self._root_sums(self._squares, deviations).sum(axis=0)
 
     def error_beside(self, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"]) -> Float[Array, " n"]:
         """Return a bound [mm] of the error of heights at nominal feet: a slope times how far feet are from these at X_RM."""
@@ -87,21 +88,37 @@ class PlaneMinima:
         moving = self.moving
         corners = moving.origin + np.array([(u, v) for u in moving.corners[:, 0] for v in moving.corners[:, 1]]) @ moving.axes
         travel = np.linalg.norm((pose.apply(X_RM, corners) - corners) @ self.reference.axes.T, axis=2).max(axis=1)
-        return EXTREME * self._spreads(deviations)[1] / min(reference.form.scales) * travel
+        return EXTREME * self._root_sums(self._squares, deviations)[1] / min(reference.form.scales) * travel
 
-    def _spreads(self, deviations: np.ndarray) -> np.ndarray:
-        """Return the root mean square heights (face, n) [mm] of both faces, whose modes are orthogonal."""
-        spreads = np.zeros((2, len(deviations)))
-        for k, (face, squares) in enumerate(zip(self.deviating, self._squares, strict=True)):
+    def _root_sums(self, mean_squares: Sequence[np.ndarray], deviations: np.ndarray) -> np.ndarray:
+        """Return root mean squares (face, n) [mm] over both faces, from mean squares (mode,) of their modes."""
+        roots = np.zeros((2, len(deviations)))
+        for k, (face, squares) in enumerate(zip(self.deviating, mean_squares, strict=True)):
             if face is not None:
-                spreads[k] = np.sqrt(deviations[:, face.form_columns] ** 2 @ squares)
-        return spreads
+                roots[k] = np.sqrt(deviations[:, face.form_columns] ** 2 @ squares)
+        return roots
 
     @cached_property
     def _squares(self) -> list[np.ndarray]:
         """The mean squares (mode,) of the modes of both faces."""
         fields = (None if face is None else face.form for face in self.deviating)
         return [np.zeros(0) if field is None else (field.place_heights**2).mean(axis=1) for field in fields]
+
+    @cached_property
+    def _bends(self) -> list[np.ndarray]:
+        """The mean squares (mode,) of second differences of the modes of both faces, over the reach."""
+        bends = []
+        for face, plane in zip(self.deviating, (self.moving, self.reference), strict=True):
+            field = None if face is None else face.form
+            differences = [
+                field.heights(field.places + self.reach * axis)
+                + field.heights(field.places - self.reach * axis)
+                - 2 * field.place_heights.T
+                for axis in plane.axes
+                if field is not None
+            ]
+            bends.append((np.concatenate(differences) ** 2).mean(axis=0) if differences else np.zeros(0))
+        return bends
 
     def find(
         self,
@@ -143,15 +160,18 @@ class PlaneMinima:
         shares = (np.stack([cell // height_kernel.CELLS, cell % height_kernel.CELLS], axis=-1) + 0.5) / height_kernel.CELLS
         return np.asarray(plane.origin + (plane.corners[0] + shares * (plane.corners[1] - plane.corners[0])) @ plane.axes)
 
-    def _inputs(self, X_RM: np.ndarray, deviations: np.ndarray) -> tuple[Plane, Plane, np.ndarray, np.ndarray, np.ndarray]:
-        """Return the planes, the poses, and the factors (n, mode) of the modes of both, as compiled passes take them."""
+    def _inputs(self, X_RM: np.ndarray, deviations: np.ndarray) -> tuple[Plane, Plane, np.ndarray, HeightSums, HeightSums]:
+        """Return the planes, the poses, and the factors of the modes of both, as compiled passes take them."""
         factors = [
             np.ascontiguousarray(deviations[:, face.form_columns])
             if face is not None and face.form is not None
             else np.zeros((len(X_RM), 0))
             for face in self.deviating
         ]
-        return self.moving, self.reference, np.ascontiguousarray(X_RM), factors[0], factors[1]
+        sums = [
+            HeightSums.of(plane.table, values) for plane, values in zip((self.moving, self.reference), factors, strict=True)
+        ]
+        return self.moving, self.reference, np.ascontiguousarray(X_RM), sums[0], sums[1]
 
 
 def with_former(labels: Int[Array, "n a"], former: Int[Array, "n b"]) -> Int[Array, "n c"]:

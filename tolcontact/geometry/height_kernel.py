@@ -8,8 +8,9 @@ import numpy as np
 from tolcontact.compiled import compiled, inner
 
 MAX_STEPS = 10  # of the search of one minimum
-STEP_SHARE = 1e-3  # of the reach: a smaller step is the last one
-SPARE_FALL = 3.0  # times the fall that a step foresees
+STEP_SHARE = 1e-2  # of the reach: a smaller step is the last one
+SPARE_FALL = 6.0  # times the fall that a step foresees
+BASIN_SHARE = 0.5  # of the reach: a start that is nearer to the end of an earlier search is spared
 NEAR_SHARE = 0.05  # of the reach: minima that are nearer to each other are one
 ON_EDGE = 1e-9  # of the reach
 CELLS = 1 << 26  # along each side of the box around a moving plane, in labels of its places
@@ -59,13 +60,44 @@ def _weights(x, values, slopes, bends):  # type: ignore[no-untyped-def]
     bends[0], bends[1], bends[2], bends[3] = y, 3 * x - 2, 3 * y - 2, x
 
 
+class HeightSums(NamedTuple):
+    """Factors of the modes of a plane, and sums of the modes at the nodes of its table, formed where a realization needs them.
+
+    factors   (realization, mode)
+    values    (node along the first axis, node along the second axis) [mm]
+    rows      of the same shape: the realization to which a sum belongs, -1 for none
+    """
+
+    factors: np.ndarray
+    values: np.ndarray
+    rows: np.ndarray
+
+    @classmethod
+    def of(cls, table: HeightTable, factors: np.ndarray) -> "HeightSums":
+        """Return factors, and no sums yet."""
+        nodes = table.coefficients.shape[:2]
+        return cls(factors, np.empty(nodes), np.full(nodes, -1))
+
+
 @inner
-def height(table, factors, u, v, weights):  # type: ignore[no-untyped-def]
-    """Return the height [mm] at coordinates u, v for factors (mode,) of the modes, and its derivatives by u, v, uu, uv, vv.
+def _sum(factors, node):  # type: ignore[no-untyped-def]
+    """Return the sum of factors (mode,) times coefficients (mode,): four sums that do not wait for each other."""
+    first, second, third, fourth, whole = 0.0, 0.0, 0.0, 0.0, factors.size // 4 * 4
+    for k in range(0, whole, 4):
+        first, second = first + factors[k] * node[k], second + factors[k + 1] * node[k + 1]
+        third, fourth = third + factors[k + 2] * node[k + 2], fourth + factors[k + 3] * node[k + 3]
+    for k in range(whole, factors.size):
+        first += factors[k] * node[k]
+    return (first + second) + (third + fourth)
+
+
+@inner
+def height(table, sums, row, u, v, weights):  # type: ignore[no-untyped-def]
+    """Return the height [mm] of a realization at coordinates u, v, and its derivatives by u, v, uu, uv, vv.
 
     weights   (6, 4): room for the weights of nodes
     """
-    nodes = table.coefficients
+    nodes, factors, values, rows = table.coefficients, sums.factors, sums.values, sums.rows
     if nodes.shape[0] == 0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     x, y = (u - table.low[0]) / table.step, (v - table.low[1]) / table.step
@@ -74,17 +106,15 @@ def height(table, factors, u, v, weights):  # type: ignore[no-untyped-def]
     _weights(y - j, weights[3], weights[4], weights[5])
     h, h_u, h_v, h_uu, h_uv, h_vv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for a in range(4):
-        first, second, third, fourth = nodes[i + a, j], nodes[i + a, j + 1], nodes[i + a, j + 2], nodes[i + a, j + 3]
-        value_1, value_2, value_3, value_4 = 0.0, 0.0, 0.0, 0.0  # sums that do not wait for each other
-        for k in range(factors.size):
-            factor = factors[k]
-            value_1, value_2 = value_1 + factor * first[k], value_2 + factor * second[k]
-            value_3, value_4 = value_3 + factor * third[k], value_4 + factor * fourth[k]
-        row = weights[3, 0] * value_1 + weights[3, 1] * value_2 + weights[3, 2] * value_3 + weights[3, 3] * value_4
-        row_v = weights[4, 0] * value_1 + weights[4, 1] * value_2 + weights[4, 2] * value_3 + weights[4, 3] * value_4
-        row_vv = weights[5, 0] * value_1 + weights[5, 1] * value_2 + weights[5, 2] * value_3 + weights[5, 3] * value_4
-        h, h_u, h_uu = h + weights[0, a] * row, h_u + weights[1, a] * row, h_uu + weights[2, a] * row
-        h_v, h_uv, h_vv = h_v + weights[0, a] * row_v, h_uv + weights[1, a] * row_v, h_vv + weights[0, a] * row_vv
+        along, along_v, along_vv = 0.0, 0.0, 0.0
+        for b in range(4):
+            if rows[i + a, j + b] != row:
+                values[i + a, j + b], rows[i + a, j + b] = _sum(factors[row], nodes[i + a, j + b]), row
+            value = values[i + a, j + b]
+            along, along_v = along + weights[3, b] * value, along_v + weights[4, b] * value
+            along_vv += weights[5, b] * value
+        h, h_u, h_uu = h + weights[0, a] * along, h_u + weights[1, a] * along, h_uu + weights[2, a] * along
+        h_v, h_uv, h_vv = h_v + weights[0, a] * along_v, h_uv + weights[1, a] * along_v, h_vv + weights[0, a] * along_vv
     s = 1 / table.step
     return h, s * h_u, s * h_v, s * s * h_uu, s * s * h_uv, s * s * h_vv
 
@@ -112,12 +142,12 @@ def write_map(moving, reference, X, along):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _gap(moving, reference, factors_m, factors_r, along, u, v, weights, scratch):  # type: ignore[no-untyped-def]
+def _gap(moving, reference, sums_m, sums_r, row, along, u, v, weights, scratch):  # type: ignore[no-untyped-def]
     """Return the gap [mm] at coordinates of the moving plane; write its derivatives by u, v, uu, uv, vv to scratch (5,)."""
-    h, h_u, h_v, h_uu, h_uv, h_vv = height(moving.table, factors_m, u, v, weights)
+    h, h_u, h_v, h_uu, h_uv, h_vv = height(moving.table, sums_m, row, u, v, weights)
     a, b, c, d = along[0, 0], along[0, 1], along[1, 0], along[1, 1]
     x, y = a * u + b * v + along[0, 2], c * u + d * v + along[1, 2]
-    r, r_x, r_y, r_xx, r_xy, r_yy = height(reference.table, factors_r, x, y, weights)
+    r, r_x, r_y, r_xx, r_xy, r_yy = height(reference.table, sums_r, row, x, y, weights)
     scratch[0] = along[2, 0] - h_u - (a * r_x + c * r_y)
     scratch[1] = along[2, 1] - h_v - (b * r_x + d * r_y)
     scratch[2] = -h_uu - (a * a * r_xx + 2 * a * c * r_xy + c * c * r_yy)
@@ -188,7 +218,7 @@ def _slide(edges, u, v, du, dv, derivatives, reach, slack):  # type: ignore[no-u
 
 
 @inner
-def _descend(moving, reference, factors_m, factors_r, along, edges, u, v, reach, level, weights, scratch, best):  # type: ignore
+def _descend(moving, reference, sums_m, sums_r, row, along, edges, u, v, reach, level, weights, scratch, best):  # type: ignore
     """Write coordinates and value (3,) of the local minimum of the gap over both faces, near u, v over them.
 
     The search ends where the gap will hardly fall below a level [mm].
@@ -196,7 +226,7 @@ def _descend(moving, reference, factors_m, factors_r, along, edges, u, v, reach,
     slack = ON_EDGE * reach
     best[2] = np.inf
     for _ in range(MAX_STEPS):
-        gap = _gap(moving, reference, factors_m, factors_r, along, u, v, weights, scratch)
+        gap = _gap(moving, reference, sums_m, sums_r, row, along, u, v, weights, scratch)
         if not gap < best[2]:
             break
         best[0], best[1], best[2] = u, v, gap
@@ -240,10 +270,10 @@ def _is_over(edges, first, end, u, v, slack):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def write_heights(moving, reference, poses, factors_m, factors_r, P_m, is_wanted, heights):  # type: ignore[no-untyped-def]
+def write_heights(moving, reference, poses, sums_m, sums_r, P_m, is_wanted, heights):  # type: ignore[no-untyped-def]
     """Write the sums of both heights (n, point) [mm] at points of the moving plane, and their feet, at X_RM (n, 12).
 
-    factors_m, factors_r   (n, mode) of the forms
+    sums_m, sums_r   HeightSums of both planes
     P_m         (n, point, 3) [mm], or (1, point, 3) if they are the same at all poses
     is_wanted   (n, point): which heights are written
     """
@@ -254,7 +284,7 @@ def write_heights(moving, reference, poses, factors_m, factors_r, P_m, is_wanted
             if not is_wanted[k, p]:
                 continue
             u, v = coordinates(moving, P_m[k % P_m.shape[0], p])
-            gap = _gap(moving, reference, factors_m[k], factors_r[k], along, u, v, weights, scratch)
+            gap = _gap(moving, reference, sums_m, sums_r, k, along, u, v, weights, scratch)
             heights[k, p] = along[2, 0] * u + along[2, 1] * v + along[2, 2] - gap
 
 
@@ -300,10 +330,10 @@ def choose_starts(points, gaps, limits, distance, chosen):  # type: ignore[no-un
 
 
 @compiled
-def find_minima(moving, reference, poses, factors_m, factors_r, grown, points, starts, reach, slack, depth, labels):  # type: ignore
+def find_minima(moving, reference, poses, sums_m, sums_r, grown, points, starts, reach, slack, depth, labels):  # type: ignore
     """Write the labels (n, place) of the deepest local minima of the gap that are deeper than `depth` [mm]; -1 for none.
 
-    factors_m, factors_r   (n, mode) of the forms
+    sums_m, sums_r   HeightSums of both planes
     grown    (n,) [mm]: the sum by which both faces have grown
     points   (n, point, 3) [mm] of the moving plane, or (1, point, 3) if they are the same at all poses
     starts   (n, start): numbers of the points from which minima are searched; -1 for none
@@ -313,9 +343,10 @@ def find_minima(moving, reference, poses, factors_m, factors_r, grown, points, s
     along, weights, scratch, best = np.empty((3, 3)), np.empty((6, 4)), np.empty(5), np.empty(3)
     count = moving.edges.shape[0]
     edges, minima = np.empty((count + reference.edges.shape[0], 7)), np.empty((labels.shape[1], 3))
+    ends = np.empty((starts.shape[1], 2))
     for k in range(poses.shape[0]):
         write_map(moving, reference, poses[k], along)
-        are_edges_known, found = False, 0
+        are_edges_known, found, searches = False, 0, 0
         for s in range(starts.shape[1]):
             if starts[k, s] < 0:
                 break
@@ -323,10 +354,16 @@ def find_minima(moving, reference, poses, factors_m, factors_r, grown, points, s
                 _write_edges(moving, reference, along, edges)
                 are_edges_known = True
             u, v = coordinates(moving, points[k % points.shape[0], starts[k, s]])
+            is_near = False
+            for e in range(searches):
+                is_near = is_near or (ends[e, 0] - u) ** 2 + (ends[e, 1] - v) ** 2 < (BASIN_SHARE * reach) ** 2
+            if is_near:
+                continue
             if not (_is_over(edges, 0, count, u, v, slack) and _is_over(edges, count, edges.shape[0], u, v, slack)):
                 continue
             level = grown[k] - depth
-            _descend(moving, reference, factors_m[k], factors_r[k], along, edges, u, v, reach, level, weights, scratch, best)
+            _descend(moving, reference, sums_m, sums_r, k, along, edges, u, v, reach, level, weights, scratch, best)
+            ends[searches, 0], ends[searches, 1], searches = best[0], best[1], searches + 1
             best[2] -= grown[k]
             if not best[2] < -depth:
                 continue
@@ -373,7 +410,7 @@ def _label(plane, u, v):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def write_places(moving, reference, poses, factors_m, factors_r, labels, slack, places, feet, gaps, heights):  # type: ignore
+def write_places(moving, reference, poses, sums_m, sums_r, labels, slack, places, feet, gaps, heights):  # type: ignore
     """Write places (n, place, 3) of labels, feet (n, place, 3), nominal gaps (n, place), and the sums of both heights [mm].
 
     Gaps are infinite where there is no place: of labels -1, and of places that stand beside a face by more than a slack.
@@ -400,6 +437,6 @@ def write_places(moving, reference, poses, factors_m, factors_r, labels, slack, 
                 places[k, p, i] = moving.origin[i] + u * moving.axes[0, i] + v * moving.axes[1, i]
                 feet[k, p, i] = reference.origin[i] + x * reference.axes[0, i] + y * reference.axes[1, i]
             if _is_over(edges, count, edges.shape[0], u, v, slack):
-                gap = _gap(moving, reference, factors_m[k], factors_r[k], along, u, v, weights, scratch)
+                gap = _gap(moving, reference, sums_m, sums_r, k, along, u, v, weights, scratch)
                 gaps[k, p] = along[2, 0] * u + along[2, 1] * v + along[2, 2]
                 heights[k, p] = gaps[k, p] - gap
