@@ -144,6 +144,7 @@ class ContactResolver:
         certified = np.flatnonzero(state.rank == 0)
         state.doubtful[certified] = self._candidates.interfere(state.relative[certified])
         state.doubtful[:] |= self._candidates.bulge(task.scans, state.relative) & (state.rank == 0)
+        state.doubtful[:] |= self._limits.lie_in_form(task, state)
         if not projected:
             self._doubt_rolled(task, state)
 

@@ -60,20 +60,23 @@ def check_facing(moving: Surface, reference: Surface, deviating: Sequence[FaceDe
 def facing_triangles(face: Surface, other: Surface, deviation: FaceDeviation | None) -> np.ndarray:
     """Return the indices (triangle,) of the triangles of a face that can touch another one, with its deviation.
 
-    Of a body on a plane with form, these are the facets that face the plane, if they lie in one plane and all others rise from
-    it: what else ends at their rim touches nothing before the rim does. Else all triangles can touch it.
+    Of a body on a plane with form, these are the nearest facets that face the plane, if all others rise from their plane: what
+    else ends at their rim, or stands farther off, touches nothing before the rim does. Else all triangles can touch it.
     """
     n, every = other.corner_normals[0, 0], np.arange(len(face.mesh.faces))
     is_facing = np.asarray(face.mesh.face_normals) @ n < FACING
     if deviation is None or deviation.form is None or not is_flat(other) or is_facing.all() or not is_facing.any():
         return every
-    part, heights = face.part(np.flatnonzero(is_facing)), np.asarray(face.mesh.vertices) @ n
+    heights = np.asarray(face.mesh.vertices) @ n
+    tops = heights[np.asarray(face.mesh.faces)].max(axis=1)
+    is_facing &= tops < tops[is_facing].min() + FLATNESS * face.mesh.scale
+    part = face.part(np.flatnonzero(is_facing))
     level = np.asarray(part.mesh.vertices) @ n
     beside = np.setdiff1d(np.asarray(face.mesh.faces), np.asarray(face.mesh.faces)[is_facing])
     dropped = np.asarray(face.mesh.vertices)[beside] - (heights[beside] - level.min())[:, None] * n
     distance = np.linalg.norm(part.nearest(dropped)[1] - dropped, axis=1)
     rises = heights[beside] - level.min() > np.maximum(MIN_RISE * distance, FLATNESS * face.mesh.scale)
-    return np.flatnonzero(is_facing) if np.ptp(level) < FLATNESS * face.mesh.scale and rises.all() else every
+    return np.flatnonzero(is_facing) if rises.all() else every
 
 
 def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[FaceDeviation | None]) -> np.ndarray | None:
