@@ -23,6 +23,8 @@ from tolcontact.geometry.meeting import Places
 from tolcontact.geometry.surface import RIM_TOLERANCE, Surface
 
 STEP_SHARE = 1 / 10  # of the length over which heights change: the distance of two nodes
+ROUGH_STEP_SHARE = 1 / 40  # the same for the covariance of fields that bend abruptly at stations
+ROUGH = "matern 3/2"
 PADDING = 10  # nodes around a face, beyond which the ends of splines are not felt
 MAX_NODES = 60_000
 MAX_STARTS = 16  # of searches at a pose
@@ -208,7 +210,8 @@ def _edges(face: Surface, vertices: np.ndarray) -> np.ndarray:
 def _table(form: FormField, origin: np.ndarray, axes: np.ndarray, corners: np.ndarray) -> HeightTable:
     """Return the table of the modes of a form over the rectangle between two corners (2, 2) [mm]."""
     extent = corners[1] - corners[0]
-    step = max(STEP_SHARE * min(form.scales), float(np.sqrt(extent.prod() / MAX_NODES)))
+    share = ROUGH_STEP_SHARE if form.form.covariance == ROUGH else STEP_SHARE
+    step = max(share * min(form.scales), float(np.sqrt(extent.prod() / MAX_NODES)))
     counts = np.ceil(extent / step).astype(int) + 1 + 2 * PADDING
     along = [low + step * (np.arange(count) - PADDING) for low, count in zip(corners[0], counts, strict=True)]
     u, v = np.meshgrid(*along, indexing="ij")
