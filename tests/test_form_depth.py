@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 import tolcontact as tc
 from tests.cases import Frame
@@ -83,3 +84,28 @@ def test_deeper_answers_are_doubtful(monkeypatch):
     depths, doubtful = deepest(run, *rectangles()), run.status.values == Status.DOUBTFUL
     assert 0.4 < doubtful.mean() < 0.9
     assert depths[~doubtful].max() < model.smallest_zone() / 1000 < depths[doubtful].max()
+
+
+def feet(step):
+    """A bar of 50 x 30 x 10 on two feet along its ends, one of them higher by a step."""
+    outline = np.array([(0, 0), (20, 0), (20, 4), (40, 4), (40, step), (50, step), (50, 10), (0, 10)], dtype=float)
+    triangles = np.array([(0, 1, 2), (0, 2, 7), (2, 6, 7), (2, 3, 6), (3, 5, 6), (3, 4, 5)])
+    bar = trimesh.creation.extrude_triangulation(outline, triangles, 30)
+    bar.apply_transform(np.array([(1, 0, 0, 0), (0, 0, -1, 30), (0, 1, 0, 0), (0, 0, 0, 1.0)]))
+    a = tc.Assembly("feet")
+    table, part = a.part("table", tc.Box(*TABLE), fixed=True), a.part("bar", tc.Mesh(bar), at=AT)
+    table.feature("top", table.face("+z"), tc.Profile(0.4))
+    stands = [tc.Locator(f"Z{k}", place, "z", 0.2) for k, place in enumerate([(2, 2, 0), (45, 2, 0), (25, 28, 0)])]
+    sides = [tc.Locator("X", (0, 15, 5), "x", 0.1), *(tc.Locator(f"Y{x}", (x, 0, 5), "y", 0.1) for x in (5, 45))]
+    a.locate(part, [*stands, *sides])
+    a.contact("seat", moving=part.face(), reference=table.face("+z"))
+    a.measure("height", part.point(25, 15, 10), along="z")
+    return a
+
+
+@pytest.mark.parametrize(("step", "certified"), [(0.0, 0.95), (0.02, 0.1)])
+def test_feet_of_a_body(step, certified):
+    """Feet of one height touch the plane between contact points, too; of others, answers are compared alone."""
+    run = tc.run(feet(step), samples=60, seed=3, fields="none", solver="daqp", surfaces=60)
+    assert np.isin(run.status.values, (Status.UNTOUCHED, Status.RESOLVED)).mean() > certified
+    assert run["surface"].surface_penetration.max() < 0.1 / 1000
