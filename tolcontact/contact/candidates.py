@@ -198,7 +198,10 @@ class Candidates:
                 scan = former if isinstance(former, RaisedScan) else raised_scan(fixed(scans[k]), deviations, always=has_minima)
                 if has_minima and isinstance(scan, RaisedScan):
                     is_raw = not isinstance(former, RaisedScan)
-                    scan = scan.with_minima(self._pairs[k], relative[:, k], deviations, self._bulge, is_raw=is_raw)
+                    in_steps = len(slots) > 0
+                    scan = scan.with_minima(
+                        self._pairs[k], relative[:, k], deviations, self._bulge, is_raw=is_raw, in_steps=in_steps
+                    )
                 scans[k] = scan
         if projected or self._method.is_iterated:
             for k in self._margins:

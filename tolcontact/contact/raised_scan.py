@@ -117,7 +117,8 @@ class RaisedScan(CompiledScan):
         deviations: Float[Array, "realization contributor"],
         depth: float,
         *,
-        is_raw: bool,
+        is_raw: bool = False,
+        in_steps: bool = False,
     ) -> "RaisedScan":
         """Return the scan with the minima of the gap at X_RM that are deeper than `depth` [mm], and those found before.
 
@@ -129,7 +130,7 @@ class RaisedScan(CompiledScan):
             if not is_clear.any():
                 return self
             rows = np.flatnonzero(is_clear)
-            found = self.take(rows).with_minima(pair, relative[rows], deviations[rows], depth, is_raw=False).minima
+            found = self.take(rows).with_minima(pair, relative[rows], deviations[rows], depth).minima
             every = GapMinima.none(len(relative), found.labels.shape[1])
             for values, of_clear in zip(every, found, strict=True):
                 values[rows] = of_clear
@@ -138,7 +139,7 @@ class RaisedScan(CompiledScan):
         gaps = np.empty((len(relative), len(self.P_m)))
         poses, block = np.ascontiguousarray(relative), (self.raised, self.lowest, self.numbers)
         raised_kernel.write_low_gaps(self.compiled_points, poses, *block, limits, gaps)
-        labels = pair.minima.find(relative, deviations, grown, self.P_m[None], gaps, limits, depth)
+        labels = pair.minima.find(relative, deviations, grown, self.P_m[None], gaps, limits, depth, in_steps=in_steps)
         labels = with_former(labels, self.minima.labels)
         if not labels.shape[1]:
             return replace(self, minima=GapMinima.none(len(relative)))

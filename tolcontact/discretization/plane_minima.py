@@ -28,6 +28,8 @@ ROUGH = "matern 3/2"
 PADDING = 10  # nodes around a face, beyond which the ends of splines are not felt
 MAX_NODES = 60_000
 MAX_STARTS = 16  # of searches at a pose
+STEP_DISTANCE = 1.6  # times the reach: how far starts are from each other in steps, of smooth fields
+SMOOTH = "squared exponential"
 START_DISTANCE = 0.9  # times the reach: how far starts are from each other
 MAX_MINIMA = 6  # of a pair that are added at a pose
 MAX_FORMER = 24  # that stay from one pose to the next
@@ -101,6 +103,11 @@ class PlaneMinima:
         return roots
 
     @cached_property
+    def _is_smooth(self) -> bool:
+        fields = [face.form for face in self.deviating if face is not None and face.form is not None]
+        return all(field.form.covariance == SMOOTH and not field.scans for field in fields)
+
+    @cached_property
     def _squares(self) -> list[np.ndarray]:
         """The mean squares (mode,) of the modes of both faces."""
         fields = (None if face is None else face.form for face in self.deviating)
@@ -131,16 +138,20 @@ class PlaneMinima:
         gaps: Float[Array, "n point"],
         limits: Float[Array, " n"],
         depth: float,
+        *,
+        in_steps: bool = False,
     ) -> Int[Array, "n minimum"]:
         """Return the labels of the minima at X_RM that are deeper than `depth` [mm], the deepest first; -1 for none.
 
         grown    [mm] by which both faces have grown
         P_m      points [mm] of the moving plane, of each pose or the same of all poses (m = 1): from those with the least
                  `gaps` [mm], below `limits` [mm], minima are searched
+        in_steps whether answers are searched more closely afterwards
         """
         points = np.ascontiguousarray(P_m)
         starts, labels = (np.empty((len(X_RM), count), dtype=np.int64) for count in (MAX_STARTS, MAX_MINIMA))
-        height_kernel.choose_starts(points, gaps, limits, START_DISTANCE * self.reach, starts)
+        distance = STEP_DISTANCE if in_steps and self._is_smooth else START_DISTANCE
+        height_kernel.choose_starts(points, gaps, limits, distance * self.reach, starts)
         inputs = self._inputs(X_RM, deviations)
         height_kernel.find_minima(*inputs, grown, points, starts, self.reach, self.slack, depth, labels)
         return labels
