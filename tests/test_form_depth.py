@@ -8,9 +8,9 @@ import tolcontact as tc
 from tests.cases import Frame
 from tests.cases.seats import sliding
 from tests.form_referee import Rectangle, deepest
-from tests.helpers import nightly
+from tests.helpers import nightly, simulate
 from tolcontact.contact.candidates import Candidates
-from tolcontact.vocabulary import Status
+from tolcontact.vocabulary import CORRECTED, Status
 
 TURNED = Frame((0.4, -0.7, 0.3), (12.0, -5.0, 31.0))
 TABLE, BLOCK = (100, 60, 10), (50, 30, 20)
@@ -76,14 +76,14 @@ def test_a_block_over_the_end_of_a_table():
     check(sliding(), over, top)
 
 
-def test_deeper_answers_are_doubtful(monkeypatch):
-    """Where no place between contact points gets a row in steps, the test of answers withdraws certificates."""
-    monkeypatch.setattr(Candidates, "change", property(lambda candidates: bool(candidates.bounded)))
-    model = box_on_box("block")
-    run = tc.run(model, samples=60, seed=3, fields="none", solver="daqp")
-    depths, doubtful = deepest(run, *rectangles()), run.status.values == Status.DOUBTFUL
-    assert 0.4 < doubtful.mean() < 0.9
-    assert depths[~doubtful].max() < model.smallest_zone() / 1000 < depths[doubtful].max()
+def test_answers_that_lie_deeper_are_noticed():
+    program, run = simulate(box_on_box("block"), samples=40, solver="daqp")
+    candidates, deviations = Candidates(program, program.groups[0]), run["deviations"]
+    relative = program.observe(poses=run["poses"][:, CORRECTED], deviations=deviations)["relative"].reshape(40, 1, 12)
+    scans = candidates.scans(relative, deviations)
+    lowered = relative - np.eye(12)[11] * 0.0005
+    for X_RM, expected in ((relative, False), (lowered, True)):
+        assert (candidates.bulge(candidates.scans(X_RM, deviations, earlier=scans), X_RM) == expected).all()
 
 
 def feet(step):
