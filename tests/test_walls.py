@@ -63,8 +63,8 @@ APART = {
 }
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
-    "version", "errors", "interrupts", "later", "readable", "child", "shape_worker", "kernel", "vocabulary", "checksums",
-    "labelled", "realizations",
+    "version", "errors", "interrupts", "later", "readable", "child", "stored_coordinates", "shape_worker", "kernel",
+    "vocabulary", "checksums", "labelled", "realizations",
     "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "features",
     "fasteners", "pmi", "discretization", "interference", "variation", "mechanics",
     "compilation", "statics", "contact", "simulation", "plausibility", "statistics", "archive", "report", "plot", "workflow",

@@ -2,7 +2,7 @@
 
 import itertools
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import manifold3d
 import numpy as np
@@ -12,12 +12,13 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from studies.certificates.loose_stacks import LOOSE
 from studies.certificates.mating_stacks import MATING
-from studies.certificates.polyhedra import Body, Polyhedron, separation_of_pairs
+from studies.certificates.polyhedra import Body, Polyhedron, ball_of_pairs, separation_of_pairs
 from studies.certificates.stacks import HEIGHT, Pieces, Stack
 
 FAMILIES = LOOSE | MATING
 FEET = (((-8, -8, 0), "z"), ((8, -8, 0), "z"), ((0, 8, 0), "z"), ((-8, 0, 0), "y"), ((8, 0, 0), "y"), ((0, 0, 0), "x"))
 REACH = 10.0  # mm
+FLUSH = 1e-6  # mm: radius of a ball in two bodies that touch
 TRIES = 30
 STEEP = 0.3  # the largest vertical component of the normals of sides
 Pairs = list[tuple[int, int]]
@@ -46,9 +47,11 @@ class Scene:
 
     @property
     def undeclared(self) -> Pairs:
-        """The pairs of bodies without a contact pair."""
-        declared = {frozenset(pair) for pair in self.pairs}
-        return [pair for pair in itertools.combinations(range(len(self.bodies)), 2) if frozenset(pair) not in declared]
+        """The pairs of bodies without a contact pair that are not in each other nominally."""
+        declared, count = {frozenset(pair) for pair in self.pairs}, len(self.bodies)
+        at_rest = np.tile(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), (1, count, 1))
+        others = [pair for pair in itertools.combinations(range(count), 2) if frozenset(pair) not in declared]
+        return [pair for pair in others if ball_of_pairs(self.bodies, [pair], at_rest, 0)[0] < FLUSH]
 
 
 @dataclass
@@ -170,8 +173,8 @@ def declare_contacts(assembly: tc.Assembly, parts: list[tc.Part], stack: Stack, 
     return f"{order}, {extent}, {points or 'default'} points within {within or 'default'}"
 
 
-def scene(seed: int, family: str, objective: str) -> Scene:
-    """Return the scene of a seed and a family."""
+def scene(seed: int, family: str, objective: str, *, omits: bool = False) -> Scene:
+    """Return the scene of a seed and a family; `omits` leaves one of its contact pairs out."""
     rng = np.random.default_rng([seed, zlib.crc32(family.encode())])
     tolerance = float(rng.choice([0.1, 0.5, 1, 2, 4]) if rng.random() < 0.7 else 10 ** rng.uniform(-1, 0.6))
     stack = close_stack(family, tolerance, rng)
@@ -187,6 +190,9 @@ def scene(seed: int, family: str, objective: str) -> Scene:
             assembly.locate(part, locators(frame, tolerance, sideways, is_pressed))
             if is_pressed:
                 assembly.force(f"weight {k}", at=part.point(0, 0, 0), vector=tuple(frame.turn.apply((0.05, -0.02, -1))))
+    if omits:
+        left_out = int(rng.integers(len(stack.pairs)))
+        stack = replace(stack, pairs=stack.pairs[:left_out] + stack.pairs[left_out + 1 :])
     contacts = declare_contacts(assembly, parts, stack, frame, rng)
     up = frame.turn.apply((0, 0, 1))
     assembly.measure("height", parts[-1].point(0, 0, 0), along=tuple(up))

@@ -125,4 +125,5 @@ def ball_of_pairs(bodies: list[Body], pairs: Iterable[tuple[int, int]], poses: n
 
 def separation_of_pairs(bodies: list[Body], pairs: Iterable[tuple[int, int]], poses: np.ndarray) -> np.ndarray:
     """Return the least signed distance (n,) [mm] of the bodies of any pair, at poses (n, part, 12)."""
-    return np.min([separations(bodies[m], bodies[r], *relative(poses, m, r)) for m, r in pairs], axis=0)
+    distances = [np.full(len(poses), np.inf), *(separations(bodies[m], bodies[r], *relative(poses, m, r)) for m, r in pairs)]
+    return np.asarray(np.min(distances, axis=0))

@@ -26,7 +26,7 @@ Each realization is one row and carries its own certificate.
 |---|---|---|
 | `measured` | realization, state, measure | values of the measures |
 | `translation`, `rotation` | realization, state, part, axis (, body_axis) | t and R of x = R x0 + t |
-| `gap_min` | realization, state, pair | smallest gap of each pair; negative is penetration |
+| `gap_min` | realization, state, pair | smallest gap of each pair, with `coordinate_error`; negative is penetration |
 | `active` | realization, pair | contact points that penetrate in the raw state |
 | `carrying`, `reaction` | realization, pair | contact points under load, and the sum of their reactions |
 | `status` | realization | see `tolcontact.contact` |
@@ -42,13 +42,16 @@ An exact resolution tests the bodies of all parts, whether their contact is decl
 lie in each other deeper than the attribute `interference_depth` [mm] where `clashes` is 0 and the realization is certified.
 The attribute `not_watched` names what the test leaves out: parts that are not closed, contact pairs that give way or have
 form, and overlaps that are declared. Where `clashes` is 0 and `clash_part` is not -1, parts with declared contact lie in each
-other, and the realization is `doubtful`. Linearized runs, and archives before these variables, were not tested.
+other, and the realization is `doubtful`. Linearized runs, and archives before format 8, were not tested.
 
-With stations (format 6) `measure_station`, `pair_station` and `part_station` state what belongs to which; the pose of a part is
+Where files round coordinates noticeably, the attribute `stored_coordinates` says to what, and what contact allows;
+`coordinate_error` in the group `contact` states the amount for each pair [mm].
+
+With stations `measure_station`, `pair_station` and `part_station` state what belongs to which; the pose of a part is
 that in the last station that holds it, and the status is that of the worst station. Groups `station/<name>` hold the poses of
 all its parts (`station_part`), `station_translation` and `station_rotation`, and `station_status`.
 
-With contact that gives way (format 7) `point_stiffness` in the group `contact` states the stiffness of each contact point. The
+With contact that gives way `point_stiffness` in the group `contact` states the stiffness of each contact point. The
 reaction of a two-sided locator is negative if it pulls.
 
 `state` is raw or corrected. Groups hold the rest: `contact` the contact points, `sample` the contributors (locators, freedoms

@@ -10,7 +10,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.archive.datum_values import datum_sizes, datum_values
 from tolcontact.archive.form_values import form_sizes, form_values
 from tolcontact.archive.rows import Row, kept_rows
-from tolcontact.archive.settings import Run, declaration, format_of, now, run_settings, versions, watch_settings
+from tolcontact.archive.settings import Run, declaration, now, run_settings, versions, watch_settings
 from tolcontact.archive.station_header import write_stations
 from tolcontact.archive.stored_rows import empty_checks
 from tolcontact.archive.variables import Contents, define, labels_of_rows, units_of_rows
@@ -19,6 +19,7 @@ from tolcontact.declaration import Mesh
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.features import FaceDeviation
 from tolcontact.geometry import known_surfaces, surface_arrays
+from tolcontact.geometry.coordinate_error import COORDINATE_SPACING, coordinate_spacing
 from tolcontact.vocabulary import ArchiveVariable
 
 
@@ -31,7 +32,7 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
     file.setncatts(
         {
             "Conventions": terms.CONVENTIONS,
-            "format": np.int64(format_of(program)),
+            "format": np.int64(terms.FORMAT),
             "title": f"variation simulation of {nominal.assembly.name}",
             "source": "Monte-Carlo variation simulation of a rigid-body assembly with contact",
             "references": "Sadeghi Tabar, Lindkvist, Wärmefjord, Söderberg: "
@@ -167,6 +168,8 @@ def _write_model(contents: Contents, group: netCDF4.Group, nominal: Nominal, doc
             mesh.createDimension(terms.CORNER, 3)
             contents.add(mesh, terms.MESH_VERTICES, part.mesh.vertices)
             contents.add(mesh, terms.MESH_FACES, part.mesh.faces)
+            if COORDINATE_SPACING in part.mesh.metadata:
+                contents.add(mesh, terms.COORDINATE_SPACING, coordinate_spacing(part.mesh))
             surfaces = known_surfaces(part.mesh)
             if surfaces is not None:
                 mesh.createDimension(terms.BREP_FACE, len(surfaces[1]))
@@ -222,7 +225,7 @@ def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
     if any(pair.is_springy for pair in pairs):
         stiffness = [np.full(len(pair.P_m), np.inf) if pair.stiffness is None else pair.stiffness for pair in pairs]
         values[terms.POINT_STIFFNESS] = np.concatenate(stiffness)
-    values |= _bounded_values(program) | _round_values(nominal) | _face_values(nominal)
+    values |= _bounded_values(program) | _coordinate_values(nominal) | _round_values(nominal) | _face_values(nominal)
     return values | form_values(program) | datum_values(program)
 
 
@@ -235,6 +238,12 @@ def _bounded_values(program: Program) -> dict[ArchiveVariable, Any]:
         terms.BOUNDED: [k in program.meetings for k in numbers],
         terms.PLANE_ERROR: [program.trials[k].error if k in program.trials else np.nan for k in numbers],
     }
+
+
+def _coordinate_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
+    """Return the errors of coordinates in files, by which gaps count larger; none unless a file rounds coordinates."""
+    errors = [pair.coordinate_error for pair in nominal.pairs]
+    return {terms.COORDINATE_ERROR: errors} if any(errors) else {}
 
 
 def _face_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:

@@ -113,9 +113,9 @@ def _check_format(file: netCDF4.Dataset) -> None:
     number = file.getncattr("format") if "format" in file.ncattrs() else 1
     if not isinstance(number, int | np.integer) or number < 1:
         raise DamagedError(f"is damaged: its format is {number!r}")
-    if number > terms.LAST_FORMAT:
+    if number > terms.FORMAT:
         raise DamagedError(
-            f"has format {number}; this version of tolcontact reads formats up to {terms.LAST_FORMAT}; use a newer one"
+            f"has format {number}; this version of tolcontact reads formats up to {terms.FORMAT}; use a newer one"
         )
 
 

@@ -20,6 +20,7 @@ from tolcontact.geometry import surfaces_of, with_known_surfaces
 from tolcontact.method import Method
 
 FIRST_WITH_FORM = 5  # the first format of archives with faces that are not flat
+FIRST_WITH_SPRINGS = 7  # and with locators that give way
 FORM_KINDS = [kind for kind, tolerance in KINDS.items() if tolerance.is_form]
 
 
@@ -53,7 +54,7 @@ def model_of(results: xr.DataTree) -> Assembly:
     number = int(results.attrs.get("format", 1))
     if number < FIRST_WITH_FORM:
         _state_form_alone(document)
-    if number < terms.SPRINGS_FORMAT:
+    if number < FIRST_WITH_SPRINGS:
         _leave_locators_rigid(document, presses=method_of_run(results).minimizes.presses)
     meshes = {}
     if "mesh" in results["model"].children:
@@ -98,15 +99,16 @@ def method_of_run(results: xr.DataTree) -> Method:
 
 
 class _Triangles:
-    def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
-        self.vertices, self.faces = vertices, faces
+    def __init__(self, vertices: np.ndarray, faces: np.ndarray, coordinate_spacing: np.ndarray) -> None:
+        self.vertices, self.faces, self.coordinate_spacing = vertices, faces, coordinate_spacing
 
 
 def _mesh(mesh: xr.Dataset) -> Any:
     """Return the mesh of a part, with the surfaces of its B-rep faces if there are any."""
     vertices, faces = mesh[terms.MESH_VERTICES.name].values, mesh[terms.MESH_FACES.name].values
     if any(variable.name not in mesh for variable in terms.KNOWN_SURFACES):
-        return _Triangles(vertices, faces)
+        stated = terms.COORDINATE_SPACING.name
+        return _Triangles(vertices, faces, mesh[stated].values if stated in mesh else np.zeros(3))
     brep = mesh[terms.BREP_OF_FACE.name].values
     arrays = {name: mesh[variable.name].values for name, variable in terms.OF_BREP_FACE.items()}
     kinds = arrays["kind"]

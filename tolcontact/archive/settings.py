@@ -61,6 +61,7 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
         "kept": run.keep,
         "fields": str(run.fields),
         "block_rows": np.int64(block_rows(program)),
+        **({terms.STORED_COORDINATES: program.stored_coordinates} if program.stored_coordinates else {}),
     }
 
 
@@ -95,13 +96,6 @@ def _method_origin(program: Program) -> str:
     if program.method == (declared or Method()):
         return "defaults" if declared is None else "model"
     return "options"
-
-
-def format_of(program: Program) -> int:
-    """Return the format number of an archive of a program."""
-    if any(pair.is_springy for pair in program.nominal.pairs):
-        return terms.SPRINGS_FORMAT
-    return terms.STATIONS_FORMAT if program.stations else terms.FORMAT
 
 
 def declaration(program: Program) -> str:

@@ -97,6 +97,8 @@ def check(
         typer.echo(f"  part {part.name}: {size} mm along x, y, z of the assembly, {len(part.mesh.faces)} triangles")
     for k, pair in enumerate(program.nominal.pairs):
         typer.echo(f"  contact {pair.name}: {program.contact_in_words(k)}")
+    if program.stored_coordinates:
+        typer.echo(f"  {program.stored_coordinates}")
     show_warnings(doubts)
     count = {0: "", 1: ", 1 warning"}.get(len(doubts), f", {len(doubts)} warnings")
     typer.echo(f"no faults found{count}")

@@ -81,7 +81,7 @@ def bounded_pair(
         travel=TRAVEL_FACTOR * travel + pushed + MIN_TRAVEL_SHARE * size,
         tilt=tilt + pushed / size,
         spread=travel,
-        overlap=_overlap(watch, pair),
+        overlap=pair.coordinate_error + _overlap(watch, pair),
         clearance=clearance(pair),
     )
     places = meeting((pair.moving_face, pair.reference_face), bodies, reach)

@@ -20,7 +20,7 @@ from tolcontact.compilation.plugins import Plugin, plugin
 from tolcontact.compilation.station_program import StationProgram, station_programs
 from tolcontact.declaration.locator import FIRST_ORDER
 from tolcontact.declaration.measure import Tape
-from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
+from tolcontact.discretization import ContactPoints, Nominal, RoundPoints, coordinates_in_words
 from tolcontact.errors import ModelError
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.interference import Watch, ordered
@@ -98,11 +98,17 @@ class Program(Pictured):
             for part in nominal.parts
         ]
         rows += [f"  contact {pair.name}: {self.contact_in_words(k)}" for k, pair in enumerate(nominal.pairs)]
+        rows += [f"  {self.stored_coordinates}"] * bool(self.stored_coordinates)
         rows += [
             f"  measurement {measure.name}: nominally {value:.6g} {measure.units}"
             for measure, value in zip(nominal.measures, self.nominal_measures, strict=True)
         ]
         return "\n".join(rows)
+
+    @property
+    def stored_coordinates(self) -> str:
+        """How exactly files store the coordinates of parts in contact, and what contact allows; empty if it hardly matters."""
+        return coordinates_in_words(self.nominal)
 
     def limits(self, measure: int) -> Limits:
         """Return the limits of a measure, given by number, with its accuracy."""
@@ -225,7 +231,8 @@ def _allowed_depths(
     """Return how deep [mm] bodies of contact pairs may lie in each other, where that is more than usual.
 
     Fixed planes err by what was allowed in their trial, of raw poses; other contact tilts parts more. Springs let faces into
-    each other, and form is not part of a solid. Parts that are declared to overlap may lie in each other at any depth.
+    each other, and form is not part of a solid. Parts that are declared to overlap may lie in each other at any depth. Bodies
+    in the watch have flat planes; where contact points are fixed, they lie on triangles as files round them.
     """
     depths = dict[tuple[int, int], float]()
     for k, pair in enumerate(nominal.pairs):
@@ -237,7 +244,8 @@ def _allowed_depths(
                 if k in trials and k not in meetings and np.isfinite(trials[k].allowed)
                 else 0.0
             )
-            depths[bodies] = max(depths.get(bodies, 0.0), np.inf if is_free else planes)
+            rounding = 0.0 if k in meetings else pair.coordinate_error
+            depths[bodies] = max(depths.get(bodies, 0.0), np.inf if is_free else planes + rounding)
     return depths | dict.fromkeys(_meant_overlaps(nominal), np.inf)
 
 

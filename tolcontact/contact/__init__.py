@@ -74,6 +74,8 @@ anyway.
 >>> bool((run.gap_min.sel(state="corrected") > -1e-8).all()), run["contact"].bounded.values.tolist()
 (True, [1])
 
+Bodies whose files round coordinates are smaller by that error (see `tolcontact.geometry`), so that they fit as drawn.
+
 `studies/certificates` judges certified realizations of random bodies by exact distances of polyhedra. Limits: triangles are the
 body, also where they stand for a curved face that is not known analytically. A pair of more than 100 000 places keeps its fixed
 points, with a warning. The objective still weighs the sampled contact points. Places are looked for within twice the largest
@@ -100,15 +102,16 @@ No realization is dropped: a failed one is a row with its status, and its last p
 ## What a certificate covers
 
 `untouched` and `resolved` are certificates. They state that the optimality conditions hold to 1e-8 mm at a pose *near* the raw
-one and, in an exact resolution, that no contact point has a gap below 0 by more than that. With `search="bounded"` they also
-state that the bodies of no contact pair lie in each other by more than a thousandth of the smallest tolerance range, by a test
-that does not know the list of contact points (see `tolcontact.interference`). The test looks at every realization. Where it
-contradicts the search, the realization is tried again; if that does not help, it is `doubtful`. The penetration that a
-linearized resolution leaves is in `gap_min`. "Near" means that no part turned by more than `near_turn` (1 rad), and no contact
-point moved by more than `near_travel` (half the size of the largest part). A longer travel is accepted if the faces themselves
-lie under the points that carry load, and penetrate each other by no more than 1 % of the smallest tolerance range (or 1e-4
-sizes, if that is less) plus the error of their triangles. For other solutions far from the raw pose, other starts are tried;
-if these do not help, the realization is `doubtful`.
+one and, in an exact resolution, that no contact point has a gap below 0 by more than that. Gaps count larger by the error of
+coordinates in files, `coordinate_error` in the archive, if any. With `search="bounded"` they also state that the bodies of no
+contact pair lie in each other by more than a thousandth of the smallest tolerance range, by a test that does not know the list
+of contact points (see `tolcontact.interference`). The test looks at every realization. Where it contradicts the search, the
+realization is tried again; if that does not help, it is `doubtful`. The penetration that a linearized resolution leaves is in
+`gap_min`. "Near" means that no part turned by more than `near_turn` (1 rad), and no contact point moved by more than
+`near_travel` (half the size of the largest part). A longer travel is accepted if the faces themselves lie under the points that
+carry load, and penetrate each other by no more than 1 % of the smallest tolerance range (or 1e-4 sizes, if that is less) plus
+the error of their triangles. For other solutions far from the raw pose, other starts are tried; if these do not help, the
+realization is `doubtful`.
 
 Two planes with form, or a body on a plane with form, touch at minima of their gap. Newton steps find these between contact
 points at every pose, inside of the faces and along their rims, and each that is deeper than 1 / 2500 of the smallest tolerance

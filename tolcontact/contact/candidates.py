@@ -17,11 +17,10 @@ from tolcontact.contact.raised_scan import RaisedScan, raised_scan
 from tolcontact.contact.scan import PairScan, RoundScan, Scan, changing, fixed, min_gaps, pair_scan
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.state import State, Task
-from tolcontact.discretization import FIRST_POINT
+from tolcontact.discretization import FIRST_POINT, ContactPoints
 from tolcontact.geometry.height_kernel import FIRST_PLACE
 from tolcontact.geometry.meeting import NEARNESS
 from tolcontact.geometry.parting import Parting, parting
-from tolcontact.geometry.surface import Surface
 from tolcontact.interference.watch import ALLOWED_SHARE
 from tolcontact.mechanics import curved_pairs
 
@@ -64,15 +63,18 @@ def half_spacing(scan: PairScan) -> float:
     return float(np.median(distance[:, 1])) / 2
 
 
-def project(scan: PairScan, surface: Surface | None, relative: Float[Array, "realization 12"], margin: float) -> PairScan:
-    """Return the scan with every contact point projected again at X_RM (realization, 12). Supports stay as they are.
+def project(scan: PairScan, pair: ContactPoints, relative: Float[Array, "realization 12"], margin: float) -> PairScan:
+    """Return the scan of a pair with every contact point projected again at X_RM (realization, 12). Supports stay as they are.
 
     Points that overhang the rim by up to `margin` [mm] still count: else points at the rim would come and go with every step.
     """
+    surface = pair.reference_face
     if surface is None:
         return scan
     shape = (len(relative), len(scan.P_m), 3)
     feet, normals, over = surface.project(pose.apply(relative, scan.P_m).reshape(-1, 3), margin=margin)
+    if pair.coordinate_error:
+        feet = feet - pair.coordinate_error * normals
     return ProjectedScan(
         **{name: getattr(scan, name) for name in PairScan.__dataclass_fields__},
         feet=feet.reshape(shape),
@@ -277,7 +279,7 @@ class Candidates:
 
     def projected(self, k: int, relative: Float[Array, "realization 12"]) -> PairScan:
         """Return a scan of the points of pair k, projected again at X_RM (realization, 12)."""
-        return project(fixed(self._carrying_scans[k]), self._pairs[k].reference_face, relative, self._margins[k])
+        return project(fixed(self._carrying_scans[k]), self._pairs[k], relative, self._margins[k])
 
     def survey(
         self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]

@@ -24,9 +24,11 @@ class Guard:
 
     @classmethod
     def of(cls, program: Program, index: int) -> "Guard | None":
-        """Return the guard of a pair; None if its bodies may lie in each other, or have no inside."""
+        """Return the guard of a pair; None if its bodies may lie in each other, have no inside, or grow where they touch."""
         pair = program.nominal.pairs[index]
         assert pair.reference is not None
+        if any(face is not None and face.grows for face in pair.deviating):
+            return None
         bodies = ordered(pair.moving, pair.reference)
         neighbours = program.watch.neighbours(bodies)
         return None if neighbours is None else cls(neighbours, pair.moving != bodies[0])

@@ -91,6 +91,7 @@ The ends of the faces are those of the nominal assembly. A shaft that is pushed 
 its wall, is detected only afterwards (see the checks of surfaces in `tolcontact.contact`).
 """
 
+from tolcontact.discretization.coordinates_in_words import coordinates_in_words
 from tolcontact.discretization.counted_points import counted_points
 from tolcontact.discretization.discretizing import discretize
 from tolcontact.discretization.form_places import FIRST_POINT, raised_places, rim_points
@@ -101,5 +102,5 @@ from tolcontact.discretization.round_points import RoundPoint, RoundPoints
 
 __all__ = [
     "FIRST_POINT", "ContactPoints", "Locators", "Nominal", "NominalPart", "Offsets", "RoundPoint",
-    "RoundPoints", "counted_points", "discretize", "raised_places", "rim_points",
+    "RoundPoints", "coordinates_in_words", "counted_points", "discretize", "raised_places", "rim_points",
 ]  # fmt: skip

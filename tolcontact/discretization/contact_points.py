@@ -27,6 +27,7 @@ from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.scenes import Scene
 from tolcontact.errors import ContactWarning, GeometryFault, designation
 from tolcontact.features import FaceDeviation, Features
+from tolcontact.geometry.coordinate_error import coordinate_error
 from tolcontact.geometry.curvature import CHORD_SHARE, curvature_points, distinct, facet_error, is_flat, sampling_error
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.overlap import overlap_corners, rim_points
@@ -60,23 +61,28 @@ def contact_points(
         reference_face = reference_face.part(facing_triangles(reference_face, moving_face, deviating[0]))
         check_facing(moving_face, reference_face, deviating)
     balls_and_shafts = round_points(moving_face, reference_face, reach) if _is_open(pair) and not lengths else []
+    # A hollow wall is fitted to many vertices: rounding hardly moves it.
+    is_rounded = not any(point.is_hollow for point in balls_and_shafts)
+    rounding = coordinate_error(moving.mesh) + coordinate_error(reference.mesh) if is_rounded else 0.0
     if balls_and_shafts:
         P_m, P_r, n_r = (np.array(rows) for rows in zip(*(point.nominal() for point in balls_and_shafts), strict=True))
     else:
         candidates = coaxial_points(moving_face, reference_face, deviating) if _is_open(pair) and lengths else None
         if candidates is None:
-            candidates = _candidates(scene.assembly, pair, moving, unplaced.mesh, (moving_face, reference_face), reach, lengths)
+            faces = moving_face, reference_face
+            candidates = _candidates(scene.assembly, pair, moving, unplaced.mesh, faces, reach, lengths, rounding)
         P_m, P_r, n_r = _touching(pair, candidates, moving_face, reference_face, reach)
     points = ContactPoints(
         name=pair.name,
         moving=scene.index(moving.part),
         reference=scene.index(reference.part),
         P_m=P_m,
-        P_r=P_r,
+        P_r=P_r - rounding * n_r if rounding else P_r,
         n_r=n_r,
         offsets=Offsets.none(len(P_m)),
         reference_face=reference_face,
         moving_face=moving_face,
+        coordinate_error=rounding,
         facets=facet_error(moving_face, reference_face, reach),
         round=RoundPoints.of(balls_and_shafts) if balls_and_shafts else None,
         deviating=deviating,
@@ -114,11 +120,12 @@ def _candidates(
     faces: tuple[Surface, Surface],
     reach: float,
     lengths: Sequence[float],
+    rounding: float,
 ) -> np.ndarray:
     """Return points (point, 3) of the moving face that become contact points if they lie over the reference face.
 
     `mesh` is the moving face in its part's own frame, `faces` are both faces in their nominal places, `lengths` are those of
-    their forms.
+    their forms, and `rounding` [mm] is the error of coordinates in files.
     """
     moving_face, reference_face = faces
     if isinstance(pair.points, str):
@@ -140,7 +147,7 @@ def _candidates(
             if lengths:
                 P_m = with_rims(P_m, moving_face, reference_face, form_spacing(lengths), reach)
     elif math.isfinite(finest):
-        P_m = _with_curvature(pair, moving_face, reference_face, P_m, finest, reach)
+        P_m = _with_curvature(pair, moving_face, reference_face, P_m, finest, reach, rounding)
     P_m = distinct(P_m, POINT_TOLERANCE * moving.mesh.scale)
     if moving_face.surfaces:
         P_m, _, _ = moving_face.project(P_m)
@@ -196,11 +203,18 @@ def _check_number(points: float, subject: str) -> None:
 
 
 def _with_curvature(
-    pair: ContactPair, moving_face: Surface, reference_face: Surface, P_m: np.ndarray, finest: float, reach: float
+    pair: ContactPair,
+    moving_face: Surface,
+    reference_face: Surface,
+    P_m: np.ndarray,
+    finest: float,
+    reach: float,
+    rounding: float,
 ) -> np.ndarray:
     """Return points P_m (point, 3) of curved faces; if the choice is open, with the points that follow curvature added.
 
-    Warns if the points, or the triangles, leave more than CHORD_SHARE times `finest` undetected, the smallest tolerance range.
+    Warns if the points, or the triangles, leave more than CHORD_SHARE times `finest` undetected, the smallest tolerance range,
+    and more than the `rounding` [mm] of coordinates in files, which bends flat faces.
     """
     dense = curvature_points(moving_face, reference_face, chord=CHORD_SHARE * finest, within=reach)
     if is_flat(reference_face) and moving_face.curvature > 0:
@@ -214,7 +228,7 @@ def _with_curvature(
         (between_points, "between its contact points", "give it more points, or leave points and spacing out"),
         (under_facets, "between flat triangles and the round faces that they approximate", "use a finer mesh"),
     ):
-        if error > CHORD_SHARE * finest:
+        if error > max(CHORD_SHARE * finest, rounding):
             warnings.warn(
                 f"{designation('contact pair', pair)}: parts may be off by up to {error:.2g} mm {place}, "
                 f"{error / finest:.2g} of the smallest tolerance ({finest:.4g} mm); {advice}",

@@ -28,6 +28,7 @@ from tolcontact.geometry.surface import Surface
 
 EVERY_POINT = slice(None)
 RIM_REACH = 0.1  # of the size of the moving face: how far from it, nominally, rim points of the other face count
+FITTED_ERRORS = 2.0  # errors of coordinates, by which triangles lie beyond the planes that are fitted to them, and inset
 GAPS_TOGETHER = 1 << 20  # that are computed at once
 
 
@@ -76,6 +77,7 @@ class ContactPoints:
     reference is the part that they are on, or None for the ground. They have no faces; their offsets are the deviations.
 
     moving_face, reference_face   in their nominal places
+    coordinate_error   [mm] of both bodies, as their files store them: P_r lie below the reference face by it
     facets      [mm] largest distance between their triangles and the round faces that these approximate
     round       the balls and shafts beside walls from which gaps follow at any pose; None if the contact points are fixed
     deviating   deviations of the moving and the reference face, if these belong to features; their heights at fixed points are
@@ -94,6 +96,7 @@ class ContactPoints:
     offsets: Offsets
     reference_face: Surface | None = None
     moving_face: Surface | None = None
+    coordinate_error: float = 0.0
     facets: float = 0.0
     round: RoundPoints | None = None
     deviating: tuple[FaceDeviation | None, FaceDeviation | None] = (None, None)
@@ -246,6 +249,7 @@ class Nominal:
             self._face_pairs[index] = FacePair(
                 body_face(pair.moving_face, self.parts[pair.moving].body, len(pair.P_m)),
                 body_face(pair.reference_face, self.parts[pair.reference].body, len(pair.P_m)),
+                FITTED_ERRORS * pair.coordinate_error,
             )
         return self._face_pairs[index]
 

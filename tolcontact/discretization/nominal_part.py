@@ -8,6 +8,7 @@ import trimesh
 
 from tolcontact.declaration import Locator, Part, ThreeTwoOne
 from tolcontact.discretization.locators import Locators
+from tolcontact.geometry.coordinate_error import COORDINATE_SPACING
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +45,9 @@ class NominalPart:
     @cached_property
     def body(self) -> trimesh.Trimesh:
         """The mesh in its nominal place."""
-        return trimesh.Trimesh(self.placed(np.asarray(self.mesh.vertices)), self.mesh.faces, process=False)
+        body = trimesh.Trimesh(self.placed(np.asarray(self.mesh.vertices)), self.mesh.faces, process=False)
+        body.metadata |= {name: self.mesh.metadata[name] for name in (COORDINATE_SPACING,) if name in self.mesh.metadata}
+        return body
 
     def placed(self, p: np.ndarray) -> np.ndarray:
         """Return nominal assembly coordinates (..., 3) [mm] of points (..., 3) in the part's own frame."""

@@ -24,6 +24,21 @@ inconsistently, a body turned inside out, coincident triangles that point opposi
 and reach 10 km from its origin. On curved faces normals are interpolated between the corners of the triangles. Triangles that
 meet at more than 30 degrees form an edge.
 
+## Coordinates in files
+
+A binary STL, a GLB or a PLY file with `float` coordinates stores them in single precision: to 4e-6 mm at 50 mm from the origin
+of the file, but to 2.4e-4 mm at 3 m. An ASCII file stores them as exactly as it prints them: to the last digit of its largest
+coordinates. Numbers of fewer than six digits count as exact, unless most of them have the same number of digits, or of
+decimals, and that is at least four, or five with a single decimal. A vertex is off by up to half the spacing along each axis.
+Contact allows for that: gaps between two bodies count larger by the errors of both, so that bodies that fit without clearance
+as drawn fit as stored. Where contact is searched at every pose, faces that are flat except for rounding are flat again, and lie
+inside by the error of their file; so do the bodies in the test of interference. A ball or a shaft in a hollow wall is fitted to
+many vertices, and nothing is allowed for it.
+
+`tolcontact check`, the summary of a run and the attribute `stored_coordinates` of its archive name the parts and the amount, if
+it is above 1e-4 of the smallest tolerance range. STEP files, boxes, pins and meshes in memory have no such error; give the file
+instead of a mesh that was read from it.
+
 ## Round faces
 
 The surface of a face is known exactly where a STEP file states a plane, cylinder, cone, sphere or torus. In other meshes a

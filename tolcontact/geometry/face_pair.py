@@ -175,10 +175,11 @@ class PairForm(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class FacePair:
-    """The faces of a pair, for checks at any pose."""
+    """The faces of a pair, for checks at any pose. Depths up to `rounding` [mm], of coordinates in files, do not count."""
 
     moving: BodyFace
     reference: BodyFace
+    rounding: float = 0.0
 
     def penetrate(self, X_RM: np.ndarray, heights: np.ndarray, form: "PairForm | None" = None) -> np.ndarray:
         """Return whether (row,) either face lies in the other's body at X_RM (row, 12), `heights` and `form` as for `depth`."""
@@ -217,7 +218,7 @@ class FacePair:
                         feet, towards = body.feet(_moved(motion, row, points), pose.rotation(motion)[row], side.normals[point])
                         places += of_rows.at_face(1 - k, row, feet)[:, None] * towards
                     body.raise_to_depths(largest[rows], row, places)
-        return largest
+        return np.maximum(largest - self.rounding, 0) if self.rounding else largest
 
 
 def _moved(motion: np.ndarray, row: np.ndarray, points: np.ndarray) -> np.ndarray:

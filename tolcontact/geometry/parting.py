@@ -13,6 +13,8 @@ import trimesh
 
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.geometry import parting_kernel
+from tolcontact.geometry.coordinate_error import coordinate_error
+from tolcontact.geometry.inset import smaller
 
 SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
 CONVEX_SHARE = 1e-6  # of the hull's size, by which the surface of a convex body may lie inside its hull: files are rounded
@@ -78,9 +80,13 @@ def parting(moving: trimesh.Trimesh, reference: trimesh.Trimesh) -> Parting | No
 
 
 def convex(body: trimesh.Trimesh) -> parting_kernel.Convex | None:
-    """Return the convex hull of a body with its planes and edges; None if the body does not fill its hull."""
+    """Return the convex hull of a body with its planes and edges; None if the body does not fill its hull.
+
+    If its file rounds coordinates, the body is smaller by their error.
+    """
     if not body.is_watertight or body.volume <= 0:
         return None
+    body = smaller(body, coordinate_error(body))
     hull = trimesh.convex.convex_hull(np.asarray(body.vertices)[np.unique(body.faces)])
     vertices, facet_normals = np.asarray(hull.vertices), np.asarray(hull.face_normals)
     neighbours, is_sharp = np.asarray(hull.face_adjacency), np.asarray(hull.face_adjacency_angles) > SHARP_ANGLE

@@ -6,7 +6,9 @@ import numpy as np
 import trimesh
 
 from tolcontact.arrays import Array, Float, Int
+from tolcontact.geometry.coordinate_error import coordinate_error
 from tolcontact.geometry.edges import edges
+from tolcontact.geometry.inset import smaller
 from tolcontact.geometry.surface import Surface
 
 SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
@@ -55,11 +57,14 @@ class Polyhedron:
 def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
     """Return the polyhedron of a face of a body, both in their nominal places.
 
-    Planes of the body count as a whole, also where the face was cut out of them: the body does not end there.
+    Planes of the body count as a whole, also where the face was cut out of them: the body does not end there. If its file
+    rounds coordinates, it is smaller by their error.
     """
     merged = trimesh.Trimesh(body.vertices, body.faces, process=False)
     merged.merge_vertices(digits_vertex=int(np.ceil(-np.log10(MERGE_SHARE * max(merged.scale, 1e-9)))))
     merged.update_faces(merged.area_faces > 0)
+    numbers, _ = Surface(merged).nearest(np.asarray(face.mesh.triangles_center))
+    merged = smaller(merged, coordinate_error(body))
     vertices, faces = np.asarray(merged.vertices), np.asarray(merged.faces)
     facet_normals = np.asarray(merged.face_normals)
     outer_ends, edge, triangles_there = edges(faces)
@@ -70,7 +75,6 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
     is_sharp = np.concatenate([np.asarray(merged.face_adjacency_angles) > SHARP_ANGLE, np.ones(len(lone), dtype=bool)])
     is_convex = np.concatenate([merged.face_adjacency_convex, np.ones(len(lone), dtype=bool)])
     planes = trimesh.graph.connected_component_labels(neighbours[~is_sharp], node_count=len(faces))
-    numbers, _ = Surface(merged).nearest(np.asarray(face.mesh.triangles_center))
     is_chosen = np.isin(planes, planes[numbers])
     chosen = np.flatnonzero(is_chosen)
     is_ours = is_sharp & is_chosen[neighbours].any(axis=1)

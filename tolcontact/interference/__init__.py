@@ -42,6 +42,7 @@ three times the error of fixed planes where a pair keeps its contact points (see
   their gap instead (see tolcontact.contact), round faces with form on their surfaces.
 - Triangles of round faces stand in the hollow of a bore, and inside a shaft. The first are moved out of the hollow; what lies
   between the triangles of a shaft and its surface is covered by the gaps of round faces, and checked on surfaces.
+- Bodies whose files round coordinates are smaller by that error from the outset, with flat planes (see `tolcontact.geometry`).
 - A body that passed through another one and is on its far side is apart.
 - Springs let faces into each other; such pairs are not tested.
 

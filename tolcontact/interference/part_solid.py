@@ -23,7 +23,8 @@ def part_solid(nominal: Nominal, index: int) -> DeviatingSolid | None:
     body = solid(nominal.parts[index].body)
     if body is None:
         return None
-    surface_of_body = Surface(trimesh.Trimesh(body.vertices, body.faces, process=False))
+    stored = nominal.parts[index].body
+    surface_of_body = Surface(trimesh.Trimesh(stored.vertices, np.asarray(stored.faces)[body.sources], process=False))
     faces = list(_deviating_faces(nominal, index, body, surface_of_body))
     return deviating_solid(body, faces, _bulges(nominal, index, body, surface_of_body))
 
@@ -39,17 +40,24 @@ def _deviating_faces(
         for number, surface in enumerate(feature.surfaces):
             face = feature.deviation(number, part.placement)
             columns = np.setdiff1d(np.arange(len(face.columns)), face.modes)
-            triangles = _triangles(surface_of_body, surface.placed(*part.placement))
-            corners = body.vertices[body.faces[triangles]].reshape(-1, 3)
-            normals = body.normals[triangles].repeat(3, axis=0)
+            placed = surface.placed(*part.placement)
+            triangles = _triangles(surface_of_body, placed)
+            corners, facets = body.vertices[body.faces[triangles]].reshape(-1, 3), body.normals[triangles].repeat(3, axis=0)
+            normals = facets.copy()
+            for piece in placed.pieces:
+                if not isinstance(piece.surface, Plane):
+                    rows = np.isin(triangles, _triangles(surface_of_body, piece.face)).repeat(3)
+                    _, slope = piece.surface.distance(corners[rows])
+                    normals[rows] = slope * np.sign((slope * facets[rows]).sum(axis=1, keepdims=True))
             motion = np.hstack([normals, np.cross(corners - face.centre, normals)]) @ face.twist + face.height
+            motion *= (normals * facets).sum(axis=1, keepdims=True)  # corners of round faces move along the normals of these
             yield triangles, face.columns[columns], motion[:, columns].reshape(len(triangles), 3, -1)
 
 
 def _bulges(nominal: Nominal, index: int, body: Solid, surface_of_body: Surface) -> np.ndarray:
     """Return how far (t,) [mm] triangles stand out of the round faces for which they stand, mostly into hollow ones."""
     part, bulges = nominal.parts[index], np.zeros(len(body.faces))
-    corners = body.vertices[body.faces]
+    corners = np.asarray(surface_of_body.mesh.triangles)
     points = np.concatenate(
         [corners, (corners + np.roll(corners, -1, axis=1)) / 2, corners.mean(axis=1, keepdims=True)], axis=1
     )
@@ -57,8 +65,9 @@ def _bulges(nominal: Nominal, index: int, body: Solid, surface_of_body: Surface)
         distance, _ = surface.distance(points[rows].reshape(-1, 3))
         _, slope = surface.distance(points[rows, -1])
         outward = np.where((slope * body.normals[rows]).sum(axis=1) < 0, -1.0, 1.0)
-        height = (distance.reshape(len(rows), -1) * outward[:, None]).max(axis=1)
-        bulges[rows] = np.maximum(bulges[rows], np.where(height > ROUNDED, height, 0.0))
+        height = float((distance.reshape(len(rows), -1) * outward[:, None]).max(initial=0))
+        # One height for all triangles of a face: their planes are nearly the same, and meet far away if they move differently.
+        bulges[rows] = np.maximum(bulges[rows], height if height > ROUNDED else 0.0)
     return bulges
 
 

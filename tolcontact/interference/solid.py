@@ -7,11 +7,13 @@ import numpy as np
 import trimesh
 
 from tolcontact.arrays import Array, Float, Int
+from tolcontact.geometry.coordinate_error import coordinate_error
+from tolcontact.geometry.inset import smaller
+from tolcontact.geometry.vertex_displacements import capped, displacements
 
 MERGE_SHARE = 1e-9  # of the size: vertices that are no farther apart are one
 SAME_PLANE = 1e-5  # rad: facets whose normals differ by less are one plane
 MIN_SINGULAR = 0.05  # of the planes around a vertex: a direction that they determine worse is left alone
-TINY = 1e-300
 MAX_SHIFT = 8.0  # insets: a vertex of a needle moves no farther
 
 
@@ -53,35 +55,29 @@ class Solid:
     def shifts(self, outward: Float[Array, "t 3 k"]) -> Float[Array, "v 3 k"]:
         """Return how vertices move if the plane of each triangle moves out of the body by `outward` at its corners.
 
-        A vertex stays on all planes around it: N u = h, of which this is the shortest solution in the sense of least squares.
-        Each of the k columns is a case of its own.
+        A vertex stays on all planes around it (see `displacements`). Each of the k columns is a case of its own.
         """
-        corners = self.faces.ravel()
-        N = self.normals.repeat(3, axis=0)
-        squares, sides = np.zeros((len(self.vertices), 3, 3)), np.zeros((len(self.vertices), 3, outward.shape[2]))
-        np.add.at(squares, corners, N[:, :, None] * N[:, None])
-        np.add.at(sides, corners, N[:, :, None] * outward.reshape(-1, 1, outward.shape[2]))
-        values, vectors = np.linalg.eigh(squares)
-        determined = values > MIN_SINGULAR**2 * values.max(axis=1, initial=TINY, keepdims=True)
-        inverse = np.where(determined, 1 / np.maximum(values, TINY), 0.0)
-        return np.asarray(vectors @ (inverse[..., None] * (vectors.swapaxes(1, 2) @ sides)))
+        N, heights = self.normals.repeat(3, axis=0), outward.reshape(-1, outward.shape[2])
+        return displacements(self.faces.ravel(), N, heights, len(self.vertices), MIN_SINGULAR)
 
     def inset(self, depths: Float[Array, " t"]) -> Float[Array, "v 3"]:
         """Return the shifts (v, 3) [mm] of the vertices that put the planes of triangles `depths` (t,) [mm] deeper."""
         shifts = self.shifts(np.broadcast_to(-depths[:, None, None], (len(self.faces), 3, 1)))[..., 0]
-        length = np.linalg.norm(shifts, axis=1)
-        most = MAX_SHIFT * float(depths.max(initial=0.0))
-        return shifts * np.minimum(1.0, most / np.maximum(length, 1e-300))[:, None]
+        return capped(shifts, MAX_SHIFT * float(depths.max(initial=0.0)))
 
 
 def solid(body: trimesh.Trimesh) -> Solid | None:
-    """Return a body in its nominal place; None if it is not closed, and so has no inside."""
+    """Return a body in its nominal place; None if it is not closed, and so has no inside.
+
+    If its file rounds coordinates, it is smaller by their error.
+    """
     if not body.is_watertight or body.volume <= 0:
         return None
     merged = trimesh.Trimesh(body.vertices, body.faces, process=False)
     merged.merge_vertices(digits_vertex=int(np.ceil(-np.log10(MERGE_SHARE * max(merged.scale, 1e-9)))))
     kept = np.flatnonzero(np.asarray(merged.area_faces) > 0)
     merged.update_faces(kept)
+    merged = smaller(merged, coordinate_error(body))
     sharp = np.asarray(merged.face_adjacency_angles) > SAME_PLANE
     edges = np.asarray(merged.face_adjacency_edges)[sharp]
     return Solid(

@@ -43,8 +43,9 @@ def face_poses(pair: ContactPoints, deviations: ca.SX) -> tuple[Pose | None, Pos
 
 
 def face_heights(pair: ContactPoints, deviations: ca.SX) -> ca.SX:
-    """Return the growth (2, 1) [mm] of the moving and the reference face of a pair."""
-    return ca.vertcat(*(face_height(face, deviations) for face in pair.deviating))
+    """Return the growth (2, 1) [mm] of the moving and the reference face of a pair, this one less the error of coordinates."""
+    moving, reference = (face_height(face, deviations) for face in pair.deviating)
+    return ca.vertcat(moving, reference - pair.coordinate_error)
 
 
 def facing_pose(faces: tuple[Pose | None, Pose | None], X_WM: Pose, X_WR: Pose | None) -> Pose:

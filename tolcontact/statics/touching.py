@@ -125,7 +125,9 @@ def _drawn_places(pair: ContactPoints) -> TouchingPlaces:
     """Return where a pair touches as drawn."""
     assert pair.moving_face is not None and pair.reference_face is not None
     size = max(pair.moving_face.mesh.scale, pair.reference_face.mesh.scale)
-    touches = np.linalg.norm(pair.P_m - pair.P_r, axis=1) <= TOUCH_SHARE * size + pair.facets + pair.bulge
+    touches = (
+        np.linalg.norm(pair.P_m - pair.P_r, axis=1) <= TOUCH_SHARE * size + pair.facets + pair.bulge + pair.coordinate_error
+    )
     if pair.round is not None:
         touches &= ~pair.round.points["is_hollow"]  # these have a place of their own at every pose
     return TouchingPlaces(pair.P_r[touches], pair.n_r[touches])

@@ -53,6 +53,7 @@ def summary_table(results: Results) -> Table:
             "smallest_range": smallest,
             terms.INTERFERENCE_DEPTH: float(results.attrs.get(terms.INTERFERENCE_DEPTH, np.nan)),
             terms.NOT_WATCHED: str(results.attrs.get(terms.NOT_WATCHED, "")),
+            terms.STORED_COORDINATES: str(results.attrs.get(terms.STORED_COORDINATES, "")),
         },
     )
 

@@ -217,6 +217,9 @@ class ArchivedPair:
             int(contact[variable.name][pair]) if variable.name in contact else -1
             for variable in (terms.FACE_OF_MOVING, terms.FACE_OF_REFERENCE)
         )
+        self.coordinate_error = (
+            float(contact[terms.COORDINATE_ERROR.name][pair]) if terms.COORDINATE_ERROR.name in contact else 0.0
+        )
         self.facing = contact[terms.FACING.name][is_own] if terms.FACING.name in contact else None
 
     @property
@@ -240,6 +243,7 @@ class ArchivedPair:
             grown = (of_moving[:, None], of_reference[:, None])
             if self.meeting:
                 return (self._gaps_at_ends(turn @ R_m, offset, deviations) - sum(grown))[..., None]
+            grown = (of_moving[:, None], of_reference[:, None] - self.coordinate_error)
             return np.stack([point.gaps(turn @ R_m, offset, *grown) for point in self.round], axis=-1)
         # (R_m P_m + t_m - R_r P_r - t_r) . R_r n / |R_r n|, multiplied out: sums over points that matrix products form.
         back, n = R_r.swapaxes(-1, -2), self.normal

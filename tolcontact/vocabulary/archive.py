@@ -128,7 +128,7 @@ GAP_MIN = ArchiveVariable(
     "gap_min",
     (REALIZATION, STATE, PAIR),
     "f8",
-    "smallest gap of all contact points of a pair; negative: penetration",
+    "smallest gap of all contact points of a pair, larger by coordinate_error if there is one; negative: penetration",
     "mm",
 )
 ACTIVE = ArchiveVariable("active", (REALIZATION, PAIR), "i4", "number of active contact points in the raw state", "1")

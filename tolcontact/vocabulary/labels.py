@@ -5,10 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 CONVENTIONS = "CF-1.11"
-FORMAT = 5  # of the archive; earlier formats can be read, and format 1 is not stated
-STATIONS_FORMAT = 6  # of an archive with stations
-SPRINGS_FORMAT = 7  # of an archive with locators or pairs that give way, with and without stations
-LAST_FORMAT = SPRINGS_FORMAT
+FORMAT = 8  # of the archive; earlier formats can be read, and format 1 is not stated
 STATES = ("raw", "corrected")
 RAW, CORRECTED = 0, 1  # their positions
 AXES = ("x", "y", "z")

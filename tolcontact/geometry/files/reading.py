@@ -12,6 +12,7 @@ import trimesh
 from tolcontact.declaration import Geometry, Mesh
 from tolcontact.declaration.geometry import UNITS
 from tolcontact.errors import GeometryFault
+from tolcontact.geometry.coordinate_error import COORDINATE_SPACING
 from tolcontact.geometry.edges import rim
 from tolcontact.geometry.files import reader, screening
 from tolcontact.geometry.files.product import (
@@ -164,9 +165,12 @@ def read(geometry: Mesh, contents: Contents) -> Shape:
     if content.product is not None:
         return Shape(content.product.part(geometry.body))
     mesh = trimesh.Trimesh(content.arrays["vertices"], content.arrays["faces"], process=False)
-    mesh.apply_scale(_scale(geometry, str(content.arrays["units"]) or None))
+    scale = _scale(geometry, str(content.arrays["units"]) or None)
+    mesh.apply_scale(scale)
     check_numbers(mesh.vertices, str(geometry))
-    return Shape(_merge_vertices(mesh, content.arrays["piece"]), unsure=not geometry.units)
+    merged = _merge_vertices(mesh, content.arrays["piece"])
+    _state_spacing(merged, scale * content.arrays["spacing"])
+    return Shape(merged, unsure=not geometry.units)
 
 
 def _in_memory(geometry: Mesh) -> trimesh.Trimesh:
@@ -176,13 +180,21 @@ def _in_memory(geometry: Mesh) -> trimesh.Trimesh:
         raise GeometryFault(f"{geometry}: its triangles refer to vertices beyond the {len(mesh.vertices)} that it has")
     if len(mesh.faces) > reader.DEFAULT_LIMITS.triangles:
         raise GeometryFault(screening.too_many(geometry, len(mesh.faces), reader.DEFAULT_LIMITS.triangles))
-    mesh.apply_scale(_scale(geometry, getattr(source, "units", None)))
+    scale = _scale(geometry, getattr(source, "units", None))
+    mesh.apply_scale(scale)
     check_numbers(mesh.vertices, str(geometry))
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    _state_spacing(mesh, scale * getattr(source, COORDINATE_SPACING, np.zeros(3)))  # from an archive
     if BREP in getattr(source, "face_attributes", {}):  # from an archive
         mesh.face_attributes[BREP] = source.face_attributes[BREP]
         mesh.metadata |= {name: source.metadata[name] for name in (SURFACES, FACE_NAMES)}
     return mesh
+
+
+def _state_spacing(mesh: trimesh.Trimesh, spacing: np.ndarray) -> None:
+    """Add the spacing (3,) [mm] of stored coordinates to a mesh, unless they are exact."""
+    if spacing.any():
+        mesh.metadata[COORDINATE_SPACING] = spacing
 
 
 def _scale(geometry: Mesh, source_unit: str | None) -> float:

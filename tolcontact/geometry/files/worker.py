@@ -2,8 +2,8 @@
 
 `python -P worker.py FOLDER` writes FOLDER/ready once it has started, and works through the list in FOLDER/jobs.json. For job
 k it writes FOLDER/k.npz with the arrays it read, or FOLDER/k.txt with the fault of the file. Of tolcontact it imports only
-`child`, and `kernel` when a STEP file comes, so that it starts quickly. Without FOLDER it loads the kernel first, and then
-waits for a line with the folder on its standard input.
+`child`, `stored_coordinates`, and `kernel` when a STEP file comes, so that it starts quickly. Without FOLDER it loads the
+kernel first, and then waits for a line with the folder on its standard input.
 """
 
 import contextlib
@@ -21,6 +21,7 @@ import lazy_loader
 import numpy as np
 
 from tolcontact.child import Refusal, limit_resources
+from tolcontact.stored_coordinates import is_binary_stl, is_single, printed_spacing, single_spacing
 
 Arrays = dict[str, np.ndarray]
 ENCODING_GUESSERS = ("charset_normalizer", "chardet")  # trimesh would ask one for the encoding of binary content
@@ -56,13 +57,16 @@ class FolderResolver:
 
 
 def read_mesh(path: Path, kind: str) -> Arrays:
-    """Return the pieces of a mesh file, joined and in their places. Lengths are in the file's units."""
+    """Return the pieces of a mesh file, joined and in their places, with the `spacing` (3,) of coordinates that it can store.
+
+    Lengths are in the file's units.
+    """
     content = path.read_bytes()
     resolver = None
     if kind == "gltf":
         resolver = FolderResolver(path.parent)
         check_json(content)
-    if kind == "obj" or (kind == "stl" and len(content) != 84 + 50 * int.from_bytes(content[80:84], "little")):
+    if kind == "obj" or (kind == "stl" and not is_binary_stl(content)):
         content = in_utf8(content)
     try:
         scene = trimesh.load_scene(io.BytesIO(content), file_type=kind, resolver=resolver, process=False)
@@ -76,13 +80,16 @@ def read_mesh(path: Path, kind: str) -> Arrays:
         raise Refusal(
             f"cannot be read as a mesh ({type(error).__name__}: {error}); export it again as STL, OBJ, PLY or GLB"
         ) from error
-    pieces = []
+    pieces, spacing = [], np.zeros(3)
+    single, printed = is_single(content, kind), printed_spacing(content, kind)
     for node in scene.graph.nodes_geometry:
         transform, name = scene.graph[node]
         geometry = scene.geometry[name]
         if isinstance(geometry, trimesh.Trimesh):
             pieces.append((trimesh.transform_points(geometry.vertices, transform), np.asarray(geometry.faces)))
-    return {**join(pieces), "units": np.array(scene.units or "")}
+            stored = np.maximum(single_spacing(np.asarray(geometry.vertices)) if single else 0.0, np.full(3, printed))
+            spacing = np.maximum(spacing, np.abs(transform[:3, :3]) @ stored)
+    return {**join(pieces), "units": np.array(scene.units or ""), "spacing": spacing}
 
 
 def check_json(content: bytes) -> None:

@@ -196,6 +196,8 @@ def contact_lines(summary: Rows, count: int) -> Iterator[str]:
     yield f"resolution: {summary.attrs['resolution']}{steps}; objective: {summary.attrs['objective']}"
     if shifted := summary.attrs["datum_shifts"]:
         yield f"datum shift of {shifted}: not drawn; contact of the datum features determines it"
+    if stored := summary.attrs["stored_coordinates"]:
+        yield stored
     yield f"largest penetration at contact points: {raw:.3g} mm without, {corrected:.3g} mm with contact"
     yield from _between(summary, count)
     yield from _advice(summary, corrected)
@@ -227,8 +229,8 @@ def _clashes(summary: Rows, count: int) -> Iterator[str]:
         yield "advice: declare their contact, or that it is meant: assembly.may_overlap(...); tolcontact check writes the lines"
     extent = f"all {grouped(watched)}" if watched == count else f"{grouped(watched)} of {grouped(count)}"
     depth = summary.attrs["interference_depth"]
-    unless = "" if share[0] > 0 else "no bodies lie in each other in certified realizations: "
-    yield f"{unless}complete test of interference to {depth:.2g} mm in {extent} realizations"
+    found = "see above" if share[0] > 0 else "none where certified"
+    yield f"interference of bodies from {depth:.2g} mm: {found} ({extent} tested)"
     if summary.attrs["not_watched"]:
         yield f"not tested for interference: {summary.attrs['not_watched']}"
 
