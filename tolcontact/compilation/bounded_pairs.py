@@ -72,7 +72,7 @@ def bounded_pair(
         return nothing
     highest = float(np.abs(pair.heights(deviations)).max())
     if pair.has_form:
-        highest += float(pair.form(deviations).highest().max())
+        highest += float(pair.form(deviations).highest().sum(axis=0).max())
     travel = _travel(pair, X_RM) + highest
     tilt = float(pose.turn(X_RM, pose.AT_REST[None]).max())
     size = float(np.ptp(pair.moving_face.mesh.vertices, axis=0).max())

@@ -84,7 +84,8 @@ def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) ->
     """
     if gaps is None or pair.is_springy:
         return np.arange(len(pair.P_m))
-    return gaps.corners if method.corners_suffice and len(gaps.corners) <= SLOTS else SLOTS
+    are_few = method.corners_suffice and len(gaps.corners) <= SLOTS and pair.minima is None
+    return gaps.corners if are_few else SLOTS
 
 
 def contact_rows(

@@ -113,6 +113,13 @@ carry load, and penetrate each other by no more than 1 % of the smallest toleran
 the error of their triangles. For other solutions far from the raw pose, other starts are tried; if these do not help, the
 realization is `doubtful`.
 
+Two planes with form, or a body on a plane with form, touch at minima of their gap. Newton steps find these between contact
+points at every pose, inside of the faces and along their rims, and each that is deeper than 1 / 2500 of the smallest tolerance
+range gets a row. An answer with a minimum deeper than a thousandth of the range is `doubtful`. The search assumes that contact
+points resolve the form: each minimum lies near a contact point that is nearly as deep. Where facets of a body reach the plane
+at several heights, answers are compared at some thousand points instead. Round faces with form are checked at contact points
+and on the surfaces alone.
+
 Where faces end, a certificate covers both bodies as their triangles, and faces under load touch. Only if steps come to no rest
 otherwise, a place that carries may lie beside its edge, as far as its plane errs there by a two-thousandth of the smallest
 tolerance range. Where contact points are fixed, or projected again, a certificate does not cover the surfaces *between* them.

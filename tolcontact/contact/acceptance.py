@@ -10,7 +10,8 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.state import State, Task
-from tolcontact.discretization import Nominal
+from tolcontact.discretization import ContactPoints, Nominal
+from tolcontact.interference.watch import ALLOWED_SHARE
 from tolcontact.mechanics import Group, curved_pairs
 from tolcontact.method import Method
 
@@ -33,6 +34,8 @@ class AcceptanceLimits:
         self._movers = [k for k, mobility in enumerate(group.mobilities) if mobility.movers]
         self._group_pairs = [nominal.pairs[index] for index in group.pairs]
         self._max_depth = min(DEPTH_SIZES * size, DEPTH_SHARE * nominal.assembly.smallest_zone())
+        self._allowed_in_form = ALLOWED_SHARE * nominal.assembly.smallest_zone()
+        self._polyhedra = [k for k, pair in enumerate(self._group_pairs) if method.is_bounded and _is_polyhedron(pair)]
         self._round = {}
         for k in curved_pairs(nominal, group):
             surface, points = self._group_pairs[k].reference_face, self._group_pairs[k].P_m
@@ -90,6 +93,19 @@ class AcceptanceLimits:
                 doubtful[rows] |= faces.depth(X_RM, pair.heights(deviations), form) > self.allowed(k)
         return doubtful
 
+    def lie_in_form(self, task: Task, state: State) -> Bool[Array, " n"]:
+        """Return whether faces with form lie in each other in a certified answer (n,), where no search finds the deepest place.
+
+        These are polyhedra on a plane with form. The faces are compared at many points.
+        """
+        found, rows = np.zeros(len(state), dtype=bool), np.flatnonzero(state.rank == 0)
+        for k in self._polyhedra if rows.size else ():
+            pair, faces, deviations = self._group_pairs[k], self._nominal.face_pair(self._pairs[k]), task.deviations[rows]
+            if faces is not None:
+                depth = faces.depth(state.relative[rows, k], pair.heights(deviations), pair.form(deviations))
+                found[rows] |= depth > self._allowed_in_form
+        return found
+
     def _is_turned(self, task: Task, state: State) -> Bool[Array, " n"]:
         """Return whether a part turned too far from its raw pose (n,)."""
         difference = state.poses[:, self._movers, :9] - task.raw[:, self._movers, :9]
@@ -121,6 +137,13 @@ class AcceptanceLimits:
         for part, centre, radius in self._balls:
             bound = np.maximum(bound, _displacement(end[:, part] - start[:, part], centre, radius))
         return bound
+
+
+def _is_polyhedron(pair: ContactPoints) -> bool:
+    """Return whether a pair with form has flat facets, and no search for the deepest place between contact points."""
+    faces = pair.moving_face, pair.reference_face
+    is_flat = all(face is not None and face.curvature == 0 for face in faces)
+    return pair.has_form and pair.minima is None and not pair.is_springy and is_flat
 
 
 def _displacement(difference: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:

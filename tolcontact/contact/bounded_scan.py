@@ -10,6 +10,7 @@ from tolcontact.contact import bounded_kernel
 from tolcontact.contact.guard import GUARD, Guard
 from tolcontact.contact.scan import Deepest, Scan, SlotScan
 from tolcontact.discretization import FIRST_POINT, ContactPoints, raised_places
+from tolcontact.geometry.height_kernel import FIRST_PLACE
 from tolcontact.geometry.kernel import CORNER_ON_FACET, INSIDE
 from tolcontact.geometry.meeting import NEARNESS, Meeting, Places
 from tolcontact.geometry.parting import Parting
@@ -46,6 +47,12 @@ class BoundedScan(SlotScan):
             *(getattr(self, name)[rows] for name in ("labels", "places", "feet", "normals", "valid", "heights")),
         )  # fmt: skip
 
+    @property
+    def minima(self) -> Int[Array, "realization minimum"]:
+        """The labels of minima of the gap between contact points, -1 for none."""
+        is_minimum = self.labels >= FIRST_PLACE
+        return np.where(is_minimum, self.labels, -1)[:, is_minimum.any(axis=0)]
+
     def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         gaps = np.where(self.valid, 0.0, np.inf)
         relative = np.ascontiguousarray(relative)
@@ -53,7 +60,12 @@ class BoundedScan(SlotScan):
         return gaps
 
     def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        return self.gaps(relative, deviations).min(axis=1, initial=np.inf)
+        gaps = np.where(self.labels < FIRST_PLACE, self.gaps(relative, deviations), np.inf)
+        return gaps.min(axis=1, initial=np.inf)
+
+    def depth_between(self, relative: np.ndarray) -> np.ndarray:
+        gaps = np.where(self.labels < FIRST_PLACE, np.inf, self.gaps(relative, np.empty((len(relative), 0))))
+        return -gaps.min(axis=1, initial=0.0)
 
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
         shape = len(relative), min(MAX_DEEPEST, self.labels.shape[1])
@@ -86,17 +98,18 @@ def bounded_scan(
     kept: Int[Array, "n k"] | None = None,
     error: float = 0.0,
     nearness: float = NEARNESS,
+    depth: float = np.inf,
     guard: Guard | None = None,
     parting: Parting | None = None,
-    carried: Int[Array, "n k"] | None = None,
+    carried: Int[Array, "n slot"] | None = None,
 ) -> BoundedScan:
-    """Return the places at which a pair can touch at X_RM (n, 12); see Meeting.at for `kept`, `error` and `nearness`.
+    """Return the places at which a pair can touch at X_RM (n, 12); see raised_places for the other arguments.
 
     Where no place shows penetration, a `guard` adds one if bodies lie in each other. A `parting` leaves out places that hold
-    bodies apart in other directions than the one in which they part best, and adds the place that does; `carried` (n, k) are
+    bodies apart in other directions than the one in which they part best, and adds the place that does; `carried` (n, slot) are
     the labels of places that carried before, -1 for none.
     """
-    found, heights = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness)
+    found, heights = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness, depth)
     if guard is not None:
         found, heights = _with_guard(found, heights, guard, X_RM)
     if parting is not None:

@@ -11,15 +11,17 @@ from scipy.spatial import KDTree
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
-from tolcontact.contact.bounded_scan import bounded_scan
-from tolcontact.contact.guard import Guard
+from tolcontact.contact.bounded_scan import BoundedScan, bounded_scan
+from tolcontact.contact.guard import GUARD, Guard
 from tolcontact.contact.raised_scan import RaisedScan, raised_scan
 from tolcontact.contact.scan import PairScan, RoundScan, Scan, changing, fixed, min_gaps, pair_scan
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.state import State, Task
-from tolcontact.discretization import ContactPoints
+from tolcontact.discretization import FIRST_POINT, ContactPoints
+from tolcontact.geometry.height_kernel import FIRST_PLACE
 from tolcontact.geometry.meeting import NEARNESS
 from tolcontact.geometry.parting import Parting, parting
+from tolcontact.interference.watch import ALLOWED_SHARE
 from tolcontact.mechanics import curved_pairs
 
 
@@ -84,7 +86,14 @@ def project(scan: PairScan, pair: ContactPoints, relative: Float[Array, "realiza
 MAX_CLUSTERS = 6
 FORM_CLUSTERS = 8  # of faces with form, which touch at more places
 EDGE_SHARE = 1 / 4000  # of the smallest tolerance range: error of planes beyond their edges, in steps
+BULGE_SHARE = 1 / 2500  # of the same: depth to which planes with form may lie in each other between contact points
+MIN_BULGE = 1e-7  # mm
 OVERHANG_SHARE = 0.01  # of their radius, by which balls and shafts that travelled far may carry beside a wall
+
+
+def _lies_between(labels: Int[Array, "n k"]) -> Bool[Array, "n k"]:
+    """Return which labels of places are those of contact points, or of minima of the gap, between the ends of faces."""
+    return ((labels >= FIRST_POINT) & (labels < GUARD)) | (labels >= FIRST_PLACE)
 
 
 class RawSurvey(NamedTuple):
@@ -94,10 +103,12 @@ class RawSurvey(NamedTuple):
     min_gap     (realization, pair) [mm]: the least gaps
     active      (realization, pair): number of active points
     moments     (realization, side, moment) of the points that count in the objective
+    is_inside   (realization,): whether faces with form lie in each other between the points
     """
 
     scans: list[Scan]
     min_gap: Float[Array, "realization pair"]
+    is_inside: Bool[Array, " realization"]
     active: Int[Array, "realization pair"]
     moments: Float[Array, "realization side moment"]
 
@@ -142,8 +153,14 @@ class Candidates:
             # If the paper's set of points may carry, those between the corners count, too.
             corners = self._method.corners_suffice and index not in program.meetings
             self._carrying_scans.append(pair_scan(pair, gaps, (), clusters, gaps.corners) if corners else self._all_scans[-1])
+        smallest = program.nominal.assembly.smallest_zone()
         self._with_form = [k for k, pair in enumerate(self._pairs) if pair.has_form]
-        self._edge_error = EDGE_SHARE * program.nominal.assembly.smallest_zone()
+        self._edge_error, self._bulge = EDGE_SHARE * smallest, max(BULGE_SHARE * smallest, MIN_BULGE)
+        self._allowed_bulge = max(ALLOWED_SHARE * smallest, 2 * MIN_BULGE)
+        searches = self._method.is_exact and self._method.is_closed and not self._method.is_iterated
+        self._with_minima = {
+            k for k in self._varying if searches and np.isfinite(smallest) and self._pairs[k].minima is not None
+        }
         self.bounded = {k: program.meetings[index] for k, index in enumerate(group.group.pairs) if index in program.meetings}
         guards = {k: Guard.of(program, group.group.pairs[k]) for k in self.bounded}
         self.guards = {k: guard for k, guard in guards.items() if guard is not None}
@@ -179,8 +196,15 @@ class Candidates:
         scans = list(self._carrying_scans)
         for k in self._with_form:
             if k not in self.bounded and not self._method.is_iterated:
-                is_raised = len(earlier) > 0 and isinstance(earlier[k], RaisedScan)
-                scans[k] = earlier[k] if is_raised else raised_scan(fixed(scans[k]), deviations)
+                former, has_minima = earlier[k] if earlier else None, k in self._with_minima
+                scan = former if isinstance(former, RaisedScan) else raised_scan(fixed(scans[k]), deviations, always=has_minima)
+                if has_minima and isinstance(scan, RaisedScan):
+                    is_raw = not isinstance(former, RaisedScan)
+                    in_steps = len(slots) > 0
+                    scan = scan.with_minima(
+                        self._pairs[k], relative[:, k], deviations, self._bulge, is_raw=is_raw, in_steps=in_steps
+                    )
+                scans[k] = scan
         if projected or self._method.is_iterated:
             for k in self._margins:
                 scans[k] = self.projected(k, relative[:, k])
@@ -188,13 +212,41 @@ class Candidates:
             kept, error = (slots[self._varying.index(k)].labels, width * self._edge_error) if slots else (None, 0.0)
             carried = None if kept is None else kept.copy()
             if kept is not None and at_rest is not None:
-                kept[at_rest] = -1
+                # Places between the ends of faces with form come and go with no edge.
+                kept[at_rest[:, None] & ~_lies_between(kept)] = -1
+            former = earlier[k] if earlier else None
+            if kept is not None and isinstance(former, BoundedScan):
+                kept = np.concatenate([kept, former.minima], axis=1)
             nearness, guard = NEARNESS if width == 1 else np.inf, self.guards.get(k) if guarded else None
+            depth = self._bulge if k in self._with_minima else np.inf
             parting = self.partings.get(k) if parted else None
             scans[k] = bounded_scan(
-                scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness, guard, parting, carried
+                scans[k],
+                self._pairs[k],
+                places,
+                relative[:, k],
+                deviations,
+                kept,
+                error,
+                nearness,
+                depth,
+                guard,
+                parting,
+                carried,
             )
         return scans
+
+    @property
+    def change(self) -> bool:
+        """Whether places of contact are found again at every pose."""
+        return bool(self.bounded or self._with_minima)
+
+    def bulge(self, scans: Sequence[Scan], relative: Float[Array, "realization pair 12"]) -> Bool[Array, " realization"]:
+        """Return whether planes with form lie in each other between contact points, by more than bodies may (realization,)."""
+        found = np.zeros(len(relative), dtype=bool)
+        for k in self._with_minima:
+            found |= scans[k].depth_between(relative[:, k]) > self._allowed_bulge
+        return found
 
     def interfere(self, relative: Float[Array, "realization pair 12"]) -> Bool[Array, " realization"]:
         """Return whether bodies of a pair lie in each other (realization,), by a test that does not know the list of places."""
@@ -216,7 +268,9 @@ class Candidates:
 
     def hold(self, task: Task, state: State, *, guarded: bool = False, parted: bool = False) -> Bool[Array, " n"]:
         """Return whether the places that carry are as near to their faces as they may be in an answer (n,)."""
-        scans = self.scans(state.relative, task.deviations, slots=state.slots, guarded=guarded, parted=parted)
+        scans = self.scans(
+            state.relative, task.deviations, slots=state.slots, earlier=task.scans, guarded=guarded, parted=parted
+        )
         held = np.ones(len(state), dtype=bool)
         for k in self.bounded:
             slots = state.slots[self._varying.index(k)]
@@ -239,6 +293,7 @@ class Candidates:
         return RawSurvey(
             scans=scans,
             min_gap=min_gaps(scans, relative, deviations),
+            is_inside=np.stack([scan.depth_between(relative[:, k]) for k, scan in enumerate(scans)]).max(axis=0) > 0,
             active=np.stack([survey.active for survey in surveys], axis=1),
             moments=np.concatenate([self._counted(k, survey.moments) for k, survey in enumerate(surveys)], axis=1),
         )
@@ -281,8 +336,14 @@ class Candidates:
         if isinstance(standing, int):
             slots = state.slots[self._varying.index(k)]
             realization, column = np.nonzero(loaded & slots.filled)
-            places = self._carrying_scans[k].P_m[slots.points[realization, column]]
+            places = self._places(k, slots.points[realization, column])
         else:
             realization, column = np.nonzero(loaded)
             places = pair.P_m[standing[column]]
         return Carriers(realization, places, np.ones(len(places), dtype=bool), 2 * half_spacing(fixed(self._all_scans[k])))
+
+    def _places(self, k: int, labels: Int[Array, " point"]) -> Float[Array, "point 3"]:
+        """Return the nominal places of contact points of pair k, and of minima of the gap between them, by their labels."""
+        is_point, minima = labels < FIRST_PLACE, self._pairs[k].minima
+        places = self._carrying_scans[k].P_m[np.where(is_point, labels, 0)]
+        return places if minima is None else np.where(is_point[:, None], places, minima.points(labels))

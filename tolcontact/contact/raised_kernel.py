@@ -75,3 +75,26 @@ def deepest(points, clusters, relative, raised, lowest, numbers, may_carry, limi
                     if gap < deepest_gap or (gap == deepest_gap and start + j < where):
                         deepest_gap, where = gap, start + j
             points_there[k, cluster], gaps_there[k, cluster] = where, deepest_gap
+
+
+@compiled
+def write_low_gaps(points, relative, raised, lowest, numbers, limits, values):  # type: ignore[no-untyped-def]
+    """Write the gaps (n, point) of the leaves that may hold gaps below `limits` (n,); infinite ones of other leaves.
+
+    points      Points
+    raised      (m, point), and lowest (m, leaf): see RaisedScan, for realizations with `numbers` (n,)
+    """
+    leaves, nothing = points.leaves, np.empty(0, dtype=np.int64)
+    factors = np.empty(points.basis.shape[1])
+    middle, spread, gaps = np.empty(leaves.size - 1), np.empty(leaves.size - 1), np.empty(LEAF)
+    for k in range(relative.shape[0]):
+        write_factors(points.basis, nothing, relative[k], relative[k], factors)
+        bounds(points.leaf_boxes, 0, middle.size, factors, middle, spread)
+        row = numbers[k]
+        for leaf in range(middle.size):
+            start, count = leaves[leaf], leaves[leaf + 1] - leaves[leaf]
+            is_clear = middle[leaf] + lowest[row, leaf] - spread[leaf] > limits[k]
+            if not is_clear:
+                gaps_of(points.coordinates, start, count, factors, gaps)
+            for j in range(count):
+                values[k, start + j] = np.inf if is_clear else gaps[j] + raised[row, start + j]

@@ -42,6 +42,8 @@ class StepKind(NamedTuple):
 
 FIRM_STEPS = (*[StepKind(1e4, newton=True)] * 6, *[StepKind(1e2, newton=True)] * 6)
 STEPS = (*[StepKind(1.0, newton=False)] * 8, *FIRM_STEPS, *[StepKind(1.0, newton=True)] * 80)
+# Places between the points of planes with form are added step by step: a few realizations need some more steps for that.
+STEPS_WITH_FORM = (*[StepKind(1.0, newton=False)] * 8, *STEPS)
 # Where faces end, places come and go. Newton's curvature is that of places that stay, so steps like the paper's come first and,
 # held back, again later, with places that stay longer: they do not jump to and fro between places. Beside its edge
 # a place holds bodies apart that would touch nearby, at a lower objective. So places only stay while steps are large, unless
@@ -65,7 +67,7 @@ def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, t
     if not len(task):
         return
     asleep, last = np.zeros(len(task), dtype=bool), None
-    for kind in STEPS_WHERE_FACES_END if candidates.bounded else STEPS:
+    for kind in STEPS_WHERE_FACES_END if candidates.bounded else STEPS_WITH_FORM if candidates.change else STEPS:
         asleep &= kind == last
         last = kind
         if asleep.all():
@@ -93,13 +95,20 @@ def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, t
         progress = None if progress is None else progress.take(moves)
         if not len(unsettled):
             return
-        if candidates.bounded:
-            poses, deviations, slots = unsettled.state.relative, unsettled.task.deviations, unsettled.state.slots
+        if candidates.change:
+            poses, task, slots = unsettled.state.relative, unsettled.task, unsettled.state.slots
             at_rest = (size[moves] < NEARLY_AT_REST) & kind.sharp
             scans = candidates.scans(
-                poses, deviations, slots=slots, width=kind.width, at_rest=at_rest, guarded=start.guarded, parted=start.parted
+                poses,
+                task.deviations,
+                slots=slots,
+                width=kind.width,
+                at_rest=at_rest,
+                earlier=task.scans,
+                guarded=start.guarded,
+                parted=start.parted,
             )
-            unsettled.task = replace(unsettled.task, scans=scans)
+            unsettled.task = replace(task, scans=scans)
         if kind.newton:
             penetration = _true_penetration(unsettled.task, unsettled.state)
             progress = progress or Progress.start(unsettled.state)

@@ -95,7 +95,7 @@ class ContactResolver:
         """
         relative = relative[:, self.pairs]
         survey = self._candidates.survey(relative, deviations)
-        moves = np.any(survey.min_gap < -PENETRATION, axis=1) | self._method.minimizes.presses
+        moves = np.any(survey.min_gap < -PENETRATION, axis=1) | survey.is_inside | self._method.minimizes.presses
         unseen = np.flatnonzero(~moves)
         moves[unseen] = self._candidates.interfere(relative[unseen])
         touched = np.flatnonzero(moves)
@@ -143,6 +143,8 @@ class ContactResolver:
         state.doubtful[:] = self._limits.is_doubtful(task, state, self._candidates)
         certified = np.flatnonzero(state.rank == 0)
         state.doubtful[certified] = self._candidates.interfere(state.relative[certified])
+        state.doubtful[:] |= self._candidates.bulge(task.scans, state.relative) & (state.rank == 0)
+        state.doubtful[:] |= self._limits.lie_in_form(task, state)
         if not projected:
             self._doubt_rolled(task, state)
 

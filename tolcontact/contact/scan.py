@@ -74,6 +74,10 @@ class Scan:
         """Return the least gap of all points (realization,) [mm]."""
         return self.gaps(relative, deviations).min(axis=1)
 
+    def depth_between(self, relative: Float[Array, "realization 12"]) -> Float[Array, " realization"]:
+        """Return the largest known depth [mm] of faces with form between the points; 0 if there is none."""
+        return np.zeros(len(relative))
+
 
 class SlotScan(Scan):
     """A scan whose points take turns in the slots of the QP.

@@ -32,7 +32,8 @@ If a face has form, its points are a fifth of the correlation length apart, unle
 refused. Planes with form touch planes that face them. A cylinder in a parallel one has a grid of points: at least 48 azimuths,
 and heights a third of the correlation length apart. Other round faces have the points of curved faces. Heights are those at the
 nominal points; where planes end, those at the places found at each pose, and contact points between these count as long as they
-stand over the reference face. Round faces with form are not followed beyond their ends.
+stand over the reference face. Planes with form also touch between contact points (see `tolcontact.contact`), so that closer
+points find no deeper contact. Round faces with form are not followed beyond their ends.
 
 ## Warnings
 

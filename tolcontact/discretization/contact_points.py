@@ -15,6 +15,7 @@ from tolcontact.discretization.form_points import (
     check_facing,
     check_resolved,
     coaxial_points,
+    facing_triangles,
     form_lengths,
     form_spacing,
     with_rims,
@@ -55,6 +56,9 @@ def contact_points(
     deviating = _deviation(pair.moving, moving, meshes, features), _deviation(pair.reference, reference, meshes, features)
     lengths = form_lengths(deviating)
     if lengths:
+        triangles = facing_triangles(moving_face, reference_face, deviating[1])
+        unplaced, moving_face = unplaced.part(triangles), moving_face.part(triangles)
+        reference_face = reference_face.part(facing_triangles(reference_face, moving_face, deviating[0]))
         check_facing(moving_face, reference_face, deviating)
     balls_and_shafts = round_points(moving_face, reference_face, reach) if _is_open(pair) and not lengths else []
     # A hollow wall is fitted to many vertices: rounding hardly moves it.

@@ -1,7 +1,8 @@
 """Places at which faces that end can touch, with the heights of their forms there.
 
 Planes that end touch at the corners of their overlap. With form they also touch between these, so that contact points over the
-reference face are places, too.
+reference face are places, too, and so are minima of the gap between them. A height is that of the point of a face which lies
+over the other face's point at the pose.
 """
 
 from typing import NamedTuple
@@ -11,10 +12,13 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.discretization.nominal import ContactPoints
+from tolcontact.discretization.plane_minima import with_former
 from tolcontact.geometry import region_kernel
+from tolcontact.geometry.height_kernel import FIRST_PLACE
 from tolcontact.geometry.meeting import NEARNESS, Meeting, Places
 
 FIRST_POINT = 1 << 40  # number of the first contact point among the labels of places
+EXACT_SHARE = 0.1  # of how far the gap may fall between points: heights in smaller gaps are exact, others those of splines
 POINT_GROUPS = 12  # of neighbouring contact points; the lowest of each group counts
 
 
@@ -38,8 +42,12 @@ def raised_places(
     retained: Int[Array, "n k"] | None = None,
     error: float = 0.0,
     nearness: float = NEARNESS,
+    depth: float = np.inf,
 ) -> RaisedPlaces:
-    """Return the places at which a pair can touch at X_RM (n, 12), see Meeting.at, for deviations (n, contributor)."""
+    """Return the places at which a pair can touch at X_RM (n, 12), see Meeting.at, for deviations (n, contributor).
+
+    Minima of the gap between contact points are among them if they are deeper than `depth` [mm].
+    """
     grown = pair.heights(deviations)[:, None]
     if not pair.has_form:
         places = meeting.at(X_RM, retained, error, nearness)
@@ -49,9 +57,9 @@ def raised_places(
     row, place = np.nonzero(np.isfinite(ends.gaps))
     heights = np.zeros(ends.gaps.shape)
     heights[row, place] = pair.form(deviations).at(row, ends.P_m[row, place], ends.P_r[row, place])
-    points, of_points = _points(pair, X_RM, deviations, retained)
-    joined = [np.concatenate(arrays, axis=1) for arrays in zip(ends, points, strict=True)]
-    return RaisedPlaces(Places(*joined), grown + np.concatenate([heights, of_points], axis=1))
+    points, of_points, between, of_minima = _points(pair, X_RM, deviations, retained, depth)
+    joined = [np.concatenate(arrays, axis=1) for arrays in zip(ends, points, between, strict=True)]
+    return RaisedPlaces(Places(*joined), grown + np.concatenate([heights, of_points, of_minima], axis=1))
 
 
 class RimPoints(NamedTuple):
@@ -76,41 +84,65 @@ def rim_points(pair: ContactPoints, X_RM: Float[Array, "n 12"]) -> RimPoints:
 
 
 def _points(
-    pair: ContactPoints, X_RM: np.ndarray, deviations: np.ndarray, retained: np.ndarray | None
-) -> tuple[Places, np.ndarray]:
+    pair: ContactPoints, X_RM: np.ndarray, deviations: np.ndarray, retained: np.ndarray | None, depth: float
+) -> tuple[Places, np.ndarray, Places, np.ndarray]:
     """Return points between the ends of the faces as places, and the heights (n, place) [mm] of the forms there.
 
-    These are the `retained` ones, and the lowest of each group: contact points, and after these points of the rim.
+    These are the `retained` ones, and the lowest of each group: contact points, and after these points of the rim. The minima
+    of the gap between them that are deeper than `depth` [mm] follow, and their heights.
     """
-    assert pair.reference_face is not None and pair.moving_face is not None
-    regions = pair.reference_face.region, pair.moving_face.region
+    assert pair.reference_face is not None and pair.moving_face is not None and pair.minima is not None
+    regions, minima = (pair.reference_face.region, pair.moving_face.region), pair.minima
     poses, rim, count = np.ascontiguousarray(X_RM), rim_points(pair, X_RM), len(pair.P_m)
     total = count + len(rim.P_r)
     groups = np.cumsum([0, *map(len, np.array_split(np.arange(total), min(POINT_GROUPS, total)))])
     gaps, heights = np.empty((len(poses), total)), np.zeros((len(poses), total))
-    region_kernel.plane_gaps(poses, *(np.ascontiguousarray(values) for values in (pair.P_m, pair.P_r, pair.n_r)), gaps)
-    gaps[:, count:], heights[:, :count] = rim.gaps, pair.form_heights(deviations)
     P_m, feet = np.ascontiguousarray(pair.P_m), np.ascontiguousarray(rim.P_m)
-    kept = np.zeros((len(poses), 0), dtype=np.int64)
+    region_kernel.plane_gaps(poses, P_m, *(np.ascontiguousarray(values) for values in (pair.P_r, pair.n_r)), gaps)
+    gaps[:, count:], heights[:, :count] = rim.gaps, pair.form_heights(deviations)
+    between = kept = np.zeros((len(poses), 0), dtype=np.int64)
     if retained is not None:
-        kept = np.where(retained >= FIRST_POINT, retained - FIRST_POINT, -1)
+        is_point = (retained >= FIRST_POINT) & (retained < FIRST_POINT + total)
+        kept = np.where(is_point, retained - FIRST_POINT, -1)[:, is_point.any(axis=0)]
+        between = np.where(retained >= FIRST_PLACE, retained, -1)
         region_kernel.keep_over(poses, P_m, feet, *regions, kept)
-    form = pair.form(deviations)
-    may_be_lowest = np.zeros(gaps.shape, dtype=bool)
-    region_kernel.write_promising(feet, gaps, form.bounds(), groups, count, regions[1], kept, may_be_lowest)
-    row, point = np.nonzero(may_be_lowest)
-    heights[row, point] = form.at(row, feet[row, point - count], rim.P_r[point - count])
+    bounds = np.stack([minima.error_beside(poses, deviations), minima.bound(deviations)], axis=1)
+    is_promising = np.zeros(gaps.shape, dtype=bool)
+    region_kernel.write_promising(poses, P_m, feet, gaps - heights, bounds, groups, *regions, kept, is_promising)
+    if bounds[:, 0].any():
+        at_feet = minima.heights(poses, deviations, P_m[None], is_promising[:, :count])
+        heights[:, :count] = np.where(is_promising[:, :count], at_feet, heights[:, :count])
+    heights[:, count:] = minima.heights(poses, deviations, feet, is_promising[:, count:])
     raised = gaps - heights
-    raised[:, count:][~may_be_lowest[:, count:]] = np.inf
+    raised[:, count:][~is_promising[:, count:]] = np.inf
     lowest = np.empty((len(poses), len(groups) - 1), dtype=np.int64)
     region_kernel.lowest_over(poses, P_m, feet, raised, groups, *regions, lowest)
+    rows = np.arange(len(poses))[:, None]
+    if np.isfinite(depth):
+        grown, limits = pair.heights(deviations), minima.bulge(deviations)
+        raised -= grown[:, None]
+        region_kernel.leave_low(poses, P_m, feet, raised, limits, *regions)
+        points = np.concatenate([np.broadcast_to(P_m, (len(poses), *P_m.shape)), feet], axis=1)
+        between = with_former(minima.find(poses, deviations, grown, points, raised, limits, depth), between)
     numbers = np.concatenate([kept, lowest], axis=1)
     for column in range(1, numbers.shape[1]):
         numbers[(numbers[:, :column] == numbers[:, column, None]).any(axis=1), column] = -1
-    rows, is_point, on_rim = np.arange(len(poses))[:, None], numbers >= 0, np.nonzero(numbers >= count)
+    is_point, on_rim = numbers >= 0, np.nonzero(numbers >= count)
     labels, gaps = np.where(is_point, numbers + FIRST_POINT, -1), np.where(is_point, gaps[rows, numbers], np.inf)
     of_pair, of_rim = np.where(numbers < count, numbers, 0), numbers[on_rim] - count
     P_m, P_r = pair.P_m[of_pair], pair.P_r[of_pair]
     P_m[on_rim], P_r[on_rim] = feet[on_rim[0], of_rim], rim.P_r[of_rim]
     n_r = np.broadcast_to(pair.n_r[0], (*numbers.shape, 3))
-    return Places(labels, gaps, P_m, P_r, n_r), heights[rows, numbers] * is_point
+    heights = heights[rows, numbers] * is_point
+    row, place = _exact(gaps - heights, minima.bulge(deviations))
+    moved = pose.apply(poses[row], P_m[row, place, None])[:, 0]
+    true_feet = moved - ((moved - P_r[row, place]) @ pair.n_r[0])[:, None] * pair.n_r[0]
+    heights[row, place] = pair.form(deviations).at(row, P_m[row, place], true_feet)
+    return Places(labels, gaps, P_m, P_r, n_r), heights, *minima.at(poses, deviations, between)
+
+
+def _exact(gaps: np.ndarray, bulge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return row and place (k,) of gaps (n, place) [mm] that may touch, or be the least: their heights have to be exact."""
+    least = np.maximum(gaps.min(axis=1, initial=np.inf), 0)
+    row, place = np.nonzero((gaps <= (least + EXACT_SHARE * bulge)[:, None]) & np.isfinite(gaps))
+    return row, place

@@ -15,6 +15,8 @@ from tolcontact.geometry.subdivision import subdivided
 from tolcontact.geometry.surface import RIM_TOLERANCE, Surface
 
 FACING = -0.99999  # cosine of the angle between the normals of planes that face each other
+MIN_RISE = 0.1  # per mm beside the rim of facets that face a plane: steeper facets touch it nowhere else, at usual tilts
+FLATNESS = 1e-6  # of a face's size: facets whose heights differ by less are one plane
 SPACING_SHARE = 1 / 5  # of the correlation length: the usual spacing
 ALONG_SHARE = 1 / 3  # of the correlation length: the same along the axis of cylinders, whose lines are straight
 MIN_AZIMUTHS = 48  # of a cylinder
@@ -53,6 +55,28 @@ def check_facing(moving: Surface, reference: Surface, deviating: Sequence[FaceDe
             f"the face of feature {name} has form, and its planes are not parallel; give its tolerance form=None, "
             "so that it keeps its shape"
         )
+
+
+def facing_triangles(face: Surface, other: Surface, deviation: FaceDeviation | None) -> np.ndarray:
+    """Return the indices (triangle,) of the triangles of a face that can touch another one, with its deviation.
+
+    Of a body on a plane with form, these are the nearest facets that face the plane, if all others rise from their plane: what
+    else ends at their rim, or stands farther off, touches nothing before the rim does. Else all triangles can touch it.
+    """
+    n, every = other.corner_normals[0, 0], np.arange(len(face.mesh.faces))
+    is_facing = np.asarray(face.mesh.face_normals) @ n < FACING
+    if deviation is None or deviation.form is None or not is_flat(other) or is_facing.all() or not is_facing.any():
+        return every
+    heights = np.asarray(face.mesh.vertices) @ n
+    tops = heights[np.asarray(face.mesh.faces)].max(axis=1)
+    is_facing &= tops < tops[is_facing].min() + FLATNESS * face.mesh.scale
+    part = face.part(np.flatnonzero(is_facing))
+    level = np.asarray(part.mesh.vertices) @ n
+    beside = np.setdiff1d(np.asarray(face.mesh.faces), np.asarray(face.mesh.faces)[is_facing])
+    dropped = np.asarray(face.mesh.vertices)[beside] - (heights[beside] - level.min())[:, None] * n
+    distance = np.linalg.norm(part.nearest(dropped)[1] - dropped, axis=1)
+    rises = heights[beside] - level.min() > np.maximum(MIN_RISE * distance, FLATNESS * face.mesh.scale)
+    return np.flatnonzero(is_facing) if rises.all() else every
 
 
 def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[FaceDeviation | None]) -> np.ndarray | None:

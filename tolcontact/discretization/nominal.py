@@ -5,20 +5,22 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.declaration import Assembly, Face, Measure, Part, Point
-from tolcontact.discretization.form_points import form_lengths, form_spacing
+from tolcontact.discretization.form_points import COVER_SHARE, form_lengths, form_spacing
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.measured_geometry import NominalMeasurement
 from tolcontact.discretization.nominal_part import NominalPart
 from tolcontact.discretization.pair_form import PairForm
+from tolcontact.discretization.plane_minima import PlaneMinima
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.features import Datum, FaceDeviation, Features, NominalFeature, NominalPattern
 from tolcontact.features.zone_kernel import sum_modes
-from tolcontact.geometry.curvature import chord_height
+from tolcontact.geometry.curvature import chord_height, is_flat
 from tolcontact.geometry.face_pair import FacePair, body_face
 from tolcontact.geometry.faces import Meshes, triangles
 from tolcontact.geometry.overlap import points_on_rim
@@ -127,6 +129,17 @@ class ContactPoints:
     def form_spacing(self) -> float:
         """The usual spacing [mm] of contact points of faces with form."""
         return form_spacing(form_lengths(self.deviating))
+
+    @cached_property
+    def minima(self) -> PlaneMinima | None:
+        """The gap between contact points of two rigid planes with form; None for other pairs."""
+        if not self.has_form or self.moving_face is None or self.reference_face is None or self.stiffness is not None:
+            return None
+        if not (is_flat(self.moving_face) and is_flat(self.reference_face)):
+            return None
+        distance = np.quantile(KDTree(self.P_m).query(self.P_m, k=2)[0][:, 1], 0.9) if len(self.P_m) > 1 else 0.0
+        reach = max(self.form_spacing / COVER_SHARE, float(distance))
+        return PlaneMinima.of((self.moving_face, self.reference_face), self.deviating, reach)
 
     @cached_property
     def reference_rim(self) -> np.ndarray:

@@ -24,26 +24,20 @@ class PairForm:
 
     def at(self, row: Int[Array, " k"], P_m: Float[Array, "k 3"], P_r: Float[Array, "k 3"]) -> Float[Array, " k"]:
         """Return the sum of both heights (k,) [mm] at places P_m, P_r (k, 3) of the nominal faces, each of its own row (k,)."""
-        heights = np.zeros(len(row))
-        for face, places in zip(self.deviating, (P_m, P_r), strict=True):
-            if face is not None and face.form is not None:
-                heights += face.form.sums(places, row, self.deviations[:, face.form_columns])
-        return heights
+        return np.add(*(self.at_face(k, row, places) for k, places in enumerate((P_m, P_r))))
 
-    def bounds(self) -> Float[Array, " row"]:
-        """Return bounds (row,) [mm] of the sums of both heights, up or down: those of all modes at their highest places."""
-        bound = np.zeros(len(self.deviations))
-        for face in self.deviating:
-            if face is not None and face.form is not None:
-                for column, mode in zip(face.form_columns, face.form.place_heights, strict=True):
-                    bound += (1 + MARGIN_SHARE) * np.abs(mode).max() * np.abs(self.deviations[:, column])
-        return bound
+    def at_face(self, k: int, row: Int[Array, " k"], places: Float[Array, "k 3"]) -> Float[Array, " k"]:
+        """Return the heights (k,) [mm] of one face at its `places` (k, 3), each of its own row; face 0 is the moving one."""
+        face = self.deviating[k]
+        if face is None or face.form is None:
+            return np.zeros(len(row))
+        return face.form.sums(places, row, self.deviations[:, face.form_columns])
 
-    def highest(self) -> Float[Array, " row"]:
-        """Return a bound (row,) [mm] of the sums of both heights, from the heights at many places of each face."""
-        bound = np.zeros(len(self.deviations))
-        for face in self.deviating:
+    def highest(self) -> Float[Array, "face row"]:
+        """Return bounds [mm] of the heights of the moving and the reference face, from the heights at many places of each."""
+        bounds = np.zeros((2, len(self.deviations)))
+        for k, face in enumerate(self.deviating):
             if face is not None and face.form is not None:
                 heights = self.deviations[:, face.form_columns] @ face.form.place_heights
-                bound += heights.max(axis=1) + MARGIN_SHARE * np.ptp(heights, axis=1)
-        return bound
+                bounds[k] = heights.max(axis=1) + MARGIN_SHARE * np.ptp(heights, axis=1)
+        return bounds

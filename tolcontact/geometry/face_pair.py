@@ -1,4 +1,10 @@
-"""The depth to which the faces of a contact pair lie in each other, also between contact points."""
+"""The depth to which the faces of a contact pair lie in each other, also between contact points.
+
+A plane with form is the boundary of its body over the nominal plane up to its rim, and no farther: each of its points is
+displaced along the normal of the plane. The faces beside it keep their nominal places, and end where they meet the displaced
+rim along that normal. The other body is thus inside as far as it reaches behind the displaced plane, also with its rim; the
+height of a plane counts along its own normal, never along the normals of other faces.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -68,7 +74,9 @@ class BodyFace:
             np.maximum.at(largest, row[hits], depth[hits])
             order, count = order[~is_next], MORE_POINTS * count
 
-    def behind(self, motion: np.ndarray, other: "BodyFace", outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def behind(
+        self, motion: np.ndarray, other: "BodyFace", outward: np.ndarray, raised: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return rows and numbers of points of another face that may lie behind this one when it is moved.
 
         Of a flat face these are points more than ROUNDED behind its plane, which few are where faces touch; of a face all of
@@ -76,12 +84,13 @@ class BodyFace:
 
         motion    (row, 12)
         outward   (row,) [mm]: how far the points lie out of their face, or bounds of that
+        raised    (row,) [mm]: how far this face lies out of its nominal place, or bounds of that
         """
         if self.plane is None:
-            return self._behind_round(motion, other, outward)
+            return self._behind_round(motion, other, np.abs(outward) + np.abs(raised))
         n, height = self.plane
         turned = n @ pose.rotation(motion)
-        level = turned @ other.points.T + (pose.translation(motion) @ n - height)[:, None]
+        level = turned @ other.points.T + (pose.translation(motion) @ n - height - raised)[:, None]
         if outward.any():
             level += outward[:, None] * (turned @ other.normals.T)
         row, point = np.nonzero(level < -ROUNDED)
@@ -99,9 +108,20 @@ class BodyFace:
             axes = np.array([*across, along if along @ surface.axis > 0 else -along])
             places = (axes @ R) @ other.points.T + ((t - surface.origin) @ axes.T)[..., None]
             level = surface.height_beside_axis(np.hypot(places[:, 0], places[:, 1]), places[:, 2])
-            is_near |= (-level if is_hollow else level) < np.abs(outward)[:, None]
+            is_near |= (-level if is_hollow else level) < outward[:, None]
         row, point = np.nonzero(is_near)
         return row, point
+
+    def feet(self, points: np.ndarray, turns: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the places (k, 3) [mm] of this face at which its heights count for points (k, 3), and its inward normals.
+
+        turns     (k, 3, 3), and
+        normals   (k, 3) of the other face, before it is turned: the opposite normals of a face that is not flat
+        """
+        if self.plane is None:
+            return points, np.einsum("kij,kj->ki", turns, normals)
+        n, height = self.plane
+        return points - (points @ n - height)[:, None] * n, np.broadcast_to(-n, points.shape)
 
     def _is_behind(self, points: np.ndarray) -> np.ndarray:
         """Return a mask (point,) of the points (point, 3) [mm] that may lie behind this face."""
@@ -146,11 +166,11 @@ class PairForm(Protocol):
     def take(self, rows: slice | np.ndarray) -> "PairForm":
         """Return the forms of some rows."""
 
-    def at(self, row: np.ndarray, P_m: np.ndarray, P_r: np.ndarray) -> np.ndarray:
-        """Return the sum of both heights (k,) [mm] at places P_m, P_r (k, 3) of the nominal faces, each of its own row (k,)."""
+    def at_face(self, k: int, row: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """Return the heights (k,) [mm] of one face at its `places` (k, 3), each of its own row; face 0 is the moving one."""
 
     def highest(self) -> np.ndarray:
-        """Return a bound (row,) [mm] of the sums of both heights."""
+        """Return bounds (face, row) [mm] of the heights of both faces."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,19 +198,25 @@ class FacePair:
         looked at.
         """
         largest = np.zeros(len(X_RM))
-        highest = heights if form is None else heights + form.highest()
+        highest = np.zeros((2, len(X_RM))) if form is None else form.highest()
+        sides = self.moving, self.reference
         for start in range(0, len(X_RM), POSES_PER_BLOCK):
             rows = slice(start, start + POSES_PER_BLOCK)
-            X, outward = X_RM[rows], heights[rows]
-            for body, motion, side in ((self.reference, X, self.moving), (self.moving, pose.inverse(X), self.reference)):
-                row, point = (numbers[::every] for numbers in body.behind(motion, side, highest[rows]))
+            X = X_RM[rows]
+            for k, (side, body, motion) in enumerate(zip(sides, sides[::-1], (X, pose.inverse(X)), strict=True)):
+                row, point = (
+                    numbers[::every]
+                    for numbers in body.behind(motion, side, heights[rows] + highest[k, rows], highest[1 - k, rows])
+                )
                 if row.size:
-                    raised = outward[row]
+                    points, outward = side.points[point], heights[rows][row]
                     if form is not None:
-                        moved = _moved(motion, row, side.points[point])
-                        P_m, P_r = (side.points[point], moved) if side is self.moving else (moved, side.points[point])
-                        raised = raised + form.take(rows).at(row, P_m, P_r)
-                    places = _moved(motion, row, side.points[point] + raised[:, None] * side.normals[point])
+                        of_rows = form.take(rows)
+                        outward = outward + of_rows.at_face(k, row, points)
+                    places = _moved(motion, row, points + outward[:, None] * side.normals[point])
+                    if form is not None:
+                        feet, towards = body.feet(_moved(motion, row, points), pose.rotation(motion)[row], side.normals[point])
+                        places += of_rows.at_face(1 - k, row, feet)[:, None] * towards
                     body.raise_to_depths(largest[rows], row, places)
         return np.maximum(largest - self.rounding, 0) if self.rounding else largest
 

@@ -34,27 +34,37 @@ def plane_gaps(X_RM, P_m, P_r, n_r, gaps):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def write_promising(rim, gaps, bounds, groups, count, moving, kept, promising):  # type: ignore[no-untyped-def]
-    """Write which points of the rim may be the lowest of their group over the moving face, or are kept.
+def write_promising(X_RM, P_m, rim, gaps, bounds, groups, reference, moving, kept, promising):  # type: ignore[no-untyped-def]
+    """Write which points may be the lowest of their group over the other face, or are kept; see lowest_over.
 
-    gaps        (n, point) [mm] of nominal faces, from number `count` on of the rim (n, rim point, 3)
-    bounds      (n,) [mm] by which forms may change them
-    groups      (group + 1,) the first point of each, and the end
+    bounds      (n, 2) [mm]: errors of the gaps of points of the moving face and of the rim; points without are left out
     kept        (n, k) numbers of points, -1 for none
     """
+    count = P_m.shape[0]
     for k in range(gaps.shape[0]):
         for group in range(groups.size - 1):
-            first, end = max(groups[group], count), groups[group + 1]
+            first, end = groups[group], groups[group + 1]
             least = np.inf
             for j in range(first, end):
-                p = rim[k, j - count]
-                if gaps[k, j] < least and contains(moving, p[0], p[1], p[2]):
-                    least = gaps[k, j]
+                highest = gaps[k, j] + bounds[k, 0 if j < count else 1]
+                if highest < least and stands_over(X_RM[k], P_m, rim[k], j, reference, moving):
+                    least = highest
             for j in range(first, end):
-                promising[k, j] = gaps[k, j] - bounds[k] <= least + bounds[k] < np.inf
+                bound = bounds[k, 0 if j < count else 1]
+                promising[k, j] = bound > 0 and gaps[k, j] - bound <= least < np.inf
         for c in range(kept.shape[1]):
-            if kept[k, c] >= count:
-                promising[k, kept[k, c]] = True
+            number = kept[k, c]
+            if number >= 0 and bounds[k, 0 if number < count else 1] > 0:
+                promising[k, number] = True
+
+
+@compiled
+def leave_low(X_RM, P_m, rim, gaps, limits, reference, moving):  # type: ignore[no-untyped-def]
+    """Replace the gaps (n, point) that are not below `limits` (n,), or do not stand over the other face, by infinity."""
+    for k in range(gaps.shape[0]):
+        for j in range(gaps.shape[1]):
+            if gaps[k, j] >= limits[k] or not stands_over(X_RM[k], P_m, rim[k], j, reference, moving):
+                gaps[k, j] = np.inf
 
 
 @compiled

@@ -38,7 +38,8 @@ three times the error of fixed planes where a pair keeps its contact points (see
 
 - Closed bodies, as their triangles. A body that is not closed has no inside and is not tested.
 - Faces of features move as they vary, with vertices on the planes where they meet; at an edge of two such faces the body ends
-  where both planes meet. Forms are not part of a solid: pairs of faces with form are checked on their surfaces instead.
+  where both planes meet. Forms are not part of a solid: planes with form are compared at the minima of
+  their gap instead (see tolcontact.contact), round faces with form on their surfaces.
 - Triangles of round faces stand in the hollow of a bore, and inside a shaft. The first are moved out of the hollow; what lies
   between the triangles of a shaft and its surface is covered by the gaps of round faces, and checked on surfaces.
 - Bodies whose files round coordinates are smaller by that error from the outset, with flat planes (see `tolcontact.geometry`).

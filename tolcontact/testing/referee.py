@@ -294,9 +294,8 @@ class ArchivedPair:
         assert self.nominal is not None
         rim, R, t = rim_points(self.nominal, X_RM), X_RM[:, :9].reshape(-1, 3, 3), X_RM[:, None, 9:]
         moved = self.moving_point @ R.swapaxes(1, 2) + t
-        gaps = ((moved - self.reference_point) * self.normal).sum(axis=2) - self._form(
-            deviations, self.moving_point, self.reference_point
-        )
+        gaps = ((moved - self.reference_point) * self.normal).sum(axis=2)
+        gaps -= self._form(deviations, self.moving_point, moved - gaps[..., None] * self.normal)
         at_rim = rim.gaps - self._form(deviations, rim.P_m, rim.P_r)
         gaps[~_are_over(self.nominal.reference_face, moved)] = np.inf
         at_rim[~_are_over(self.nominal.moving_face, rim.P_m)] = np.inf

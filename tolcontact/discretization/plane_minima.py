@@ -1,0 +1,235 @@
+"""Local minima of the gap between two planes with form: where they touch between their contact points.
+
+Contact points of faces with form are a share of the correlation length apart, and between them the faces bulge. At a given pose
+the gap is a smooth function of place on the moving plane, whose minima over both faces Newton steps find: inside of the faces,
+along their rims, and at corners. The heights follow from splines. A minimum is named by its place on the moving plane, so that
+its label alone tells where it is.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tolcontact import poses as pose
+from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.features import FaceDeviation, FormField
+from tolcontact.geometry import height_kernel
+from tolcontact.geometry.edges import on_rim
+from tolcontact.geometry.face_frame import face_frame
+from tolcontact.geometry.height_kernel import FIRST_PLACE, HeightSums, HeightTable, Plane
+from tolcontact.geometry.meeting import Places
+from tolcontact.geometry.surface import RIM_TOLERANCE, Surface
+
+STEP_SHARE = 1 / 10  # of the length over which heights change: the distance of two nodes
+ROUGH_STEP_SHARE = 1 / 40  # the same for the covariance of fields that bend abruptly at stations
+ROUGH = "matern 3/2"
+PADDING = 10  # nodes around a face, beyond which the ends of splines are not felt
+MAX_NODES = 60_000
+MAX_STARTS = 16  # of searches at a pose
+STEP_DISTANCE = 1.6  # times the reach: how far starts are from each other in steps, of smooth fields
+SMOOTH = "squared exponential"
+START_DISTANCE = 0.9  # times the reach: how far starts are from each other
+MAX_MINIMA = 6  # of a pair that are added at a pose
+MAX_FORMER = 24  # that stay from one pose to the next
+BEND_FACTOR = 1.6  # times the root mean square second difference over the reach: how far gaps fall between points
+EXTREME = 5.0  # times the root mean square height: the largest height, and over the length of its changes the largest slope
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneMinima:
+    """The gap between two planes that face each other, at any of their places.
+
+    deviating           deviations of the moving and the reference face, if these belong to features
+    moving, reference   the planes
+    reach               [mm] of a step of the search: the distance of contact points
+    slack               [mm] by which places may stand beside a rim
+    """
+
+    deviating: tuple[FaceDeviation | None, FaceDeviation | None]
+    moving: Plane
+    reference: Plane
+    reach: float
+    slack: float
+
+    @classmethod
+    def of(
+        cls, faces: tuple[Surface, Surface], deviating: tuple[FaceDeviation | None, FaceDeviation | None], reach: float
+    ) -> "PlaneMinima":
+        """Return the gap between a moving and a reference plane, whose contact points are `reach` [mm] apart."""
+        planes = [_plane(face, deviation) for face, deviation in zip(faces, deviating, strict=True)]
+        return cls(deviating, planes[0], planes[1], reach, RIM_TOLERANCE * max(float(face.mesh.scale) for face in faces))
+
+    def heights(
+        self,
+        X_RM: Float[Array, "n 12"],
+        deviations: Float[Array, "n contributor"],
+        P_m: Float[Array, "m point 3"],
+        is_required: Bool[Array, "n point"],
+    ) -> Float[Array, "n point"]:
+        """Return the sums of both heights [mm] at points P_m of the moving plane and their feet at X_RM; 0 if not required.
+
+        P_m are those of each pose, or the same of all poses (m = 1).
+        """
+        heights = np.zeros(is_required.shape)
+        height_kernel.write_heights(*self._inputs(X_RM, deviations), np.ascontiguousarray(P_m), is_required, heights)
+        return heights
+
+    def bulge(self, deviations: Float[Array, "n contributor"]) -> Float[Array, " n"]:
+        """Return how far [mm] the gap may fall between contact points, at most."""
+        return BEND_FACTOR * self._root_sums(self._bends, deviations).sum(axis=0)
+
+    def bound(self, deviations: Float[Array, "n contributor"]) -> Float[Array, " n"]:
+        """Return a bound [mm] of the sum of both heights, up or down."""
+        return EXTREME * self._root_sums(self._squares, deviations).sum(axis=0)
+
+    def error_beside(self, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"]) -> Float[Array, " n"]:
+        """Return a bound [mm] of the error of heights at nominal feet: a slope times how far feet are from these at X_RM."""
+        reference = self.deviating[1]
+        if reference is None or reference.form is None:
+            return np.zeros(len(X_RM))
+        moving = self.moving
+        corners = moving.origin + np.array([(u, v) for u in moving.corners[:, 0] for v in moving.corners[:, 1]]) @ moving.axes
+        travel = np.linalg.norm((pose.apply(X_RM, corners) - corners) @ self.reference.axes.T, axis=2).max(axis=1)
+        return EXTREME * self._root_sums(self._squares, deviations)[1] / min(reference.form.scales) * travel
+
+    def _root_sums(self, mean_squares: Sequence[np.ndarray], deviations: np.ndarray) -> np.ndarray:
+        """Return root mean squares (face, n) [mm] over both faces, from mean squares (mode,) of their modes."""
+        roots = np.zeros((2, len(deviations)))
+        for k, (face, squares) in enumerate(zip(self.deviating, mean_squares, strict=True)):
+            if face is not None:
+                roots[k] = np.sqrt(deviations[:, face.form_columns] ** 2 @ squares)
+        return roots
+
+    @cached_property
+    def _is_smooth(self) -> bool:
+        fields = [face.form for face in self.deviating if face is not None and face.form is not None]
+        return all(field.form.covariance == SMOOTH and not field.scans for field in fields)
+
+    @cached_property
+    def _squares(self) -> list[np.ndarray]:
+        """The mean squares (mode,) of the modes of both faces."""
+        fields = (None if face is None else face.form for face in self.deviating)
+        return [np.zeros(0) if field is None else (field.place_heights**2).mean(axis=1) for field in fields]
+
+    @cached_property
+    def _bends(self) -> list[np.ndarray]:
+        """The mean squares (mode,) of second differences of the modes of both faces, over the reach."""
+        bends = []
+        for face, plane in zip(self.deviating, (self.moving, self.reference), strict=True):
+            field = None if face is None else face.form
+            differences = [
+                field.heights(field.places + self.reach * axis)
+                + field.heights(field.places - self.reach * axis)
+                - 2 * field.place_heights.T
+                for axis in plane.axes
+                if field is not None
+            ]
+            bends.append((np.concatenate(differences) ** 2).mean(axis=0) if differences else np.zeros(0))
+        return bends
+
+    def find(
+        self,
+        X_RM: Float[Array, "n 12"],
+        deviations: Float[Array, "n contributor"],
+        grown: Float[Array, " n"],
+        P_m: Float[Array, "m point 3"],
+        gaps: Float[Array, "n point"],
+        limits: Float[Array, " n"],
+        depth: float,
+        *,
+        in_steps: bool = False,
+    ) -> Int[Array, "n minimum"]:
+        """Return the labels of the minima at X_RM that are deeper than `depth` [mm], the deepest first; -1 for none.
+
+        grown    [mm] by which both faces have grown
+        P_m      points [mm] of the moving plane, of each pose or the same of all poses (m = 1): from those with the least
+                 `gaps` [mm], below `limits` [mm], minima are searched
+        in_steps whether answers are searched more closely afterwards
+        """
+        points = np.ascontiguousarray(P_m)
+        starts, labels = (np.empty((len(X_RM), count), dtype=np.int64) for count in (MAX_STARTS, MAX_MINIMA))
+        distance = STEP_DISTANCE if in_steps and self._is_smooth else START_DISTANCE
+        height_kernel.choose_starts(points, gaps, limits, distance * self.reach, starts)
+        inputs = self._inputs(X_RM, deviations)
+        height_kernel.find_minima(*inputs, grown, points, starts, self.reach, self.slack, depth, labels)
+        return labels
+
+    def at(
+        self, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"], labels: Int[Array, "n place"]
+    ) -> tuple[Places, Float[Array, "n place"]]:
+        """Return the places with labels at X_RM, -1 for none, and the sums of both heights [mm] there."""
+        P_m, P_r = np.zeros((2, *labels.shape, 3))
+        gaps, heights = np.empty((2, *labels.shape))
+        inputs = self._inputs(X_RM, deviations)
+        height_kernel.write_places(*inputs, np.ascontiguousarray(labels), self.slack, P_m, P_r, gaps, heights)
+        n_r = np.broadcast_to(self.reference.normal, P_m.shape)
+        return Places(np.where(np.isfinite(gaps), labels, -1), gaps, P_m, P_r, n_r), heights
+
+    def points(self, labels: Int[Array, " place"]) -> Float[Array, "place 3"]:
+        """Return the nominal places [mm] of labels on the moving plane."""
+        plane, cell = self.moving, labels - FIRST_PLACE
+        shares = (np.stack([cell // height_kernel.CELLS, cell % height_kernel.CELLS], axis=-1) + 0.5) / height_kernel.CELLS
+        return np.asarray(plane.origin + (plane.corners[0] + shares * (plane.corners[1] - plane.corners[0])) @ plane.axes)
+
+    def _inputs(self, X_RM: np.ndarray, deviations: np.ndarray) -> tuple[Plane, Plane, np.ndarray, HeightSums, HeightSums]:
+        """Return the planes, the poses, and the factors of the modes of both, as compiled passes take them."""
+        factors = [
+            np.ascontiguousarray(deviations[:, face.form_columns])
+            if face is not None and face.form is not None
+            else np.zeros((len(X_RM), 0))
+            for face in self.deviating
+        ]
+        sums = [
+            HeightSums.of(plane.table, values) for plane, values in zip((self.moving, self.reference), factors, strict=True)
+        ]
+        return self.moving, self.reference, np.ascontiguousarray(X_RM), sums[0], sums[1]
+
+
+def with_former(labels: Int[Array, "n a"], former: Int[Array, "n b"]) -> Int[Array, "n c"]:
+    """Return labels of minima, and after them the labels of former ones, as many as fit; -1 for none."""
+    joined = np.empty((len(labels), min(labels.shape[1] + former.shape[1], MAX_FORMER)), dtype=np.int64)
+    width = height_kernel.join(labels, np.ascontiguousarray(former), joined)
+    return np.ascontiguousarray(joined[:, :width])
+
+
+def _plane(face: Surface, deviation: FaceDeviation | None) -> Plane:
+    """Return a flat face with the table of its form."""
+    frame = face_frame(face.mesh)
+    axes, origin = np.ascontiguousarray(frame.axes[:, :2].T), np.asarray(frame.centre)
+    vertices = (np.asarray(face.mesh.vertices) - origin) @ axes.T
+    corners = np.array([vertices.min(axis=0), vertices.max(axis=0)])
+    form = None if deviation is None else deviation.form
+    no_table = HeightTable(np.zeros(2), 1.0, np.zeros((0, 0, 0)))
+    table = no_table if form is None else _table(form, origin, axes, corners)
+    return Plane(origin, axes, np.array(face.corner_normals[0, 0]), _edges(face, vertices), corners, table)
+
+
+def _edges(face: Surface, vertices: np.ndarray) -> np.ndarray:
+    """Return the edges (edge, 7) of the rim of a flat face, see Plane; `vertices` (vertex, 2) [mm] are its coordinates."""
+    faces = np.asarray(face.mesh.faces)
+    triangle, first = np.nonzero(on_rim(faces))
+    start, end, opposite = (vertices[faces[triangle, (first + k) % 3]] for k in range(3))
+    length = np.linalg.norm(end - start, axis=1, keepdims=True)
+    direction = (end - start) / length
+    inward = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
+    inward *= np.sign(((opposite - start) * inward).sum(axis=1, keepdims=True))
+    return np.ascontiguousarray(np.hstack([start, direction, length, inward]))
+
+
+def _table(form: FormField, origin: np.ndarray, axes: np.ndarray, corners: np.ndarray) -> HeightTable:
+    """Return the table of the modes of a form over the rectangle between two corners (2, 2) [mm]."""
+    extent = corners[1] - corners[0]
+    share = ROUGH_STEP_SHARE if form.form.covariance == ROUGH else STEP_SHARE
+    step = max(share * min(form.scales), float(np.sqrt(extent.prod() / MAX_NODES)))
+    counts = np.ceil(extent / step).astype(int) + 1 + 2 * PADDING
+    along = [low + step * (np.arange(count) - PADDING) for low, count in zip(corners[0], counts, strict=True)]
+    u, v = np.meshgrid(*along, indexing="ij")
+    nodes = form.heights(origin + u[..., None] * axes[0] + v[..., None] * axes[1])
+    for axis, count in enumerate(counts):
+        beside = np.full(count - 1, 1 / 6)
+        splines = np.diag(np.full(count, 2 / 3)) + np.diag(beside, 1) + np.diag(beside, -1)
+        nodes = np.moveaxis(np.tensordot(np.linalg.inv(splines), nodes, axes=(1, axis)), 0, axis)
+    kept = slice(PADDING - 2, 1 - PADDING)  # a node before and two after each interval
+    return HeightTable(corners[0] - step, step, np.ascontiguousarray(nodes[kept, kept]))
