@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from tolcontact.arrays import Array, Int
 
 MERGE_SHARE = 1e-9  # of the size: vertices that are no farther apart are one
+ROUNDED = 1e-9  # of a full turn: triangles at an edge that are no farther apart are in one place
 
 
 class MergedSurface(NamedTuple):
@@ -77,8 +78,9 @@ def _across_material(
     arms = vertices[faces[face, (corner + 2) % 3]] - low
     arms -= np.outer(arms @ along, along)
     u = arms[np.argmax(np.linalg.norm(arms, axis=1))]
-    angles = np.arctan2(arms @ np.cross(along, u), arms @ u)
-    order = np.lexsort([is_forward, angles])
+    turns = np.arctan2(arms @ np.cross(along, u), arms @ u) / (2 * np.pi)
+    # Of triangles in one place the one that ends material comes first: flush blocks remain two.
+    order = np.lexsort([~is_forward, np.round(turns / ROUNDED) % (1 / ROUNDED)])
     opened, pairs = list[int](), list[tuple[int, int]]()
     for place in [*order, *order]:  # twice around
         if not is_forward[place] and edge[place] not in [back for back, _ in pairs] and place not in opened:
