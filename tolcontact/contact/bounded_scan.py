@@ -89,6 +89,7 @@ def bounded_scan(
     guard: Guard | None = None,
     parting: Parting | None = None,
     carried: Int[Array, "n k"] | None = None,
+    deepest=None,
 ) -> BoundedScan:
     """Return the places at which a pair can touch at X_RM (n, 12); see Meeting.at for `kept`, `error` and `nearness`.
 
@@ -97,6 +98,9 @@ def bounded_scan(
     the labels of places that carried before, -1 for none.
     """
     found, heights = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness)
+    if deepest is not None:
+        gaps = found.gaps - heights
+        found = found._replace(gaps=np.where(gaps >= -np.broadcast_to(deepest, len(gaps))[:, None], found.gaps, np.inf))
     if guard is not None:
         found, heights = _with_guard(found, heights, guard, X_RM)
     if parting is not None:

@@ -163,6 +163,7 @@ class Candidates:
         earlier: Sequence[Scan] = (),
         guarded: bool = False,
         parted: bool = False,
+        deepest=None,
     ) -> list[Scan]:
         """Return scans of the points that may carry, projected again if the method requires it.
 
@@ -189,7 +190,7 @@ class Candidates:
             nearness, guard = NEARNESS if width == 1 else np.inf, self.guards.get(k) if guarded else None
             parting = self.partings.get(k) if parted else None
             scans[k] = bounded_scan(
-                scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness, guard, parting, carried
+                scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness, guard, parting, carried, deepest
             )
         return scans
 

@@ -13,6 +13,7 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
+from tolcontact.contact.free_steps import FREE_DEPTH, FreeSteps
 from tolcontact.contact.linear_step import PENETRATION, LinearStep, Step
 from tolcontact.contact.progress import Progress
 from tolcontact.contact.scan import min_gaps
@@ -57,22 +58,30 @@ STEPS_WHERE_FACES_END = (
     *[StepKind(1.0, newton=True, width=WIDE)] * 50,
 )
 
+STEPS_OF_FREE = (*[StepKind(1.0, newton=False)] * 60, *[StepKind(1.0, newton=True)] * 30)
+DEBUG = False
 
-def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, task: Task, state: State, start: Start) -> None:
+
+def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, free_steps: FreeSteps, task: Task, state: State, start: Start) -> None:
     """Take the steps of `state` to their end, as the `start` says. Without rest there is only an answer to a contradiction."""
     unsettled, trail = Unsettled(task, state), list[np.ndarray]()
     progress: Progress | None = None
     if not len(task):
         return
     asleep, last = np.zeros(len(task), dtype=bool), None
-    for kind in STEPS_WHERE_FACES_END if candidates.bounded else STEPS:
+    for kind in STEPS_OF_FREE if start.free else STEPS_WHERE_FACES_END if candidates.bounded else STEPS:
         asleep &= kind == last
         last = kind
         if asleep.all():
             continue
+        before = unsettled.state.take(np.arange(len(unsettled))) if start.free else unsettled.state
         size, scaled = _take(step, unsettled, np.flatnonzero(~asleep), kind, start.stride)
+        shares = np.ones(len(unsettled))
+        if start.free:
+            shares = free_steps.hold_back(unsettled.task, before, unsettled.state, size, start.parted)
+            if DEBUG: print(kind.newton, "sizes", np.sort(size)[::-1][:5], "shares", np.sort(shares)[:5], len(size))
         rounding_counts = kind.newton or step.knows_walls or start.balances
-        moves = (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
+        moves = (shares < 1) | (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
         if kind.width > 1:
             moves |= ~candidates.hold(unsettled.task, unsettled.state, guarded=start.guarded, parted=start.parted)
         # The smaller one tells: steps are large in freedoms that nothing holds, and in the norm of the objective if
@@ -97,7 +106,8 @@ def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, t
             poses, deviations, slots = unsettled.state.relative, unsettled.task.deviations, unsettled.state.slots
             at_rest = (size[moves] < NEARLY_AT_REST) & kind.sharp
             scans = candidates.scans(
-                poses, deviations, slots=slots, width=kind.width, at_rest=at_rest, guarded=start.guarded, parted=start.parted
+                poses, deviations, slots=slots, width=kind.width, at_rest=at_rest, guarded=start.guarded, parted=start.parted,
+                deepest=FREE_DEPTH if start.free else None,
             )
             unsettled.task = replace(unsettled.task, scans=scans)
         if kind.newton:

@@ -15,13 +15,14 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ACCURACY, ContactGroup, Program
 from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
+from tolcontact.contact.free_steps import FREE_DEPTH, FreeSteps
 from tolcontact.contact.iterated_search import search
 from tolcontact.contact.linear_step import MAX_ROUNDS, PENETRATION, LinearStep
 from tolcontact.contact.record import accumulate_starts
 from tolcontact.contact.repeated_steps import repeat
 from tolcontact.contact.scan import min_gaps, undone
 from tolcontact.contact.springs import spring_misfit
-from tolcontact.contact.starts import BALANCE, GUARDED, OTHER_STARTS, OTHER_STARTS_CURVED, PARTED, Start
+from tolcontact.contact.starts import BALANCE, FREE, GUARDED, OTHER_STARTS, OTHER_STARTS_CURVED, PARTED, Start
 from tolcontact.contact.state import NO_ANSWER, Resolved, State, Task
 from tolcontact.interference import ordered
 
@@ -44,6 +45,9 @@ class ContactResolver:
         self._springy = [k for k, pair in enumerate(self.contact_points) if pair.is_springy]
         size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
         self._limits = AcceptanceLimits(program.nominal, group.group, self._method, size)
+        self._free_steps = FreeSteps(
+            group.group, self.contact_points, self._candidates, self._limits, self._relate, self._energy_of
+        )
 
     def twin(self) -> "ContactResolver":
         """Return the same resolver for another thread."""
@@ -123,13 +127,14 @@ class ContactResolver:
             caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull far if nothing holds
             search(self._step, self._limits, self._candidates, self._energy_of, task, state, start.stride, caution)
         elif self._method.is_exact:
-            repeat(self._step, self._limits, self._candidates, task, state, start)
+            repeat(self._step, self._limits, self._candidates, self._free_steps, task, state, start)
         else:
             self._step.take(task, state, stride=start.stride)
         state.searched[:] = projected
         self._leave_adrift(task, state)
         scans = self._candidates.scans(
-            state.relative, task.deviations, projected=projected, earlier=task.scans, parted=start.parted
+            state.relative, task.deviations, projected=projected, earlier=task.scans, parted=start.parted,
+            deepest=FREE_DEPTH if start.free else None,
         )
         task = replace(task, scans=scans)
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
@@ -178,6 +183,10 @@ class ContactResolver:
         rows = np.flatnonzero(state.rank == NO_ANSWER)
         for start in PARTED if rows.size and self._candidates.partings else ():
             rows = self._try_again(task, state, rows, start)
+        rows = np.flatnonzero(state.rank > 0)
+        for start in FREE if rows.size and self._candidates.bounded else ():
+            rows = self._try_again(task, state, rows, start)
+            rows = rows[state.rank[rows] > 0]
 
     def _try_again(self, task: Task, state: State, rows: Int[Array, " n"], start: Start) -> Int[Array, " left"]:
         """Try some realizations (n,) again and keep the better answer. Return those to be tried further (left,)."""
@@ -185,10 +194,13 @@ class ContactResolver:
             return rows
         part = task.take(rows)
         poses, relative = self._at_nominal(part) if start.at_nominal else (part.raw, part.relative)
+        if start.free:
+            poses, relative = self._free_steps.lift(poses, relative, part.deviations)
         part = replace(
             part,
             scans=self._candidates.scans(
-                relative, part.deviations, projected=start.projected, guarded=start.guarded, parted=start.parted
+                relative, part.deviations, projected=start.projected, guarded=start.guarded, parted=start.parted,
+                deepest=FREE_DEPTH if start.free else None,
             ),
         )
         attempt = self._step.start(poses, relative)

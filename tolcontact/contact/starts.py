@@ -14,6 +14,7 @@ class Start(NamedTuple):
     balances     whether steps end where they are rounding, though they may grow from there
     guarded      whether bodies that lie in each other, where no place of contact shows it, get one (see Guard)
     parted       whether convex bodies are held apart only in the direction in which they part best (see Parting)
+    free         whether steps end before bodies that were free enter each other (see free_steps)
     """
 
     at_nominal: bool = False
@@ -22,6 +23,7 @@ class Start(NamedTuple):
     balances: bool = False
     guarded: bool = False
     parted: bool = False
+    free: bool = False
 
 
 OTHER_STARTS = (Start(at_nominal=True), Start(stride=SMALL_STRIDE))  # if no face is curved
@@ -30,3 +32,4 @@ OTHER_STARTS_CURVED = (Start(projected=True), Start(projected=True, at_nominal=T
 BALANCE = Start(balances=True)
 GUARDED = (Start(guarded=True), Start(guarded=True, stride=SMALL_STRIDE))
 PARTED = (Start(parted=True), Start(parted=True, stride=SMALL_STRIDE))
+FREE = (Start(free=True, at_nominal=True), Start(free=True))

@@ -1,0 +1,106 @@
+"""Steps of bodies that are free of each other: they end before bodies enter each other, so that none contradict each other."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tolcontact import poses as pose
+from tolcontact.arrays import Array, Float
+from tolcontact.contact.acceptance import AcceptanceLimits
+from tolcontact.contact.candidates import Candidates
+from tolcontact.contact.scan import min_gaps
+from tolcontact.contact.state import State, Task
+from tolcontact.discretization import ContactPoints
+from tolcontact.mechanics import Group
+
+MAX_HALVINGS = 20
+SINK_SHARE = 0.02  # of a step, by which places may sink in: they follow planes, and rotations are curved
+TOUCHING = 1e-9  # mm: bodies no deeper in each other touch
+GAIN_SHARE = 1e-9  # of the objective, by which rounding may raise it
+FREE_DEPTH = 1e-3  # mm: free bodies are not deeper in each other; places that show more are on the far side of a body
+MAX_LIFTS = 30
+LIFT_FACTOR = 1.1  # times the width of what bodies share, by which they are moved apart
+
+
+class FreeSteps:
+    """What keeps the bodies of a group free of each other, or frees them.
+
+    relate, energy   return X_RM of all pairs at some poses, and the objective of a task's state
+    """
+
+    def __init__(
+        self,
+        group: Group,
+        pairs: list[ContactPoints],
+        candidates: Candidates,
+        limits: AcceptanceLimits,
+        relate: Callable[..., np.ndarray],
+        energy: Callable[[Task, State], np.ndarray],
+    ) -> None:
+        self._group, self._pairs, self._candidates, self._limits = group, pairs, candidates, limits
+        self._relate, self._energy = relate, energy
+
+    def hold_back(self, task: Task, before: State, state: State, size: Float[Array, " n"], parted: bool) -> Float[Array, " n"]:
+        """Halve steps from `before` to `state`, of a size (n,) [mm], until bodies stay free; return the shares taken (n,)."""
+        shares, rows = np.ones(len(task)), np.arange(len(task))
+        depths = self._depths(task, before.relative, np.full(len(task), FREE_DEPTH), parted)
+        enters, objective = ~self._candidates.interfere(before.relative), self._energy(task, before) * (1 + GAIN_SHARE)
+        objective[(depths > TOUCHING) | ~enters] = np.inf
+        motions = self._limits.displacement(before.poses, state.poses)
+        for _ in range(MAX_HALVINGS):
+            part, share = task.take(rows), shares[rows]
+            # Places that show more than bodies have moved are on the far side of a body.
+            depth = self._depths(part, state.relative[rows], depths[rows] + share * motions[rows] + TOUCHING, parted)
+            fails = depth > TOUCHING + depths[rows] * (1 - share) + SINK_SHARE * share * size[rows]
+            fails |= enters[rows] & self._candidates.interfere(state.relative[rows])
+            fails |= self._energy(part, state.take(rows)) > objective[rows]
+            rows, part = rows[fails], part.take(fails)
+            if not rows.size:
+                break
+            shares[rows] /= 2
+            state.poses[rows] = _halfway(before.poses[rows], state.poses[rows])
+            state.relative[rows] = self._related(state.poses[rows], part.deviations)
+        return shares
+
+    def lift(
+        self, poses: Float[Array, "n part 12"], relative: Float[Array, "n pair 12"], deviations: Float[Array, "n contributor"]
+    ) -> tuple[Float[Array, "n part 12"], Float[Array, "n pair 12"]]:
+        """Return poses, and X_RM, at which bodies that lie in each other are moved apart, where they are narrowest."""
+        poses, relative = poses.copy(), relative.copy()
+        for _ in range(MAX_LIFTS):
+            is_free = True
+            for k, guard in self._candidates.guards.items():
+                rows = np.flatnonzero(guard.interferes(relative[:, k]))
+                if not rows.size:
+                    continue
+                is_free, way, pair = False, guard.ways_out(relative[rows, k]), self._pairs[k]
+                assert pair.reference is not None
+                sides = self._group.position(pair.moving), self._group.position(pair.reference)
+                normals = np.einsum("nij,nj->ni", pose.rotation(poses[rows, sides[1]]), way.normals)
+                shift = LIFT_FACTOR * way.widths[:, None] * normals
+                movers = [self._group.mobilities[side].movers for side in sides]
+                apart = [set(movers[0]) - set(movers[1]), set(movers[1]) - set(movers[0])]
+                for sense, own in zip((1, -1), apart, strict=True):
+                    share = sense / sum(map(bool, apart))
+                    for part, mobility in enumerate(self._group.mobilities):
+                        if own & set(mobility.movers):
+                            poses[rows, part, 9:] += share * shift
+                relative[rows] = self._related(poses[rows], deviations[rows])
+            if is_free:
+                break
+        return poses, relative
+
+    def _related(self, poses: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        return self._relate(poses=poses, deviations=deviations).reshape(len(poses), len(self._pairs), -1)
+
+    def _depths(self, task: Task, relative: np.ndarray, deepest: np.ndarray, parted: bool) -> np.ndarray:
+        """Return the largest penetration (n,) [mm] that places show, of those not deeper than `deepest` (n,) [mm]."""
+        scans = self._candidates.scans(relative, task.deviations, parted=parted, deepest=deepest)
+        return np.maximum(-min_gaps(scans, relative, task.deviations).min(axis=1), 0)
+
+
+def _halfway(first: Float[Array, "n part 12"], second: Float[Array, "n part 12"]) -> Float[Array, "n part 12"]:
+    """Return poses halfway between two poses."""
+    mean = (first + second) / 2
+    U, _, Vt = np.linalg.svd(pose.rotation(mean))
+    return pose.pose(U @ Vt, pose.translation(mean))
