@@ -39,6 +39,7 @@ class FreeSteps:
     ) -> None:
         self._group, self._pairs, self._candidates, self._limits = group, pairs, candidates, limits
         self._relate, self._energy = relate, energy
+        self._centres = np.array([np.asarray(mobility.centre, dtype=float).ravel() for mobility in group.mobilities])
 
     def hold_back(self, task: Task, before: State, state: State, size: Float[Array, " n"], parted: bool) -> Float[Array, " n"]:
         """Halve steps from `before` to `state`, of a size (n,) [mm], until bodies stay free; return the shares taken (n,)."""
@@ -58,7 +59,7 @@ class FreeSteps:
             if not rows.size:
                 break
             shares[rows] /= 2
-            state.poses[rows] = _halfway(before.poses[rows], state.poses[rows])
+            state.poses[rows] = _halfway(before.poses[rows], state.poses[rows], self._centres)
             state.relative[rows] = self._related(state.poses[rows], part.deviations)
         return shares
 
@@ -99,8 +100,11 @@ class FreeSteps:
         return np.maximum(-min_gaps(scans, relative, task.deviations).min(axis=1), 0)
 
 
-def _halfway(first: Float[Array, "n part 12"], second: Float[Array, "n part 12"]) -> Float[Array, "n part 12"]:
-    """Return poses halfway between two poses."""
+def _halfway(
+    first: Float[Array, "n part 12"], second: Float[Array, "n part 12"], centres: Float[Array, "part 3"]
+) -> Float[Array, "n part 12"]:
+    """Return poses halfway between two poses, where `centres` of parts move straight."""
     mean = (first + second) / 2
     U, _, Vt = np.linalg.svd(pose.rotation(mean))
-    return pose.pose(U @ Vt, pose.translation(mean))
+    R = U @ Vt
+    return pose.pose(R, np.einsum("npij,pj->npi", pose.rotation(mean) - R, centres) + pose.translation(mean))
