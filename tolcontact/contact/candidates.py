@@ -17,7 +17,7 @@ from tolcontact.contact.raised_scan import RaisedScan, raised_scan
 from tolcontact.contact.scan import PairScan, RoundScan, Scan, changing, fixed, min_gaps, pair_scan
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.state import State, Task
-from tolcontact.geometry.meeting import NEARNESS
+from tolcontact.geometry.meeting import NEARNESS, Meeting
 from tolcontact.geometry.parting import Parting, parting
 from tolcontact.geometry.surface import Surface
 from tolcontact.mechanics import curved_pairs
@@ -164,6 +164,7 @@ class Candidates:
         guarded: bool = False,
         parted: bool = False,
         deepest=None,
+        beside=False,
     ) -> list[Scan]:
         """Return scans of the points that may carry, projected again if the method requires it.
 
@@ -182,7 +183,7 @@ class Candidates:
         if projected or self._method.is_iterated:
             for k in self._margins:
                 scans[k] = self.projected(k, relative[:, k])
-        for k, places in self.bounded.items():
+        for k, places in (self._widened if beside else self.bounded).items():
             kept, error = (slots[self._varying.index(k)].labels, width * self._edge_error) if slots else (None, 0.0)
             carried = None if kept is None else kept.copy()
             if kept is not None and at_rest is not None:
@@ -200,6 +201,11 @@ class Candidates:
         for k, guard in self.guards.items():
             found |= guard.interferes(relative[:, k])
         return found
+
+    @cached_property
+    def _widened(self) -> dict[int, Meeting]:
+        """The bounded pairs with places that count a little beside their edges."""
+        return {k: places.widened(self._edge_error) for k, places in self.bounded.items()}
 
     @cached_property
     def partings(self) -> dict[int, Parting]:

@@ -57,10 +57,13 @@ class FreeSteps:
             fails |= self._energy(part, state.take(rows)) > objective[rows]
             rows, part = rows[fails], part.take(fails)
             if not rows.size:
-                break
+                return shares
             shares[rows] /= 2
             state.poses[rows] = _halfway(before.poses[rows], state.poses[rows], self._centres)
             state.relative[rows] = self._related(state.poses[rows], part.deviations)
+        rows = rows[enters[rows] & self._candidates.interfere(state.relative[rows])]
+        shares[rows] = 0
+        state.poses[rows], state.relative[rows] = before.poses[rows], before.relative[rows]
         return shares
 
     def lift(

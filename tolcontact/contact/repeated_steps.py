@@ -107,7 +107,7 @@ def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, f
             at_rest = (size[moves] < NEARLY_AT_REST) & kind.sharp
             scans = candidates.scans(
                 poses, deviations, slots=slots, width=kind.width, at_rest=at_rest, guarded=start.guarded, parted=start.parted,
-                deepest=FREE_DEPTH if start.free else None,
+                deepest=FREE_DEPTH if start.free else None, beside=start.free,
             )
             unsettled.task = replace(unsettled.task, scans=scans)
         if kind.newton:
