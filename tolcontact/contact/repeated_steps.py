@@ -59,7 +59,6 @@ STEPS_WHERE_FACES_END = (
 )
 
 STEPS_OF_FREE = (*[StepKind(1.0, newton=False)] * 60, *[StepKind(1.0, newton=True)] * 30)
-DEBUG = False
 
 
 def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, free_steps: FreeSteps, task: Task, state: State, start: Start) -> None:
@@ -79,7 +78,7 @@ def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, f
         shares = np.ones(len(unsettled))
         if start.free:
             shares = free_steps.hold_back(unsettled.task, before, unsettled.state, size, start.parted)
-            if DEBUG: print(kind.newton, "sizes", np.sort(size)[::-1][:5], "shares", np.sort(shares)[:5], len(size))
+            _restore(step, free_steps, candidates, unsettled, np.flatnonzero(shares < 1), start)
         rounding_counts = kind.newton or step.knows_walls or start.balances
         moves = (shares < 1) | (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
         if kind.width > 1:
@@ -142,6 +141,20 @@ def _take(step: LinearStep, unsettled: Unsettled, rows: np.ndarray, kind: StepKi
     size[rows], scaled[rows] = step.take(task, state, stride=stride, firmness=kind.firmness, newton=kind.newton)
     unsettled.state.put(rows, state)
     return Step(size, scaled)
+
+
+def _restore(
+    step: LinearStep, free_steps: FreeSteps, candidates: Candidates, unsettled: Unsettled, rows: np.ndarray, start: Start
+) -> None:
+    """Free bodies that a curved step left in each other, by the smallest motion."""
+    if not rows.size:
+        return
+    task, before = unsettled.task.take(rows), unsettled.state.take(rows)
+    scans = candidates.scans(before.relative, task.deviations, slots=before.slots, deepest=FREE_DEPTH, beside=True)
+    state, task = before.take(np.arange(len(rows))), replace(task, raw=before.poses, relative=before.relative, scans=scans)
+    size, _ = step.take(task, state, stride=start.stride)
+    free_steps.hold_back(task, before, state, size, start.parted)
+    unsettled.state.put_poses(rows, state)
 
 
 def _goes_round(trail: Sequence[np.ndarray], state: State) -> Bool[Array, " n"]:
