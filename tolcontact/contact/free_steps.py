@@ -1,14 +1,17 @@
 """Steps of bodies that are free of each other: they end before bodies enter each other, so that none contradict each other."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from tolcontact import poses as pose
-from tolcontact.arrays import Array, Float
+from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.acceptance import AcceptanceLimits
-from tolcontact.contact.candidates import Candidates
+from tolcontact.contact.candidates import FREE_DEPTH, Candidates
+from tolcontact.contact.linear_step import LinearStep
 from tolcontact.contact.scan import min_gaps
+from tolcontact.contact.starts import FREE_WHERE_RAW, STRIDE
 from tolcontact.contact.state import State, Task
 from tolcontact.discretization import ContactPoints
 from tolcontact.mechanics import Group
@@ -17,7 +20,6 @@ MAX_HALVINGS = 20
 SINK_SHARE = 0.02  # of a step, by which places may sink in: they follow planes, and rotations are curved
 TOUCHING = 1e-9  # mm: bodies no deeper in each other touch
 GAIN_SHARE = 1e-9  # of the objective, by which rounding may raise it
-FREE_DEPTH = 1e-3  # mm: free bodies are not deeper in each other; places that show more are on the far side of a body
 MAX_LIFTS = 30
 LIFT_FACTOR = 1.1  # times the width of what bodies share, by which they are moved apart
 
@@ -31,7 +33,7 @@ class FreeSteps:
     def __init__(
         self,
         group: Group,
-        pairs: list[ContactPoints],
+        pairs: Sequence[ContactPoints],
         candidates: Candidates,
         limits: AcceptanceLimits,
         relate: Callable[..., np.ndarray],
@@ -41,30 +43,48 @@ class FreeSteps:
         self._relate, self._energy = relate, energy
         self._centres = np.array([np.asarray(mobility.centre, dtype=float).ravel() for mobility in group.mobilities])
 
-    def hold_back(self, task: Task, before: State, state: State, size: Float[Array, " n"], parted: bool) -> Float[Array, " n"]:
-        """Halve steps from `before` to `state`, of a size (n,) [mm], until bodies stay free; return the shares taken (n,)."""
+    def shorten(self, step: LinearStep, task: Task, before: State, state: State, size: Float[Array, " n"]) -> Bool[Array, " n"]:
+        """Shorten steps from `before` to `state`, of a size (n,) [mm], so that bodies stay free; return which are short (n,).
+
+        What a short step left in each other since rotations are curved comes free by another one, the smallest that does.
+        """
+        is_short = self._hold_back(task, before, state, size)
+        rows = np.flatnonzero(is_short)
+        if rows.size:
+            part, held = task.take(rows), state.take(rows)
+            scans = self._candidates.scans(held.relative, part.deviations, slots=held.slots, start=FREE_WHERE_RAW)
+            part = replace(part, raw=held.poses, relative=held.relative, scans=scans)
+            freed = held.take(np.arange(len(rows)))
+            size_of_rows, _ = step.take(part, freed, stride=STRIDE)
+            self._hold_back(part, held, freed, size_of_rows)
+            state.poses[rows], state.relative[rows] = freed.poses, freed.relative
+        return is_short
+
+    def _hold_back(self, task: Task, before: State, state: State, size: Float[Array, " n"]) -> Bool[Array, " n"]:
+        """Halve steps until no body enters another one and the objective is lower; return which are short (n,)."""
         shares, rows = np.ones(len(task)), np.arange(len(task))
-        depths = self._depths(task, before.relative, np.full(len(task), FREE_DEPTH), parted)
-        enters, objective = ~self._candidates.interfere(before.relative), self._energy(task, before) * (1 + GAIN_SHARE)
+        depths = self._depths(task, before.relative, np.full(len(task), FREE_DEPTH))
+        enters = ~self._candidates.interfere(before.relative, task.deviations)
+        objective = self._energy(task, before) * (1 + GAIN_SHARE)
         objective[(depths > TOUCHING) | ~enters] = np.inf
         motions = self._limits.displacement(before.poses, state.poses)
         for _ in range(MAX_HALVINGS):
             part, share = task.take(rows), shares[rows]
             # Places that show more than bodies have moved are on the far side of a body.
-            depth = self._depths(part, state.relative[rows], depths[rows] + share * motions[rows] + TOUCHING, parted)
+            depth = self._depths(part, state.relative[rows], depths[rows] + share * motions[rows] + TOUCHING)
             fails = depth > TOUCHING + depths[rows] * (1 - share) + SINK_SHARE * share * size[rows]
-            fails |= enters[rows] & self._candidates.interfere(state.relative[rows])
+            fails |= enters[rows] & self._candidates.interfere(state.relative[rows], part.deviations)
             fails |= self._energy(part, state.take(rows)) > objective[rows]
             rows, part = rows[fails], part.take(fails)
             if not rows.size:
-                return shares
+                break
             shares[rows] /= 2
             state.poses[rows] = _halfway(before.poses[rows], state.poses[rows], self._centres)
             state.relative[rows] = self._related(state.poses[rows], part.deviations)
-        rows = rows[enters[rows] & self._candidates.interfere(state.relative[rows])]
-        shares[rows] = 0
+        # Places show themselves once bodies have moved a little, unless only the complete test sees what is in the way.
+        rows = rows[enters[rows] & self._candidates.interfere(state.relative[rows], task.deviations[rows])]
         state.poses[rows], state.relative[rows] = before.poses[rows], before.relative[rows]
-        return shares
+        return shares < 1
 
     def lift(
         self, poses: Float[Array, "n part 12"], relative: Float[Array, "n pair 12"], deviations: Float[Array, "n contributor"]
@@ -74,7 +94,7 @@ class FreeSteps:
         for _ in range(MAX_LIFTS):
             is_free = True
             for k, guard in self._candidates.guards.items():
-                rows = np.flatnonzero(guard.interferes(relative[:, k]))
+                rows = np.flatnonzero(guard.interferes(relative[:, k], deviations))
                 if not rows.size:
                     continue
                 is_free, way, pair = False, guard.ways_out(relative[rows, k]), self._pairs[k]
@@ -83,12 +103,11 @@ class FreeSteps:
                 normals = np.einsum("nij,nj->ni", pose.rotation(poses[rows, sides[1]]), way.normals)
                 shift = LIFT_FACTOR * way.widths[:, None] * normals
                 movers = [self._group.mobilities[side].movers for side in sides]
-                apart = [set(movers[0]) - set(movers[1]), set(movers[1]) - set(movers[0])]
-                for sense, own in zip((1, -1), apart, strict=True):
-                    share = sense / sum(map(bool, apart))
+                own = [set(movers[0]) - set(movers[1]), set(movers[1]) - set(movers[0])]
+                for sense, moved in zip((1, -1), own, strict=True):
                     for part, mobility in enumerate(self._group.mobilities):
-                        if own & set(mobility.movers):
-                            poses[rows, part, 9:] += share * shift
+                        if moved & set(mobility.movers):
+                            poses[rows, part, 9:] += sense * shift / (2 if all(own) else 1)
                 relative[rows] = self._related(poses[rows], deviations[rows])
             if is_free:
                 break
@@ -97,9 +116,9 @@ class FreeSteps:
     def _related(self, poses: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         return self._relate(poses=poses, deviations=deviations).reshape(len(poses), len(self._pairs), -1)
 
-    def _depths(self, task: Task, relative: np.ndarray, deepest: np.ndarray, parted: bool) -> np.ndarray:
+    def _depths(self, task: Task, relative: np.ndarray, deepest: np.ndarray) -> np.ndarray:
         """Return the largest penetration (n,) [mm] that places show, of those not deeper than `deepest` (n,) [mm]."""
-        scans = self._candidates.scans(relative, task.deviations, parted=parted, deepest=deepest)
+        scans = self._candidates.scans(relative, task.deviations, start=FREE_WHERE_RAW, deepest=deepest)
         return np.maximum(-min_gaps(scans, relative, task.deviations).min(axis=1), 0)
 
 

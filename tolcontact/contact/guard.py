@@ -31,9 +31,11 @@ class Guard:
         neighbours = program.watch.neighbours(bodies)
         return None if neighbours is None else cls(neighbours, pair.moving != bodies[0])
 
-    def interferes(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
-        """Return whether the bodies lie in each other at X_RM (n,)."""
-        return self.neighbours.interfere(pose.inverse(X_RM) if self.is_swapped else X_RM)
+    def interferes(
+        self, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"] | None = None
+    ) -> Bool[Array, " n"]:
+        """Return whether the bodies lie in each other at X_RM (n,). Without `deviations`, faces are as they are nominally."""
+        return self.neighbours.interfere(pose.inverse(X_RM) if self.is_swapped else X_RM, deviations)
 
     def ways_out(self, X_RM: Float[Array, "n 12"]) -> WayOut:
         """Return how the bodies part: P_m, P_r and n_r of the paper, and how deep the place P_m lies (n,) [mm]."""

@@ -13,7 +13,7 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
-from tolcontact.contact.free_steps import FREE_DEPTH, FreeSteps
+from tolcontact.contact.free_steps import FreeSteps
 from tolcontact.contact.linear_step import PENETRATION, LinearStep, Step
 from tolcontact.contact.progress import Progress
 from tolcontact.contact.scan import min_gaps
@@ -57,32 +57,38 @@ STEPS_WHERE_FACES_END = (
     *[StepKind(1.0, newton=False, width=WIDE)] * 30,
     *[StepKind(1.0, newton=True, width=WIDE)] * 50,
 )
+STEPS_OF_FREE_BODIES = (*[StepKind(1.0, newton=False)] * 60, *[StepKind(1.0, newton=True)] * 30)
 
-STEPS_OF_FREE = (*[StepKind(1.0, newton=False)] * 60, *[StepKind(1.0, newton=True)] * 30)
 
-
-def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, free_steps: FreeSteps, task: Task, state: State, start: Start) -> None:
+def repeat(
+    step: LinearStep,
+    limits: AcceptanceLimits,
+    candidates: Candidates,
+    free_steps: FreeSteps,
+    task: Task,
+    state: State,
+    start: Start,
+) -> None:
     """Take the steps of `state` to their end, as the `start` says. Without rest there is only an answer to a contradiction."""
     unsettled, trail = Unsettled(task, state), list[np.ndarray]()
     progress: Progress | None = None
     if not len(task):
         return
     asleep, last = np.zeros(len(task), dtype=bool), None
-    for kind in STEPS_OF_FREE if start.free else STEPS_WHERE_FACES_END if candidates.bounded else STEPS:
+    for kind in STEPS_OF_FREE_BODIES if start.free else STEPS_WHERE_FACES_END if candidates.bounded else STEPS:
         asleep &= kind == last
         last = kind
         if asleep.all():
             continue
-        before = unsettled.state.take(np.arange(len(unsettled))) if start.free else unsettled.state
+        before = unsettled.state.take(np.arange(len(unsettled))) if start.free else None
         size, scaled = _take(step, unsettled, np.flatnonzero(~asleep), kind, start.stride)
-        shares = np.ones(len(unsettled))
-        if start.free:
-            shares = free_steps.hold_back(unsettled.task, before, unsettled.state, size, start.parted)
-            _restore(step, free_steps, candidates, unsettled, np.flatnonzero(shares < 1), start)
+        is_short = np.zeros(len(unsettled), dtype=bool)
+        if before is not None:
+            is_short = free_steps.shorten(step, unsettled.task, before, unsettled.state, size)
         rounding_counts = kind.newton or step.knows_walls or start.balances
-        moves = (shares < 1) | (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
+        moves = is_short | (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
         if kind.width > 1:
-            moves |= ~candidates.hold(unsettled.task, unsettled.state, guarded=start.guarded, parted=start.parted)
+            moves |= ~candidates.hold(unsettled.task, unsettled.state, start)
         # The smaller one tells: steps are large in freedoms that nothing holds, and in the norm of the objective if
         # Newton's curvature is stiff.
         unrest = np.minimum(size, scaled)
@@ -104,10 +110,7 @@ def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, f
         if candidates.bounded:
             poses, deviations, slots = unsettled.state.relative, unsettled.task.deviations, unsettled.state.slots
             at_rest = (size[moves] < NEARLY_AT_REST) & kind.sharp
-            scans = candidates.scans(
-                poses, deviations, slots=slots, width=kind.width, at_rest=at_rest, guarded=start.guarded, parted=start.parted,
-                deepest=FREE_DEPTH if start.free else None, beside=start.free,
-            )
+            scans = candidates.scans(poses, deviations, slots=slots, width=kind.width, at_rest=at_rest, start=start)
             unsettled.task = replace(unsettled.task, scans=scans)
         if kind.newton:
             penetration = _true_penetration(unsettled.task, unsettled.state)
@@ -141,20 +144,6 @@ def _take(step: LinearStep, unsettled: Unsettled, rows: np.ndarray, kind: StepKi
     size[rows], scaled[rows] = step.take(task, state, stride=stride, firmness=kind.firmness, newton=kind.newton)
     unsettled.state.put(rows, state)
     return Step(size, scaled)
-
-
-def _restore(
-    step: LinearStep, free_steps: FreeSteps, candidates: Candidates, unsettled: Unsettled, rows: np.ndarray, start: Start
-) -> None:
-    """Free bodies that a curved step left in each other, by the smallest motion."""
-    if not rows.size:
-        return
-    task, before = unsettled.task.take(rows), unsettled.state.take(rows)
-    scans = candidates.scans(before.relative, task.deviations, slots=before.slots, deepest=FREE_DEPTH, beside=True)
-    state, task = before.take(np.arange(len(rows))), replace(task, raw=before.poses, relative=before.relative, scans=scans)
-    size, _ = step.take(task, state, stride=start.stride)
-    free_steps.hold_back(task, before, state, size, start.parted)
-    unsettled.state.put_poses(rows, state)
 
 
 def _goes_round(trail: Sequence[np.ndarray], state: State) -> Bool[Array, " n"]:

@@ -137,10 +137,6 @@ class State(Record):
         for name in ANSWER:
             getattr(self, name)[rows] = getattr(state, name)
 
-    def put_poses(self, rows: np.ndarray, state: "State") -> None:
-        """Replace the poses of some realizations alone."""
-        self.poses[rows], self.relative[rows] = state.poses, state.relative
-
 
 _ARRAYS = tuple(entry.name for entry in fields(State) if entry.name != "slots")
 

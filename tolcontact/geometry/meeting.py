@@ -207,7 +207,8 @@ class Meeting:
         )
         places_kernel.find(
             *self._bodies, self.candidates,
-            np.array([self.reach.depth, self.reach.height, _passed(self.reach, self.size)]), kernel.MARGIN * self.size + self.beside,
+            np.array([self.reach.depth, self.reach.height, _passed(self.reach, self.size)]),
+            kernel.MARGIN * self.size + self.beside,
             np.array([error, self.reach.depth, nearness, self.beside]),
             np.ascontiguousarray(X_RM), retained, DIRECTIONS, *places,
         )  # fmt: skip
