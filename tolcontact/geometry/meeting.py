@@ -13,7 +13,7 @@ beside them is held by another facet.
 """
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -106,7 +106,7 @@ class Meeting:
     candidates: places_kernel.Candidates
     reach: Reach
     size: float
-    beside: float = 0.0
+    beside: float = field(default=0.0, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.candidates.kinds)
