@@ -186,7 +186,7 @@ def test_a_kind_of_place_that_the_search_lacks_is_noticed(kind, moving, fixed, m
     model, bodies = set_down(moving, fixed)
     program = tc.build(model, solver="daqp")
     meeting = program.meetings[0]
-    lacking = LackingMeeting(*(getattr(meeting, name.name) for name in fields(Meeting)), kind)
+    lacking = LackingMeeting(**{field.name: getattr(meeting, field.name) for field in fields(Meeting)}, lacks=kind)
     program = replace(program, meetings={0: lacking})
     assert np.nanmax(radii(simulated(program, 100), bodies), initial=0) < 5e-4  # what is certified is true
     untested = replace(program, watch=replace(program.watch, allowed={(0, 1): np.inf}))

@@ -102,14 +102,17 @@ def bounded_scan(
     guard: Guard | None = None,
     parting: Parting | None = None,
     carried: Int[Array, "n slot"] | None = None,
+    deepest: Float[Array, " n"] | None = None,
 ) -> BoundedScan:
     """Return the places at which a pair can touch at X_RM (n, 12); see raised_places for the other arguments.
 
     Where no place shows penetration, a `guard` adds one if bodies lie in each other. A `parting` leaves out places that hold
     bodies apart in other directions than the one in which they part best, and adds the place that does; `carried` (n, slot) are
-    the labels of places that carried before, -1 for none.
+    the labels of places that carried before, -1 for none. Places deeper than `deepest` (n,) [mm] do not count.
     """
     found, heights = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness, depth)
+    if deepest is not None:
+        found = found._replace(gaps=np.where(found.gaps - heights >= -deepest[:, None], found.gaps, np.inf))
     if guard is not None:
         found, heights = _with_guard(found, heights, guard, X_RM)
     if parting is not None:

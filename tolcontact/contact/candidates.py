@@ -16,10 +16,11 @@ from tolcontact.contact.guard import GUARD, Guard
 from tolcontact.contact.raised_scan import RaisedScan, raised_scan
 from tolcontact.contact.scan import PairScan, RoundScan, Scan, changing, fixed, min_gaps, pair_scan
 from tolcontact.contact.slots import Slots
+from tolcontact.contact.starts import FIRST, Start
 from tolcontact.contact.state import State, Task
 from tolcontact.discretization import FIRST_POINT, ContactPoints
 from tolcontact.geometry.height_kernel import FIRST_PLACE
-from tolcontact.geometry.meeting import NEARNESS
+from tolcontact.geometry.meeting import NEARNESS, Meeting
 from tolcontact.geometry.parting import Parting, parting
 from tolcontact.interference.watch import ALLOWED_SHARE
 from tolcontact.mechanics import curved_pairs
@@ -89,6 +90,8 @@ EDGE_SHARE = 1 / 4000  # of the smallest tolerance range: error of planes beyond
 BULGE_SHARE = 1 / 2500  # of the same: depth to which planes with form may lie in each other between contact points
 MIN_BULGE = 1e-7  # mm
 OVERHANG_SHARE = 0.01  # of their radius, by which balls and shafts that travelled far may carry beside a wall
+
+FREE_DEPTH = 1e-3  # mm: free bodies are not deeper in each other
 
 
 def _lies_between(labels: Int[Array, "n k"]) -> Bool[Array, "n k"]:
@@ -181,15 +184,17 @@ class Candidates:
         width: float = 1.0,
         at_rest: Bool[Array, " realization"] | None = None,
         earlier: Sequence[Scan] = (),
-        guarded: bool = False,
-        parted: bool = False,
+        start: Start = FIRST,
+        deepest: Float[Array, " realization"] | None = None,
     ) -> list[Scan]:
         """Return scans of the points that may carry, projected again if the method requires it.
 
         Places of bounded pairs are found anew; in steps, with the `slots` of the pairs with changing points, places that carry
         remain a little beyond their edges, `width` times as far as they may in an answer, unless the realization is `at_rest`.
-        With `guarded`, bodies that lie in each other where no place shows it get one more place (see Guard). With `parted`,
-        places hold convex bodies apart only in the direction in which they part best (see Parting).
+        If the `start` is guarded, bodies that lie in each other where no place shows it get one more place (see Guard). If it
+        is parted, places hold convex bodies apart only in the direction in which they part best (see Parting). If it is free,
+        places deeper than `deepest` (realization,) [mm], FREE_DEPTH by default, are on the far side of a body and do not count.
+        Its steps know places a little beside their edges: a corner in a valley then meets both sides of it.
         With `projected`, points against curved faces are projected again in any case. `earlier` are scans of the same
         realizations, whose heights are summed up.
         """
@@ -208,7 +213,7 @@ class Candidates:
         if projected or self._method.is_iterated:
             for k in self._margins:
                 scans[k] = self.projected(k, relative[:, k])
-        for k, places in self.bounded.items():
+        for k, places in (self._widened if start.free and slots else self.bounded).items():
             kept, error = (slots[self._varying.index(k)].labels, width * self._edge_error) if slots else (None, 0.0)
             carried = None if kept is None else kept.copy()
             if kept is not None and at_rest is not None:
@@ -217,9 +222,10 @@ class Candidates:
             former = earlier[k] if earlier else None
             if kept is not None and isinstance(former, BoundedScan):
                 kept = np.concatenate([kept, former.minima], axis=1)
-            nearness, guard = NEARNESS if width == 1 else np.inf, self.guards.get(k) if guarded else None
+            nearness, guard = NEARNESS if width == 1 else np.inf, self.guards.get(k) if start.guarded else None
             depth = self._bulge if k in self._with_minima else np.inf
-            parting = self.partings.get(k) if parted else None
+            parting = self.partings.get(k) if start.parted else None
+            limits = np.full(len(relative), FREE_DEPTH) if start.free and deepest is None else deepest
             scans[k] = bounded_scan(
                 scans[k],
                 self._pairs[k],
@@ -233,6 +239,7 @@ class Candidates:
                 guard,
                 parting,
                 carried,
+                limits,
             )
         return scans
 
@@ -256,6 +263,16 @@ class Candidates:
         return found
 
     @cached_property
+    def _widened(self) -> dict[int, Meeting]:
+        """The bounded pairs with places that count a little beside their edges."""
+        return {k: places.widened(self._edge_error) for k, places in self.bounded.items()}
+
+    @property
+    def are_guarded(self) -> bool:
+        """Whether there are bounded pairs, and of each it is known whether its bodies lie in each other."""
+        return len(self.bounded) > 0 and len(self.guards) == len(self.bounded)
+
+    @cached_property
     def partings(self) -> dict[int, Parting]:
         """Of bounded pairs those of convex bodies without deviations, by their number in the group."""
         partings = {}
@@ -266,11 +283,9 @@ class Candidates:
                 partings[k] = parting(*(self._bodies[part] for part in (pair.moving, pair.reference)))
         return {k: found for k, found in partings.items() if found is not None}
 
-    def hold(self, task: Task, state: State, *, guarded: bool = False, parted: bool = False) -> Bool[Array, " n"]:
+    def hold(self, task: Task, state: State, start: Start) -> Bool[Array, " n"]:
         """Return whether the places that carry are as near to their faces as they may be in an answer (n,)."""
-        scans = self.scans(
-            state.relative, task.deviations, slots=state.slots, earlier=task.scans, guarded=guarded, parted=parted
-        )
+        scans = self.scans(state.relative, task.deviations, slots=state.slots, earlier=task.scans, start=start)
         held = np.ones(len(state), dtype=bool)
         for k in self.bounded:
             slots = state.slots[self._varying.index(k)]

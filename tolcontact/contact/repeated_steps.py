@@ -13,6 +13,7 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
+from tolcontact.contact.free_steps import FreeSteps
 from tolcontact.contact.linear_step import PENETRATION, LinearStep, Step
 from tolcontact.contact.progress import Progress
 from tolcontact.contact.scan import min_gaps
@@ -58,25 +59,44 @@ STEPS_WHERE_FACES_END = (
     *[StepKind(1.0, newton=False, width=WIDE)] * 30,
     *[StepKind(1.0, newton=True, width=WIDE)] * 50,
 )
+STEPS_OF_FREE_BODIES = (*[StepKind(1.0, newton=False)] * 60, *[StepKind(1.0, newton=True)] * 30)
 
 
-def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, task: Task, state: State, start: Start) -> None:
+def _steps(candidates: Candidates, start: Start) -> Sequence[StepKind]:
+    if start.free:
+        return STEPS_OF_FREE_BODIES
+    return STEPS_WHERE_FACES_END if candidates.bounded else STEPS_WITH_FORM if candidates.change else STEPS
+
+
+def repeat(
+    step: LinearStep,
+    limits: AcceptanceLimits,
+    candidates: Candidates,
+    free_steps: FreeSteps,
+    task: Task,
+    state: State,
+    start: Start,
+) -> None:
     """Take the steps of `state` to their end, as the `start` says. Without rest there is only an answer to a contradiction."""
     unsettled, trail = Unsettled(task, state), list[np.ndarray]()
     progress: Progress | None = None
     if not len(task):
         return
     asleep, last = np.zeros(len(task), dtype=bool), None
-    for kind in STEPS_WHERE_FACES_END if candidates.bounded else STEPS_WITH_FORM if candidates.change else STEPS:
+    for kind in _steps(candidates, start):
         asleep &= kind == last
         last = kind
         if asleep.all():
             continue
+        before = unsettled.state.take(np.arange(len(unsettled))) if start.free else None
         size, scaled = _take(step, unsettled, np.flatnonzero(~asleep), kind, start.stride)
+        is_short = np.zeros(len(unsettled), dtype=bool)
+        if before is not None:
+            is_short = free_steps.shorten(step, unsettled.task, before, unsettled.state, size)
         rounding_counts = kind.newton or step.knows_walls or start.balances
-        moves = (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
+        moves = is_short | (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
         if kind.width > 1:
-            moves |= ~candidates.hold(unsettled.task, unsettled.state, guarded=start.guarded, parted=start.parted)
+            moves |= ~candidates.hold(unsettled.task, unsettled.state, start)
         # The smaller one tells: steps are large in freedoms that nothing holds, and in the norm of the objective if
         # Newton's curvature is stiff.
         unrest = np.minimum(size, scaled)
@@ -99,14 +119,7 @@ def repeat(step: LinearStep, limits: AcceptanceLimits, candidates: Candidates, t
             poses, task, slots = unsettled.state.relative, unsettled.task, unsettled.state.slots
             at_rest = (size[moves] < NEARLY_AT_REST) & kind.sharp
             scans = candidates.scans(
-                poses,
-                task.deviations,
-                slots=slots,
-                width=kind.width,
-                at_rest=at_rest,
-                earlier=task.scans,
-                guarded=start.guarded,
-                parted=start.parted,
+                poses, task.deviations, slots=slots, width=kind.width, at_rest=at_rest, earlier=task.scans, start=start
             )
             unsettled.task = replace(task, scans=scans)
         if kind.newton:

@@ -14,18 +14,30 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ACCURACY, ContactGroup, Program
 from tolcontact.contact.acceptance import AcceptanceLimits
-from tolcontact.contact.candidates import Candidates
+from tolcontact.contact.candidates import FREE_DEPTH, Candidates
+from tolcontact.contact.free_steps import FreeSteps
 from tolcontact.contact.iterated_search import search
 from tolcontact.contact.linear_step import MAX_ROUNDS, PENETRATION, LinearStep
 from tolcontact.contact.record import accumulate_starts
 from tolcontact.contact.repeated_steps import repeat
 from tolcontact.contact.scan import min_gaps, undone
 from tolcontact.contact.springs import spring_misfit
-from tolcontact.contact.starts import BALANCE, GUARDED, OTHER_STARTS, OTHER_STARTS_CURVED, PARTED, Start
+from tolcontact.contact.starts import (
+    BALANCE,
+    FIRST,
+    FREE,
+    FREE_WHERE_RAW,
+    GUARDED,
+    OTHER_STARTS,
+    OTHER_STARTS_CURVED,
+    PARTED,
+    Start,
+)
 from tolcontact.contact.state import NO_ANSWER, Resolved, State, Task
 from tolcontact.interference import ordered
 
 SAME_CONFLICT = 1e-3  # share by which the penetration of two conflicts differs that are taken for the same
+UNMOVED = 1e-9  # mm: contact moves bodies by more
 MIN_GAIN = 1e-6  # of the objective, or mm of penetration: what another start must gain to be preferred
 
 
@@ -44,6 +56,9 @@ class ContactResolver:
         self._springy = [k for k, pair in enumerate(self.contact_points) if pair.is_springy]
         size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
         self._limits = AcceptanceLimits(program.nominal, group.group, self._method, size)
+        self._free_steps = FreeSteps(
+            group.group, self.contact_points, self._candidates, self._limits, self._relate, self._energy_of
+        )
 
     def twin(self) -> "ContactResolver":
         """Return the same resolver for another thread."""
@@ -109,12 +124,27 @@ class ContactResolver:
             scans=scans,
         )
         state = self._step.start(task.raw, task.relative)
-        self._attempt(task, state, Start())
+        self._attempt(task, state, FIRST)
         if self._method.is_exact:
+            self._try_again(task, state, self._apart(task, survey.min_gap[touched]), FREE_WHERE_RAW)
             self._try_other_starts(task, state)
         gap_min = np.stack([survey.min_gap, survey.min_gap], axis=1)
         gap_min[touched, 1] = state.gap_min
-        return Resolved(touched, state, gap_min, survey.active)
+        stays = self._stays(task, state)
+        gap_min[touched[stays], 0] = state.gap_min[stays]
+        return Resolved(touched[~stays], state.take(np.flatnonzero(~stays)), gap_min, survey.active)
+
+    def _apart(self, task: Task, min_gap: Float[Array, "n pair"]) -> Int[Array, " k"]:
+        """Return the realizations (k,) whose raw bodies are apart, though places with a least gap (n, pair) [mm] deny it."""
+        if not self._candidates.are_guarded or self._method.minimizes.presses:
+            return np.zeros(0, dtype=int)
+        rows = np.flatnonzero((min_gap < -FREE_DEPTH).any(axis=1))
+        return rows[~self._candidates.interfere(task.relative[rows])]
+
+    def _stays(self, task: Task, state: State) -> Bool[Array, " n"]:
+        """Return whether answers are the raw poses, without contact (n,)."""
+        is_loaded = (state.multipliers > 0).any(axis=1) | self._method.minimizes.presses
+        return (state.rank == 0) & ~is_loaded & (self._limits.displacement(task.raw, state.poses) <= UNMOVED)
 
     def _attempt(self, task: Task, state: State, start: Start) -> None:
         """Take steps from the poses of `state` to an answer, and judge it."""
@@ -123,14 +153,12 @@ class ContactResolver:
             caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull far if nothing holds
             search(self._step, self._limits, self._candidates, self._energy_of, task, state, start.stride, caution)
         elif self._method.is_exact:
-            repeat(self._step, self._limits, self._candidates, task, state, start)
+            repeat(self._step, self._limits, self._candidates, self._free_steps, task, state, start)
         else:
             self._step.take(task, state, stride=start.stride)
         state.searched[:] = projected
         self._leave_adrift(task, state)
-        scans = self._candidates.scans(
-            state.relative, task.deviations, projected=projected, earlier=task.scans, parted=start.parted
-        )
+        scans = self._candidates.scans(state.relative, task.deviations, projected=projected, earlier=task.scans, start=start)
         task = replace(task, scans=scans)
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
         if self._method.is_exact:
@@ -180,6 +208,8 @@ class ContactResolver:
         rows = np.flatnonzero(state.rank == NO_ANSWER)
         for start in PARTED if rows.size and self._candidates.partings else ():
             rows = self._try_again(task, state, rows, start)
+        for start in FREE if self._candidates.are_guarded else ():
+            self._try_again(task, state, np.flatnonzero(state.rank > 0), start)
 
     def _try_again(self, task: Task, state: State, rows: Int[Array, " n"], start: Start) -> Int[Array, " left"]:
         """Try some realizations (n,) again and keep the better answer. Return those to be tried further (left,)."""
@@ -187,11 +217,11 @@ class ContactResolver:
             return rows
         part = task.take(rows)
         poses, relative = self._at_nominal(part) if start.at_nominal else (part.raw, part.relative)
+        if start.free:
+            poses, relative = self._free_steps.lift(poses, relative, part.deviations)
         part = replace(
             part,
-            scans=self._candidates.scans(
-                relative, part.deviations, projected=start.projected, guarded=start.guarded, parted=start.parted
-            ),
+            scans=self._candidates.scans(relative, part.deviations, projected=start.projected, start=start),
         )
         attempt = self._step.start(poses, relative)
         self._attempt(part, attempt, start)

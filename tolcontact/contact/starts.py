@@ -14,6 +14,7 @@ class Start(NamedTuple):
     balances     whether steps end where they are rounding, though they may grow from there
     guarded      whether bodies that lie in each other, where no place of contact shows it, get one (see Guard)
     parted       whether convex bodies are held apart only in the direction in which they part best (see Parting)
+    free         whether bodies are moved apart first, and steps end before they enter each other (see FreeSteps)
     """
 
     at_nominal: bool = False
@@ -22,11 +23,16 @@ class Start(NamedTuple):
     balances: bool = False
     guarded: bool = False
     parted: bool = False
+    free: bool = False
 
 
+FIRST = Start()
 OTHER_STARTS = (Start(at_nominal=True), Start(stride=SMALL_STRIDE))  # if no face is curved
 OTHER_STARTS_CURVED = (Start(projected=True), Start(projected=True, at_nominal=True))
 # Planes at fixed points of a shaft leave it as it spins. If its spin is free, rounding grows until it falls through them.
 BALANCE = Start(balances=True)
 GUARDED = (Start(guarded=True), Start(guarded=True, stride=SMALL_STRIDE))
 PARTED = (Start(parted=True), Start(parted=True, stride=SMALL_STRIDE))
+# Where bodies part in several directions, full steps go to and fro between these, or ask for contradictory ones.
+FREE_WHERE_RAW = Start(free=True)
+FREE = (Start(free=True, at_nominal=True), FREE_WHERE_RAW)

@@ -13,7 +13,7 @@ beside them is held by another facet.
 """
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -98,6 +98,7 @@ class Meeting:
              of the moving and of the reference plane
     reach    how far the bodies may be from their nominal places
     size     [mm] of the larger face
+    beside   [mm]: how far beside its edges any place counts
     """
 
     moving: Polyhedron
@@ -105,9 +106,14 @@ class Meeting:
     candidates: places_kernel.Candidates
     reach: Reach
     size: float
+    beside: float = field(default=0.0, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.candidates.kinds)
+
+    def widened(self, beside: float) -> "Meeting":
+        """Return the same candidates, which count up to `beside` [mm] beside their edges."""
+        return replace(self, beside=beside)
 
     @property
     def kinds(self) -> Int[Array, " c"]:
@@ -121,7 +127,8 @@ class Meeting:
         if self.reach.travel > MAX_TRAVEL * self.size:
             return None
         travel, tilt = FARTHER * self.reach.travel, FARTHER * (self.reach.tilt + SPARE_LEANING)
-        return _meeting(self.moving, self.reference, self.reach._replace(travel=travel, tilt=tilt), self.size)
+        farther = _meeting(self.moving, self.reference, self.reach._replace(travel=travel, tilt=tilt), self.size)
+        return None if farther is None else farther.widened(self.beside)
 
     @property
     def turn(self) -> float:
@@ -200,8 +207,9 @@ class Meeting:
         )
         places_kernel.find(
             *self._bodies, self.candidates,
-            np.array([self.reach.depth, self.reach.height, _passed(self.reach, self.size)]), kernel.MARGIN * self.size,
-            np.array([error, self.reach.depth, nearness]),
+            np.array([self.reach.depth, self.reach.height, _passed(self.reach, self.size)]),
+            kernel.MARGIN * self.size + self.beside,
+            np.array([error, self.reach.depth, nearness, self.beside]),
             np.ascontiguousarray(X_RM), retained, DIRECTIONS, *places,
         )  # fmt: skip
         return places

@@ -79,12 +79,15 @@ def cover(poses, corners, travel, turn, covered):  # type: ignore[no-untyped-def
 
 
 @uncounted
-def _keep_shallowest(candidates, touching, gaps):  # type: ignore[no-untyped-def]
-    """Drop all but the nearest of the facets that a corner is behind: by that one it leaves. Facing planes hold all corners."""
+def _keep_shallowest(candidates, touching, gaps, least):  # type: ignore[no-untyped-def]
+    """Drop all but the nearest of the facets that a corner is behind: by that one it leaves. Facing planes hold all corners.
+
+    It may be behind several by no more than `least` [mm].
+    """
     best, owner_of_best = -1, -1
     for s in touching:
         kind = candidates.kinds[s]
-        if kind == EDGE_ON_EDGE or not gaps[s] < -INSIDE:
+        if kind == EDGE_ON_EDGE or not gaps[s] < -least:
             continue
         owner = 2 * candidates.firsts[s] if kind == CORNER_ON_FACET else 2 * candidates.seconds[s] + 1
         if owner != owner_of_best:
@@ -171,7 +174,7 @@ def _range(A, candidates, s, moved, spare):  # type: ignore[no-untyped-def]
 
 
 @uncounted
-def _find_at(A, B, candidates, reach, margins, nearness, retained, X, moved, touching, is_held, gaps, all_places):  # type: ignore
+def _find_at(A, B, candidates, reach, margins, nearness, beside, retained, X, moved, touching, is_held, gaps, all_places):  # type: ignore
     """Write gap, places and normal of the candidates that touch at one pose X_RM (12,); return how many there are.
 
     Of facing planes, candidates that are kept count a little beside their edges: there, near a corner of the overlap, the
@@ -204,7 +207,7 @@ def _find_at(A, B, candidates, reach, margins, nearness, retained, X, moved, tou
                     touching[count], count = s, count + 1
             s += 1
     drop_passed(A, B, candidates, reach[2], X, touching[:count], gaps, all_places, is_held)
-    _keep_shallowest(candidates, touching[:count], gaps)
+    _keep_shallowest(candidates, touching[:count], gaps, max(INSIDE, beside))
     strict = count
     for s in retained:
         if s >= 0 and candidates.planes[s] >= 0 and gaps[s] == np.inf:
@@ -276,7 +279,7 @@ def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, direc
             margins[j] = max(margin, min(error[0] / max(margins[j], TINY), error[1]))
         moved = (corners, lines, back)
         number = _find_at(
-            A, B, candidates, reach, margins, error[2], retained[k], X, moved, touching, is_held, all_gaps, all_places
+            A, B, candidates, reach, margins, error[2], error[3], retained[k], X, moved, touching, is_held, all_gaps, all_places
         )
         if count <= room:
             for p in range(room):
@@ -305,8 +308,8 @@ def find(A, B, candidates, reach, margin, error, poses, retained, directions, la
     reach         (3,) [mm]: the largest depth, and the largest gap, that a place may have; from which nominal depth on a body
                   has come in elsewhere
     margin        [mm] by which places may lie beside edges
-    error         (3,) [mm] that facing planes may make beside their edges, the margin in which they may make it, and how many
-                  margins away from a place where they touch
+    error         (4,) [mm] that facing planes may make beside their edges, the margin in which they may make it, how many
+                  margins away from a place where they touch, and the depth up to which a corner counts behind several facets
     labels        (n, p): numbers of the candidates, -1 where there is none
     gaps          (n, p) [mm], infinite where there is none
     places, feet, normals   (n, p, 3), left as they are where there is none

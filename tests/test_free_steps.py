@@ -1,0 +1,24 @@
+"""Bodies whose full steps contradict each other find a pose from free ones, and bodies that are apart stay where they are."""
+
+import numpy as np
+import pytest
+
+from studies.certificates.coincidences import judged, quick_builds
+from studies.certificates.placements import scene
+
+SAMPLES = 12
+
+
+@pytest.mark.parametrize(("family", "seed"), [("keys", 66), ("combs", 39)])
+def test_bodies_that_are_free_nearby_have_an_answer(family, seed):
+    with quick_builds():
+        findings = judged(scene(seed, family, "all points"), SAMPLES, seed, "daqp")
+    assert findings.counts["certified"] == SAMPLES
+    assert not findings.wrong
+
+
+def test_bodies_that_are_apart_are_untouched():
+    with quick_builds():
+        findings = judged(scene(115, "boxes", "all points"), 40, 115, "daqp")
+    assert findings.counts["falsely touched"] == findings.counts["lifted off"] == 0
+    assert np.isclose(findings.deepest, 0)

@@ -1,0 +1,132 @@
+"""Steps of bodies that are free of each other: they end before bodies enter each other, so that none contradict each other."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tolcontact import poses as pose
+from tolcontact.arrays import Array, Bool, Float
+from tolcontact.contact.acceptance import AcceptanceLimits
+from tolcontact.contact.candidates import FREE_DEPTH, Candidates
+from tolcontact.contact.linear_step import LinearStep
+from tolcontact.contact.scan import min_gaps
+from tolcontact.contact.starts import FREE_WHERE_RAW, STRIDE
+from tolcontact.contact.state import State, Task
+from tolcontact.discretization import ContactPoints
+from tolcontact.mechanics import Group
+
+MAX_HALVINGS = 20
+SINK_SHARE = 0.02  # of a step, by which places may sink in: they follow planes, and rotations are curved
+TOUCHING = 1e-9  # mm: bodies no deeper in each other touch
+GAIN_SHARE = 1e-9  # of the objective, by which rounding may raise it
+MAX_LIFTS = 30
+LIFT_FACTOR = 1.1  # times the width of what bodies share, by which they are moved apart
+
+
+class FreeSteps:
+    """What keeps the bodies of a group free of each other, or frees them.
+
+    relate, energy   return X_RM of all pairs at some poses, and the objective of a task's state
+    """
+
+    def __init__(
+        self,
+        group: Group,
+        pairs: Sequence[ContactPoints],
+        candidates: Candidates,
+        limits: AcceptanceLimits,
+        relate: Callable[..., np.ndarray],
+        energy: Callable[[Task, State], np.ndarray],
+    ) -> None:
+        self._group, self._pairs, self._candidates, self._limits = group, pairs, candidates, limits
+        self._relate, self._energy = relate, energy
+        self._centres = np.array([np.asarray(mobility.centre, dtype=float).ravel() for mobility in group.mobilities])
+
+    def shorten(self, step: LinearStep, task: Task, before: State, state: State, size: Float[Array, " n"]) -> Bool[Array, " n"]:
+        """Shorten steps from `before` to `state`, of a size (n,) [mm], so that bodies stay free; return which are short (n,).
+
+        What a short step left in each other since rotations are curved comes free by another one, the smallest that does.
+        """
+        is_short = self._hold_back(task, before, state, size)
+        rows = np.flatnonzero(is_short)
+        if rows.size:
+            part, held = task.take(rows), state.take(rows)
+            scans = self._candidates.scans(held.relative, part.deviations, slots=held.slots, start=FREE_WHERE_RAW)
+            part = replace(part, raw=held.poses, relative=held.relative, scans=scans)
+            freed = held.take(np.arange(len(rows)))
+            size_of_rows, _ = step.take(part, freed, stride=STRIDE)
+            self._hold_back(part, held, freed, size_of_rows)
+            state.poses[rows], state.relative[rows] = freed.poses, freed.relative
+        return is_short
+
+    def _hold_back(self, task: Task, before: State, state: State, size: Float[Array, " n"]) -> Bool[Array, " n"]:
+        """Halve steps until no body enters another one and the objective is lower; return which are short (n,)."""
+        shares, rows = np.ones(len(task)), np.arange(len(task))
+        depths = self._depths(task, before.relative, np.full(len(task), FREE_DEPTH))
+        enters = ~self._candidates.interfere(before.relative)
+        objective = self._energy(task, before) * (1 + GAIN_SHARE)
+        objective[(depths > TOUCHING) | ~enters] = np.inf
+        motions = self._limits.displacement(before.poses, state.poses)
+        for _ in range(MAX_HALVINGS):
+            part, share = task.take(rows), shares[rows]
+            # Places that show more than bodies have moved are on the far side of a body.
+            depth = self._depths(part, state.relative[rows], depths[rows] + share * motions[rows] + TOUCHING)
+            fails = depth > TOUCHING + depths[rows] * (1 - share) + SINK_SHARE * share * size[rows]
+            fails |= enters[rows] & self._candidates.interfere(state.relative[rows])
+            fails |= self._energy(part, state.take(rows)) > objective[rows]
+            rows, part = rows[fails], part.take(fails)
+            if not rows.size:
+                break
+            shares[rows] /= 2
+            state.poses[rows] = _halfway(before.poses[rows], state.poses[rows], self._centres)
+            state.relative[rows] = self._related(state.poses[rows], part.deviations)
+        # Places show themselves once bodies have moved a little, unless only the complete test sees what is in the way.
+        rows = rows[enters[rows] & self._candidates.interfere(state.relative[rows])]
+        state.poses[rows], state.relative[rows] = before.poses[rows], before.relative[rows]
+        return shares < 1
+
+    def lift(
+        self, poses: Float[Array, "n part 12"], relative: Float[Array, "n pair 12"], deviations: Float[Array, "n contributor"]
+    ) -> tuple[Float[Array, "n part 12"], Float[Array, "n pair 12"]]:
+        """Return poses, and X_RM, at which bodies that lie in each other are moved apart, where they are narrowest."""
+        poses, relative = poses.copy(), relative.copy()
+        for _ in range(MAX_LIFTS):
+            is_free = True
+            for k, guard in self._candidates.guards.items():
+                rows = np.flatnonzero(guard.interferes(relative[:, k]))
+                if not rows.size:
+                    continue
+                is_free, way, pair = False, guard.ways_out(relative[rows, k]), self._pairs[k]
+                assert pair.reference is not None
+                sides = self._group.position(pair.moving), self._group.position(pair.reference)
+                normals = np.einsum("nij,nj->ni", pose.rotation(poses[rows, sides[1]]), way.normals)
+                shift = LIFT_FACTOR * way.widths[:, None] * normals
+                movers = [self._group.mobilities[side].movers for side in sides]
+                own = [set(movers[0]) - set(movers[1]), set(movers[1]) - set(movers[0])]
+                for sense, moved in zip((1, -1), own, strict=True):
+                    for part, mobility in enumerate(self._group.mobilities):
+                        if moved & set(mobility.movers):
+                            poses[rows, part, 9:] += sense * shift / (2 if all(own) else 1)
+                relative[rows] = self._related(poses[rows], deviations[rows])
+            if is_free:
+                break
+        return poses, relative
+
+    def _related(self, poses: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        return self._relate(poses=poses, deviations=deviations).reshape(len(poses), len(self._pairs), -1)
+
+    def _depths(self, task: Task, relative: np.ndarray, deepest: np.ndarray) -> np.ndarray:
+        """Return the largest penetration (n,) [mm] that places show, of those not deeper than `deepest` (n,) [mm]."""
+        scans = self._candidates.scans(relative, task.deviations, start=FREE_WHERE_RAW, deepest=deepest)
+        return np.maximum(-min_gaps(scans, relative, task.deviations).min(axis=1), 0)
+
+
+def _halfway(
+    first: Float[Array, "n part 12"], second: Float[Array, "n part 12"], centres: Float[Array, "part 3"]
+) -> Float[Array, "n part 12"]:
+    """Return poses halfway between two poses, where `centres` of parts move straight."""
+    mean = (first + second) / 2
+    U, _, Vt = np.linalg.svd(pose.rotation(mean))
+    R = U @ Vt
+    return pose.pose(R, np.einsum("npij,pj->npi", pose.rotation(mean) - R, centres) + pose.translation(mean))
