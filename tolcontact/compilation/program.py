@@ -239,11 +239,8 @@ def _allowed_depths(
         if pair.reference is not None and pair.moving_face is not None:
             bodies = ordered(pair.moving, pair.reference)
             is_free = pair.is_springy or pair.has_form
-            planes = (
-                PLANES_FACTOR * trials[k].allowed
-                if k in trials and k not in meetings and np.isfinite(trials[k].allowed)
-                else 0.0
-            )
+            is_fixed = k in trials and k not in meetings and np.isfinite(trials[k].allowed)
+            planes = PLANES_FACTOR * trials[k].allowed if is_fixed else 0.0
             rounding = 0.0 if k in meetings else pair.coordinate_error
             depths[bodies] = max(depths.get(bodies, 0.0), np.inf if is_free else planes + rounding)
     return depths | dict.fromkeys(_meant_overlaps(nominal), np.inf)

@@ -1,88 +1,27 @@
 """The contact points of a group's pairs: all of them, those that may carry, and where they are at other poses."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import KDTree
 
-from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
 from tolcontact.contact.bounded_scan import BoundedScan, bounded_scan
 from tolcontact.contact.guard import GUARD, Guard
+from tolcontact.contact.projected_scan import half_spacing, project
 from tolcontact.contact.raised_scan import RaisedScan, raised_scan
 from tolcontact.contact.scan import PairScan, RoundScan, Scan, changing, fixed, min_gaps, pair_scan
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.starts import FIRST, Start
 from tolcontact.contact.state import State, Task
-from tolcontact.discretization import FIRST_POINT, ContactPoints
+from tolcontact.discretization import FIRST_POINT
 from tolcontact.geometry.height_kernel import FIRST_PLACE
 from tolcontact.geometry.meeting import NEARNESS, Meeting
 from tolcontact.geometry.parting import Parting, parting
 from tolcontact.interference.watch import ALLOWED_SHARE
 from tolcontact.mechanics import curved_pairs
-
-
-@dataclass(frozen=True, eq=False)
-class ProjectedScan(PairScan):
-    """A scan in which every realization has feet of its own.
-
-    feet, normals    (realization, point, 3): P^r and n^r, nominal
-    over             (realization, point): points that do not overhang the rim of the reference face; the others cannot touch
-    """
-
-    feet: Float[Array, "realization point 3"]
-    normals: Float[Array, "realization point 3"]
-    over: Bool[Array, "realization point"]
-
-    def take(self, rows: np.ndarray) -> "ProjectedScan":
-        return replace(self, feet=self.feet[rows], normals=self.normals[rows], over=self.over[rows])
-
-    def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        offset = pose.apply(relative, self.P_m) - self.feet
-        n = self.normals
-        gaps = n[..., 0] * offset[..., 0] + n[..., 1] * offset[..., 1] + n[..., 2] * offset[..., 2]
-        if self.columns.size:
-            gaps -= self.offsets.heights(deviations, np.broadcast_to(np.arange(len(self.P_m)), gaps.shape))
-        return np.where(self.over, gaps, np.inf)
-
-    def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        feet, normals = (np.take_along_axis(values, points[..., None], axis=1) for values in (self.feet, self.normals))
-        if self.columns.size:
-            feet = feet + self.offsets.heights(deviations, points)[..., None] * normals
-        return self.P_m[points], feet, normals
-
-
-def half_spacing(scan: PairScan) -> float:
-    """Return half the usual distance of two contact points [mm]: how far each represents its surroundings."""
-    if len(scan.P_m) < 2:
-        return 0.0
-    distance, _ = KDTree(scan.P_m).query(scan.P_m, k=2)
-    return float(np.median(distance[:, 1])) / 2
-
-
-def project(scan: PairScan, pair: ContactPoints, relative: Float[Array, "realization 12"], margin: float) -> PairScan:
-    """Return the scan of a pair with every contact point projected again at X_RM (realization, 12). Supports stay as they are.
-
-    Points that overhang the rim by up to `margin` [mm] still count: else points at the rim would come and go with every step.
-    """
-    surface = pair.reference_face
-    if surface is None:
-        return scan
-    shape = (len(relative), len(scan.P_m), 3)
-    feet, normals, over = surface.project(pose.apply(relative, scan.P_m).reshape(-1, 3), margin=margin)
-    if pair.coordinate_error:
-        feet = feet - pair.coordinate_error * normals
-    return ProjectedScan(
-        **{name: getattr(scan, name) for name in PairScan.__dataclass_fields__},
-        feet=feet.reshape(shape),
-        normals=normals.reshape(shape),
-        over=over.reshape(shape[:2]),
-    )
-
 
 MAX_CLUSTERS = 6
 FORM_CLUSTERS = 8  # of faces with form, which touch at more places
@@ -201,15 +140,8 @@ class Candidates:
         scans = list(self._carrying_scans)
         for k in self._with_form:
             if k not in self.bounded and not self._method.is_iterated:
-                former, has_minima = earlier[k] if earlier else None, k in self._with_minima
-                scan = former if isinstance(former, RaisedScan) else raised_scan(fixed(scans[k]), deviations, always=has_minima)
-                if has_minima and isinstance(scan, RaisedScan):
-                    is_raw = not isinstance(former, RaisedScan)
-                    in_steps = len(slots) > 0
-                    scan = scan.with_minima(
-                        self._pairs[k], relative[:, k], deviations, self._bulge, is_raw=is_raw, in_steps=in_steps
-                    )
-                scans[k] = scan
+                former = earlier[k] if earlier else None
+                scans[k] = self._raised(k, fixed(scans[k]), former, relative[:, k], deviations, in_steps=len(slots) > 0)
         if projected or self._method.is_iterated:
             for k in self._margins:
                 scans[k] = self.projected(k, relative[:, k])
@@ -242,6 +174,16 @@ class Candidates:
                 limits,
             )
         return scans
+
+    def _raised(
+        self, k: int, scan: PairScan, former: Scan | None, X_RM: np.ndarray, deviations: np.ndarray, *, in_steps: bool
+    ) -> RaisedScan | PairScan:
+        """Return the scan of a pair with form at X_RM (n, 12), with minima of the gap between its points."""
+        is_raw = not isinstance(former, RaisedScan)
+        raised = former if isinstance(former, RaisedScan) else raised_scan(scan, deviations, always=k in self._with_minima)
+        if k in self._with_minima and isinstance(raised, RaisedScan):
+            return raised.with_minima(self._pairs[k], X_RM, deviations, self._bulge, is_raw=is_raw, in_steps=in_steps)
+        return raised
 
     @property
     def change(self) -> bool:

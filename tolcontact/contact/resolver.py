@@ -205,11 +205,18 @@ class ContactResolver:
         rows = np.flatnonzero((state.rank > 0) | ~self._limits.is_near(task, state))
         for start in OTHER_STARTS_CURVED if self._candidates.curved else OTHER_STARTS:
             rows = self._try_again(task, state, rows, start)
-        rows = np.flatnonzero(state.rank == NO_ANSWER)
+        rows = self._without_answer(state)
         for start in PARTED if rows.size and self._candidates.partings else ():
-            rows = self._try_again(task, state, rows, start)
+            self._try_again(task, state, rows, start)
+            rows = self._without_answer(state)
         for start in FREE if self._candidates.are_guarded else ():
             self._try_again(task, state, np.flatnonzero(state.rank > 0), start)
+
+    def _without_answer(self, state: State) -> Int[Array, " k"]:
+        """Return the realizations (k,) without an answer in which bodies are apart; one that is merely too far away is one."""
+        rows = np.flatnonzero(state.rank > 0)
+        is_apart = state.solved[rows] & ~state.in_conflict[rows] & ~self._candidates.interfere(state.relative[rows])
+        return rows[~is_apart]
 
     def _try_again(self, task: Task, state: State, rows: Int[Array, " n"], start: Start) -> Int[Array, " left"]:
         """Try some realizations (n,) again and keep the better answer. Return those to be tried further (left,)."""
