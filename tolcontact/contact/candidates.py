@@ -134,8 +134,7 @@ class Candidates:
         is parted, places hold convex bodies apart only in the direction in which they part best (see Parting). If it is free,
         places deeper than `deepest` (realization,) [mm], FREE_DEPTH by default, are on the far side of a body and do not count.
         Its steps know places a little beside their edges: a corner in a valley then meets both sides of it.
-        With `projected`, points against curved faces are projected again in any case. `earlier` are scans of the same
-        realizations, whose heights are summed up.
+        With `projected`, points against curved faces are projected, too. `earlier` are scans with the sums of heights.
         """
         scans = list(self._carrying_scans)
         for k in self._with_form:

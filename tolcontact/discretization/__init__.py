@@ -96,8 +96,9 @@ from tolcontact.discretization.counted_points import counted_points
 from tolcontact.discretization.discretizing import discretize
 from tolcontact.discretization.form_places import FIRST_POINT, raised_places, rim_points
 from tolcontact.discretization.locators import Locators
-from tolcontact.discretization.nominal import ContactPoints, Nominal, Offsets
+from tolcontact.discretization.nominal import ContactPoints, Nominal
 from tolcontact.discretization.nominal_part import NominalPart
+from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_points import RoundPoint, RoundPoints
 
 __all__ = [

@@ -1,6 +1,5 @@
 """The nominal model: every declared thing with its numbers, in the nominal assembly frame W. Lengths in mm."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -14,6 +13,7 @@ from tolcontact.discretization.form_points import COVER_SHARE, form_lengths, for
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.measured_geometry import NominalMeasurement
 from tolcontact.discretization.nominal_part import NominalPart
+from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.pair_form import PairForm
 from tolcontact.discretization.plane_minima import PlaneMinima
 from tolcontact.discretization.point_weights import point_weights
@@ -30,43 +30,6 @@ EVERY_POINT = slice(None)
 RIM_REACH = 0.1  # of the size of the moving face: how far from it, nominally, rim points of the other face count
 FITTED_ERRORS = 2.0  # errors of coordinates, by which triangles lie beyond the planes that are fitted to them, and inset
 GAPS_TOGETHER = 1 << 20  # that are computed at once
-
-
-@dataclass(frozen=True, eq=False)
-class Offsets:
-    """Heights of the contact points of a pair along n^r, linear in the deviations. Gaps are smaller by these heights.
-
-    columns   (contributor,): columns of the deviations
-    matrix    (contributor, point): height of each point for a deviation of 1
-    """
-
-    columns: np.ndarray
-    matrix: np.ndarray
-
-    @classmethod
-    def none(cls, points: int) -> "Offsets":
-        """Return the offsets of points whose heights do not vary."""
-        return cls(np.zeros(0, dtype=int), np.zeros((0, points)))
-
-    @classmethod
-    def joined(cls, terms: "Sequence[Offsets]", points: int) -> "Offsets":
-        """Return the sum of several offsets of the same points."""
-        columns = np.unique(np.concatenate([np.zeros(0, dtype=int), *(term.columns for term in terms)]))
-        matrix = np.zeros((len(columns), points))
-        for term in terms:
-            matrix[np.searchsorted(columns, term.columns)] += term.matrix
-        return cls(columns, matrix)
-
-    def take(self, points: np.ndarray) -> "Offsets":
-        """Return the offsets of some points."""
-        return Offsets(self.columns, self.matrix[:, points])
-
-    def heights(self, deviations: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Return heights (row, slot) [mm] of `points` (row, slot) for deviations (row, column), summed up in a fixed order."""
-        heights = np.zeros(points.shape)
-        for column, row in zip(self.columns, self.matrix, strict=True):
-            heights += deviations[:, column, None] * row[points]
-        return heights
 
 
 @dataclass(frozen=True, eq=False)
