@@ -10,9 +10,9 @@ from tolcontact.contact import bounded_kernel
 from tolcontact.contact.guard import GUARD, Guard
 from tolcontact.contact.scan import Deepest, Scan, SlotScan
 from tolcontact.discretization import FIRST_POINT, ContactPoints, raised_places
-from tolcontact.geometry.height_kernel import FIRST_PLACE
 from tolcontact.geometry.kernel import CORNER_ON_FACET, INSIDE
 from tolcontact.geometry.meeting import NEARNESS, Meeting, Places
+from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.parting import Parting
 from tolcontact.interference import WayOut
 

@@ -17,8 +17,8 @@ from tolcontact.contact.slots import Slots
 from tolcontact.contact.starts import FIRST, Start
 from tolcontact.contact.state import State, Task
 from tolcontact.discretization import FIRST_POINT
-from tolcontact.geometry.height_kernel import FIRST_PLACE
 from tolcontact.geometry.meeting import NEARNESS, Meeting
+from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.parting import Parting, parting
 from tolcontact.interference.watch import ALLOWED_SHARE
 from tolcontact.mechanics import curved_pairs

@@ -14,7 +14,7 @@ from tolcontact.contact import bounded_kernel, kernel, raised_kernel
 from tolcontact.contact.scan import CompiledScan, Deepest, PairScan
 from tolcontact.discretization import ContactPoints
 from tolcontact.discretization.plane_minima import with_former
-from tolcontact.geometry.height_kernel import FIRST_PLACE
+from tolcontact.geometry.minima_kernel import FIRST_PLACE
 
 MIN_HEIGHTS = 4  # that vary independently: fewer are as quick in every pass
 

@@ -116,12 +116,7 @@ def repeat(
         if not len(unsettled):
             return
         if candidates.change:
-            poses, task, slots = unsettled.state.relative, unsettled.task, unsettled.state.slots
-            at_rest = (size[moves] < NEARLY_AT_REST) & kind.sharp
-            scans = candidates.scans(
-                poses, task.deviations, slots=slots, width=kind.width, at_rest=at_rest, earlier=task.scans, start=start
-            )
-            unsettled.task = replace(task, scans=scans)
+            _find_places(candidates, unsettled, kind.width, (size[moves] < NEARLY_AT_REST) & kind.sharp, start)
         if kind.newton:
             penetration = _true_penetration(unsettled.task, unsettled.state)
             progress = progress or Progress.start(unsettled.state)
@@ -132,6 +127,13 @@ def repeat(
                 asleep, unrest, progress = asleep[~ends], unrest[~ends], progress.take(~ends)
                 trail = [poses[~ends] for poses in trail]
     _end(unsettled, progress, unrest, np.ones(len(unsettled), dtype=bool))
+
+
+def _find_places(candidates: Candidates, unsettled: Unsettled, width: float, at_rest: np.ndarray, start: Start) -> None:
+    """Find the places of contact at the poses of unsettled realizations."""
+    poses, task, slots = unsettled.state.relative, unsettled.task, unsettled.state.slots
+    scans = candidates.scans(poses, task.deviations, slots=slots, width=width, at_rest=at_rest, earlier=task.scans, start=start)
+    unsettled.task = replace(task, scans=scans)
 
 
 def _end(unsettled: Unsettled, progress: Progress | None, unrest: Float[Array, " n"], ends: Bool[Array, " n"]) -> None:

@@ -14,8 +14,8 @@ from tolcontact.arrays import Array, Float, Int
 from tolcontact.discretization.nominal import ContactPoints
 from tolcontact.discretization.plane_minima import with_former
 from tolcontact.geometry import region_kernel
-from tolcontact.geometry.height_kernel import FIRST_PLACE
 from tolcontact.geometry.meeting import NEARNESS, Meeting, Places
+from tolcontact.geometry.minima_kernel import FIRST_PLACE
 
 FIRST_POINT = 1 << 40  # number of the first contact point among the labels of places
 EXACT_SHARE = 0.1  # of how far the gap may fall between points: heights in smaller gaps are exact, others those of splines

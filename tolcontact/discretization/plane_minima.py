@@ -15,11 +15,12 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.features import FaceDeviation, FormField
-from tolcontact.geometry import height_kernel
+from tolcontact.geometry import height_kernel, minima_kernel
 from tolcontact.geometry.edges import on_rim
 from tolcontact.geometry.face_frame import face_frame
-from tolcontact.geometry.height_kernel import FIRST_PLACE, HeightSums, HeightTable, Plane
+from tolcontact.geometry.height_kernel import HeightSums, HeightTable, Plane
 from tolcontact.geometry.meeting import Places
+from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.surface import RIM_TOLERANCE, Surface
 
 STEP_SHARE = 1 / 10  # of the length over which heights change: the distance of two nodes
@@ -151,9 +152,9 @@ class PlaneMinima:
         points = np.ascontiguousarray(P_m)
         starts, labels = (np.empty((len(X_RM), count), dtype=np.int64) for count in (MAX_STARTS, MAX_MINIMA))
         distance = STEP_DISTANCE if in_steps and self._is_smooth else START_DISTANCE
-        height_kernel.choose_starts(points, gaps, limits, distance * self.reach, starts)
+        minima_kernel.choose_starts(points, gaps, limits, distance * self.reach, starts)
         inputs = self._inputs(X_RM, deviations)
-        height_kernel.find_minima(*inputs, grown, points, starts, self.reach, self.slack, depth, labels)
+        minima_kernel.find_minima(*inputs, grown, points, starts, self.reach, self.slack, depth, labels)
         return labels
 
     def at(
@@ -163,14 +164,14 @@ class PlaneMinima:
         P_m, P_r = np.zeros((2, *labels.shape, 3))
         gaps, heights = np.empty((2, *labels.shape))
         inputs = self._inputs(X_RM, deviations)
-        height_kernel.write_places(*inputs, np.ascontiguousarray(labels), self.slack, P_m, P_r, gaps, heights)
+        minima_kernel.write_places(*inputs, np.ascontiguousarray(labels), self.slack, P_m, P_r, gaps, heights)
         n_r = np.broadcast_to(self.reference.normal, P_m.shape)
         return Places(np.where(np.isfinite(gaps), labels, -1), gaps, P_m, P_r, n_r), heights
 
     def points(self, labels: Int[Array, " place"]) -> Float[Array, "place 3"]:
         """Return the nominal places [mm] of labels on the moving plane."""
         plane, cell = self.moving, labels - FIRST_PLACE
-        shares = (np.stack([cell // height_kernel.CELLS, cell % height_kernel.CELLS], axis=-1) + 0.5) / height_kernel.CELLS
+        shares = (np.stack([cell // minima_kernel.CELLS, cell % height_kernel.CELLS], axis=-1) + 0.5) / height_kernel.CELLS
         return np.asarray(plane.origin + (plane.corners[0] + shares * (plane.corners[1] - plane.corners[0])) @ plane.axes)
 
     def _inputs(self, X_RM: np.ndarray, deviations: np.ndarray) -> tuple[Plane, Plane, np.ndarray, HeightSums, HeightSums]:
@@ -190,7 +191,7 @@ class PlaneMinima:
 def with_former(labels: Int[Array, "n a"], former: Int[Array, "n b"]) -> Int[Array, "n c"]:
     """Return labels of minima, and after them the labels of former ones, as many as fit; -1 for none."""
     joined = np.empty((len(labels), min(labels.shape[1] + former.shape[1], MAX_FORMER)), dtype=np.int64)
-    width = height_kernel.join(labels, np.ascontiguousarray(former), joined)
+    width = minima_kernel.join(labels, np.ascontiguousarray(former), joined)
     return np.ascontiguousarray(joined[:, :width])
 
 
