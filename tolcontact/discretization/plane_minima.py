@@ -171,7 +171,7 @@ class PlaneMinima:
     def points(self, labels: Int[Array, " place"]) -> Float[Array, "place 3"]:
         """Return the nominal places [mm] of labels on the moving plane."""
         plane, cell = self.moving, labels - FIRST_PLACE
-        shares = (np.stack([cell // minima_kernel.CELLS, cell % height_kernel.CELLS], axis=-1) + 0.5) / height_kernel.CELLS
+        shares = (np.stack([cell // minima_kernel.CELLS, cell % minima_kernel.CELLS], axis=-1) + 0.5) / minima_kernel.CELLS
         return np.asarray(plane.origin + (plane.corners[0] + shares * (plane.corners[1] - plane.corners[0])) @ plane.axes)
 
     def _inputs(self, X_RM: np.ndarray, deviations: np.ndarray) -> tuple[Plane, Plane, np.ndarray, HeightSums, HeightSums]:
