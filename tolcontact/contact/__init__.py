@@ -40,6 +40,11 @@ the raw pose first end where they are rounding, since rounding may grow from the
 through planes at fixed points. If two starts end in the same conflict, there is no third. The best solution is kept; `starts`
 counts the starts.
 
+Where faces end (see below), steps may go to and fro between two sets of places, or ask for contradictory ones, though bodies
+come free if one is lifted a little. Two more starts are tried then. Convex bodies are held apart only along the direction in
+which they part best. Other bodies are first moved apart, each time along the direction in which what they share is narrowest,
+until they lie in each other nowhere; steps from there are halved until they neither enter each other nor raise the objective.
+
 ## Contact search
 
 With `search="fixed"` contact points are projected once, in the nominal state; `search="iterated"` projects them again at the

@@ -36,12 +36,15 @@ three times the error of fixed planes where a pair keeps its contact points (see
 
 ## What is covered
 
-- Closed bodies, as their triangles. A body that is not closed has no inside and is not tested.
+- Closed bodies, as their triangles. A body that is not closed has no inside and is not tested. One that touches itself, along
+  an edge or in a corner, is closed. Around such a corner planes may exclude each other, so that no vertex lies inside all of
+  them: such bodies may count as in each other nominally where they only touch.
 - Faces of features move as they vary, with vertices on the planes where they meet; at an edge of two such faces the body ends
   where both planes meet. Forms are not part of a solid: planes with form are compared at the minima of
   their gap instead (see tolcontact.contact), round faces with form on their surfaces.
 - Triangles of round faces stand in the hollow of a bore, and inside a shaft. The first are moved out of the hollow; what lies
-  between the triangles of a shaft and its surface is covered by the gaps of round faces, and checked on surfaces.
+  between the triangles of a shaft and its surface is covered by the gaps of round faces, and checked on surfaces. So are two
+  round faces of one contact pair, a pin in its bore: their triangles are not compared with each other.
 - Bodies whose files round coordinates are smaller by that error from the outset, with flat planes (see `tolcontact.geometry`).
 - A body that passed through another one and is on its far side is apart.
 - Springs let faces into each other; such pairs are not tested.
