@@ -25,6 +25,7 @@ from tolcontact.mechanics import curved_pairs
 
 MAX_CLUSTERS = 6
 FORM_CLUSTERS = 8  # of faces with form, which touch at more places
+APART = 2.0  # times the error of planes beyond their edges: bodies that carry load are no farther apart
 EDGE_SHARE = 1 / 4000  # of the smallest tolerance range: error of planes beyond their edges, in steps
 BULGE_SHARE = 1 / 2500  # of the same: depth to which planes with form may lie in each other between contact points
 MIN_BULGE = 1e-7  # mm
@@ -223,6 +224,14 @@ class Candidates:
             if not any(pair.deviating) and not guard.neighbours.varies:
                 partings[k] = parting(*(self._bodies[part] for part in (pair.moving, pair.reference)))
         return {k: found for k, found in partings.items() if found is not None}
+
+    def are_apart(self, state: State) -> Bool[Array, " n"]:
+        """Return whether bodies of a bounded pair that carry load touch nowhere (n,)."""
+        found = np.zeros(len(state), dtype=bool)
+        for k in self.bounded:
+            if not self._pairs[k].has_form:  # whose minima are not among the gaps
+                found |= state.loaded[:, self._spans[k]].any(axis=1) & (state.gap_min[:, k] > APART * self._edge_error)
+        return found
 
     def hold(self, task: Task, state: State, start: Start) -> Bool[Array, " n"]:
         """Return whether the places that carry are as near to their faces as they may be in an answer (n,)."""

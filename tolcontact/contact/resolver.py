@@ -171,6 +171,7 @@ class ContactResolver:
         state.doubtful[:] = self._limits.is_doubtful(task, state, self._candidates)
         certified = np.flatnonzero(state.rank == 0)
         state.doubtful[certified] = self._candidates.interfere(state.relative[certified])
+        state.doubtful[:] |= self._candidates.are_apart(state) & (state.rank == 0)
         state.doubtful[:] |= self._candidates.bulge(task.scans, state.relative) & (state.rank == 0)
         state.doubtful[:] |= self._limits.lie_in_form(task, state)
         if not projected:
