@@ -181,7 +181,7 @@ def test_archives_of_the_first_format_are_read_and_not_resumed(good, tmp_path):
 
 def test_a_newer_format_is_named(good, tmp_path):
     make(good, tmp_path / "newer.nc", "format is newer")
-    with pytest.raises(ArchiveError, match="has format 99; this version of tolcontact reads formats up to 7"):
+    with pytest.raises(ArchiveError, match="has format 99; this version of tolcontact reads formats up to 8"):
         tc.open_archive(tmp_path / "newer.nc")
 
 

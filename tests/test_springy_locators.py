@@ -93,7 +93,7 @@ def test_a_stiffness_in_an_older_archive_lets_nothing_give_way(tmp_path):
     path = tmp_path / "bar.nc"
     tc.run(bar_on_springs(), samples=2, out=path)
     with tc.open_archive(path) as tree:
-        assert tree.attrs["format"] == 7
+        assert tree.attrs["format"] == 8
         document = json.loads(str(tree["model/declaration"].values))
         for locator in document["locations"][0]["scheme"]:
             locator.pop("springy", None)

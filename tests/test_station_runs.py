@@ -30,7 +30,7 @@ def test_an_archive_holds_every_station(archive):
     program = tc.build(cases.rail(), solver="daqp")
     (block,) = tc.simulate_blocks(program, samples=300, seed=3)
     with xr.open_datatree(archive) as results:
-        assert results.attrs["format"] == 6
+        assert results.attrs["format"] == 8
         assert results.measure_station.values.tolist() == ["weld", "check"]
         assert results.pair_station.values.tolist() == ["weld"]
         assert results.part_station.values.tolist() == ["check"] * 3

@@ -62,7 +62,8 @@ class FreeSteps:
 
     def _hold_back(self, task: Task, before: State, state: State, size: Float[Array, " n"]) -> Bool[Array, " n"]:
         """Halve steps until no body enters another one and the objective is lower; return which are short (n,)."""
-        shares, rows = np.ones(len(task)), np.arange(len(task))
+        shares = np.ones(len(task))
+        rows = np.flatnonzero(np.isfinite(before.poses).all(axis=(1, 2)) & np.isfinite(state.poses).all(axis=(1, 2)))
         depths = self._depths(task, before.relative, np.full(len(task), FREE_DEPTH))
         enters = ~self._candidates.interfere(before.relative)
         objective = self._energy(task, before) * (1 + GAIN_SHARE)

@@ -208,15 +208,14 @@ class ContactResolver:
             rows = self._try_again(task, state, rows, start)
         rows = self._without_answer(state)
         for start in PARTED if rows.size and self._candidates.partings else ():
-            self._try_again(task, state, rows, start)
-            rows = self._without_answer(state)
+            rows = self._try_again(task, state, rows, start)
         for start in FREE if self._candidates.are_guarded else ():
             self._try_again(task, state, np.flatnonzero(state.rank > 0), start)
 
     def _without_answer(self, state: State) -> Int[Array, " k"]:
-        """Return the realizations (k,) without an answer in which bodies are apart; one that is merely too far away is one."""
-        rows = np.flatnonzero(state.rank > 0)
-        is_apart = state.solved[rows] & ~state.in_conflict[rows] & ~self._candidates.interfere(state.relative[rows])
+        """Return the realizations (k,) without an answer in which bodies are apart; one that is far away counts as one."""
+        rows = np.flatnonzero(state.rank == NO_ANSWER)
+        is_apart = state.solved[rows] & ~self._candidates.interfere(state.relative[rows])
         return rows[~is_apart]
 
     def _try_again(self, task: Task, state: State, rows: Int[Array, " n"], start: Start) -> Int[Array, " left"]:

@@ -45,12 +45,13 @@ def _deviating_faces(
             corners, facets = body.vertices[body.faces[triangles]].reshape(-1, 3), body.normals[triangles].repeat(3, axis=0)
             normals = facets.copy()
             for piece in placed.pieces:
-                if not isinstance(piece.surface, Plane):
+                if not (piece.is_hollow or isinstance(piece.surface, Plane)):
                     rows = np.isin(triangles, _triangles(surface_of_body, piece.face)).repeat(3)
                     _, slope = piece.surface.distance(corners[rows])
                     normals[rows] = slope * np.sign((slope * facets[rows]).sum(axis=1, keepdims=True))
             motion = np.hstack([normals, np.cross(corners - face.centre, normals)]) @ face.twist + face.height
-            motion *= (normals * facets).sum(axis=1, keepdims=True)  # corners of round faces move along the normals of these
+            # Corners of a shaft stay on it; the facets of a bore stay behind it, in their middle, too.
+            motion *= (normals * facets).sum(axis=1, keepdims=True)
             yield triangles, face.columns[columns], motion[:, columns].reshape(len(triangles), 3, -1)
 
 
