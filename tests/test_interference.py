@@ -204,3 +204,16 @@ def test_blocks_that_touch_are_one_closed_body(at):
     cube = body(box((0, 0, 0), (3, 3, 3)))
     found = Neighbours(cube, deviating_solid(touching, [], np.zeros(len(touching.faces))), INSETS, 1.0).interfere(X)
     assert found.tolist() == [False, False, at == (10, 10, 0)]
+
+
+def test_facets_are_flat_or_known_not_to_be():
+    """A union whose smaller surface is not flat any more: its triangles are compared one by one."""
+    blocks = [box((0, 0, 0), (4, 4, 4)), box((2, 2, 2), (6, 6, 6)), box((-2, 1, 1), (5, 3, 3))]
+    union = trimesh.boolean.union(blocks, engine="manifold")
+    rng = np.random.default_rng(3)
+    post = box((-0.4, -0.4, -9), (0.4, 0.4, 9))
+    for turn in rng.normal(size=(4, 3)):
+        X = np.array([pose(shift, turn) for shift in rng.uniform(-3, 7, (200, 3))])
+        found = neighbours(post, union, 20.0).interfere(X)
+        expected = [any(common_ball(post, block, one) > 1e-3 for block in blocks) for one in X]
+        assert (found >= np.array(expected)).all() and found.sum() - np.sum(expected) <= 2

@@ -85,6 +85,8 @@ class BoundedScan(SlotScan):
         return found
 
     def moves(self, points: np.ndarray) -> np.ndarray:
+        if not len(self.meeting.kinds):
+            return np.zeros(points.shape, dtype=bool)
         at_ends = np.where(points < FIRST_POINT, points, 0)
         return (self.meeting.kinds[at_ends] == CORNER_ON_FACET) & (points < FIRST_POINT)
 

@@ -24,7 +24,7 @@ class Side(NamedTuple):
     edges       (e, 2), those nominally nearest to the other body first
     outward     (e, 3): sums of the outward normals of the facets that meet at each edge
     distances   (e,) [mm]: bounds from below of their nominal distances from it
-    facets      (f, 10): of each facet, triangles in one plane, its box (6), normal n and level n . x
+    facets      (f, 10): of each facet, triangles in one plane, its box (6), normal n and level n . x; NaN if it is not flat
     members, first_members   the triangles of each facet, as in a CSR matrix
     vertices_of_facets   (f, 3): three vertices of facets that deviations move, -1 for others
     starts, listed, reaches   the facets near each edge, as in a CSR matrix, the nearest first, with their nominal distances
@@ -206,7 +206,10 @@ def motion_of(X, bounds):  # type: ignore[no-untyped-def]
 
 @inlined_uncounted
 def _heights(side, k, f, p, q):  # type: ignore[no-untyped-def]
-    """Return heights of p and q over the plane of a facet in realization k: both 1 if their segment misses its box."""
+    """Return heights of p and q over the plane of a facet in realization k: both 1 if their segment misses its box.
+
+    Of facets that are not flat nothing is known: then they are 1 and -1.
+    """
     facets = side.facets
     if (
         facets[f, 0] > max(p[0], q[0]) or facets[f, 3] < min(p[0], q[0]) or facets[f, 1] > max(p[1], q[1])
@@ -218,16 +221,22 @@ def _heights(side, k, f, p, q):  # type: ignore[no-untyped-def]
         b, c = vertex(side, k, side.vertices_of_facets[f, 1]), vertex(side, k, side.vertices_of_facets[f, 2])
         n = cross(minus(b, a), minus(c, a))
         return dot(n, minus(p, a)), dot(n, minus(q, a))
+    if facets[f, 9] != facets[f, 9]:
+        return 1.0, -1.0
     n = (facets[f, 6], facets[f, 7], facets[f, 8])
     return dot(n, p) - facets[f, 9], dot(n, q) - facets[f, 9]
 
 
 @uncounted
-def _passes_facet(side, k, p, q, share, shares, senses):  # type: ignore[no-untyped-def]
-    """Return whether the segment from p to q passes a triangle near where it passes, at a share, the plane of a facet."""
-    x = along(p, share, minus(q, p))
-    margin = ROUNDED * (1.0 + max(abs(x[0]), abs(x[1]), abs(x[2])))
-    low, high = (x[0] - margin, x[1] - margin, x[2] - margin), (x[0] + margin, x[1] + margin, x[2] + margin)
+def _passes_facet(side, k, f, p, q, start, end, shares, senses):  # type: ignore[no-untyped-def]
+    """Return whether the segment from p to q, at heights `start` and `end` over a flat facet, passes a triangle near there."""
+    n = (side.facets[f, 6], side.facets[f, 7], side.facets[f, 8])
+    size = 1.0 + max(abs(p[0]), abs(p[1]), abs(p[2]), abs(q[0]), abs(q[1]), abs(q[2]))
+    margin, share = ROUNDED * size, start / (start - end)
+    spare = margin * math.sqrt(dot(n, n)) / abs(start - end)  # the flatter, the less it is known where
+    x, y = along(p, max(share - spare, 0.0), minus(q, p)), along(p, min(share + spare, 1.0), minus(q, p))
+    low = (min(x[0], y[0]) - margin, min(x[1], y[1]) - margin, min(x[2], y[2]) - margin)
+    high = (max(x[0], y[0]) + margin, max(x[1], y[1]) + margin, max(x[2], y[2]) + margin)
     return passes_in(side, k, low, high, p, q, shares, senses) > 0
 
 
@@ -255,7 +264,10 @@ def _passes_any(owner, target, k, X, is_forward, motion, shares, senses):  # typ
             if start * end <= 0.0 and start != end:
                 first, last = target.first_members[facet], target.first_members[facet + 1]
                 if last - first > MANY:
-                    if _passes_facet(target, k, p, q, start / (start - end), shares, senses):
+                    is_flat = target.facets[facet, 9] == target.facets[facet, 9]
+                    if is_flat and _passes_facet(target, k, facet, p, q, start, end, shares, senses):
+                        return True
+                    if not is_flat and passes(target, k, p, q, shares, senses) > 0:
                         return True
                     continue
                 for place in range(first, last):

@@ -43,6 +43,9 @@ class WayOut(NamedTuple):
     widths: Float[Array, " n"]
 
 
+FLAT = 1e-12  # of coordinates: how far corners of a facet may be from its plane
+
+
 @dataclass(frozen=True, eq=False)
 class Neighbours:
     """Two bodies, which count as a little smaller than they are.
@@ -152,7 +155,7 @@ def _side(
         outward=np.ascontiguousarray(solid.normals[solid.sides[order]].sum(axis=1)),
         distances=distances[order],
         facets=np.concatenate(
-            [_boxes_of_facets(body, corners.min(axis=1), corners.max(axis=1)), planes[body.first_of_facet]], axis=1
+            [_boxes_of_facets(body, corners.min(axis=1), corners.max(axis=1)), _planes_of_facets(body, corners, planes)], axis=1
         ),
         members=np.argsort(body.facet_of, kind="stable"),
         first_members=np.cumsum([0, *np.bincount(body.facet_of)]),
@@ -195,6 +198,20 @@ def _near_facets(edges: np.ndarray, tree: BoxTree, corners: np.ndarray, facets: 
     lists = lists._replace(listed=np.empty(count, dtype=np.int64), reaches=np.empty(count))
     near_kernel.near_facets(*boxes, tree, around, facets, reach, True, *lists)
     return lists
+
+
+def _planes_of_facets(body: DeviatingSolid, corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
+    """Return the planes (f, 4) of the facets; NaN where corners (t, 3, 3) of their triangles lie beside them.
+
+    Triangles in one plane are not in one any more where a vertex of a smaller body cannot lie on all planes around it.
+    """
+    of_facets = planes[body.first_of_facet]
+    n = of_facets[body.facet_of, None, :3]
+    heights = np.abs((n * corners).sum(axis=2) - of_facets[body.facet_of, None, 3]) / np.linalg.norm(n, axis=2)
+    largest = np.zeros(len(of_facets))
+    np.maximum.at(largest, body.facet_of, heights.max(axis=1))
+    size = float(np.abs(corners).max(initial=1.0))
+    return np.where(largest[:, None] > FLAT * size, np.nan, of_facets)
 
 
 def _boxes_of_facets(body: DeviatingSolid, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
