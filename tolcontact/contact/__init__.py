@@ -41,9 +41,11 @@ through planes at fixed points. If two starts end in the same conflict, there is
 counts the starts.
 
 Where faces end (see below), steps may go to and fro between two sets of places, or ask for contradictory ones, though bodies
-come free if one is lifted a little. Two more starts are tried then. Convex bodies are held apart only along the direction in
-which they part best. Other bodies are first moved apart, each time along the direction in which what they share is narrowest,
+come free if one is lifted a little. More starts are tried then. Convex bodies are held apart only along the direction in
+which they part best. All others are first moved apart, each time along the direction in which what they share is narrowest,
 until they lie in each other nowhere; steps from there are halved until they neither enter each other nor raise the objective.
+In solutions from such a start, places more than 0.001 mm deep are on the far side of a body and do not count; that bodies are
+apart is known from the complete test alone (see `tolcontact.interference`).
 
 ## Contact search
 
