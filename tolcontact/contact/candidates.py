@@ -172,6 +172,7 @@ class Candidates:
                 parting,
                 carried,
                 limits,
+                former,
             )
         return scans
 

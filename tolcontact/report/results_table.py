@@ -8,7 +8,7 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.labelled import Rows
-from tolcontact.report.figures import grouped, number, plain
+from tolcontact.report.figures import grouped, number, percent, plain
 from tolcontact.statistics.verdict import FAILS, UNDECIDED, Verdict, verdict
 
 PPM_BELOW = 0.01  # if all shares are smaller, the table states them in ppm
@@ -88,8 +88,8 @@ def _row(measure: Rows, summary: Rows) -> ResultRow:
         full_name(measure),
         str(measure["measure_units"].values),
         str(measure["measure_quantity"].values),
-        verdict_text(opinion),
-        None if opinion is None or opinion.word == UNDECIDED else opinion.word != FAILS,
+        verdict_text(opinion) + (reservation(summary) if opinion else ""),
+        None if opinion is None or opinion.word == UNDECIDED or reservation(summary) else opinion.word != FAILS,
         nominal,
         lower,
         upper,
@@ -121,6 +121,12 @@ def verdict_text(opinion: Verdict | None) -> str:
     return f"{UNDECIDED}: about {grouped(int(round(opinion.more, min(digits, 0))))} more realizations"
 
 
+def reservation(summary: Rows) -> str:
+    """Return what follows each verdict if parts without declared contact lie in each other; else ""."""
+    share = summary["clash_share"].values
+    return f"; but parts lie in each other in {percent(share)} of realizations" if share[0] > 0 else ""
+
+
 def full_name(measure: Rows) -> str:
     """Return the name of one measure of a summary, with its station if the assembly has stations."""
     name, station = str(measure[terms.MEASURE].values), terms.MEASURE_STATION.name
@@ -132,7 +138,7 @@ def verdict_lines(summary: Rows) -> Iterator[str]:
     for name in summary["measure"].values:
         measure = summary.sel(measure=name)
         if text := verdict_text(verdict_of(measure, summary.attrs["realizations"])):
-            yield f"{full_name(measure)}: {text}" + ("" if text.startswith(UNDECIDED) else " its limits")
+            yield f"{full_name(measure)}: {text}" + ("" if text.startswith(UNDECIDED) else " its limits") + reservation(summary)
 
 
 def overview_columns() -> list[str]:

@@ -60,10 +60,6 @@ def _sections(summary: Rows) -> Iterator[Text | FigureTable | Padding]:
     yield Text(f"{ESTIMATES_NOTE}.\nChanges are from the same draws.\n")
     yield FigureTable(overview_columns(), overview_rows(summary))
     yield from map(Text, verdict_lines(summary))
-    if (share := summary["clash_share"].values)[0] > 0:
-        yield Text(
-            f"verdicts do not hold in {percent(share)} of realizations: parts without contact lie in each other (see below)"
-        )
     for measure in summary["measure"].values:
         yield from _measure_section(summary.sel(measure=measure))
     magnitudes = int(summary["magnitude_realizations"])
