@@ -28,6 +28,7 @@ from tolcontact.contact.starts import (
     FREE,
     FREE_WHERE_RAW,
     GUARDED,
+    GUARDED_SMALL,
     OTHER_STARTS,
     OTHER_STARTS_CURVED,
     PARTED,
@@ -199,18 +200,21 @@ class ContactResolver:
         """
         if self._candidates.curved:
             self._try_again(task, state, np.flatnonzero(state.rank == NO_ANSWER), BALANCE)
-        doubtful = np.flatnonzero(state.doubtful)
-        rows = doubtful[self._candidates.interfere(state.relative[doubtful])]
-        for start in GUARDED:
-            rows = self._try_again(task, state, rows, start)
+        self._try_again(task, state, self._doubted_inside(state), GUARDED)
         rows = np.flatnonzero((state.rank > 0) | ~self._limits.is_near(task, state))
         for start in OTHER_STARTS_CURVED if self._candidates.curved else OTHER_STARTS:
             rows = self._try_again(task, state, rows, start)
+        self._try_again(task, state, self._doubted_inside(state), GUARDED_SMALL)
         rows = self._without_answer(state)
         for start in PARTED if rows.size and self._candidates.partings else ():
             rows = self._try_again(task, state, rows, start)
         for start in FREE if self._candidates.are_guarded else ():
             self._try_again(task, state, np.flatnonzero(state.rank > 0), start)
+
+    def _doubted_inside(self, state: State) -> Int[Array, " k"]:
+        """Return the realizations (k,) whose answers are doubtful, with bodies of a pair in each other."""
+        doubtful = np.flatnonzero(state.doubtful)
+        return doubtful[self._candidates.interfere(state.relative[doubtful])]
 
     def _without_answer(self, state: State) -> Int[Array, " k"]:
         """Return the realizations (k,) without an answer in which bodies are apart; one that is far away counts as one."""
