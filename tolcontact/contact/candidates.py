@@ -159,21 +159,9 @@ class Candidates:
             parting = self.partings.get(k) if start.parted else None
             limits = np.full(len(relative), FREE_DEPTH) if start.free and deepest is None else deepest
             scans[k] = bounded_scan(
-                scans[k],
-                self._pairs[k],
-                places,
-                relative[:, k],
-                deviations,
-                kept,
-                error,
-                nearness,
-                depth,
-                guard,
-                parting,
-                carried,
-                limits,
-                former,
-            )
+                scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness, depth, guard, parting,
+                carried, limits, former,
+            )  # fmt: skip
         return scans
 
     def _raised(
