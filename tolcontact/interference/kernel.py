@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.compiled import compiled, inlined_uncounted, uncounted
-from tolcontact.geometry.vector_kernel import along, cross, dot, minus, move, move_back, row, row_of
+from tolcontact.geometry.vector_kernel import along, cross, dot, minus, move, move_back, row, row_of, turn_back
 
 LEAF = 4
 MANY = 8  # triangles of a facet: of more, only those are looked at that lie where an edge passes their plane
@@ -293,3 +293,13 @@ def interfere(A, B, poses, interferes):  # type: ignore[no-untyped-def]
             or _holds(A, B, k, X, True, motion)
             or _holds(B, A, k, X, False, motion)
         )
+
+
+@compiled
+def relative(X_WA, X_WB, X_BA):  # type: ignore[no-untyped-def]
+    """Write the poses X_BA (n, 12) of A in the frame of B."""
+    for k in range(X_BA.shape[0]):
+        A, B = X_WA[k], X_WB[k]
+        for j in range(3):
+            X_BA[k, j], X_BA[k, 3 + j], X_BA[k, 6 + j] = turn_back(B, (A[j], A[3 + j], A[6 + j]))
+        X_BA[k, 9], X_BA[k, 10], X_BA[k, 11] = move_back(B, (A[9], A[10], A[11]))

@@ -8,11 +8,10 @@ import igl
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
-from tolcontact.interference import depth_kernel, kernel, near_kernel, parting_kernel
+from tolcontact.interference import depth_kernel, free_kernel, kernel, near_kernel, parting_kernel
 from tolcontact.interference.box_tree import BoxTree, box_tree, boxes_of_nodes
 from tolcontact.interference.deviating_solid import DeviatingSolid
-
-CORNERS = np.array(np.meshgrid(*[(0, 1)] * 3)).reshape(3, -1).T
+from tolcontact.interference.free_region import CORNERS, InsetBody, free_region
 
 
 class Interference(NamedTuple):
@@ -43,6 +42,7 @@ class WayOut(NamedTuple):
     widths: Float[Array, " n"]
 
 
+MIN_TRIANGLES = 100  # of two bodies: with fewer, a complete test takes no longer than a certificate
 FLAT = 1e-12  # of coordinates: how far corners of a facet may be from its plane
 
 
@@ -80,6 +80,23 @@ class Neighbours:
         """Whether faces of a body deviate."""
         return self.A.varies or self.B.varies
 
+    @cached_property
+    def _regions(self) -> list[free_kernel.Region]:
+        """Regions in which one body nominally lies, and which the other one does not reach; none if tests are quick anyway."""
+        A, B = (InsetBody(body, side.vertices) for body, side in zip((self.A, self.B), self._nominal, strict=True))
+        if len(self.A.solid.faces) + len(self.B.solid.faces) < MIN_TRIANGLES:
+            return []
+        regions = (free_region(B, A, is_forward=True), free_region(A, B, is_forward=False))
+        return [region for region in regions if region is not None]
+
+    def _are_apart(self, X_BA: np.ndarray, deviations: np.ndarray | None) -> np.ndarray:
+        """Return in which realizations (n,) one body certainly lies in a region that the other one does not reach."""
+        are_apart = np.zeros(len(X_BA), dtype=bool)
+        for region in self._regions:
+            outer, inner = (self.B, self.A) if region.is_forward else (self.A, self.B)
+            free_kernel.certify(region, X_BA, _columns(outer, X_BA, deviations), _columns(inner, X_BA, deviations), are_apart)
+        return are_apart
+
     def _sides(self, deviations: np.ndarray | None) -> tuple[kernel.Side, kernel.Side]:
         if deviations is None:
             return self._nominal
@@ -96,8 +113,12 @@ class Neighbours:
 
         Without `deviations`, faces are as they are nominally.
         """
-        interferes = np.zeros(len(X_BA), dtype=bool)
-        kernel.interfere(*self._sides(deviations), np.ascontiguousarray(X_BA), interferes)
+        X_BA, interferes = np.ascontiguousarray(X_BA), np.zeros(len(X_BA), dtype=bool)
+        rows = np.flatnonzero(~self._are_apart(X_BA, deviations))
+        if rows.size:
+            of_rows = np.zeros(rows.size, dtype=bool)
+            kernel.interfere(*self._sides(None if deviations is None else deviations[rows]), X_BA[rows], of_rows)
+            interferes[rows] = of_rows
         return interferes
 
     def ways_out(self, X_BA: Float[Array, "n 12"]) -> WayOut:
@@ -116,6 +137,13 @@ class Neighbours:
                 is_edge = (solid.edges == side.edges[-1 - triangles[row]]).all(axis=1)
                 triangles[row] = -1 - int(is_edge.argmax())
         return result._replace(depths=result.depths + sum(self.insets))
+
+
+def _columns(body: DeviatingSolid, poses: np.ndarray, deviations: np.ndarray | None) -> np.ndarray:
+    """Return the deviations (n, k) of a body at poses (n, 12): 0 if there are none."""
+    return (
+        np.zeros((len(poses), len(body.columns))) if deviations is None else np.ascontiguousarray(deviations[:, body.columns])
+    )
 
 
 def _side(

@@ -10,6 +10,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.discretization import Nominal
+from tolcontact.interference import kernel
 from tolcontact.interference.deviating_solid import DeviatingSolid
 from tolcontact.interference.neighbours import CORNERS, Interference, Neighbours
 from tolcontact.interference.part_solid import curved_triangles, part_solid
@@ -37,6 +38,13 @@ class Clash(NamedTuple):
 def ordered(first: int, second: int) -> tuple[int, int]:
     """Return the numbers of two bodies, the smaller one first."""
     return (first, second) if first < second else (second, first)
+
+
+def _relative(X_WA: Float[Array, "n 12"], X_WB: Float[Array, "n 12"]) -> Float[Array, "n 12"]:
+    """Return X_BA (n, 12) of bodies that rotate and do not stretch, so that no matrix need be inverted."""
+    X_BA = np.empty((len(X_WA), pose.ENTRIES))
+    kernel.relative(np.ascontiguousarray(X_WA), np.ascontiguousarray(X_WB), X_BA)
+    return X_BA
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +219,7 @@ class Watch:
             is_left_out = pair in left_out or (among is not None and pair not in among)
             neighbours = None if is_left_out else self.neighbours(pair)
             if neighbours is not None:
-                X_BA = pose.relative(poses[:, pair[0]], poses[:, pair[1]])
+                X_BA = _relative(poses[:, pair[0]], poses[:, pair[1]])
                 rows = np.flatnonzero(neighbours.interfere(X_BA, deviations) & is_finite)
                 if rows.size:
                     yield Clash(pair, rows)
@@ -223,4 +231,4 @@ class Watch:
         neighbours = self.neighbours(clash.pair)
         assert neighbours is not None
         i, j = clash.pair
-        return neighbours.measured(pose.relative(poses[clash.rows, i], poses[clash.rows, j]), deviations[clash.rows])
+        return neighbours.measured(_relative(poses[clash.rows, i], poses[clash.rows, j]), deviations[clash.rows])
