@@ -65,12 +65,6 @@ class DeviatingSolid:
         moved = np.flatnonzero(np.abs(shifts).max(axis=(1, 2), initial=0) > 0)
         return moved, shifts[moved]
 
-    def shifts(self, deviations: Float[Array, "n contributor"]) -> tuple[Int[Array, " m"], Float[Array, "n m 3"]]:
-        """Return the vertices (m,) that deviations (n, contributor) move, and how far (n, m, 3) [mm]."""
-        moved, motions = self.motions
-        shifts = deviations[:, self.columns] @ motions.reshape(-1, len(self.columns)).T
-        return moved, np.ascontiguousarray(shifts.reshape(len(deviations), len(moved), 3))
-
     def growth(self, deviations: Float[Array, "n contributor"]) -> float:
         """Return how far [mm] deviations (n, contributor) move any vertex at most."""
         if not self.varies:

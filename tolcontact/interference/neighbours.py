@@ -93,8 +93,11 @@ class Neighbours:
         """Return in which realizations (n,) one body certainly lies in a region that the other one does not reach."""
         are_apart = np.zeros(len(X_BA), dtype=bool)
         for region in self._regions:
-            outer, inner = (self.B, self.A) if region.is_forward else (self.A, self.B)
-            free_kernel.certify(region, X_BA, _columns(outer, X_BA, deviations), _columns(inner, X_BA, deviations), are_apart)
+            outer, inner = (
+                np.zeros((len(X_BA), len(body.columns))) if deviations is None else _columns(body, deviations)
+                for body in ((self.B, self.A) if region.is_forward else (self.A, self.B))
+            )
+            free_kernel.certify(region, X_BA, outer, inner, are_apart)
         return are_apart
 
     def _sides(self, deviations: np.ndarray | None) -> tuple[kernel.Side, kernel.Side]:
@@ -139,11 +142,9 @@ class Neighbours:
         return result._replace(depths=result.depths + sum(self.insets))
 
 
-def _columns(body: DeviatingSolid, poses: np.ndarray, deviations: np.ndarray | None) -> np.ndarray:
-    """Return the deviations (n, k) of a body at poses (n, 12): 0 if there are none."""
-    return (
-        np.zeros((len(poses), len(body.columns))) if deviations is None else np.ascontiguousarray(deviations[:, body.columns])
-    )
+def _columns(body: DeviatingSolid, deviations: np.ndarray) -> np.ndarray:
+    """Return the deviations (n, k) that move the faces of a body."""
+    return np.ascontiguousarray(deviations[:, body.columns])
 
 
 def _side(
@@ -176,7 +177,9 @@ def _side(
     return kernel.Side(
         vertices=vertices,
         moved=np.full(len(vertices), -1),
-        shifts=np.zeros((1, 0, 3)),
+        motions=np.zeros((0, 0, 3)),
+        deviations=np.zeros((1, 0)),
+        shifts=np.zeros((0, 3)),
         faces=solid.faces,
         planes=planes,
         edges=np.ascontiguousarray(solid.edges[order]),
@@ -193,7 +196,6 @@ def _side(
         triangles=tree.triangles,
         boxes=tree.boxes,
         next=tree.next,
-        spare=0.0,
         bounds=np.where(CORNERS == 0, vertices.min(axis=0), vertices.max(axis=0)),
         witnesses=witnesses,
         clearances=np.sqrt(squares[witnesses]),
@@ -253,20 +255,22 @@ def _boxes_of_facets(body: DeviatingSolid, lower: np.ndarray, upper: np.ndarray)
 
 def _deviating(side: kernel.Side, body: DeviatingSolid, deviations: np.ndarray) -> kernel.Side:
     """Return a body with the deviations (n, contributor) of some realizations."""
-    vertices, shifts = body.shifts(deviations)
+    (vertices, motions), of_body = body.motions, _columns(body, deviations)
     moved = side.moved.copy()
     moved[vertices] = np.arange(len(vertices))
+    extremes = motions * of_body.min(axis=0, initial=0), motions * of_body.max(axis=0, initial=0)
     low, high = side.vertices.copy(), side.vertices.copy()
-    low[vertices] += shifts.min(axis=0, initial=0)
-    high[vertices] += shifts.max(axis=0, initial=0)
+    low[vertices] += np.minimum(*extremes).sum(axis=2)
+    high[vertices] += np.maximum(*extremes).sum(axis=2)
     lower, upper = low[side.faces].min(axis=1), high[side.faces].max(axis=1)
     facets = side.facets.copy()
     facets[:, :6] = _boxes_of_facets(body, lower, upper)
     return side._replace(
         facets=facets,
         moved=moved,
-        shifts=shifts,
+        motions=np.ascontiguousarray(motions.swapaxes(1, 2)),
+        deviations=of_body,
+        shifts=np.zeros((len(vertices), 3)),
         planes=np.where(body.moves[:, None], np.nan, side.planes),
         boxes=boxes_of_nodes(side.triangles, lower, upper),
-        spare=float(np.linalg.norm(shifts, axis=2).max(initial=0)),
     )
