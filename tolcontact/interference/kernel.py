@@ -220,6 +220,15 @@ def motion_of(X, bounds):  # type: ignore[no-untyped-def]
 
 
 @inlined_uncounted
+def _misses(boxes, p, q):  # type: ignore[no-untyped-def]
+    """Return whether the box around p and q misses that of a whole body."""
+    return (
+        boxes[0, 0] > max(p[0], q[0]) or boxes[0, 3] < min(p[0], q[0]) or boxes[0, 1] > max(p[1], q[1])
+        or boxes[0, 4] < min(p[1], q[1]) or boxes[0, 2] > max(p[2], q[2]) or boxes[0, 5] < min(p[2], q[2])
+    )  # fmt: skip
+
+
+@inlined_uncounted
 def _heights(side, f, p, q):  # type: ignore[no-untyped-def]
     """Return heights of p and q over the plane of a facet: both 1 if their segment misses its box.
 
@@ -256,16 +265,33 @@ def _passes_facet(side, f, p, q, start, end, shares, senses):  # type: ignore[no
 
 
 @uncounted
+def _passes_listed(side, f, p, q, shares, senses):  # type: ignore[no-untyped-def]
+    """Return whether the segment from p to q passes a facet, or any other one near it if the facet is not flat."""
+    start, end = _heights(side, f, p, q)
+    if start * end > 0.0 or start == end:
+        return False
+    first, last = side.first_members[f], side.first_members[f + 1]
+    if last - first > MANY:
+        if side.facets[f, 9] == side.facets[f, 9]:
+            return _passes_facet(side, f, p, q, start, end, shares, senses)
+        return passes(side, p, q, shares, senses) > 0
+    for place in range(first, last):
+        _, sense = crossing(side, side.members[place], p, q)
+        if sense != 0:
+            return True
+    return False
+
+
+@uncounted
 def _passes_any(owner, target, X, is_forward, motion, shares, senses):  # type: ignore[no-untyped-def]
     """Return whether an edge of a body passes the surface of the other one."""
-    is_listed, boxes = motion <= owner.reach, target.boxes
+    is_listed = motion <= owner.reach
     for j in range(near_count(owner.distances, motion)):
+        if is_listed and (owner.starts[j] == owner.starts[j + 1] or owner.reaches[owner.starts[j]] > motion):
+            continue
         p, q = vertex(owner, owner.edges[j, 0]), vertex(owner, owner.edges[j, 1])
         p, q = (move(X, p), move(X, q)) if is_forward else (move_back(X, p), move_back(X, q))
-        if (
-            boxes[0, 0] > max(p[0], q[0]) or boxes[0, 3] < min(p[0], q[0]) or boxes[0, 1] > max(p[1], q[1])
-            or boxes[0, 4] < min(p[1], q[1]) or boxes[0, 2] > max(p[2], q[2]) or boxes[0, 5] < min(p[2], q[2])
-        ):  # fmt: skip
+        if _misses(target.boxes, p, q):
             continue
         if not is_listed:
             if passes(target, p, q, shares, senses) > 0:
@@ -274,21 +300,8 @@ def _passes_any(owner, target, X, is_forward, motion, shares, senses):  # type: 
         for m in range(owner.starts[j], owner.starts[j + 1]):
             if owner.reaches[m] > motion:
                 break
-            facet = owner.listed[m]
-            start, end = _heights(target, facet, p, q)
-            if start * end <= 0.0 and start != end:
-                first, last = target.first_members[facet], target.first_members[facet + 1]
-                if last - first > MANY:
-                    is_flat = target.facets[facet, 9] == target.facets[facet, 9]
-                    if is_flat and _passes_facet(target, facet, p, q, start, end, shares, senses):
-                        return True
-                    if not is_flat and passes(target, p, q, shares, senses) > 0:
-                        return True
-                    continue
-                for place in range(first, last):
-                    _, sense = crossing(target, target.members[place], p, q)
-                    if sense != 0:
-                        return True
+            if _passes_listed(target, owner.listed[m], p, q, shares, senses):
+                return True
     return False
 
 
