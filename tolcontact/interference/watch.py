@@ -174,6 +174,12 @@ class Watch:
         pairs = [pair for pair in self.nominal.pairs if pair.reference is not None and (pair.is_springy or pair.has_form)]
         return tuple(dict.fromkeys(pair.name for pair in pairs))
 
+    @property
+    def round_pairs(self) -> tuple[str, ...]:
+        """The names of contact pairs of round faces: their gaps are exact, and their triangles are not compared."""
+        pairs = [pair for pair in self.nominal.pairs if pair.reference is not None and pair.round is not None]
+        return tuple(dict.fromkeys(pair.name for pair in pairs if not (pair.is_springy or pair.has_form)))
+
     @cached_property
     def overlapping(self) -> frozenset[tuple[int, int]]:
         """Pairs of bodies that lie in each other in the nominal assembly."""
