@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tolcontact.geometry.analytic_surfaces import Cylinder
-from tolcontact.interference import Neighbours, deviating_solid, neighbours as module, solid
+from tolcontact.interference import Neighbours, deviating_solid, solid
 from tolcontact.interference.free_region import InsetBody, free_region
 
 INSETS = (4e-5, 6e-5)
@@ -69,26 +69,16 @@ def poses(count, spread, tilt, rng):
     return np.c_[turns.as_matrix().reshape(count, 9), shifts]
 
 
-@pytest.fixture
-def without_regions(monkeypatch):
-    def judged(A, B, X, deviations):
-        with monkeypatch.context() as patched:
-            patched.setattr(module, "MIN_TRIANGLES", np.inf)
-            return Neighbours(A, B, INSETS, 1.0).interfere(X, deviations)
-
-    return judged
-
-
 @pytest.mark.parametrize("half", [0.0, HALF])
 @pytest.mark.parametrize("varies", [False, True])
 @pytest.mark.parametrize("is_pin_first", [True, False])
-def test_no_certificate_contradicts_the_complete_test(half, varies, is_pin_first, without_regions):
+def test_no_certificate_contradicts_the_complete_test(half, varies, is_pin_first):
     rng = np.random.default_rng(3)
     inner, outer = pin(varies=varies), plate(half, varies=varies and not half)
     A, B = (inner, outer) if is_pin_first else (outer, inner)
     X, deviations = poses(3000, 0.03, 0.002, rng), rng.normal(0, 0.02, (3000, 2))
-    pair = Neighbours(A, B, INSETS, 1.0)
-    are_apart, expected = pair._are_apart(X, deviations), without_regions(A, B, X, deviations)
+    pair, complete = Neighbours(A, B, INSETS, 1.0), Neighbours(A, B, INSETS, 1.0, min_triangles=np.inf)
+    are_apart, expected = pair.are_apart(X, deviations), complete.interfere(X, deviations)
     assert 300 < are_apart.sum() < 2700 and expected.sum() > 100
     assert not (are_apart & expected).any()
     assert (pair.interfere(X, deviations) == expected).all()
@@ -103,14 +93,14 @@ def test_a_pin_is_certified_until_it_lies_in_the_wall():
         X = np.zeros((SIDES, 12))
         X[:, [0, 4, 8]] = 1
         X[:, 9:11] = share * clearance * np.c_[np.cos(turns), np.sin(turns)]
-        assert (pair._are_apart(X, None) == is_apart).all()
+        assert (pair.are_apart(X) == is_apart).all()
 
 
 def test_a_slot_has_room_along_itself():
     pair = Neighbours(pin(), plate(HALF, varies=False), INSETS, 1.0)
     X = np.zeros((2, 12))
     X[:, [0, 4, 8]], X[:, 9] = 1, [1.0, HALF + 0.2]
-    assert pair._are_apart(X, None).tolist() == [True, False]
+    assert pair.are_apart(X).tolist() == [True, False]
 
 
 def test_sizes_change_the_room_of_a_pin():
@@ -118,7 +108,7 @@ def test_sizes_change_the_room_of_a_pin():
     X = np.tile(np.r_[np.eye(3).ravel(), 0.02, 0, 0], (4, 1))
     left = RADIUS - PIN - 0.02 + sum(INSETS)  # both sizes are diameters
     deviations = np.array([[0, 1.99 * left], [0, 2.01 * left], [-1.99 * left, 0], [-2.01 * left, 0]])
-    assert pair._are_apart(X, deviations).tolist() == [True, False, True, False]
+    assert pair.are_apart(X, deviations).tolist() == [True, False, True, False]
 
 
 def test_the_bottom_of_a_hole_is_a_half_space():

@@ -13,6 +13,8 @@ from tolcontact.interference.box_tree import BoxTree, box_tree, boxes_of_nodes
 from tolcontact.interference.deviating_solid import DeviatingSolid
 from tolcontact.interference.free_region import CORNERS, InsetBody, free_region
 
+MIN_TRIANGLES = 100  # of two bodies: with fewer, a complete test takes no longer than a certificate
+
 
 class Interference(NamedTuple):
     """How bodies A and B lie in each other, in n realizations.
@@ -42,7 +44,6 @@ class WayOut(NamedTuple):
     widths: Float[Array, " n"]
 
 
-MIN_TRIANGLES = 100  # of two bodies: with fewer, a complete test takes no longer than a certificate
 FLAT = 1e-12  # of coordinates: how far corners of a facet may be from its plane
 
 
@@ -56,6 +57,7 @@ class Neighbours:
     round_faces    (t,) of the triangles of A and of B: the number of the round face for which each stands, -1 for none. Two
                    faces of one number touch by their exact gaps (see `tolcontact.discretization.round_contact`), and their
                    triangles are not compared
+    min_triangles  of both bodies, from which on a certificate may spare the complete test
     """
 
     A: DeviatingSolid
@@ -63,6 +65,7 @@ class Neighbours:
     insets: tuple[float, float]
     reach: float
     round_faces: tuple[Int[Array, " t_A"], Int[Array, " t_B"]] | None = None
+    min_triangles: float = MIN_TRIANGLES
 
     @cached_property
     def _nominal(self) -> tuple[kernel.Side, kernel.Side]:
@@ -84,12 +87,14 @@ class Neighbours:
     def _regions(self) -> list[free_kernel.Region]:
         """Regions in which one body nominally lies, and which the other one does not reach; none if tests are quick anyway."""
         A, B = (InsetBody(body, side.vertices) for body, side in zip((self.A, self.B), self._nominal, strict=True))
-        if len(self.A.solid.faces) + len(self.B.solid.faces) < MIN_TRIANGLES:
+        if len(self.A.solid.faces) + len(self.B.solid.faces) < self.min_triangles:
             return []
         regions = (free_region(B, A, is_forward=True), free_region(A, B, is_forward=False))
         return [region for region in regions if region is not None]
 
-    def _are_apart(self, X_BA: np.ndarray, deviations: np.ndarray | None) -> np.ndarray:
+    def are_apart(
+        self, X_BA: Float[Array, "n 12"], deviations: Float[Array, "n contributor"] | None = None
+    ) -> Bool[Array, " n"]:
         """Return in which realizations (n,) one body certainly lies in a region that the other one does not reach."""
         are_apart = np.zeros(len(X_BA), dtype=bool)
         for region in self._regions:
@@ -117,7 +122,7 @@ class Neighbours:
         Without `deviations`, faces are as they are nominally.
         """
         X_BA, interferes = np.ascontiguousarray(X_BA), np.zeros(len(X_BA), dtype=bool)
-        rows = np.flatnonzero(~self._are_apart(X_BA, deviations))
+        rows = np.flatnonzero(~self.are_apart(X_BA, deviations))
         if rows.size:
             of_rows = np.zeros(rows.size, dtype=bool)
             kernel.interfere(*self._sides(None if deviations is None else deviations[rows]), X_BA[rows], of_rows)

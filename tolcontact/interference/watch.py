@@ -12,7 +12,8 @@ from tolcontact.arrays import Array, Float, Int
 from tolcontact.discretization import Nominal
 from tolcontact.interference import kernel
 from tolcontact.interference.deviating_solid import DeviatingSolid
-from tolcontact.interference.neighbours import CORNERS, Interference, Neighbours
+from tolcontact.interference.free_region import CORNERS
+from tolcontact.interference.neighbours import Interference, Neighbours
 from tolcontact.interference.part_solid import curved_triangles, part_solid
 
 # Of the smallest tolerance range, twice the radius of a ball in both bodies: the depth from which on these lie in each other.
