@@ -117,11 +117,11 @@ def test_vertices_stay_on_planes_that_deviate():
     side = np.flatnonzero(closed.normals[:, 0] > 0.5)
     heights = [np.full((2, 3, 1), 1.0), np.full((2, 3, 1), 1.0)]
     faces = [(top, np.array([0]), heights[0]), (side, np.array([2]), heights[1])]
-    vertices, shifts = deviating_solid(closed, faces, np.zeros(12)).shifts(np.array([[0.3, 9.0, -0.2]]))
+    vertices, motions = deviating_solid(closed, faces, np.zeros(12)).motions
     expected = np.zeros((8, 3))
     expected[closed.vertices[:, 2] > 5, 2], expected[closed.vertices[:, 0] > 5, 0] = 0.3, -0.2
     moved = np.zeros((8, 3))
-    moved[vertices] = shifts[0]
+    moved[vertices] = motions @ (0.3, -0.2)
     np.testing.assert_allclose(moved, expected, atol=1e-12)
 
 

@@ -41,7 +41,7 @@ Each realization is one row and carries its own certificate.
 An exact resolution tests the bodies of all parts, whether their contact is declared or not, by a test that is complete: no two
 lie in each other deeper than the attribute `interference_depth` [mm] where `clashes` is 0 and the realization is certified.
 The attribute `not_watched` names what the test leaves out: parts that are not closed, contact pairs that give way or have
-form, and overlaps that are declared. Two round faces of one contact pair are judged by their gaps. Where `clashes` is 0 and
+form, overlaps that are declared, and round faces of a contact pair, which are judged by their gaps. Where `clashes` is 0 and
 `clash_part` is not -1, parts with declared contact lie in each other, and the realization is `doubtful`.
 Linearized runs, and archives before format 8, were not tested.
 

@@ -73,6 +73,7 @@ def watch_settings(program: Program) -> dict[str, Any]:
     untested = {
         "parts that are not closed": watch.open_parts,
         "contact pairs that give way or have form": watch.untested_pairs,
+        "round faces of contact pairs, which are judged by their gaps": watch.round_pairs,
         "parts that lie in each other nominally": watch.overlapping_parts,
         "overlaps that are declared": tuple(f"({overlap.name})" for overlap in assembly.overlaps),
     }

@@ -58,8 +58,15 @@ do not change a status, since nothing holds them apart: the archive counts them 
 nominally are left out, of that count and, unless their places of contact are found at every pose, of certificates; the
 attribute `not_watched` of an archive names them.
 
-Boxes decide first which bodies are near. Of an edge, only facets count that are nominally no farther away than the bodies
-have moved against each other."""
+## What it costs
+
+Boxes decide first which bodies are near. Of these, many pairs are settled by a certificate: if one body lies in a convex region
+that the surface of the other one does not reach, both are apart. The region is found once, in the nominal assembly, from
+half-spaces and the hollow of a bore or a slot: a part on a table, a pin in its hole. In every realization it is as large as the
+deviating faces of the outer body leave it, and the vertices of the inner body are compared with it (see
+`tolcontact.interference.free_region`). A certificate is a proof, so that answers are the same without it. Small bodies, and
+bodies without such a region, such as a bolt with its head or bodies that hook into each other, take the complete test. Of an
+edge, only facets count that are nominally no farther away than the bodies have moved against each other."""
 
 from tolcontact.interference.deviating_solid import DeviatingSolid, deviating_solid
 from tolcontact.interference.neighbours import Interference, Neighbours, WayOut

@@ -6,7 +6,17 @@ import numpy as np
 
 from tolcontact.compiled import compiled, inlined_uncounted, uncounted
 from tolcontact.geometry.vector_kernel import along, dot, minus, move, move_back, scaled
-from tolcontact.interference.kernel import LEAF, corners_of, is_beyond, is_within, motion_of, near_count, passes, vertex
+from tolcontact.interference.kernel import (
+    LEAF,
+    corners_of,
+    deviate,
+    is_beyond,
+    is_within,
+    motion_of,
+    near_count,
+    passes,
+    vertex,
+)
 
 SAMPLES = 4  # of a piece of an edge inside the other body
 MAX_PASSES = 64  # of one edge
@@ -45,15 +55,15 @@ def _box_distance(boxes, node, p):  # type: ignore[no-untyped-def]
 
 
 @uncounted
-def _seems_within(side, k, p, shares, senses):  # type: ignore[no-untyped-def]
+def _seems_within(side, p, shares, senses):  # type: ignore[no-untyped-def]
     """Return whether a ray from p leaves a body where it first passes the surface; a ray along an edge may be wrong."""
     boxes = side.boxes
     reach = 2.0 * (boxes[0, 3] - boxes[0, 0] + boxes[0, 4] - boxes[0, 1] + boxes[0, 5] - boxes[0, 2])
-    return passes(side, k, p, along(p, reach, RAY), shares, senses) > 0 and senses[0] > 0
+    return passes(side, p, along(p, reach, RAY), shares, senses) > 0 and senses[0] > 0
 
 
 @uncounted
-def _near_leaf(side, k, p):  # type: ignore[no-untyped-def]
+def _near_leaf(side, p):  # type: ignore[no-untyped-def]
     """Return a bound from above of the squared distance of p from the surface: that from a leaf with a near box."""
     node, inner, square = 0, side.next.size // 2, np.inf
     while node < inner:
@@ -63,17 +73,17 @@ def _near_leaf(side, k, p):  # type: ignore[no-untyped-def]
         triangle = side.triangles[node - inner, j]
         if triangle < 0:
             break
-        a, b, c = corners_of(side, k, triangle)
+        a, b, c = corners_of(side, triangle)
         arm = minus(p, _nearest_on_triangle(p, a, b, c))
         square = min(square, dot(arm, arm))
     return square * (1.0 + 1e-12)
 
 
 @uncounted
-def _nearest(side, k, p, enough):  # type: ignore[no-untyped-def]
+def _nearest(side, p, enough):  # type: ignore[no-untyped-def]
     """Return the distance of p from the surface, the triangle and the place there; any if the distance is below `enough`."""
     node, inner, best, foot, square = 0, side.next.size // 2, -1, p, np.inf
-    bound = _near_leaf(side, k, p)
+    bound = _near_leaf(side, p)
     while node < side.next.size:
         if _box_distance(side.boxes, node, p) > min(square, bound):
             node = side.next[node]
@@ -85,7 +95,7 @@ def _nearest(side, k, p, enough):  # type: ignore[no-untyped-def]
             triangle = side.triangles[node - inner, j]
             if triangle < 0:
                 break
-            a, b, c = corners_of(side, k, triangle)
+            a, b, c = corners_of(side, triangle)
             place = _nearest_on_triangle(p, a, b, c)
             arm = minus(p, place)
             if dot(arm, arm) < square:
@@ -101,7 +111,7 @@ def _sound(target, k, X, is_forward, p, q, edge, depths, triangles, places):  # 
     """Raise the depth of realization k to that of a piece of an edge from p to q, which lies in the other body."""
     for j in range(SAMPLES + 1):
         place = along(p, j / SAMPLES, minus(q, p))
-        depth, triangle, foot = _nearest(target, k, place, depths[k])
+        depth, triangle, foot = _nearest(target, place, depths[k])
         if depth > depths[k]:
             depths[k] = depth
             place_A, place_B = (place, foot) if is_forward else (move(X, foot), move(X, place))
@@ -121,9 +131,9 @@ def _sound_edges(owner, target, k, X, is_forward, motion, is_in, shares, senses,
                 i, m = owner.edges[j, 0], owner.edges[j, 1]
                 if not is_first and is_in[i] == is_in[m]:
                     continue
-                p, q = vertex(owner, k, i), vertex(owner, k, m)
+                p, q = vertex(owner, i), vertex(owner, m)
                 p, q = (move(X, p), move(X, q)) if is_forward else (move_back(X, p), move_back(X, q))
-                count = passes(target, k, p, q, shares, senses)
+                count = passes(target, p, q, shares, senses)
                 if is_first and count > 0:
                     start, was_in = 0.0, senses[0] > 0
                     is_in[i] = is_in[i] or was_in
@@ -149,13 +159,13 @@ def _sound_centres(owner, target, k, X, is_forward, shares, senses, depths, tria
     Where faces are flush, edges lie on the surface, and only what is between them is inside.
     """
     for t in range(owner.faces.shape[0]):
-        a, b, c = corners_of(owner, k, t)
+        a, b, c = corners_of(owner, t)
         p = scaled(1.0 / 3.0, along(along(a, 1.0, b), 1.0, c))
         p = move(X, p) if is_forward else move_back(X, p)
-        if is_beyond(target, p) or not _seems_within(target, k, p, shares, senses):
+        if is_beyond(target, p) or not _seems_within(target, p, shares, senses):
             continue
-        depth, triangle, foot = _nearest(target, k, p, depths[k])
-        if depth > depths[k] and is_within(target, k, p):
+        depth, triangle, foot = _nearest(target, p, depths[k])
+        if depth > depths[k] and is_within(target, p):
             depths[k] = depth
             place_A, place_B = (p, foot) if is_forward else (move(X, foot), move(X, p))
             triangles[k, 0], triangles[k, 1] = (t, triangle) if is_forward else (triangle, t)
@@ -178,7 +188,7 @@ def sound(A, B, poses, depths, triangles, places):  # type: ignore[no-untyped-de
     for k in range(poses.shape[0]):
         depths[k], triangles[k, :], places[k] = 0.0, 0, 0.0
         X = poses[k]
-        motion = motion_of(X, A.bounds) + 2.0 * (A.spare + B.spare)
+        motion = motion_of(X, A.bounds) + 2.0 * (deviate(A, k) + deviate(B, k))
         in_B, in_A = np.zeros(A.vertices.shape[0], dtype=np.bool_), np.zeros(B.vertices.shape[0], dtype=np.bool_)
         _sound_edges(A, B, k, X, True, motion, in_B, shares, senses, depths, triangles, places)
         _sound_edges(B, A, k, X, False, motion, in_A, shares, senses, depths, triangles, places)

@@ -8,6 +8,7 @@ import numpy as np
 import trimesh
 
 from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.geometry.analytic_surfaces import Cylinder
 from tolcontact.interference.solid import Solid
 
 IN_PLANE = 1e-9  # of the largest motion of a vertex: a motion along the normal that is rounding
@@ -21,12 +22,14 @@ class DeviatingSolid:
     columns    (k,) of the deviations that move its faces
     outward    (t, 3, k) [mm]: how far the plane of each triangle moves outwards at each of its corners for unit deviations
     bulges     (t,) [mm]: how far triangles of hollow round faces stand in the hollow
+    cylinders  those on which its triangles are known to lie, in its frame
     """
 
     solid: Solid
     columns: Int[Array, " k"]
     outward: Float[Array, "t 3 k"]
     bulges: Float[Array, " t"]
+    cylinders: tuple[Cylinder, ...] = ()
 
     @property
     def varies(self) -> bool:
@@ -36,7 +39,7 @@ class DeviatingSolid:
     @cached_property
     def moves(self) -> Bool[Array, " t"]:
         """Whether deviations move the plane of each triangle (t,); corners may move in it."""
-        vertices, motions = self._motions
+        vertices, motions = self.motions
         of_vertices = np.zeros((len(self.solid.vertices), 3, len(self.columns)))
         of_vertices[vertices] = motions
         heights = np.abs(np.einsum("tj,tcjk->tck", self.solid.normals, of_vertices[self.solid.faces]))
@@ -54,7 +57,7 @@ class DeviatingSolid:
         return np.unique(self.facet_of, return_index=True)[1]
 
     @cached_property
-    def _motions(self) -> tuple[np.ndarray, np.ndarray]:
+    def motions(self) -> tuple[Int[Array, " m"], Float[Array, "m 3 k"]]:
         """The vertices that deviations move (m,), and how far (m, 3, k) [mm] for unit deviations."""
         if not self.varies:
             return np.zeros(0, dtype=int), np.zeros((0, 3, 0))
@@ -62,17 +65,11 @@ class DeviatingSolid:
         moved = np.flatnonzero(np.abs(shifts).max(axis=(1, 2), initial=0) > 0)
         return moved, shifts[moved]
 
-    def shifts(self, deviations: Float[Array, "n contributor"]) -> tuple[Int[Array, " m"], Float[Array, "n m 3"]]:
-        """Return the vertices (m,) that deviations (n, contributor) move, and how far (n, m, 3) [mm]."""
-        moved, motions = self._motions
-        shifts = deviations[:, self.columns] @ motions.reshape(-1, len(self.columns)).T
-        return moved, np.ascontiguousarray(shifts.reshape(len(deviations), len(moved), 3))
-
     def growth(self, deviations: Float[Array, "n contributor"]) -> float:
         """Return how far [mm] deviations (n, contributor) move any vertex at most."""
         if not self.varies:
             return 0.0
-        lengths = np.linalg.norm(self._motions[1], axis=1).max(axis=0, initial=0)
+        lengths = np.linalg.norm(self.motions[1], axis=1).max(axis=0, initial=0)
         return float((np.abs(deviations[:, self.columns]) @ lengths).max(initial=0))
 
     def inset(self, depth: float) -> Float[Array, "v 3"]:
@@ -81,11 +78,14 @@ class DeviatingSolid:
 
 
 def deviating_solid(
-    solid: Solid, faces: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], bulges: np.ndarray
+    solid: Solid,
+    faces: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]],
+    bulges: np.ndarray,
+    cylinders: Sequence[Cylinder] = (),
 ) -> DeviatingSolid:
     """Return a solid whose faces deviate: triangles (m,), columns (k,) and outward (m, 3, k) of each face."""
     columns = np.unique(np.concatenate([np.zeros(0, dtype=int), *(face[1] for face in faces)]))
     outward = np.zeros((len(solid.faces), 3, len(columns)))
     for triangles, of_face, motion in faces:
         outward[np.ix_(triangles, np.arange(3), np.searchsorted(columns, of_face))] += motion
-    return DeviatingSolid(solid, columns, outward, bulges)
+    return DeviatingSolid(solid, columns, outward, bulges, tuple(cylinders))

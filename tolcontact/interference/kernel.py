@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.compiled import compiled, inlined_uncounted, uncounted
-from tolcontact.geometry.vector_kernel import along, cross, dot, minus, move, move_back, row, row_of
+from tolcontact.geometry.vector_kernel import along, cross, dot, minus, move, move_back, row, row_of, turn_back
 
 LEAF = 4
 MANY = 8  # triangles of a facet: of more, only those are looked at that lie where an edge passes their plane
@@ -18,7 +18,9 @@ class Side(NamedTuple):
 
     vertices    (v, 3) [mm], without deviations
     moved       (v,): index of each vertex among those that deviations move, -1 for others
-    shifts      (n, m, 3) [mm]: how far deviations move these, in each realization
+    motions     (m, j, 3) [mm]: how far a unit of each deviation moves these
+    deviations  (n, j) that do
+    shifts      (m, 3) [mm]: how far they move in one realization; see `deviate`
     faces       (t, 3)
     planes      (t, 4): outward normal n and level n . x of each triangle; NaN for triangles that deviations move
     edges       (e, 2), those nominally nearest to the other body first
@@ -30,7 +32,6 @@ class Side(NamedTuple):
     starts, listed, reaches   the facets near each edge, as in a CSR matrix, the nearest first, with their nominal distances
     reach       [mm] up to which facets are near
     triangles, boxes, next   its BoxTree
-    spare       [mm] by which deviations move a vertex at most
     bounds      (8, 3) [mm]: corners of a box that holds the body
     witnesses   (c,): a vertex of each connected component, nominally far from the surface of the other body
     clearances  (c,) [mm]: bounds from below of that distance
@@ -39,6 +40,8 @@ class Side(NamedTuple):
 
     vertices: np.ndarray
     moved: np.ndarray
+    motions: np.ndarray
+    deviations: np.ndarray
     shifts: np.ndarray
     faces: np.ndarray
     planes: np.ndarray
@@ -56,31 +59,43 @@ class Side(NamedTuple):
     triangles: np.ndarray
     boxes: np.ndarray
     next: np.ndarray
-    spare: float
     bounds: np.ndarray
     witnesses: np.ndarray
     clearances: np.ndarray
     is_in: np.ndarray
 
 
+@uncounted
+def deviate(side, k):  # type: ignore[no-untyped-def]
+    """Move the vertices of a body as in realization k; return how far [mm] they move at most."""
+    square, columns = 0.0, side.motions.shape[1]
+    for m in range(side.motions.shape[0]):
+        shift = (0.0, 0.0, 0.0)
+        for j in range(columns):
+            shift = along(shift, side.deviations[k, j], row_of(side.motions, m, j))
+        side.shifts[m, 0], side.shifts[m, 1], side.shifts[m, 2] = shift
+        square = max(square, dot(shift, shift))
+    return math.sqrt(square)
+
+
 @inlined_uncounted
-def vertex(side, k, number):  # type: ignore[no-untyped-def]
-    """Return a vertex of a body in realization k."""
+def vertex(side, number):  # type: ignore[no-untyped-def]
+    """Return a vertex of a body in the present realization."""
     m, x = side.moved[number], row(side.vertices, number)
-    return x if m < 0 else along(x, 1.0, row_of(side.shifts, k, m))
+    return x if m < 0 else along(x, 1.0, row(side.shifts, m))
 
 
 @inlined_uncounted
-def corners_of(side, k, triangle):  # type: ignore[no-untyped-def]
-    """Return the corners of a triangle in realization k."""
+def corners_of(side, triangle):  # type: ignore[no-untyped-def]
+    """Return the corners of a triangle in the present realization."""
     faces = side.faces
     return (
-        vertex(side, k, faces[triangle, 0]), vertex(side, k, faces[triangle, 1]), vertex(side, k, faces[triangle, 2]),
+        vertex(side, faces[triangle, 0]), vertex(side, faces[triangle, 1]), vertex(side, faces[triangle, 2]),
     )  # fmt: skip
 
 
 @inlined_uncounted
-def crossing(side, k, triangle, p, q):  # type: ignore[no-untyped-def]
+def crossing(side, triangle, p, q):  # type: ignore[no-untyped-def]
     """Return the share of the segment from p to q at which it passes a triangle, and its sense: -1 inwards, 1 outwards, 0 none.
 
     Places on the edges of the triangle count, so that none gets through between two triangles.
@@ -91,7 +106,7 @@ def crossing(side, k, triangle, p, q):  # type: ignore[no-untyped-def]
         start, end = dot(n, p) - planes[triangle, 3], dot(n, q) - planes[triangle, 3]
         if start * end > 0.0 or start == end:
             return 0.0, 0
-    a, b, c = corners_of(side, k, triangle)
+    a, b, c = corners_of(side, triangle)
     if not is_known:
         n = cross(minus(b, a), minus(c, a))
         start, end = dot(n, minus(p, a)), dot(n, minus(q, a))
@@ -106,14 +121,14 @@ def crossing(side, k, triangle, p, q):  # type: ignore[no-untyped-def]
 
 
 @inlined_uncounted
-def passes(side, k, p, q, shares, senses):  # type: ignore[no-untyped-def]
+def passes(side, p, q, shares, senses):  # type: ignore[no-untyped-def]
     """Write at which shares, in order, and in which senses the segment from p to q passes the surface; return how often."""
     low, high = (min(p[0], q[0]), min(p[1], q[1]), min(p[2], q[2])), (max(p[0], q[0]), max(p[1], q[1]), max(p[2], q[2]))
-    return passes_in(side, k, low, high, p, q, shares, senses)
+    return passes_in(side, low, high, p, q, shares, senses)
 
 
 @uncounted
-def passes_in(side, k, low, high, p, q, shares, senses):  # type: ignore[no-untyped-def]
+def passes_in(side, low, high, p, q, shares, senses):  # type: ignore[no-untyped-def]
     """Write and return what `passes` does, of triangles whose boxes reach into a box from `low` to `high`."""
     count, node, inner = 0, 0, side.next.size // 2
     boxes = side.boxes
@@ -131,7 +146,7 @@ def passes_in(side, k, low, high, p, q, shares, senses):  # type: ignore[no-unty
             triangle = side.triangles[node - inner, j]
             if triangle < 0:
                 break
-            share, sense = crossing(side, k, triangle, p, q)
+            share, sense = crossing(side, triangle, p, q)
             if sense != 0 and count < shares.size:
                 place = count
                 while place > 0 and shares[place - 1] > share:
@@ -155,28 +170,28 @@ def near_count(distances, motion):  # type: ignore[no-untyped-def]
 
 
 @uncounted
-def _holds(owner, target, k, X, is_forward, motion):  # type: ignore[no-untyped-def]
+def _holds(owner, target, X, is_forward, motion):  # type: ignore[no-untyped-def]
     """Return whether a component of a body lies in the other one, if its surface passes that one's nowhere."""
     for c in range(owner.witnesses.size):
         if owner.clearances[c] > motion:
             if owner.is_in[c]:
                 return True
             continue
-        p = vertex(owner, k, owner.witnesses[c])
+        p = vertex(owner, owner.witnesses[c])
         p = move(X, p) if is_forward else move_back(X, p)
         if is_beyond(target, p):
             continue
-        if is_within(target, k, p):
+        if is_within(target, p):
             return True
     return False
 
 
 @uncounted
-def is_within(side, k, p):  # type: ignore[no-untyped-def]
+def is_within(side, p):  # type: ignore[no-untyped-def]
     """Return whether p lies in a body: its triangles fill all solid angles (van Oosterom and Strackee, 1983)."""
     total = 0.0
     for t in range(side.faces.shape[0]):
-        a, b, c = corners_of(side, k, t)
+        a, b, c = corners_of(side, t)
         a, b, c = minus(a, p), minus(b, p), minus(c, p)
         length_a, length_b, length_c = math.sqrt(dot(a, a)), math.sqrt(dot(b, b)), math.sqrt(dot(c, c))
         near = length_a * length_b * length_c + dot(a, b) * length_c + dot(b, c) * length_a + dot(c, a) * length_b
@@ -205,8 +220,17 @@ def motion_of(X, bounds):  # type: ignore[no-untyped-def]
 
 
 @inlined_uncounted
-def _heights(side, k, f, p, q):  # type: ignore[no-untyped-def]
-    """Return heights of p and q over the plane of a facet in realization k: both 1 if their segment misses its box.
+def _misses(boxes, p, q):  # type: ignore[no-untyped-def]
+    """Return whether the box around p and q misses that of a whole body."""
+    return (
+        boxes[0, 0] > max(p[0], q[0]) or boxes[0, 3] < min(p[0], q[0]) or boxes[0, 1] > max(p[1], q[1])
+        or boxes[0, 4] < min(p[1], q[1]) or boxes[0, 2] > max(p[2], q[2]) or boxes[0, 5] < min(p[2], q[2])
+    )  # fmt: skip
+
+
+@inlined_uncounted
+def _heights(side, f, p, q):  # type: ignore[no-untyped-def]
+    """Return heights of p and q over the plane of a facet: both 1 if their segment misses its box.
 
     Of facets that are not flat nothing is known: then they are 1 and -1.
     """
@@ -217,8 +241,8 @@ def _heights(side, k, f, p, q):  # type: ignore[no-untyped-def]
     ):  # fmt: skip
         return 1.0, 1.0
     if side.vertices_of_facets[f, 0] >= 0:
-        a = vertex(side, k, side.vertices_of_facets[f, 0])
-        b, c = vertex(side, k, side.vertices_of_facets[f, 1]), vertex(side, k, side.vertices_of_facets[f, 2])
+        a = vertex(side, side.vertices_of_facets[f, 0])
+        b, c = vertex(side, side.vertices_of_facets[f, 1]), vertex(side, side.vertices_of_facets[f, 2])
         n = cross(minus(b, a), minus(c, a))
         return dot(n, minus(p, a)), dot(n, minus(q, a))
     if facets[f, 9] != facets[f, 9]:
@@ -228,7 +252,7 @@ def _heights(side, k, f, p, q):  # type: ignore[no-untyped-def]
 
 
 @uncounted
-def _passes_facet(side, k, f, p, q, start, end, shares, senses):  # type: ignore[no-untyped-def]
+def _passes_facet(side, f, p, q, start, end, shares, senses):  # type: ignore[no-untyped-def]
     """Return whether the segment from p to q, at heights `start` and `end` over a flat facet, passes a triangle near there."""
     n = (side.facets[f, 6], side.facets[f, 7], side.facets[f, 8])
     size = 1.0 + max(abs(p[0]), abs(p[1]), abs(p[2]), abs(q[0]), abs(q[1]), abs(q[2]))
@@ -237,43 +261,47 @@ def _passes_facet(side, k, f, p, q, start, end, shares, senses):  # type: ignore
     x, y = along(p, max(share - spare, 0.0), minus(q, p)), along(p, min(share + spare, 1.0), minus(q, p))
     low = (min(x[0], y[0]) - margin, min(x[1], y[1]) - margin, min(x[2], y[2]) - margin)
     high = (max(x[0], y[0]) + margin, max(x[1], y[1]) + margin, max(x[2], y[2]) + margin)
-    return passes_in(side, k, low, high, p, q, shares, senses) > 0
+    return passes_in(side, low, high, p, q, shares, senses) > 0
 
 
 @uncounted
-def _passes_any(owner, target, k, X, is_forward, motion, shares, senses):  # type: ignore[no-untyped-def]
-    """Return whether an edge of a body passes the surface of the other one in realization k."""
-    is_listed, boxes = motion <= owner.reach, target.boxes
+def _passes_listed(side, f, p, q, shares, senses):  # type: ignore[no-untyped-def]
+    """Return whether the segment from p to q passes a facet, or any other one near it if the facet is not flat."""
+    start, end = _heights(side, f, p, q)
+    if start * end > 0.0 or start == end:
+        return False
+    first, last = side.first_members[f], side.first_members[f + 1]
+    if last - first > MANY:
+        if side.facets[f, 9] == side.facets[f, 9]:
+            return _passes_facet(side, f, p, q, start, end, shares, senses)
+        return passes(side, p, q, shares, senses) > 0
+    for place in range(first, last):
+        _, sense = crossing(side, side.members[place], p, q)
+        if sense != 0:
+            return True
+    return False
+
+
+@uncounted
+def _passes_any(owner, target, X, is_forward, motion, shares, senses):  # type: ignore[no-untyped-def]
+    """Return whether an edge of a body passes the surface of the other one."""
+    is_listed = motion <= owner.reach
     for j in range(near_count(owner.distances, motion)):
-        p, q = vertex(owner, k, owner.edges[j, 0]), vertex(owner, k, owner.edges[j, 1])
+        if is_listed and (owner.starts[j] == owner.starts[j + 1] or owner.reaches[owner.starts[j]] > motion):
+            continue
+        p, q = vertex(owner, owner.edges[j, 0]), vertex(owner, owner.edges[j, 1])
         p, q = (move(X, p), move(X, q)) if is_forward else (move_back(X, p), move_back(X, q))
-        if (
-            boxes[0, 0] > max(p[0], q[0]) or boxes[0, 3] < min(p[0], q[0]) or boxes[0, 1] > max(p[1], q[1])
-            or boxes[0, 4] < min(p[1], q[1]) or boxes[0, 2] > max(p[2], q[2]) or boxes[0, 5] < min(p[2], q[2])
-        ):  # fmt: skip
+        if _misses(target.boxes, p, q):
             continue
         if not is_listed:
-            if passes(target, k, p, q, shares, senses) > 0:
+            if passes(target, p, q, shares, senses) > 0:
                 return True
             continue
         for m in range(owner.starts[j], owner.starts[j + 1]):
             if owner.reaches[m] > motion:
                 break
-            facet = owner.listed[m]
-            start, end = _heights(target, k, facet, p, q)
-            if start * end <= 0.0 and start != end:
-                first, last = target.first_members[facet], target.first_members[facet + 1]
-                if last - first > MANY:
-                    is_flat = target.facets[facet, 9] == target.facets[facet, 9]
-                    if is_flat and _passes_facet(target, k, facet, p, q, start, end, shares, senses):
-                        return True
-                    if not is_flat and passes(target, k, p, q, shares, senses) > 0:
-                        return True
-                    continue
-                for place in range(first, last):
-                    _, sense = crossing(target, k, target.members[place], p, q)
-                    if sense != 0:
-                        return True
+            if _passes_listed(target, owner.listed[m], p, q, shares, senses):
+                return True
     return False
 
 
@@ -286,10 +314,20 @@ def interfere(A, B, poses, interferes):  # type: ignore[no-untyped-def]
     shares, senses = np.empty(1), np.empty(1, dtype=np.int64)
     for k in range(poses.shape[0]):
         X = poses[k]
-        motion = motion_of(X, A.bounds) + 2.0 * (A.spare + B.spare)
+        motion = motion_of(X, A.bounds) + 2.0 * (deviate(A, k) + deviate(B, k))
         interferes[k] = (
-            _passes_any(A, B, k, X, True, motion, shares, senses)
-            or _passes_any(B, A, k, X, False, motion, shares, senses)
-            or _holds(A, B, k, X, True, motion)
-            or _holds(B, A, k, X, False, motion)
+            _passes_any(A, B, X, True, motion, shares, senses)
+            or _passes_any(B, A, X, False, motion, shares, senses)
+            or _holds(A, B, X, True, motion)
+            or _holds(B, A, X, False, motion)
         )
+
+
+@compiled
+def relative(X_WA, X_WB, X_BA):  # type: ignore[no-untyped-def]
+    """Write the poses X_BA (n, 12) of A in the frame of B."""
+    for k in range(X_BA.shape[0]):
+        A, B = X_WA[k], X_WB[k]
+        for j in range(3):
+            X_BA[k, j], X_BA[k, 3 + j], X_BA[k, 6 + j] = turn_back(B, (A[j], A[3 + j], A[6 + j]))
+        X_BA[k, 9], X_BA[k, 10], X_BA[k, 11] = move_back(B, (A[9], A[10], A[11]))

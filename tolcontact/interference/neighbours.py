@@ -8,11 +8,12 @@ import igl
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
-from tolcontact.interference import depth_kernel, kernel, near_kernel, parting_kernel
+from tolcontact.interference import depth_kernel, free_kernel, kernel, near_kernel, parting_kernel
 from tolcontact.interference.box_tree import BoxTree, box_tree, boxes_of_nodes
 from tolcontact.interference.deviating_solid import DeviatingSolid
+from tolcontact.interference.free_region import CORNERS, InsetBody, free_region
 
-CORNERS = np.array(np.meshgrid(*[(0, 1)] * 3)).reshape(3, -1).T
+MIN_TRIANGLES = 100  # of two bodies: with fewer, a complete test takes no longer than a certificate
 
 
 class Interference(NamedTuple):
@@ -56,6 +57,7 @@ class Neighbours:
     round_faces    (t,) of the triangles of A and of B: the number of the round face for which each stands, -1 for none. Two
                    faces of one number touch by their exact gaps (see `tolcontact.discretization.round_contact`), and their
                    triangles are not compared
+    min_triangles  of both bodies, from which on a certificate may spare the complete test
     """
 
     A: DeviatingSolid
@@ -63,6 +65,7 @@ class Neighbours:
     insets: tuple[float, float]
     reach: float
     round_faces: tuple[Int[Array, " t_A"], Int[Array, " t_B"]] | None = None
+    min_triangles: float = MIN_TRIANGLES
 
     @cached_property
     def _nominal(self) -> tuple[kernel.Side, kernel.Side]:
@@ -80,6 +83,28 @@ class Neighbours:
         """Whether faces of a body deviate."""
         return self.A.varies or self.B.varies
 
+    @cached_property
+    def _regions(self) -> list[free_kernel.Region]:
+        """Regions in which one body nominally lies, and which the other one does not reach; none if tests are quick anyway."""
+        A, B = (InsetBody(body, side.vertices) for body, side in zip((self.A, self.B), self._nominal, strict=True))
+        if len(self.A.solid.faces) + len(self.B.solid.faces) < self.min_triangles:
+            return []
+        regions = (free_region(B, A, is_forward=True), free_region(A, B, is_forward=False))
+        return [region for region in regions if region is not None]
+
+    def are_apart(
+        self, X_BA: Float[Array, "n 12"], deviations: Float[Array, "n contributor"] | None = None
+    ) -> Bool[Array, " n"]:
+        """Return in which realizations (n,) one body certainly lies in a region that the other one does not reach."""
+        are_apart = np.zeros(len(X_BA), dtype=bool)
+        for region in self._regions:
+            outer, inner = (
+                np.zeros((len(X_BA), len(body.columns))) if deviations is None else _columns(body, deviations)
+                for body in ((self.B, self.A) if region.is_forward else (self.A, self.B))
+            )
+            free_kernel.certify(region, X_BA, outer, inner, are_apart)
+        return are_apart
+
     def _sides(self, deviations: np.ndarray | None) -> tuple[kernel.Side, kernel.Side]:
         if deviations is None:
             return self._nominal
@@ -96,8 +121,12 @@ class Neighbours:
 
         Without `deviations`, faces are as they are nominally.
         """
-        interferes = np.zeros(len(X_BA), dtype=bool)
-        kernel.interfere(*self._sides(deviations), np.ascontiguousarray(X_BA), interferes)
+        X_BA, interferes = np.ascontiguousarray(X_BA), np.zeros(len(X_BA), dtype=bool)
+        rows = np.flatnonzero(~self.are_apart(X_BA, deviations))
+        if rows.size:
+            of_rows = np.zeros(rows.size, dtype=bool)
+            kernel.interfere(*self._sides(None if deviations is None else deviations[rows]), X_BA[rows], of_rows)
+            interferes[rows] = of_rows
         return interferes
 
     def ways_out(self, X_BA: Float[Array, "n 12"]) -> WayOut:
@@ -116,6 +145,11 @@ class Neighbours:
                 is_edge = (solid.edges == side.edges[-1 - triangles[row]]).all(axis=1)
                 triangles[row] = -1 - int(is_edge.argmax())
         return result._replace(depths=result.depths + sum(self.insets))
+
+
+def _columns(body: DeviatingSolid, deviations: np.ndarray) -> np.ndarray:
+    """Return the deviations (n, k) that move the faces of a body."""
+    return np.ascontiguousarray(deviations[:, body.columns])
 
 
 def _side(
@@ -148,7 +182,9 @@ def _side(
     return kernel.Side(
         vertices=vertices,
         moved=np.full(len(vertices), -1),
-        shifts=np.zeros((1, 0, 3)),
+        motions=np.zeros((0, 0, 3)),
+        deviations=np.zeros((1, 0)),
+        shifts=np.zeros((0, 3)),
         faces=solid.faces,
         planes=planes,
         edges=np.ascontiguousarray(solid.edges[order]),
@@ -165,7 +201,6 @@ def _side(
         triangles=tree.triangles,
         boxes=tree.boxes,
         next=tree.next,
-        spare=0.0,
         bounds=np.where(CORNERS == 0, vertices.min(axis=0), vertices.max(axis=0)),
         witnesses=witnesses,
         clearances=np.sqrt(squares[witnesses]),
@@ -225,20 +260,22 @@ def _boxes_of_facets(body: DeviatingSolid, lower: np.ndarray, upper: np.ndarray)
 
 def _deviating(side: kernel.Side, body: DeviatingSolid, deviations: np.ndarray) -> kernel.Side:
     """Return a body with the deviations (n, contributor) of some realizations."""
-    vertices, shifts = body.shifts(deviations)
+    (vertices, motions), of_body = body.motions, _columns(body, deviations)
     moved = side.moved.copy()
     moved[vertices] = np.arange(len(vertices))
+    extremes = motions * of_body.min(axis=0, initial=0), motions * of_body.max(axis=0, initial=0)
     low, high = side.vertices.copy(), side.vertices.copy()
-    low[vertices] += shifts.min(axis=0, initial=0)
-    high[vertices] += shifts.max(axis=0, initial=0)
+    low[vertices] += np.minimum(*extremes).sum(axis=2)
+    high[vertices] += np.maximum(*extremes).sum(axis=2)
     lower, upper = low[side.faces].min(axis=1), high[side.faces].max(axis=1)
     facets = side.facets.copy()
     facets[:, :6] = _boxes_of_facets(body, lower, upper)
     return side._replace(
         facets=facets,
         moved=moved,
-        shifts=shifts,
+        motions=np.ascontiguousarray(motions.swapaxes(1, 2)),
+        deviations=of_body,
+        shifts=np.zeros((len(vertices), 3)),
         planes=np.where(body.moves[:, None], np.nan, side.planes),
         boxes=boxes_of_nodes(side.triangles, lower, upper),
-        spare=float(np.linalg.norm(shifts, axis=2).max(initial=0)),
     )

@@ -1,12 +1,12 @@
 """The solid of each part, with the features that move its faces."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import trimesh
 
 from tolcontact.discretization import Nominal, NominalPart
-from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cylinder, Plane
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.surface_recognition import known_surfaces
 from tolcontact.interference.deviating_solid import DeviatingSolid, deviating_solid
@@ -26,7 +26,9 @@ def part_solid(nominal: Nominal, index: int) -> DeviatingSolid | None:
     stored = nominal.parts[index].body
     surface_of_body = Surface(trimesh.Trimesh(stored.vertices, np.asarray(stored.faces)[body.sources], process=False))
     faces = list(_deviating_faces(nominal, index, body, surface_of_body))
-    return deviating_solid(body, faces, _bulges(nominal, index, body, surface_of_body))
+    round_faces = list(_round_faces(nominal, nominal.parts[index], body, surface_of_body))
+    cylinders = [surface for surface, _ in round_faces if isinstance(surface, Cylinder)]
+    return deviating_solid(body, faces, _bulges(body, surface_of_body, round_faces), cylinders)
 
 
 def _deviating_faces(
@@ -55,14 +57,14 @@ def _deviating_faces(
             yield triangles, face.columns[columns], motion[:, columns].reshape(len(triangles), 3, -1)
 
 
-def _bulges(nominal: Nominal, index: int, body: Solid, surface_of_body: Surface) -> np.ndarray:
+def _bulges(body: Solid, surface_of_body: Surface, round_faces: Sequence[tuple[AnalyticSurface, np.ndarray]]) -> np.ndarray:
     """Return how far (t,) [mm] triangles stand out of the round faces for which they stand, mostly into hollow ones."""
-    part, bulges = nominal.parts[index], np.zeros(len(body.faces))
+    bulges = np.zeros(len(body.faces))
     corners = np.asarray(surface_of_body.mesh.triangles)
     points = np.concatenate(
         [corners, (corners + np.roll(corners, -1, axis=1)) / 2, corners.mean(axis=1, keepdims=True)], axis=1
     )
-    for surface, rows in _round_faces(nominal, part, body, surface_of_body):
+    for surface, rows in round_faces:
         distance, _ = surface.distance(points[rows].reshape(-1, 3))
         _, slope = surface.distance(points[rows, -1])
         outward = np.where((slope * body.normals[rows]).sum(axis=1) < 0, -1.0, 1.0)

@@ -24,7 +24,7 @@ def _add(vectors, count, v):  # type: ignore[no-untyped-def]
 
 
 @uncounted
-def _collect(owner, target, k, X, is_forward, region, counts, normals, crossing_edges):  # type: ignore[no-untyped-def]  # noqa: PLR0912
+def _collect(owner, target, X, is_forward, region, counts, normals, crossing_edges):  # type: ignore[no-untyped-def]  # noqa: PLR0912
     """Add what edges of a body say of the common region: its corners on them, and normals of triangles that they pass.
 
     All are in the frame of B. `counts` (3,) are those of points in `region`, of `normals` and of edges in `crossing_edges`.
@@ -32,7 +32,7 @@ def _collect(owner, target, k, X, is_forward, region, counts, normals, crossing_
     node_count, inner = target.next.size, target.next.size // 2
     counts[2] = 0
     for j in range(owner.edges.shape[0]):
-        p, q = vertex(owner, k, owner.edges[j, 0]), vertex(owner, k, owner.edges[j, 1])
+        p, q = vertex(owner, owner.edges[j, 0]), vertex(owner, owner.edges[j, 1])
         p, q = (move(X, p), move(X, q)) if is_forward else (move_back(X, p), move_back(X, q))
         entry, exit_share, entry_sense, exit_sense, node = np.inf, -np.inf, 0, 0, 0
         while node < node_count:
@@ -50,9 +50,9 @@ def _collect(owner, target, k, X, is_forward, region, counts, normals, crossing_
                 triangle = target.triangles[node - inner, m]
                 if triangle < 0:
                     break
-                share, sense = crossing(target, k, triangle, p, q)
+                share, sense = crossing(target, triangle, p, q)
                 if sense != 0:
-                    a, b, c = corners_of(target, k, triangle)
+                    a, b, c = corners_of(target, triangle)
                     place, n = along(p, share, minus(q, p)), cross(minus(b, a), minus(c, a))
                     n = scaled(1.0 / math.sqrt(dot(n, n)), n)
                     place, n = (place, n) if is_forward else (move(X, place), scaled(-1.0, turn(X, n)))
@@ -72,13 +72,13 @@ def _collect(owner, target, k, X, is_forward, region, counts, normals, crossing_
 
 
 @uncounted
-def _add_common_normals(A, B, k, X, edges_A, edges_B, normals, count):  # type: ignore[no-untyped-def]
+def _add_common_normals(A, B, X, edges_A, edges_B, normals, count):  # type: ignore[no-untyped-def]
     """Add the common normals of edges of A and of B, from B to A, where both bodies are convex; return how many there are."""
     for i in edges_A:
-        d = turn(X, minus(vertex(A, k, A.edges[i, 1]), vertex(A, k, A.edges[i, 0])))
+        d = turn(X, minus(vertex(A, A.edges[i, 1]), vertex(A, A.edges[i, 0])))
         from_A = turn(X, row(A.outward, i))
         for j in edges_B:
-            e = minus(vertex(B, k, B.edges[j, 1]), vertex(B, k, B.edges[j, 0]))
+            e = minus(vertex(B, B.edges[j, 1]), vertex(B, B.edges[j, 0]))
             n = cross(d, e)
             length = math.sqrt(dot(n, n))
             if length > MIN_SINE * math.sqrt(dot(d, d) * dot(e, e)):
@@ -106,10 +106,10 @@ def ways_out(A, B, poses, inset, places, feet, normals, widths):  # type: ignore
     for k in range(poses.shape[0]):
         X = poses[k]
         counts[:], widths[k] = 0, 0.0
-        _collect(A, B, k, X, True, region, counts, candidates, crossing_A)
+        _collect(A, B, X, True, region, counts, candidates, crossing_A)
         edges_of_A = counts[2]
-        _collect(B, A, k, X, False, region, counts, candidates, crossing_B)
-        count = _add_common_normals(A, B, k, X, crossing_A[:edges_of_A], crossing_B[: counts[2]], candidates, counts[1])
+        _collect(B, A, X, False, region, counts, candidates, crossing_B)
+        count = _add_common_normals(A, B, X, crossing_A[:edges_of_A], crossing_B[: counts[2]], candidates, counts[1])
         best, min_width = 0, np.inf
         for m in range(count):
             low, high = np.inf, -np.inf

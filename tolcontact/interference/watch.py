@@ -10,8 +10,10 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.discretization import Nominal
+from tolcontact.interference import kernel
 from tolcontact.interference.deviating_solid import DeviatingSolid
-from tolcontact.interference.neighbours import CORNERS, Interference, Neighbours
+from tolcontact.interference.free_region import CORNERS
+from tolcontact.interference.neighbours import Interference, Neighbours
 from tolcontact.interference.part_solid import curved_triangles, part_solid
 
 # Of the smallest tolerance range, twice the radius of a ball in both bodies: the depth from which on these lie in each other.
@@ -37,6 +39,13 @@ class Clash(NamedTuple):
 def ordered(first: int, second: int) -> tuple[int, int]:
     """Return the numbers of two bodies, the smaller one first."""
     return (first, second) if first < second else (second, first)
+
+
+def _relative(X_WA: Float[Array, "n 12"], X_WB: Float[Array, "n 12"]) -> Float[Array, "n 12"]:
+    """Return X_BA (n, 12) of bodies that rotate and do not stretch, so that no matrix need be inverted."""
+    X_BA = np.empty((len(X_WA), pose.ENTRIES))
+    kernel.relative(np.ascontiguousarray(X_WA), np.ascontiguousarray(X_WB), X_BA)
+    return X_BA
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +175,12 @@ class Watch:
         pairs = [pair for pair in self.nominal.pairs if pair.reference is not None and (pair.is_springy or pair.has_form)]
         return tuple(dict.fromkeys(pair.name for pair in pairs))
 
+    @property
+    def round_pairs(self) -> tuple[str, ...]:
+        """The names of contact pairs of round faces: their gaps are exact, and their triangles are not compared."""
+        pairs = [pair for pair in self.nominal.pairs if pair.reference is not None and pair.round is not None]
+        return tuple(dict.fromkeys(pair.name for pair in pairs if not (pair.is_springy or pair.has_form)))
+
     @cached_property
     def overlapping(self) -> frozenset[tuple[int, int]]:
         """Pairs of bodies that lie in each other in the nominal assembly."""
@@ -211,7 +226,7 @@ class Watch:
             is_left_out = pair in left_out or (among is not None and pair not in among)
             neighbours = None if is_left_out else self.neighbours(pair)
             if neighbours is not None:
-                X_BA = pose.relative(poses[:, pair[0]], poses[:, pair[1]])
+                X_BA = _relative(poses[:, pair[0]], poses[:, pair[1]])
                 rows = np.flatnonzero(neighbours.interfere(X_BA, deviations) & is_finite)
                 if rows.size:
                     yield Clash(pair, rows)
@@ -223,4 +238,4 @@ class Watch:
         neighbours = self.neighbours(clash.pair)
         assert neighbours is not None
         i, j = clash.pair
-        return neighbours.measured(pose.relative(poses[clash.rows, i], poses[clash.rows, j]), deviations[clash.rows])
+        return neighbours.measured(_relative(poses[clash.rows, i], poses[clash.rows, j]), deviations[clash.rows])

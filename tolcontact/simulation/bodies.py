@@ -61,10 +61,8 @@ def watched_bodies(
     stations = [scene.station for scene in nominal.scenes] or [""]
     counted = dict[tuple[int, int], np.ndarray]()
     bodies, declared = WatchedBodies.none(count), list[Clash]()
-    for clash in watch.clashes(poses, deviations, left_out=tested):
+    for clash in watch.clashes(poses, deviations, left_out={*tested, *watch.overlapping}):
         rows, parts = clash.rows, _parts(program, clash)
-        if clash.pair in watch.overlapping:
-            continue
         if clash.pair in watch.declared:
             bodies.withdrawn.append((stations.index(nominal.parts[clash.pair[0]].station), rows))
             declared.append(clash)
