@@ -106,7 +106,7 @@ def judged(scene: Scene, samples: int, seed: int, solver: str) -> Findings:
 def leaves_rotations_free(program: tc.Program) -> bool:
     """Return whether the contact points of a body that moves lie on a line.
 
-    No objective that sums up displacements of these points holds the body's rotation about the line: its pose is not determined.
+    No sum of their displacements holds the rotation about the line, so that the pose of the body is not determined.
     """
     if not program.method.minimizes.counts_points:
         return False

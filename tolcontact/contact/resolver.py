@@ -14,7 +14,7 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ACCURACY, ContactGroup, Program
 from tolcontact.contact.acceptance import AcceptanceLimits
-from tolcontact.contact.candidates import FREE_DEPTH, Candidates
+from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.free_steps import FreeSteps
 from tolcontact.contact.iterated_search import search
 from tolcontact.contact.linear_step import MAX_ROUNDS, PENETRATION, LinearStep
@@ -138,7 +138,7 @@ class ContactResolver:
         """Return the realizations (k,) whose raw bodies are apart, though places with a least gap (n, pair) [mm] deny it."""
         if not self._candidates.are_guarded or self._method.minimizes.presses:
             return np.zeros(0, dtype=int)
-        rows = np.flatnonzero((min_gap < -FREE_DEPTH).any(axis=1))
+        rows = np.flatnonzero((min_gap < -self._candidates.free_depth).any(axis=1))
         return rows[~self._candidates.interfere(task.relative[rows])]
 
     def _stays(self, task: Task, state: State) -> Bool[Array, " n"]:
