@@ -38,12 +38,12 @@ def add_barriers(
     """
     gaps, each = entered.gaps(entering, np.empty((len(rows), 0))), np.arange(len(rows))
     deepest = gaps.argmin(axis=1) if gaps.shape[1] else np.zeros(len(rows), dtype=int)
-    is_shown = gaps.min(axis=1, initial=np.inf) < -TOUCHING
-    is_known = scan.take(rows).holds(np.maximum(entered.labels[each, deepest], 0)[:, None])[:, 0] & is_shown
+    is_known = scan.take(rows).holds(np.maximum(entered.labels[each, deepest], 0)[:, None])[:, 0]
+    is_shown = (gaps.min(axis=1, initial=np.inf) < -TOUCHING) & ~is_known
     way = guard.ways_out(entering)
     places = entered.places[each, deepest], entered.feet[each, deepest], entered.normals[each, deepest]
     added = [np.where(is_shown[:, None], *vectors) for vectors in zip(places, (way.places, way.feet, way.normals), strict=True)]
-    is_new = ~is_known & (is_shown | (way.widths > 0))
+    is_new = is_shown | (way.widths > 0)
     if not is_new.any():
         return scan
     rows, added = rows[is_new], [vectors[is_new] for vectors in added]
