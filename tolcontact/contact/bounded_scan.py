@@ -23,7 +23,8 @@ ALIGNED = 0.87  # cosine of the angle to the axis along which bodies part, up to
 SHOWN_SHARE = 0.05  # of the gap along this axis: where other places show it up to that, it needs no place of its own
 
 
-def _is_barrier(labels: Int[Array, "n k"]) -> Bool[Array, "n k"]:
+def is_barrier(labels: Int[Array, "n k"]) -> Bool[Array, "n k"]:
+    """Return which labels of places are those of barriers."""
     return (labels >= FIRST_BARRIER) & (labels < FIRST_PLACE)
 
 
@@ -61,13 +62,13 @@ class BoundedScan(SlotScan):
     @property
     def barriers(self) -> Places:
         """The barriers of the pair, without gaps."""
-        columns = _is_barrier(self.labels).any(axis=0)
+        columns = is_barrier(self.labels).any(axis=0)
         labels, *vectors = (values[:, columns] for values in (self.labels, self.places, self.feet, self.normals))
         return Places(labels, np.where(labels < 0, np.inf, 0.0), *vectors)
 
     def with_barriers(self, barriers: Places) -> "BoundedScan":
         """Return the scan with `barriers` in place of those that it has."""
-        others = ~_is_barrier(self.labels).any(axis=0)
+        others = ~is_barrier(self.labels).any(axis=0)
         joined = (
             np.concatenate([values[:, others], added], axis=1)
             for values, added in (

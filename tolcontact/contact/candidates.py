@@ -8,7 +8,7 @@ import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
-from tolcontact.contact.bounded_scan import BoundedScan, bounded, bounded_scan
+from tolcontact.contact.bounded_scan import BoundedScan, bounded, bounded_scan, is_barrier
 from tolcontact.contact.guard import GUARD, Guard
 from tolcontact.contact.projected_scan import half_spacing, project
 from tolcontact.contact.raised_scan import RaisedScan, raised_scan
@@ -132,7 +132,7 @@ class Candidates:
         If the `start` is guarded, bodies that lie in each other where no place shows it get one more place (see Guard). If it
         is parted, places hold convex bodies apart only in the direction in which they part best (see Parting). If it is free,
         places deeper than `deepest` (realization,) [mm], `free_depth` by default, are on the far side of a body and do not
-        count. Its steps keep barriers, and know places a little beside their edges: a corner in a valley meets both sides of it.
+        count. Its steps keep barriers and know places a little beside edges: a corner in a valley meets both sides of it.
         With `projected`, points against curved faces are projected, too. `earlier` are scans with the sums of heights.
         """
         scans = list(self._carrying_scans)
@@ -235,11 +235,16 @@ class Candidates:
         return {k: found for k, found in partings.items() if found is not None}
 
     def are_apart(self, state: State) -> Bool[Array, " n"]:
-        """Return whether bodies of a bounded pair that carry load touch nowhere (n,)."""
+        """Return whether bodies of a bounded pair that carry load touch nowhere (n,).
+
+        At barriers they touch: else steps release these.
+        """
         found = np.zeros(len(state), dtype=bool)
         for k in self.bounded:
             if not self._pairs[k].has_form:  # whose minima are not among the gaps
-                found |= state.loaded[:, self._spans[k]].any(axis=1) & (state.gap_min[:, k] > APART * self._edge_error)
+                loaded = state.loaded[:, self._spans[k]]
+                at_barrier = is_barrier(state.slots[self.slot_of(k)].labels) & loaded
+                found |= loaded.any(axis=1) & ~at_barrier.any(axis=1) & (state.gap_min[:, k] > APART * self._edge_error)
         return found
 
     def hold(self, task: Task, state: State, start: Start) -> Bool[Array, " n"]:

@@ -19,8 +19,7 @@ from tolcontact.discretization import ContactPoints
 from tolcontact.mechanics import Group
 
 MAX_HALVINGS = 20
-SINK_SHARE = 0.2  # of a step, by which places may sink in: normals lean by that, and rotations are curved
-AT_REST = 1e-6  # mm: after a smaller step, barriers are probed
+SINK_SHARE = 1.0  # of a step, by which places may sink in: planes that face each other touch along the normal of one
 GAIN_SHARE = 1e-9  # of the objective, by which rounding may raise it
 MAX_LIFTS = 30
 LIFT_FACTOR = 1.1  # times the width of what bodies share, by which they are moved apart
@@ -66,11 +65,11 @@ class FreeSteps:
         rows = np.flatnonzero(np.isfinite(entering).all(axis=(1, 2)))
         scans, entering = list(task.scans), entering[rows]
         entered = self._candidates.scans(entering, task.deviations[rows], start=FREE_WHERE_RAW, deepest=limits[rows])
-        rests, is_short = (size <= AT_REST) & ~is_short, is_short & (size > TOUCHING)
+        is_whole, is_short = ~is_short, is_short & (size > TOUCHING)
         for k, guard in self._candidates.guards.items():
             X_RM = state.relative[:, k]
             scan = add_barriers(bounded(scans[k]), guard, X_RM, rows, entering[:, k], bounded(entered[k]))
-            carried = np.where(rests[:, None], state.slots[self._candidates.slot_of(k)].labels, -1)
+            carried = np.where(is_whole[:, None], state.slots[self._candidates.slot_of(k)].labels, -1)
             scans[k], is_released = release(scan, guard, X_RM, carried)
             is_short = is_short | is_released
         return replace(task, scans=scans), is_short
