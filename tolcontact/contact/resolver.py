@@ -203,14 +203,18 @@ class ContactResolver:
         rows = doubtful[self._candidates.interfere(state.relative[doubtful])]
         for start in GUARDED:
             rows = self._try_again(task, state, rows, start)
-        rows = np.flatnonzero((state.rank > 0) | ~self._limits.is_near(task, state))
+        rows = self._uncertain(task, state)
         for start in OTHER_STARTS_CURVED if self._candidates.curved else OTHER_STARTS:
             rows = self._try_again(task, state, rows, start)
         rows = self._without_answer(state)
         for start in PARTED if rows.size and self._candidates.partings else ():
             rows = self._try_again(task, state, rows, start)
         for start in FREE if self._candidates.are_guarded else ():
-            self._try_again(task, state, np.flatnonzero(state.rank > 0), start)
+            self._try_again(task, state, self._uncertain(task, state), start)
+
+    def _uncertain(self, task: Task, state: State) -> Int[Array, " k"]:
+        """Return the realizations (k,) that are not certified, or far from their raw pose."""
+        return np.flatnonzero((state.rank > 0) | ~self._limits.is_near(task, state, self._candidates))
 
     def _without_answer(self, state: State) -> Int[Array, " k"]:
         """Return the realizations (k,) without an answer in which bodies are apart; one that is far away counts as one."""
