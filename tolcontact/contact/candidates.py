@@ -146,15 +146,13 @@ class Candidates:
         for k, places in (self._widened if start.free and slots else self.bounded).items():
             kept, error = (slots[self._varying.index(k)].labels, width * self._edge_error) if slots else (None, 0.0)
             carried = None if kept is None else kept.copy()
-            if kept is not None and at_rest is not None:
-                # Places between the ends of faces with form come and go with no edge.
+            if kept is not None and at_rest is not None:  # places between the ends of faces with form come and go with no edge
                 kept[at_rest[:, None] & ~_lies_between(kept)] = -1
             former = earlier[k] if earlier else None
             if kept is not None and isinstance(former, BoundedScan):
                 kept = np.concatenate([kept, former.minima], axis=1)
             nearness, guard = NEARNESS if width == 1 else np.inf, self.guards.get(k) if start.guarded else None
-            depth = self._bulge if k in self._with_minima else np.inf
-            parting = self.partings.get(k) if start.parted else None
+            depth, parting = self._bulge if k in self._with_minima else np.inf, self.partings.get(k) if start.parted else None
             limits = np.full(len(relative), self.free_depth) if start.free and deepest is None else deepest
             scans[k] = bounded_scan(
                 scans[k],
