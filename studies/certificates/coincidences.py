@@ -31,11 +31,13 @@ ALLOWED, NOTICED = 5e-4, 1e-4  # radius of a ball in two bodies, as a share of t
 TOUCHING = 1e-6  # mm
 LIFTS = (0.0, 0.25, 0.5, 1, 2, 4)  # in tolerance ranges
 UNANSWERED = 0.1  # share of the realizations of a scene
+ON_A_LINE = 1e-3  # of the size of a body, within which its contact points lie on a line
+STIFF = "locator stiffness"
 LISTED = 6  # wrong realizations of a scene
 CONTRADICTIONS = ("inside", "noticed", "missed", "falsely touched", "lifted off", "not told", "falsely told")
 UNCERTIFIED = ("not converged", "not assemblable", "doubtful")
 OTHERS = ("liftable", "refused", "crashed", "seconds")
-COLUMNS = ("scenes", "rows", "certified", *CONTRADICTIONS, "undeclared", "told", *UNCERTIFIED, *OTHERS)
+COLUMNS = ("scenes", "rows", "stiff", "certified", *CONTRADICTIONS, "undeclared", "told", *UNCERTIFIED, *OTHERS)
 
 
 @dataclass
@@ -62,6 +64,9 @@ class Findings:
 def judged(scene: Scene, samples: int, seed: int, solver: str) -> Findings:
     """Return what the judge finds in realizations of a scene."""
     program = tc.build(scene.assembly, solver=solver)
+    is_stiff = leaves_rotations_free(program)
+    if is_stiff:
+        program = tc.build(scene.assembly, solver=solver, method=scene.assembly.method.with_choices(objective=STIFF))
     blocks = list(simulate_blocks(program, samples=samples, seed=seed, threads=1))
     names = [part.name for part in program.nominal.parts]
     order = [names.index(f"body {k}") for k in range(len(scene.bodies))]
@@ -79,6 +84,7 @@ def judged(scene: Scene, samples: int, seed: int, solver: str) -> Findings:
         before, after = np.zeros((2, touched.size))
     counts = {
         "rows": samples,
+        "stiff": samples * is_stiff,
         "certified": certified.size,
         "inside": np.sum(radii > ALLOWED),
         "noticed": np.sum(radii > NOTICED),
@@ -95,6 +101,27 @@ def judged(scene: Scene, samples: int, seed: int, solver: str) -> Findings:
     wrong = {*certified[radii > NOTICED], *touched[(before > TOUCHING) | (after > ALLOWED * scene.tolerance)]}
     numbers = collections.Counter({name: int(count) for name, count in counts.items()})
     return Findings(numbers, float(radii.max(initial=0.0)), sorted(map(int, wrong)))
+
+
+def leaves_rotations_free(program: tc.Program) -> bool:
+    """Return whether the contact points of a body that moves lie on a line.
+
+    No sum of their displacements holds the rotation about the line, so that the pose of the body is not determined.
+    """
+    if not program.method.minimizes.counts_points:
+        return False
+    points: dict[int, list[np.ndarray]] = collections.defaultdict(list)
+    for pair in program.nominal.pairs:
+        points[pair.moving].append(pair.P_m)
+        points[pair.reference].append(pair.P_r)
+    for part, sets in points.items():
+        centred = np.concatenate(sets) - np.concatenate(sets).mean(axis=0)
+        axis = np.linalg.svd(centred)[2][0]  # of the line nearest to the points
+        distances = np.linalg.norm(centred - np.outer(centred @ axis, axis), axis=1)
+        body = program.nominal.parts[part]
+        if body.movers and distances.max() < ON_A_LINE * body.body.scale:
+            return True
+    return False
 
 
 def liftable(scene: Scene, poses: np.ndarray) -> np.ndarray:

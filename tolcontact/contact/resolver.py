@@ -14,7 +14,7 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ACCURACY, ContactGroup, Program
 from tolcontact.contact.acceptance import AcceptanceLimits
-from tolcontact.contact.candidates import FREE_DEPTH, Candidates
+from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.free_steps import FreeSteps
 from tolcontact.contact.iterated_search import search
 from tolcontact.contact.linear_step import MAX_ROUNDS, PENETRATION, LinearStep
@@ -139,7 +139,7 @@ class ContactResolver:
         """Return the realizations (k,) whose raw bodies are apart, though places with a least gap (n, pair) [mm] deny it."""
         if not self._candidates.are_guarded or self._method.minimizes.presses:
             return np.zeros(0, dtype=int)
-        rows = np.flatnonzero((min_gap < -FREE_DEPTH).any(axis=1))
+        rows = np.flatnonzero((min_gap < -self._candidates.free_depth).any(axis=1))
         return rows[~self._candidates.interfere(task.relative[rows])]
 
     def _stays(self, task: Task, state: State) -> Bool[Array, " n"]:
@@ -201,7 +201,7 @@ class ContactResolver:
         if self._candidates.curved:
             self._try_again(task, state, np.flatnonzero(state.rank == NO_ANSWER), BALANCE)
         self._try_again(task, state, self._doubted_inside(state), GUARDED)
-        rows = np.flatnonzero((state.rank > 0) | ~self._limits.is_near(task, state))
+        rows = self._uncertain(task, state)
         for start in OTHER_STARTS_CURVED if self._candidates.curved else OTHER_STARTS:
             rows = self._try_again(task, state, rows, start)
         self._try_again(task, state, self._doubted_inside(state), GUARDED_SMALL)
@@ -209,7 +209,11 @@ class ContactResolver:
         for start in PARTED if rows.size and self._candidates.partings else ():
             rows = self._try_again(task, state, rows, start)
         for start in FREE if self._candidates.are_guarded else ():
-            self._try_again(task, state, np.flatnonzero(state.rank > 0), start)
+            self._try_again(task, state, self._uncertain(task, state), start)
+
+    def _uncertain(self, task: Task, state: State) -> Int[Array, " k"]:
+        """Return the realizations (k,) that are not certified, or far from their raw pose."""
+        return np.flatnonzero((state.rank > 0) | ~self._limits.is_near(task, state, self._candidates))
 
     def _doubted_inside(self, state: State) -> Int[Array, " k"]:
         """Return the realizations (k,) whose answers are doubtful, with bodies of a pair in each other."""
