@@ -5,8 +5,7 @@ import copy
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float
-from tolcontact.compilation.active_set import ActiveSet
-from tolcontact.compilation.band_order import band_order
+from tolcontact.compilation.active_set import ActiveSet, band_order
 from tolcontact.compilation.contact_qp import ContactQP
 from tolcontact.compilation.elements import ElementQP
 from tolcontact.compilation.functions import InterpretedFunction, flat

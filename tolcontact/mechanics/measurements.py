@@ -23,11 +23,10 @@ from tolcontact.discretization.measured_geometry import (
 )
 from tolcontact.features import FaceDeviation
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere, Torus
-from tolcontact.mechanics.mesh_clearance import mesh_clearance
+from tolcontact.mechanics.mesh_clearance import least, mesh_clearance, segment_distance
 from tolcontact.mechanics.plane_clearance import plane_clearance
 from tolcontact.mechanics.pose import ENTRIES, Pose, relative
 from tolcontact.mechanics.round_gap import round_gaps
-from tolcontact.mechanics.segments import least, segment_distance
 from tolcontact.mechanics.setting import face_height, face_pose
 
 

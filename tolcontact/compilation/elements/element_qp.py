@@ -10,17 +10,13 @@ from tolcontact.arrays import Array, Float
 from tolcontact.compilation.conditioning import SLACK, slack_owners
 from tolcontact.compilation.contact_qp import Evaluators, Standing, row_spans
 from tolcontact.compilation.contact_rows import standing_points
-from tolcontact.compilation.elements.corrected_poses import CorrectedPoses
 from tolcontact.compilation.elements.element import Element
 from tolcontact.compilation.elements.element_batch import Arrays, ElementBatch, Elements
 from tolcontact.compilation.elements.element_functions import function_of
 from tolcontact.compilation.elements.element_layout import ElementLayout
-from tolcontact.compilation.elements.pair_element import PairElement, pair_elements
-from tolcontact.compilation.elements.pair_elements import Numbers, PairElements
-from tolcontact.compilation.elements.pair_functions import pair_functions
-from tolcontact.compilation.elements.part_element import PartElement, part_elements
-from tolcontact.compilation.elements.part_elements import PartElements
-from tolcontact.compilation.elements.part_functions import part_functions
+from tolcontact.compilation.elements.mover_functions import CorrectedPoses
+from tolcontact.compilation.elements.pair_element import Numbers, PairElement, PairElements, pair_elements, pair_functions
+from tolcontact.compilation.elements.part_element import PartElement, PartElements, part_elements, part_functions
 from tolcontact.compilation.functions import NamedFunction, flat, located
 from tolcontact.compilation.outcome import step_share
 from tolcontact.compilation.plugins import Plugin
