@@ -130,7 +130,7 @@ def exact_pose(locators: Locators, steps: ca.SX, start: Pose, within: Sequence[P
 
     To first order a locator pushes a point of its part along its direction. Exactly, the face of the part, a plane through that
     point, has to pass through the tip of the locator, wherever on the face this is. Six locators give six equations for the
-    pose. More give a best fit: the least sum of squared heights of the tips over the faces, as a measuring machine aligns parts.
+    pose. More give a best fit: the least sum of squared heights of the tips over the faces, as a measuring machine does.
 
     steps    (locator, 1) [mm] of each locator along its direction
     start    pose to first order
