@@ -19,11 +19,11 @@ Problem = Mapping[str, Float[Array, "QP ..."]]
 class ActiveSet(NamedTuple):
     """The active sets of QPs: min x'Hx/2 + g'x, a x >= lba; the last rows are equations, the last variables, slacks, >= 0.
 
-    carries   (QP, row)
+    active   (QP, row)
     is_open   (QP, slack)
     """
 
-    carries: Bool[Array, "QP row"]
+    active: Bool[Array, "QP row"]
     is_open: Bool[Array, "QP slack"]
 
     @classmethod
@@ -31,14 +31,14 @@ class ActiveSet(NamedTuple):
         """Return the active sets of a solver's answers.
 
         problem     h (QP, n, n), g (QP, n), a (QP, row, n), lba (QP, row)
-        answer      x (QP, n), lam_a (QP, row), lam_x (QP, n) of a solver; multipliers are below 0 if a row carries
+        answer      x (QP, n), lam_a (QP, row), lam_x (QP, n) of a solver; multipliers are below 0 if a row active
         """
         A, lower = problem["a"], problem["lba"]
         x, lam_a, lam_x = (answer[name] for name in ("x", "lam_a", "lam_x"))
         # Of a row and its multiplier the smaller one is rounding, for every solver.
-        carries = -lam_a > np.einsum("kij,kj->ki", A, x) - lower
-        carries[:, carries.shape[1] - equations :] = True
-        return cls(carries, (-lam_x <= x)[:, x.shape[1] - slacks :])
+        active = -lam_a > np.einsum("kij,kj->ki", A, x) - lower
+        active[:, active.shape[1] - equations :] = True
+        return cls(active, (-lam_x <= x)[:, x.shape[1] - slacks :])
 
     def answer(self, problem: Problem, order: Int[Array, " unknown"]) -> dict[str, np.ndarray]:
         """Return x, lam_a and lam_x (QP, entry) of the QPs; NaN if the conditions have no solution.
@@ -49,7 +49,7 @@ class ActiveSet(NamedTuple):
         count, rows, size = A.shape
         slacks = self.is_open.shape[1]
         solution = np.empty((count, size + rows + slacks))
-        solve_conditions((H, g, A, lower), self.carries, self.is_open, order, COMPLIANCE, REFINEMENTS, solution)
+        solve_conditions((H, g, A, lower), self.active, self.is_open, order, COMPLIANCE, REFINEMENTS, solution)
         x, multipliers = solution[:, :size], solution[:, size:]
         lam_x = np.zeros_like(x)
         lam_x[:, size - slacks :] = -multipliers[:, rows:]

@@ -9,8 +9,8 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Int
 from tolcontact.compilation.contact_rows import Rows, springs_of
 from tolcontact.mechanics.correction import FREEDOMS
+from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.pose import Number
-from tolcontact.mechanics.setting import Setting
 
 SLACK = 1e-3  # mm of gap that a slack of 1 mm opens, unless its row gives way
 IDLE_DISTANCE = 1e3  # lengths of the group: bound of an empty row, which never binds
@@ -25,25 +25,25 @@ class ConditionedRows(NamedTuple):
     length: ca.SX
 
 
-def conditioned(setting: Setting, Q: ca.SX, pull: ca.SX, rows: Rows, misfit: ca.SX, scale: ca.SX) -> dict[str, ca.SX]:
+def conditioned(system: GroupEquations, Q: ca.SX, gradient: ca.SX, rows: Rows, misfit: ca.SX, scale: ca.SX) -> dict[str, ca.SX]:
     """Return the QP min 1/2 y'Hy + g'y with lba <= a y <= uba, in y = (U z, slacks), and the `length` of the unscaled rows.
 
     `misfit` (locator, 1) [mm] of exact two-sided locators gives the last rows, which are equations. A row that gives way has a
     slack of its own without a price, after those of the pairs: with the opening sqrt(C) it opens the gap by C times the
     multiplier. `scale` is that of the objective.
     """
-    pairs, equations = len(setting.group.pairs), misfit.numel()
+    pairs, equations = len(system.group.pairs), misfit.numel()
     H, to_z = unit_blocks(Q)
     A = rows.slopes @ to_z
     idle = [idle_row(k, A[k, :].nnz()) for k in range(len(rows))]
-    gap_rows = conditioned_rows(A, rows.gaps, rows.filled, idle, setting.group.length, openings(rows.compliance, scale))
-    B = setting.slope(misfit) @ to_z
+    gap_rows = conditioned_rows(A, rows.gaps, rows.filled, idle, system.group.length, openings(rows.compliance, scale))
+    B = system.slope(misfit) @ to_z
     owners, priced = slack_owners(rows.pairs, rows.springs, pairs)
     opens = ca.sparsify(ca.DM(np.equal.outer(owners, range(len(priced))).astype(float)))
-    targets = -setting.at_rest(misfit)
+    targets = -system.at_rest(misfit)
     return {
         "h": ca.diagcat(H, ca.SX.eye(len(priced))),
-        "g": ca.vertcat(to_z.T @ pull, ca.DM(priced.astype(float)) * setting.group.length),
+        "g": ca.vertcat(to_z.T @ gradient, ca.DM(priced.astype(float)) * system.group.length),
         "a": ca.blockcat([[gap_rows.A, ca.diag(gap_rows.opening) @ opens], [B, ca.SX(equations, len(priced))]]),
         "lba": ca.vertcat(gap_rows.lower, targets),
         "uba": ca.vertcat(ca.DM(np.full(len(rows), np.inf)), targets),

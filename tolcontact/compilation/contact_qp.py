@@ -27,11 +27,11 @@ from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import FREEDOMS, linear, published, rigid
 from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.gap import GapMap
+from tolcontact.mechanics.group_equations import GroupEquations, face_heights, face_poses
 from tolcontact.mechanics.groups import Group, curved_pairs
 from tolcontact.mechanics.objective import energy
-from tolcontact.mechanics.placement import hold_steps, misfit
+from tolcontact.mechanics.placement import bilateral_steps, misfit
 from tolcontact.mechanics.pose import ENTRIES, poses_of
-from tolcontact.mechanics.setting import Setting, face_heights, face_poses
 from tolcontact.method import Method
 
 Standing = Sequence[np.ndarray | int]  # see ContactQP
@@ -118,28 +118,30 @@ def contact_qp(
     slack (q)            penetration of each pair that no increment could remove, to first order [mm]
     step (2)             largest increment (dt, L w) of a mover [mm], and the same in the norm of the objective, max |y|, of
                          the whole correction
-    astray               largest misfit [mm] of exact two-sided locators at `corrected`
+    locator_residual               largest misfit [mm] of exact two-sided locators at `corrected`
     """
     standing = standing or [standing_points(nominal.pairs[k], gaps[k], method) for k in group.pairs]
     inputs = _inputs(nominal, group, standing)
     pairs = [nominal.pairs[index] for index in group.pairs]
-    setting = Setting(
+    system = GroupEquations(
         nominal, group, method, raw=poses_of(inputs["raw"]), z=ca.SX.sym("z", FREEDOMS * len(group.free)),
-        **{name: inputs[name] for name in ("moments", "deviations", "firmness")},
+        **{name: inputs[name] for name in ("moments", "deviations", "regularization_factor")},
         faces=[face_poses(pair, inputs["deviations"]) for pair in pairs],
         heights=[face_heights(pair, inputs["deviations"]) for pair in pairs],
-        steps=[hold_steps(nominal, group.parts[hold.part], inputs["deviations"]) for hold in group.holds],
+        steps=[bilateral_steps(nominal, group.parts[locators.part], inputs["deviations"]) for locators in group.bilateral],
     )  # fmt: skip
-    motion = setting.motion(poses_of(inputs["poses"]))
+    motion = system.motion(poses_of(inputs["poses"]))
     current, moved, reactions = motion.poses, motion.by(linear), inputs["reactions"]
-    rows = contact_rows(setting, row_points(setting, standing, inputs), current, moved, reactions)
+    rows = contact_rows(system, row_points(system, standing, inputs), current, moved, reactions)
     projects = method.is_iterated or bool(curved_pairs(nominal, group))
-    terms = quadratic_terms(setting, rows, motion, reactions, ca.sum1(reactions), projects=projects)
-    exact = misfit(setting, moved, linear=True) if method.minimizes.presses else ca.SX(0, 1)
-    problem = conditioned(setting, *terms.summed(inputs["newton"], inputs["caution"]), rows, exact, terms.scale)
+    terms = quadratic_terms(system, rows, motion, reactions, ca.sum1(reactions), projects=projects)
+    exact = misfit(system, moved, linear=True) if method.minimizes.presses else ca.SX(0, 1)
+    problem = conditioned(system, *terms.summed(inputs["newton"], inputs["proximal_weight"]), rows, exact, terms.scale)
     poses = motion.by(rigid if method.is_exact else published)
-    solution_symbols, results = outcome(setting, terms.scale, rows, poses, problem, inputs["stride"])
-    pure_energy = ca.substitute(energy(setting, current).value, setting.firmness, 1) + rows.spring_energy() / terms.scale
+    solution_symbols, results = outcome(system, terms.scale, rows, poses, problem, inputs["stride"])
+    pure_energy = (
+        ca.substitute(energy(system, current).value, system.regularization_factor, 1) + rows.spring_energy() / terms.scale
+    )
     return ContactQP(
         assemble=_function("assemble", inputs, problem),
         plugin=plugin,
@@ -148,7 +150,7 @@ def contact_qp(
         relate=_function(
             "relate",
             {name: inputs[name] for name in ("poses", "deviations")},
-            {"relative": ca.vertcat(*(X.vector() for X in setting.relative(current)))},
+            {"relative": ca.vertcat(*(X.vector() for X in system.relative(current)))},
         ),
         slacks=len(group.pairs) + len(rows.springs),
         has_springs=group.has_springs,
@@ -167,10 +169,10 @@ def _inputs(nominal: Nominal, group: Group, standing: Standing) -> dict[str, ca.
     raw (12 p)           their raw poses, from which displacements count
     moments (10, sides)  moments of the points of each side that count in the objective
     deviations (c)       of all contributors of the model
-    firmness             factor of the regularization: 1, or more in early steps
+    regularization_factor             factor of the regularization: 1, or more in early steps
     newton               1 to count the curvature of objective and gaps, 0 for the linear step of the paper
     stride               in an exact resolution: the largest angle [rad] by which a step turns a mover
-    caution              if points are projected in each step: weight of the step, in all contact points, beside the objective
+    proximal_weight              if points are projected in each step: weight of the step, in all contact points, beside the objective
     reactions (k)        if `newton`: the reaction of each row's point in the previous step
     bend (12 v)          if `newton`: the sum, over the points in the slots of the previous step, of reaction times the gap's
                          gradient by the entries of X_RM
@@ -184,10 +186,10 @@ def _inputs(nominal: Nominal, group: Group, standing: Standing) -> dict[str, ca.
         "raw": (ENTRIES * len(group.parts), 1),
         "moments": (MOMENTS, len(group.sides)),
         "deviations": (len(nominal.contributors), 1),
-        "firmness": (1, 1),
+        "regularization_factor": (1, 1),
         "newton": (1, 1),
         "stride": (1, 1),
-        "caution": (1, 1),
+        "proximal_weight": (1, 1),
         "reactions": (rows, 1),
         "bend": (ENTRIES * varying, 1),
         "P_m": (3, slots),

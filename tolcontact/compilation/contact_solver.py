@@ -104,39 +104,39 @@ class ContactSolver:
 
     def _solved_batch(self, solver: "_Solver", inputs: Arrays) -> Arrays:
         problem = self._assemble(**inputs)
-        slacks = np.ones((len(inputs["guess"]), self._qp.slacks))  # what gives way opens whenever it carries
+        slacks = np.ones((len(inputs["guess"]), self._qp.slacks))  # what gives way opens whenever it active
         slacks[:, : inputs["guessed_slack"].shape[1]] = inputs["guessed_slack"]
         if not solver.remembers:
             return self._polished(inputs, problem, *solver(problem, inputs["guess"], slacks))
-        outputs, foreseen = self._foreseen(inputs, problem, slacks)
-        if foreseen.all():
+        outputs, predicted = self._predicted(inputs, problem, slacks)
+        if predicted.all():
             return outputs
-        rest = np.flatnonzero(~foreseen)
+        rest = np.flatnonzero(~predicted)
         inputs, problem = _of(inputs, rest), _of(problem, rest)
         answer = self._polished(inputs, problem, *solver(problem, inputs["guess"], slacks[rest]))
-        if not foreseen.any():
+        if not predicted.any():
             return answer
         _replace(outputs, rest, answer)
         return outputs
 
-    def _foreseen(self, inputs: Arrays, problem: Arrays, slacks: np.ndarray) -> tuple[Arrays, Bool[Array, " realization"]]:
+    def _predicted(self, inputs: Arrays, problem: Arrays, slacks: np.ndarray) -> tuple[Arrays, Bool[Array, " realization"]]:
         """Return the outputs with the rows and slacks of the guess as the active set, and of which problems it is.
 
         Small steps seldom change the active set. Outputs of other problems are arbitrary.
         """
-        carries = np.zeros((len(slacks), self._qp.sparsity("a").size1()), dtype=np.bool_)
-        carries[:, : inputs["guess"].shape[1]] = inputs["guess"] > 0
-        carries[:, carries.shape[1] - self._qp.equations :] = True
+        active = np.zeros((len(slacks), self._qp.sparsity("a").size1()), dtype=np.bool_)
+        active[:, : inputs["guess"].shape[1]] = inputs["guess"] > 0
+        active[:, active.shape[1] - self._qp.equations :] = True
         outputs: Arrays = {}
-        foreseen = np.zeros(len(slacks), dtype=np.bool_)
+        predicted = np.zeros(len(slacks), dtype=np.bool_)
         for rows in self._parts(np.flatnonzero(inputs["guess"].any(axis=1))):
             systems = self._dense_problem(problem, rows)
-            solution = ActiveSet(carries[rows], slacks[rows] > 0).answer(systems, self._order)
+            solution = ActiveSet(active[rows], slacks[rows] > 0).answer(systems, self._order)
             answer = self._finished(_of(inputs, rows) | _of(problem, rows) | solution)
             outputs = outputs or {name: np.empty((len(slacks), values.shape[1])) for name, values in answer.items()}
             _replace(outputs, rows, answer)
-            foreseen[rows] = ~_is_rough(answer)
-        return outputs, foreseen
+            predicted[rows] = ~_is_rough(answer)
+        return outputs, predicted
 
     def _polished(self, inputs: Arrays, problem: Arrays, solution: Arrays, failed: Bool[Array, " realization"]) -> Arrays:
         """Return the outputs for a solver's solutions; those that are rough are polished."""

@@ -7,16 +7,16 @@ import casadi as ca
 from tolcontact.compilation.conditioning import SLACK
 from tolcontact.compilation.contact_rows import Rows
 from tolcontact.mechanics.correction import FREEDOMS
+from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.placement import misfit
 from tolcontact.mechanics.pose import Number, Pose
-from tolcontact.mechanics.setting import Setting
 
 QP_ENTRIES = ("h", "g", "a", "lba", "to_z", "length")  # the QP as it was solved, whose residuals are computed
 SOLUTION = ("x", "lam_a", "lam_x")
 
 
 def outcome(
-    setting: Setting,
+    system: GroupEquations,
     scale: ca.SX,
     rows: Rows,
     poses: Sequence[Pose],
@@ -28,7 +28,7 @@ def outcome(
     `poses` are those after z. The QP's matrices are inputs, so that nothing is computed twice and the residuals are those of
     the QP that was solved.
     """
-    group, z, count = setting.group, setting.z, len(rows)
+    group, z, count = system.group, system.z, len(rows)
     slacks = len(group.pairs) + len(rows.springs)
     size, equations = z.numel() + slacks, problem["a"].size1() - count
     symbols = {name: ca.SX.sym(name, problem[name].sparsity()) for name in QP_ENTRIES}
@@ -41,12 +41,12 @@ def outcome(
     residuals = [stationarity, ca.norm_inf(natural), *([ca.norm_inf(excess[count:])] if equations else [])]
     step = symbols["to_z"] @ y
     taken_step = step
-    if setting.method.is_exact:
+    if system.method.is_exact:
         taken_step = step * step_share(step, stride, group.length)
     end_values = {
         "corrected": ca.vertcat(*(pose.vector() for pose in poses)),
-        "relative": ca.vertcat(*(X_RM.vector() for X_RM in setting.relative(poses))),
-        "astray": ca.norm_inf(misfit(setting, poses)) if equations else ca.SX(0),
+        "relative": ca.vertcat(*(X_RM.vector() for X_RM in system.relative(poses))),
+        "locator_residual": ca.norm_inf(misfit(system, poses)) if equations else ca.SX(0),
     }
     results = {
         "linearized": ca.substitute(rows.relative, z, step),

@@ -9,11 +9,11 @@ from tolcontact.compiled import compiled, uncounted
 
 
 @compiled
-def solve_conditions(problem, carries, is_open, order, compliance, refinements, solution):  # type: ignore[no-untyped-def]
+def solve_conditions(problem, active, is_open, order, compliance, refinements, solution):  # type: ignore[no-untyped-def]
     """Solve H x + g - C'm - (0, p) = 0, C x = b, C the rows that carry; write x, m (QP, n + row), 0 of other rows, and p.
 
     problem    H (QP, n, n), g (QP, n), rows (QP, row, n), b (QP, row); H is the identity for slacks, the last variables
-    carries    (QP, row)
+    active    (QP, row)
     is_open    (QP, slack): other slacks are 0, and have a multiplier p
     order      (n - slack + row,): variables but slacks, and rows after them, in an order that makes the system a narrow band
 
@@ -22,7 +22,7 @@ def solve_conditions(problem, carries, is_open, order, compliance, refinements, 
     """
     H, gradient, rows, bounds = problem
     for k in range(len(H)):
-        place, total = _places(carries[k], H.shape[1] - is_open.shape[1], order)
+        place, total = _places(active[k], H.shape[1] - is_open.shape[1], order)
         K, right = _conditions(H[k], gradient[k], rows[k], bounds[k], is_open[k], place, total)
         x = np.zeros(total)
         if _solve(K, right, place[len(place) - rows.shape[1] :], compliance, refinements, x):
@@ -32,11 +32,11 @@ def solve_conditions(problem, carries, is_open, order, compliance, refinements, 
 
 
 @compiled
-def _places(carries, size, order):  # type: ignore[no-untyped-def]
+def _places(active, size, order):  # type: ignore[no-untyped-def]
     """Return the place of each variable and row among the unknowns, -1 for rows that do not carry, and their number."""
     place, total = np.full(len(order), -1), 0
     for unknown in order:
-        if unknown < size or carries[unknown - size]:
+        if unknown < size or active[unknown - size]:
             place[unknown] = total
             total += 1
     return place, total
@@ -72,13 +72,13 @@ def _write(x, place, gradient, rows, is_open, solution):  # type: ignore[no-unty
         if place[size + row] >= 0:
             multipliers[row] = x[place[size + row]]
     for slack in range(slacks):
-        pull = -gradient[size + slack]
+        value = -gradient[size + slack]
         for row in range(count):
-            pull += rows[row, size + slack] * multipliers[row]
+            value += rows[row, size + slack] * multipliers[row]
         if is_open[slack]:
-            solution[size + slack] = pull
+            solution[size + slack] = value
         else:
-            multipliers[count + slack] = -pull
+            multipliers[count + slack] = -value
 
 
 @compiled

@@ -11,7 +11,7 @@ import numpy as np
 
 from tolcontact.compilation.bounded_pairs import TRIAL_SEED, TRIALS, Trial, bounded_pair, push
 from tolcontact.compilation.contact_qp import ContactQP, contact_qp
-from tolcontact.compilation.contact_rows import LEAST_SLOTS, SLOTS, standing_points
+from tolcontact.compilation.contact_rows import MIN_SLOTS, SLOTS, standing_points
 from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.elements import ElementQP, has_elements
 from tolcontact.compilation.functions import NamedFunction
@@ -27,13 +27,13 @@ from tolcontact.interference import Watch, ordered
 from tolcontact.limits import Limits
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.gap import GapMap, gap_map, gap_matrix
+from tolcontact.mechanics.group_equations import face_heights, face_poses, facing_pose
 from tolcontact.mechanics.groups import Group, contact_groups
 from tolcontact.mechanics.measures import measured, record
 from tolcontact.mechanics.placement import raw_poses
 from tolcontact.mechanics.pose import ENTRIES, Pose, poses_of
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 from tolcontact.mechanics.round_gap import round_gaps
-from tolcontact.mechanics.setting import face_heights, face_poses, facing_pose
 from tolcontact.method import Method
 from tolcontact.poses import AT_REST
 from tolcontact.readable import Pictured
@@ -266,7 +266,7 @@ def _contact_group(
 ) -> ContactGroup:
     # Where bodies meet changes with every pose, so that no row of such a pair stands.
     standing = [
-        min(max(trials[k].places, LEAST_SLOTS), SLOTS) if k in meetings else standing_points(nominal.pairs[k], gaps[k], method)
+        min(max(trials[k].places, MIN_SLOTS), SLOTS) if k in meetings else standing_points(nominal.pairs[k], gaps[k], method)
         for k in group.pairs
     ]
     build = ElementQP if has_elements(group, method) else contact_qp

@@ -8,10 +8,10 @@ import numpy as np
 
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.discretization import Nominal
+from tolcontact.mechanics.group_equations import face_poses, facing_pose
 from tolcontact.mechanics.groups import Group
 from tolcontact.mechanics.placement import placed_poses
 from tolcontact.mechanics.pose import ENTRIES, Pose, nearest_rotation, poses_of
-from tolcontact.mechanics.setting import face_poses, facing_pose
 from tolcontact.method import Method
 
 

@@ -37,8 +37,10 @@ class Element:
     def kind(self) -> Hashable:
         """What elements share whose functions are the same."""
         sides, loads = (tuple(entry.part for entry in entries) for entries in (self.group.sides, self.group.loads))
-        holds = tuple((hold.part, hold.owners, hold.parent, hold.is_placed) for hold in self.group.holds)
-        return type(self), tuple(mobility.movers for mobility in self.group.mobilities), sides, loads, holds
+        bilateral = tuple(
+            (locators.part, locators.owners, locators.parent, locators.is_placed) for locators in self.group.bilateral
+        )
+        return type(self), tuple(mobility.movers for mobility in self.group.mobilities), sides, loads, bilateral
 
     @cached_property
     def constants(self) -> np.ndarray:
@@ -50,9 +52,9 @@ class Element:
         yield from (np.asarray(mobility.centre) for mobility in group.mobilities)
         yield from (np.asarray(values) for side in group.sides for values in (side.centre, side.all_moments))
         yield from (np.asarray(values) for load in group.loads for values in (load.point, load.vector))
-        for hold in group.holds:
-            yield from map(np.asarray, (*hold.points, *hold.directions))
-            yield from (np.array([stiffness]) for stiffness in hold.stiffness)
+        for locators in group.bilateral:
+            yield from map(np.asarray, (*locators.points, *locators.directions))
+            yield from (np.array([stiffness]) for stiffness in locators.stiffness)
 
     def symbolic(self, constants: ca.SX, length: ca.SX, count: ca.SX) -> Group:
         """Return the group with symbols in place of its constants, the length and the number of points of the whole group.
@@ -72,14 +74,14 @@ class Element:
             mobilities=tuple(replace(mobility, centre=next(remaining)) for mobility in group.mobilities),
             sides=tuple(replace(side, centre=next(remaining), all_moments=next(remaining)) for side in group.sides),
             loads=tuple(replace(load, point=next(remaining), vector=next(remaining)) for load in group.loads),
-            holds=tuple(
+            bilateral=tuple(
                 replace(
-                    hold,
-                    points=of_each(hold.points),
-                    directions=of_each(hold.directions),
-                    stiffness=of_each(hold.stiffness),
+                    locators,
+                    points=of_each(locators.points),
+                    directions=of_each(locators.directions),
+                    stiffness=of_each(locators.stiffness),
                 )
-                for hold in group.holds
+                for locators in group.bilateral
             ),
             length=length,
             count=count,
@@ -109,7 +111,7 @@ class Extent:
             pairs=(),
             sides=(),
             loads=(),
-            holds=(),
+            bilateral=(),
         )
 
     def _local(self, mobility: Mobility) -> Mobility:

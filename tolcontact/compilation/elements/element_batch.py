@@ -16,7 +16,7 @@ from tolcontact.mechanics.pose import ENTRIES
 Arrays = dict[str, Float[Array, "_ _"]]
 Columns = Int[Array, "element _"]
 
-VALUES_OF_ALL = ("firmness", "length", "count", "scale", "load")
+VALUES_OF_ALL = ("regularization_factor", "length", "count", "scale", "load")
 
 
 class Elements:

@@ -63,7 +63,7 @@ class Movers:
     factor: IndexedFunction
     whiten: IndexedFunction
     couple: IndexedFunction
-    pull: IndexedFunction
+    coupling_forces: IndexedFunction
     step: IndexedFunction
 
 
@@ -97,8 +97,8 @@ class ElementLayout:
     def sizes_of_terms(self) -> dict[str, int]:
         """The number of entries that all elements contribute, by name."""
         between = BLOCK * len(self.coupling_sum.places)
-        sizes = {"pull": FREEDOMS * self._contributions, "hold": FREEDOMS * self._contributions}
-        for name in ("Q", "curvature", "nearness"):
+        sizes = {"gradient": FREEDOMS * self._contributions, "augmented_gradient": FREEDOMS * self._contributions}
+        for name in ("Q", "curvature", "proximal_hessian"):
             sizes |= {name: BLOCK * self._contributions, f"{name}_between": between}
         return sizes
 
@@ -107,7 +107,7 @@ class ElementLayout:
         functions, own = mover_functions(), np.arange(self._movers)[:, None]
         one_each = {
             **dict.fromkeys(("Q", "curvature", "V"), blocks(own, BLOCK)),
-            **dict.fromkeys(("pull", "g", "y", "step"), blocks(own, FREEDOMS)),
+            **dict.fromkeys(("gradient", "g", "y", "step"), blocks(own, FREEDOMS)),
             "convex": own,
         }
         i, j = self._coupled[:, :1], self._coupled[:, 1:]
@@ -120,7 +120,7 @@ class ElementLayout:
             "force_i": blocks(forces[0], FREEDOMS), "force_j": blocks(forces[1], FREEDOMS),
         }  # fmt: skip
         of_one = {name: getattr(functions, name).at(one_each) for name in ("factor", "whiten", "step")}
-        return Movers(**of_one, **{name: getattr(functions, name).at(pairs) for name in ("couple", "pull")})
+        return Movers(**of_one, **{name: getattr(functions, name).at(pairs) for name in ("couple", "coupling_forces")})
 
     def _lay_out_h(self) -> SparseLayout:
         freedoms = np.arange(FREEDOMS)
@@ -156,9 +156,9 @@ class ElementLayout:
             diagonal, force = (_by_element(sums.places[own], count) for sums in (self.mover_sum, self.force_sum))
             coupled = _by_element(self.coupling_sum.places[between], count)
             places = {
-                **dict.fromkeys(("Q", "curvature", "nearness"), blocks(diagonal, BLOCK)),
-                **dict.fromkeys(("Q_between", "curvature_between", "nearness_between"), blocks(coupled, BLOCK)),
-                **dict.fromkeys(("pull", "hold"), blocks(diagonal, FREEDOMS)),
+                **dict.fromkeys(("Q", "curvature", "proximal_hessian"), blocks(diagonal, BLOCK)),
+                **dict.fromkeys(("Q_between", "curvature_between", "proximal_hessian_between"), blocks(coupled, BLOCK)),
+                **dict.fromkeys(("gradient", "augmented_gradient"), blocks(diagonal, FREEDOMS)),
                 "force": blocks(force, FREEDOMS),
                 "a": _by_element(self._row_places[number], count),
             }

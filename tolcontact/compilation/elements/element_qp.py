@@ -24,14 +24,14 @@ from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.gap import GapMap
+from tolcontact.mechanics.group_equations import face_heights, face_poses
 from tolcontact.mechanics.groups import Group, curved_pairs
 from tolcontact.mechanics.objective import objective_scale
-from tolcontact.mechanics.placement import hold_steps
+from tolcontact.mechanics.placement import bilateral_steps
 from tolcontact.mechanics.pose import ENTRIES
-from tolcontact.mechanics.setting import face_heights, face_poses
 from tolcontact.method import Method
 
-MANY_MOVERS = 6  # from which on a group is assembled from elements
+MIN_MOVERS_FOR_ELEMENTS = 6  # from which on a group is assembled from elements
 MAX_ENTRIES = 1_000_000  # of the terms of all elements of a batch of realizations
 
 
@@ -41,7 +41,7 @@ E = TypeVar("E", bound=Element)
 def has_elements(group: Group, method: Method) -> bool:
     """Return whether a group has many bodies, and its objective is a sum over its pairs and parts."""
     is_sum = method.minimizes.presses or method.regularization == "points"
-    return is_sum and len(group.free) >= MANY_MOVERS
+    return is_sum and len(group.free) >= MIN_MOVERS_FOR_ELEMENTS
 
 
 class ElementQP:
@@ -111,11 +111,11 @@ class ElementQP:
         local = [shared | batch.arrays(inputs["deviations"]) for batch in self._batches]
         for batch, own in zip(self._batches, local, strict=True):
             batch.evaluate("newton" if newton else "terms", count, own)
-        Q, between, pull = self._summed(terms, inputs, newton=newton)
+        Q, between, gradient = self._summed(terms, inputs, newton=newton)
         V, h, a = (np.ones((count, size)) for size in (Q.shape[1], len(layout.matrices["h"]), len(layout.matrices["a"])))
         g = np.empty((count, self._size + self.slacks))
         g[:, self._size :] = self._prices
-        self._movers.whiten(count, located({"Q": Q, "pull": pull, "V": V, "g": g}))
+        self._movers.whiten(count, located({"Q": Q, "gradient": gradient, "V": V, "g": g}))
         self._movers.couple(count, located({"Q": between, "V_i": V, "V_j": V, "H": h, "mirrored": h}))
         of_rows = located({"row_length": row_length, "V": V, "a": a, "opening": a})
         for batch, own in zip(self._batches, local, strict=True):
@@ -137,7 +137,7 @@ class ElementQP:
         share = self._share(step=steps, y=x[:, : self._size], stride=stride, length=length)
         corrected = self._corrected_poses(arrays["poses"], steps * share["share"])
         sizes = {
-            "residual": layout.elements, "astray": layout.elements, "slack_force": self.slacks,
+            "residual": layout.elements, "locator_residual": layout.elements, "slack_force": self.slacks,
             "multipliers": self.spans[-1].stop, **dict.fromkeys(("linearized", "relative"), ENTRIES * self._pairs),
         }  # fmt: skip
         # Elements without rows contribute nothing.
@@ -149,10 +149,10 @@ class ElementQP:
         before = located(checked | self._values | {"step": steps})
         after = before | located({"poses": corrected})
         for batch in self._batches:
-            for name, values in (("check", before), ("advance", before), ("relate", after), ("astray", after)):
+            for name, values in (("check", before), ("advance", before), ("relate", after), ("locator_residual", after)):
                 batch.evaluate(name, count, values | batch.own)
-        pulls = {"H": arrays["h"], "y_i": x, "y_j": x, "force_i": forces, "force_j": forces}
-        self._movers.pull(count, located(pulls))
+        couplings = {"H": arrays["h"], "y_i": x, "y_j": x, "force_i": forces, "force_j": forces}
+        self._movers.coupling_forces(count, located(couplings))
         force = np.concatenate([layout.force_sum(forces), results["slack_force"]], axis=1)
         stationarity = np.abs(x + arrays["g"] + force + lam_x)
         residuals = [stationarity, np.abs(np.minimum(slack, -lam_x[:, self._size :])), results["residual"]]
@@ -164,7 +164,7 @@ class ElementQP:
             "residual": np.concatenate(residuals, axis=1).max(axis=1, keepdims=True),
             "slack": SLACK * slack[:, : self._pairs],
             "step": share["size"],
-            "astray": results["astray"].max(axis=1, keepdims=True),
+            "locator_residual": results["locator_residual"].max(axis=1, keepdims=True),
         }
 
     def energy(self, **inputs: Float[Array, "realization ..."]) -> Arrays:
@@ -196,20 +196,23 @@ class ElementQP:
         return shared
 
     def _summed(self, terms: Arrays, inputs: Arrays, *, newton: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the blocks of Q (n, 36 * mover), those between two movers (n, 36 * coupling), and the pull (n, 6 * mover)."""
+        """Return the blocks of Q (n, 36 * mover), those between two movers (n, 36 * coupling), and the gradient (n, 6 * mover)."""
         layout, count = self._layout, len(inputs["newton"])
-        (Q, between), pull = self._blocks("Q", terms), layout.mover_sum(terms["pull"])
+        (Q, between), gradient = self._blocks("Q", terms), layout.mover_sum(terms["gradient"])
         if newton:
             curvature, curvature_between = self._blocks("curvature", terms)
             convex = np.empty((count, self._size // FREEDOMS))
             self._movers.factor(count, located({"Q": Q, "curvature": curvature, "convex": convex}))
             counts = (inputs["newton"] != 0) & (convex > 0).all(axis=1, keepdims=True)
             Q, between = Q + np.where(counts, curvature, 0), between + np.where(counts, curvature_between, 0)
-            pull = pull + np.where(counts, layout.mover_sum(terms["hold"]), 0)
+            gradient = gradient + np.where(counts, layout.mover_sum(terms["augmented_gradient"]), 0)
         if self._projects:
-            nearness, nearness_between = self._blocks("nearness", terms)
-            Q, between = Q + inputs["caution"] * nearness, between + inputs["caution"] * nearness_between
-        return Q, between, pull
+            proximal_hessian, proximal_hessian_between = self._blocks("proximal_hessian", terms)
+            Q, between = (
+                Q + inputs["proximal_weight"] * proximal_hessian,
+                between + inputs["proximal_weight"] * proximal_hessian_between,
+            )
+        return Q, between, gradient
 
     def _blocks(self, name: str, terms: Arrays) -> tuple[np.ndarray, np.ndarray]:
         """Return the sums of the blocks of elements, by mover and by pair of coupled movers."""
@@ -249,7 +252,7 @@ def _shared_function(nominal: Nominal, group: Group, method: Method) -> NamedFun
     pairs = [nominal.pairs[index] for index in group.pairs]
     poses = [pose.vector() for pair in pairs for pose in face_poses(pair, inputs["deviations"]) if pose is not None]
     heights = [face_heights(pair, inputs["deviations"]) for pair in pairs]
-    steps = [hold_steps(nominal, group.parts[hold.part], inputs["deviations"]) for hold in group.holds]
+    steps = [bilateral_steps(nominal, group.parts[locators.part], inputs["deviations"]) for locators in group.bilateral]
     outputs = {
         "faces": ca.vertcat(ca.SX(0, 1), *poses),
         "heights": ca.vertcat(*heights),

@@ -22,16 +22,16 @@ class MoverFunctions:
     """The functions of a mover and of two coupled movers, with blocks (36) of Q and of V = U^-1.
 
     factor    Q, curvature -> convex
-    whiten    Q, pull (6) -> V, g (6)
+    whiten    Q, gradient (6) -> V, g (6)
     couple    Q, V_i, V_j -> H, and the same once more for its mirrored place
-    pull      H, y_i, y_j (6) -> force_i, force_j (6): the forces on both movers by their coupling
+    coupling_forces   H, y_i, y_j (6) -> force_i, force_j (6): the forces on both movers by their coupling
     step      V, y (6) -> step (6)
     """
 
     factor: NamedFunction
     whiten: NamedFunction
     couple: NamedFunction
-    pull: NamedFunction
+    coupling_forces: NamedFunction
     step: NamedFunction
 
 
@@ -43,9 +43,9 @@ def mover_functions() -> MoverFunctions:
     H = coupling(Q, upper, ca.triu(V_j))
     return MoverFunctions(
         factor=function_of("factor", {"Q": Q, "curvature": second}, {"convex": is_convex(Q + second)}),
-        whiten=function_of("whiten", {"Q": Q, "pull": p}, {"V": V, "g": V.T @ p}),
+        whiten=function_of("whiten", {"Q": Q, "gradient": p}, {"V": V, "g": V.T @ p}),
         couple=function_of("couple", {"Q": Q, "V_i": V_i, "V_j": V_j}, {"H": H, "mirrored": H}),
-        pull=function_of("pull", {"H": Q, "y_i": p, "y_j": q}, {"force_i": Q @ q, "force_j": Q.T @ p}),
+        coupling_forces=function_of("coupling_forces", {"H": Q, "y_i": p, "y_j": q}, {"force_i": Q @ q, "force_j": Q.T @ p}),
         step=function_of("step", {"V": V_i, "y": p}, {"step": upper @ p}),
     )
 

@@ -18,8 +18,8 @@ from tolcontact.compilation.elements.element_functions import (
     BLOCK,
     Functions,
     common_shapes,
+    element_equations,
     function_of,
-    setting_of,
     symbols,
     term_functions,
     upper_blocks,
@@ -118,16 +118,16 @@ def pair_functions(element: PairElement, method: Method, *, projects: bool) -> F
     faces = iter(poses_of(ca.vec(inputs["faces"])))
     moving, reference = (next(faces) if deviates else None for deviates in element.deviating)
     heights = [inputs.get("heights", ca.SX(2, 1))]
-    setting = setting_of(element, method, inputs, moments=inputs["moments"], faces=[(moving, reference)], heights=heights)
-    motion = setting.motion(poses_of(inputs["poses"]))
-    rows = contact_rows(setting, [_row_points(element, inputs)], motion.poses, motion.by(linear), inputs["reactions"])
+    system = element_equations(element, method, inputs, moments=inputs["moments"], faces=[(moving, reference)], heights=heights)
+    motion = system.motion(poses_of(inputs["poses"]))
+    rows = contact_rows(system, [_row_points(element, inputs)], motion.poses, motion.by(linear), inputs["reactions"])
     results = {"slopes": rows.slopes, "gaps": rows.gaps}
     return {
-        **term_functions(setting, rows, motion, inputs, results, projects=projects),
+        **term_functions(system, rows, motion, inputs, results, projects=projects),
         "rows": _rows_function(element, inputs),
         "check": _check_function(element, inputs),
-        "advance": function_of("advance", inputs | {"step": setting.z}, {"linearized": rows.relative}),
-        "relate": function_of("relate", inputs, {"relative": setting.relative(motion.poses)[0].vector()}),
+        "advance": function_of("advance", inputs | {"step": system.z}, {"linearized": rows.relative}),
+        "relate": function_of("relate", inputs, {"relative": system.relative(motion.poses)[0].vector()}),
     }
 
 

@@ -44,7 +44,7 @@ def multiply(layout, work):  # type: ignore[no-untyped-def]
     multipliers = work.positions[MULTIPLIER]
     for j in range(work.joints.shape[0]):
         for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            row = work.carrying[t]
+            row = work.active[t]
             multipliers[t] = work.rows[row, BOUND] + product(layout.blocks, work.slopes, row, work.vectors[GRADIENT])
             if work.joints[j, OPEN]:
                 multipliers[t] += work.rows[row, OPENING] * work.slacks[PRICE, j]
@@ -62,7 +62,7 @@ def move(layout, work):  # type: ignore[no-untyped-def]
     for j in range(work.joints.shape[0]):
         pull = -work.slacks[PRICE, j]
         for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            row, multiplier = work.carrying[t], work.positions[MULTIPLIER, t]
+            row, multiplier = work.active[t], work.positions[MULTIPLIER, t]
             add_row(layout.blocks, work.slopes, row, multiplier, work.vectors[Y])
             pull += work.rows[row, OPENING] * multiplier
             largest = max(largest, abs(multiplier))
@@ -78,7 +78,7 @@ def refine(layout, work):  # type: ignore[no-untyped-def]
         remainder = 0.0
         for j in range(work.joints.shape[0]):
             for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-                work.positions[STEP, t] = -excess(layout, work, work.carrying[t])
+                work.positions[STEP, t] = -excess(layout, work, work.active[t])
                 remainder = max(remainder, abs(work.positions[STEP, t]))
         helps = remainder > FEASIBLE and remainder < missed / 2
         missed = remainder
@@ -189,14 +189,14 @@ def _aim(layout, work, target):  # type: ignore[no-untyped-def]
     for j in range(work.joints.shape[0]):
         work.slacks[CHANGE, j] = opening if j == joint else 0.0
         for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            change[t] = product(layout.blocks, work.slopes, work.carrying[t], scatter)
+            change[t] = product(layout.blocks, work.slopes, work.active[t], scatter)
             if work.joints[j, OPEN] and j == joint:
-                change[t] += opening * work.rows[work.carrying[t], OPENING]
+                change[t] += opening * work.rows[work.active[t], OPENING]
     solve(layout, work, change)
     for j in range(work.joints.shape[0]):
         for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            add_row(layout.blocks, work.slopes, work.carrying[t], -change[t], direction)
-            work.slacks[CHANGE, j] -= work.rows[work.carrying[t], OPENING] * change[t]
+            add_row(layout.blocks, work.slopes, work.active[t], -change[t], direction)
+            work.slacks[CHANGE, j] -= work.rows[work.active[t], OPENING] * change[t]
     rate = opening * work.slacks[CHANGE, joint] if work.joints[joint, OPEN] else 0.0
     if is_row:
         rate += product(layout.blocks, work.slopes, target, direction)
@@ -205,7 +205,7 @@ def _aim(layout, work, target):  # type: ignore[no-untyped-def]
         # If the slack closes, as little remains of its rows as of the slack, times their openings' square.
         largest = 0.0
         for t in range(layout.joints[joint, POSITION], layout.joints[joint, POSITION] + work.joints[joint, COUNT]):
-            largest = max(largest, work.rows[work.carrying[t], OPENING] ** 2)
+            largest = max(largest, work.rows[work.active[t], OPENING] ** 2)
         square = 1.0 / largest if largest > 0.0 else 0.0
     return rate if rate > dependence(work) * square else 0.0
 
@@ -220,7 +220,7 @@ def _block(layout, work):  # type: ignore[no-untyped-def]
         for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
             change = work.positions[STEP, t]
             if change > RELIEVED and work.positions[MULTIPLIER, t] < step * change:
-                step, blocking = max(work.positions[MULTIPLIER, t], 0.0) / change, work.carrying[t]
+                step, blocking = max(work.positions[MULTIPLIER, t], 0.0) / change, work.active[t]
         change = work.slacks[CHANGE, j]
         if not work.joints[j, OPEN] and change > RELIEVED and -work.slacks[VALUE, j] < step * change:
             step, blocking = max(-work.slacks[VALUE, j], 0.0) / change, work.place.size + j

@@ -33,7 +33,7 @@ class Work(NamedTuple):
                 of the factor are valid; whether factorization changed others; whether the slack may differ from zero
     slacks      (3, joint) price, value and direction; the value of a closed slack is the multiplier of its bound, times -1
     factor      (position, position) the Cholesky factor, below its diagonal
-    carrying    (position,) rows that carry
+    active      (position,) indices of the active rows
     positions   (3, position) their multipliers, a step of these, the next row of the factor
     """
 
@@ -44,7 +44,7 @@ class Work(NamedTuple):
     joints: np.ndarray
     slacks: np.ndarray
     factor: np.ndarray
-    carrying: np.ndarray
+    active: np.ndarray
     positions: np.ndarray
 
 
@@ -94,7 +94,7 @@ def append(layout, work, row):  # type: ignore[no-untyped-def]
     """Let a row carry, behind the others of its joint."""
     j = layout.rows[row, JOINT]
     position = layout.joints[j, POSITION] + work.joints[j, COUNT]
-    work.carrying[position], work.place[row] = row, position
+    work.active[position], work.place[row] = row, position
     work.positions[MULTIPLIER, position] = 0.0
     work.joints[j, COUNT] += 1
 
@@ -102,12 +102,12 @@ def append(layout, work, row):  # type: ignore[no-untyped-def]
 @inlined_inner
 def remove(layout, work, position):  # type: ignore[no-untyped-def]
     """Let the row at a position carry no longer."""
-    j = layout.rows[work.carrying[position], JOINT]
-    work.place[work.carrying[position]] = -1
+    j = layout.rows[work.active[position], JOINT]
+    work.place[work.active[position]] = -1
     work.joints[j, COUNT] -= 1
     for s in range(position, layout.joints[j, POSITION] + work.joints[j, COUNT]):
-        work.carrying[s], work.positions[MULTIPLIER, s] = work.carrying[s + 1], work.positions[MULTIPLIER, s + 1]
-        work.place[work.carrying[s]] = s
+        work.active[s], work.positions[MULTIPLIER, s] = work.active[s + 1], work.positions[MULTIPLIER, s + 1]
+        work.place[work.active[s]] = s
     work.joints[j, FRESH] = min(work.joints[j, FRESH], position - layout.joints[j, POSITION])
     work.joints[j, CHANGED] = 1
 
@@ -128,8 +128,8 @@ def _eliminated(layout, work, j, position, value, solution):  # type: ignore[no-
 @inlined_inner
 def _factor_row(layout, work, j, position, threshold):  # type: ignore[no-untyped-def]
     """Compute the factor's row at a position of joint j, and return whether the row is independent of those before it."""
-    factor, column, carrying, scatter = work.factor, work.positions[COLUMN], work.carrying, work.vectors[SCATTER]
-    row, start = carrying[position], layout.joints[j, POSITION]
+    factor, column, active, scatter = work.factor, work.positions[COLUMN], work.active, work.vectors[SCATTER]
+    row, start = active[position], layout.joints[j, POSITION]
     opening = work.rows[row, OPENING] if work.joints[j, OPEN] else 0.0
     set_row(layout.blocks, work.slopes, row, 1.0, scatter)
     square = squared_length(layout.blocks, work.slopes, row) + opening * opening
@@ -137,13 +137,13 @@ def _factor_row(layout, work, j, position, threshold):  # type: ignore[no-untype
     for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
         k, adjacent = layout.prior[q, 0], layout.prior[q, 1]
         for t in range(layout.joints[k, POSITION], layout.joints[k, POSITION] + work.joints[k, COUNT]):
-            value = product(layout.blocks, work.slopes, carrying[t], scatter) if adjacent else 0.0
+            value = product(layout.blocks, work.slopes, active[t], scatter) if adjacent else 0.0
             column[t] = _eliminated(layout, work, k, t, value, column) / factor[t, t]
             rest -= column[t] * column[t]
     for t in range(start, position):
-        value = product(layout.blocks, work.slopes, carrying[t], scatter)
+        value = product(layout.blocks, work.slopes, active[t], scatter)
         if work.joints[j, OPEN]:
-            value += opening * work.rows[carrying[t], OPENING]
+            value += opening * work.rows[active[t], OPENING]
         column[t] = _eliminated(layout, work, j, t, value, column) / factor[t, t]
         rest -= column[t] * column[t]
     for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):

@@ -105,7 +105,7 @@ class _Search:
             joints=np.zeros((joints, 4), dtype=np.int64),
             slacks=np.zeros((3, joints)),
             factor=np.zeros((positions, positions)),
-            carrying=np.zeros(positions, dtype=np.int64),
+            active=np.zeros(positions, dtype=np.int64),
             positions=np.zeros((3, positions)),
         )
         self._blocks = np.zeros((len(storage.columns) if coupled else 0, FREEDOMS, FREEDOMS))

@@ -40,7 +40,7 @@ def _tolerance(layout, work, refines):  # type: ignore[no-untyped-def]
 
 
 @inlined_inner
-def _hold_joints(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-def]
+def _update_joints(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-def]
     """Let rows enter and leave in all joints at once; return whether the solution is reached."""
     changes = release(layout, work, tolerance) + close_slacks(layout, work, tolerance)
     if not scan(layout, work, tolerance, depths, deepest):
@@ -50,7 +50,7 @@ def _hold_joints(layout, work, tolerance, depths, deepest):  # type: ignore[no-u
 
 
 @inlined_inner
-def _hold_row(layout, work, tolerance, depths, deepest, state):  # type: ignore[no-untyped-def]
+def _enter_row(layout, work, tolerance, depths, deepest, state):  # type: ignore[no-untyped-def]
     """Take a step towards the most violated row; return whether none is violated. `state` is the result, target and growth."""
     result, target, growth = state
     if result != PARTIAL:
@@ -66,7 +66,7 @@ def _hold_row(layout, work, tolerance, depths, deepest, state):  # type: ignore[
 
 
 @inlined_inner
-def find_carrying(layout, work, limits, depths, deepest, counters):  # type: ignore[no-untyped-def]
+def find_active_rows(layout, work, limits, depths, deepest, counters):  # type: ignore[no-untyped-def]
     """Find the rows that carry, and return whether they were found.
 
     limits            rounds of all joints at once, steps of single rows in an attempt
@@ -82,7 +82,7 @@ def find_carrying(layout, work, limits, depths, deepest, counters):  # type: ign
             tolerance = _tolerance(layout, work, phase == ROWS) * looseness
         if phase == JOINTS:
             counters[0] += 1
-            if _hold_joints(layout, work, tolerance, depths, deepest):
+            if _update_joints(layout, work, tolerance, depths, deepest):
                 return True
             if counters[0] >= limits[0] or (counters[0] >= ROUNDS_IN_CONFLICT and any_open(work)):
                 phase = RELEASE
@@ -92,7 +92,7 @@ def find_carrying(layout, work, limits, depths, deepest, counters):  # type: ign
                 state = CHECKED, deepest.size, 0.0
                 counters[1] += 1
         else:
-            holds, state = _hold_row(layout, work, tolerance, depths, deepest, state)
+            holds, state = _enter_row(layout, work, tolerance, depths, deepest, state)
             if holds:
                 return True
             steps += 1

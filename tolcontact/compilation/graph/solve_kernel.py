@@ -16,7 +16,7 @@ from tolcontact.compilation.graph.factor_kernel import (
 )
 from tolcontact.compilation.graph.hessian_kernel import from_unit, load_hessian, rows_to_unit, vectors_to_unit
 from tolcontact.compilation.graph.layout import JOINT, POSITION, ROW, SLACK, SOURCE
-from tolcontact.compilation.graph.search_kernel import find_carrying
+from tolcontact.compilation.graph.search_kernel import find_active_rows
 from tolcontact.compiled import inlined_inner, uncounted
 
 MISSED = 1e-7  # mm: an equation that depends on others and is missed by more contradicts them
@@ -81,7 +81,7 @@ def _store(layout, storage, work, k, x, lam_a, lam_x):  # type: ignore[no-untype
             else:
                 lam_x[k, 6 * bodies + layout.joints[j, SLACK]] = work.slacks[VALUE, j]
         for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            lam_a[k, layout.rows[work.carrying[t], SOURCE]] = -work.positions[MULTIPLIER, t]
+            lam_a[k, layout.rows[work.active[t], SOURCE]] = -work.positions[MULTIPLIER, t]
 
 
 @uncounted
@@ -108,7 +108,7 @@ def solve_batch(layout, storage, work, hessian, problem, guess, limits, search, 
             vectors_to_unit(storage, blocks, work.vectors[GRADIENT])
             rows_to_unit(layout.blocks, storage, blocks, work.slopes)
         _start(layout, work, reactions, slacks, k)
-        if not find_carrying(layout, work, limits, depths, deepest, counters[k]):
+        if not find_active_rows(layout, work, limits, depths, deepest, counters[k]):
             failed[k] = True
             continue
         refine(layout, work)
