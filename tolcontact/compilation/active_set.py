@@ -1,4 +1,4 @@
-"""The active set of a QP: the rows that carry and the slacks that are open, for which its answer is one linear system."""
+"""The active set of a QP: its active rows and its positive slacks, for which the answer is one linear system."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation.polish_kernel import solve_conditions
 from tolcontact.mechanics.correction import FREEDOMS
 
-COMPLIANCE = 1e-9  # of the rows, so that dependent rows have a solution; refinement removes its effect
+COMPLIANCE = 1e-9  # of the rows, so that dependent rows have a solution; iterative refinement removes its effect
 REFINEMENTS = 4
 
 Problem = Mapping[str, Float[Array, "QP ..."]]
@@ -19,8 +19,8 @@ Problem = Mapping[str, Float[Array, "QP ..."]]
 class ActiveSet(NamedTuple):
     """The active sets of QPs: min x'Hx/2 + g'x, a x >= lba; the last rows are equations, the last variables, slacks, >= 0.
 
-    active   (QP, row)
-    is_open   (QP, slack)
+    active    (QP, row): whether a row is active
+    is_open   (QP, slack): whether a slack is positive
     """
 
     active: Bool[Array, "QP row"]
@@ -31,11 +31,11 @@ class ActiveSet(NamedTuple):
         """Return the active sets of a solver's answers.
 
         problem     h (QP, n, n), g (QP, n), a (QP, row, n), lba (QP, row)
-        answer      x (QP, n), lam_a (QP, row), lam_x (QP, n) of a solver; multipliers are below 0 if a row active
+        answer      x (QP, n), lam_a (QP, row), lam_x (QP, n) of a solver; multipliers of active rows are negative
         """
         A, lower = problem["a"], problem["lba"]
         x, lam_a, lam_x = (answer[name] for name in ("x", "lam_a", "lam_x"))
-        # Of a row and its multiplier the smaller one is rounding, for every solver.
+        # For every solver, either the row or its multiplier is zero up to rounding: the smaller of the two.
         active = -lam_a > np.einsum("kij,kj->ki", A, x) - lower
         active[:, active.shape[1] - equations :] = True
         return cls(active, (-lam_x <= x)[:, x.shape[1] - slacks :])
@@ -43,7 +43,7 @@ class ActiveSet(NamedTuple):
     def answer(self, problem: Problem, order: Int[Array, " unknown"]) -> dict[str, np.ndarray]:
         """Return x, lam_a and lam_x (QP, entry) of the QPs; NaN if the conditions have no solution.
 
-        order   of the unknowns, see solve_conditions
+        order   order of the unknowns, see solve_conditions
         """
         H, g, A, lower = (problem[name] for name in ("h", "g", "a", "lba"))
         count, rows, size = A.shape
@@ -57,9 +57,9 @@ class ActiveSet(NamedTuple):
 
 
 def band_order(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int) -> Int[Array, " unknown"]:
-    """Return the variables of the movers, and the rows after them, mover by mover; a row follows the last of its movers.
+    """Return the variables of the movers and the rows, mover by mover; each row follows the last of its movers.
 
-    Movers are in the order of Cuthill and McKee.
+    Movers are in Cuthill-McKee order.
     """
     size = h.size1() - slacks
     movers_of_rows: list[set[int]] = [set() for _ in range(a.size1())]
@@ -78,7 +78,10 @@ def band_order(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int) -> Int[Array, " u
 
 
 def _cuthill_mckee(neighbours: list[set[int]]) -> list[int]:
-    """Return the nodes of a graph, each island level by level, from the last node of its levels about any of its nodes."""
+    """Return the nodes of a graph in Cuthill-McKee order.
+
+    Each connected component is ordered level by level, starting from a node of the last level about an arbitrary node.
+    """
     order: list[int] = []
     for node in range(len(neighbours)):
         if node not in order:
@@ -87,10 +90,10 @@ def _cuthill_mckee(neighbours: list[set[int]]) -> list[int]:
 
 
 def _levels(neighbours: list[set[int]], start: int) -> list[int]:
-    """Return the nodes that are connected with `start`, the nearest ones first, of these those with few neighbours."""
+    """Return the nodes that are connected to `start`, by distance from it; nodes with fewer neighbours come first."""
     order, reached = [start], {start}
     for node in order:
-        following = sorted(neighbours[node] - reached, key=lambda other: (len(neighbours[other]), other))
-        order += following
-        reached.update(following)
+        level = sorted(neighbours[node] - reached, key=lambda neighbour: (len(neighbours[neighbour]), neighbour))
+        order += level
+        reached.update(level)
     return order

@@ -1,4 +1,4 @@
-"""The outcome of a QP: poses, reactions, and residuals that judge them."""
+"""The outcome of a QP: poses, reactions, and their residuals."""
 
 from collections.abc import Mapping, Sequence
 
@@ -25,7 +25,7 @@ def outcome(
 ) -> tuple[dict[str, ca.SX], dict[str, ca.SX]]:
     """Return symbols of the QP and its solution, and the outputs of contact_qp as expressions of them.
 
-    `poses` are those after z. The QP's matrices are inputs, so that nothing is computed twice and the residuals are those of
+    `poses` are the poses after z. The QP's matrices are inputs, so that nothing is computed twice and the residuals belong to
     the QP that was solved.
     """
     group, z, count = system.group, system.z, len(rows)
@@ -60,7 +60,7 @@ def outcome(
 
 
 def row_residuals(excess: ca.SX, lam: ca.SX, length: ca.SX) -> ca.SX:
-    """Return what is left of min(row, multiplier) = 0, and the depth of gaps that remain negative, of rows (row, 1)."""
+    """Return the residuals of rows (row, 1): of min(row, multiplier) = 0, and the depth of gaps that remain negative."""
     return ca.vertcat(ca.fmin(excess, -lam), ca.fmin(excess * length, 0))
 
 
@@ -70,6 +70,6 @@ def reactions(lam: ca.SX, length: ca.SX, filled: ca.SX, scale: ca.SX) -> ca.SX:
 
 
 def step_share(step: ca.SX, stride: ca.SX, length: Number) -> ca.SX:
-    """Return the share of a step (z, 1) [mm] in which no mover turns by more than `stride` [rad]."""
-    turns = ca.vertcat(*(step[k + 3 : k + FREEDOMS] for k in range(0, step.numel(), FREEDOMS)))
-    return ca.fmin(1, stride * length / ca.norm_inf(turns))
+    """Return the share of a step (z, 1) [mm] that rotates no mover by more than `stride` [rad] about any axis."""
+    rotations = ca.vertcat(*(step[k + 3 : k + FREEDOMS] for k in range(0, step.numel(), FREEDOMS)))
+    return ca.fmin(1, stride * length / ca.norm_inf(rotations))

@@ -1,4 +1,4 @@
-"""The objective of a contact QP to second order in the increments, and what Newton steps add to it."""
+"""The objective of a contact QP to second order in the increments, and the additional terms of Newton steps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,10 +17,10 @@ from tolcontact.mechanics.symmetric_products import congruent
 class QuadraticTerms:
     """The objective 1/2 z'Qz + gradient'z at a pose, divided by `scale`, see tolcontact.mechanics.objective.
 
-    Q, gradient     (z, z), (z, 1), in an exact resolution with the curvature of walls around round faces
-    curvature   (z, z): to be added to Q if a Newton step counts the curvature of objective and gaps, and Q stays convex
-    hold        (z, 1): to be added to `gradient` with it
-    proximal_hessian    (z, z): to be added to Q where points are projected in each step, times `proximal_weight`
+    Q, gradient          (z, z), (z, 1), in an exact resolution with the curvature of walls around round faces
+    curvature            (z, z): added to Q if a Newton step counts the curvature of objective and gaps, and Q stays convex
+    augmented_gradient   (z, 1): added to `gradient` together with `curvature`; from the augmented Lagrangian
+    proximal_hessian     (z, z): added to Q, times `proximal_weight`, if points are projected in each step
     """
 
     Q: ca.SX
@@ -31,10 +31,10 @@ class QuadraticTerms:
     scale: ca.SX
 
     def summed(self, newton: ca.SX, proximal_weight: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """Return Q and its linear term, if `newton` is 1 with the curvature.
+        """Return Q and the gradient, with curvature if `newton` is 1.
 
-        Curvature counts only while Q stays convex. The check covers the freedoms of each mover, not those of several movers
-        together.
+        Curvature counts only while Q stays convex. The check covers the diagonal block of each mover, not the coupling of
+        movers.
         """
         counts = ca.logic_and(newton, is_convex(self.Q + self.curvature))
         Q = self.Q + ca.if_else(counts, self.curvature, 0) + proximal_weight * self.proximal_hessian
@@ -50,7 +50,7 @@ def quadratic_terms(
     projects    whether points may be projected in each step
     """
     size = system.z.numel()
-    if system.group.has_springs:  # what holds weakly must not share the load with springs: it counts from the present poses
+    if system.group.has_springs:  # weak terms must not share the load with springs: they start from the present poses
         system = replace(system, raw=motion.poses)
     moved, nothing = motion.by(linear), ca.SX(size, size)
     goal = energy(system, moved)
@@ -60,23 +60,23 @@ def quadratic_terms(
     Q += rows.hollow_curvature / goal.scale
     curvature = _lagrangian_hessian(system, motion.by(quadratic), rows.bends / goal.scale)
     curvature += (rows.hollow_curvature - rows.curvature) / goal.scale - Q
-    # A penalty holds the rows that carry. It does not change the answer, and restores convexity in most cases.
-    hold = (1 + 2 * load / goal.scale / system.group.length) * ca.if_else(reactions > 0, rows.filled, 0)
-    curvature += congruent(ca.diag(hold), rows.slopes)
-    give = rows.gaps + rows.compliance * reactions
+    # The augmented Lagrangian term of the active rows does not change the answer, and restores convexity in most cases.
+    penalty = (1 + 2 * load / goal.scale / system.group.length) * ca.if_else(reactions > 0, rows.filled, 0)
+    curvature += congruent(ca.diag(penalty), rows.slopes)
+    row_values = rows.gaps + rows.compliance * reactions
     proximal_hessian = system.curvature(proximity(system, motion.poses, moved)) / system.group.length if projects else nothing
-    return QuadraticTerms(Q, gradient, curvature, rows.slopes.T @ (hold * give), proximal_hessian, goal.scale)
+    return QuadraticTerms(Q, gradient, curvature, rows.slopes.T @ (penalty * row_values), proximal_hessian, goal.scale)
 
 
 def _lagrangian_hessian(system: GroupEquations, poses: Sequence[Pose], bends: ca.SX) -> ca.SX:
     """Return the Hessian, at z = 0, of the Lagrangian: the objective less the reactions' work on the gaps (linear in X_RM)."""
-    weights = ca.SX.sym("bends", bends.numel())  # do not depend on z: as symbols they are left alone by the derivatives
+    weights = ca.SX.sym("bends", bends.numel())  # independent of z: symbols, so that they are not differentiated
     work = ca.dot(weights, ca.vertcat(*(X_RM.vector() for X_RM in system.relative(poses))))
     return ca.substitute(system.curvature(energy(system, poses).value - work), weights, bends)
 
 
 def is_convex(Q: ca.SX) -> ca.SX:
-    """Return 1 if the diagonal blocks of Q are positive definite, else 0, also for a NaN among the pivots."""
+    """Return 1 if the diagonal blocks of Q are positive definite, else 0; a NaN pivot gives 0, too."""
     blocks = (ca.densify(Q[k : k + FREEDOMS, k : k + FREEDOMS]) for k in range(0, Q.size1(), FREEDOMS))
     pivots = ca.vertcat(*(ca.diag(ca.chol(block)) for block in blocks))
     return ca.mmin(ca.if_else(pivots > 0, 1, 0))

@@ -1,4 +1,4 @@
-"""An element of a contact group: a share of it whose terms are summed with those of others, and the constants of both."""
+"""An element of a contact group: a share of the group whose terms are summed with the terms of other elements."""
 
 from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -14,17 +14,17 @@ from tolcontact.mechanics.groups import Group
 
 @dataclass(frozen=True, eq=False)
 class Element:
-    """A contact pair, or a part with its forces and its two-sided locators; positions are those in the whole group.
+    """A contact pair, or a part with its forces and its two-sided locators; positions refer to the whole group.
 
     group      the group of this element alone
-    number     among the elements of the whole group: pairs, then parts
+    index      index among the elements of the whole group: pairs, then parts
     parts      positions of the element's parts
-    movers     numbers of the movers whose increments move them
+    movers     indices of the movers whose increments move these parts
     """
 
     nominal: Nominal
     group: Group
-    number: int
+    index: int
     parts: tuple[int, ...]
     movers: tuple[int, ...]
 
@@ -35,7 +35,7 @@ class Element:
 
     @property
     def kind(self) -> Hashable:
-        """What elements share whose functions are the same."""
+        """The key under which elements share functions."""
         sides, loads = (tuple(entry.part for entry in entries) for entries in (self.group.sides, self.group.loads))
         bilateral = tuple(
             (locators.part, locators.owners, locators.parent, locators.is_placed) for locators in self.group.bilateral
@@ -44,7 +44,7 @@ class Element:
 
     @cached_property
     def constants(self) -> np.ndarray:
-        """The constants (see `symbolic`), one after the other."""
+        """The concatenated constants (see `symbolic`)."""
         return np.concatenate(list(self._constants()))
 
     def _constants(self) -> Iterator[np.ndarray]:
@@ -57,7 +57,7 @@ class Element:
             yield from (np.array([stiffness]) for stiffness in locators.stiffness)
 
     def symbolic(self, constants: ca.SX, length: ca.SX, count: ca.SX) -> Group:
-        """Return the group with symbols in place of its constants, the length and the number of points of the whole group.
+        """Return the group with symbols in place of its constants, and with length and point count of the whole group.
 
         Constants are centres of the parts; centre and moments of each side; point and vector of each force; points, directions
         and stiffness of two-sided locators.
@@ -65,7 +65,7 @@ class Element:
         offsets = np.cumsum([0, *(values.size for values in self._constants())]).tolist()
         remaining = iter(ca.vertsplit(constants, offsets))
 
-        def of_each(entries: Iterable) -> list[ca.SX]:
+        def symbols_of(entries: Iterable) -> list[ca.SX]:
             return [next(remaining) for _ in entries]
 
         group = self.group
@@ -77,9 +77,9 @@ class Element:
             bilateral=tuple(
                 replace(
                     locators,
-                    points=of_each(locators.points),
-                    directions=of_each(locators.directions),
-                    stiffness=of_each(locators.stiffness),
+                    points=symbols_of(locators.points),
+                    directions=symbols_of(locators.directions),
+                    stiffness=symbols_of(locators.stiffness),
                 )
                 for locators in group.bilateral
             ),

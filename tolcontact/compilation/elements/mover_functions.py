@@ -1,4 +1,4 @@
-"""The functions of movers, and of a kind of parts that they move: CasADi expressions of the equations of mechanics."""
+"""The functions of movers, and of the parts that they move: CasADi expressions of the equations of mechanics."""
 
 from dataclasses import dataclass
 
@@ -21,11 +21,11 @@ from tolcontact.method import Method
 class MoverFunctions:
     """The functions of a mover and of two coupled movers, with blocks (36) of Q and of V = U^-1.
 
-    factor    Q, curvature -> convex
-    whiten    Q, gradient (6) -> V, g (6)
-    couple    Q, V_i, V_j -> H, and the same once more for its mirrored place
+    factor            Q, curvature -> convex
+    whiten            Q, gradient (6) -> V, g (6)
+    couple            Q, V_i, V_j -> H, and a copy of it for the mirrored block
     coupling_forces   H, y_i, y_j (6) -> force_i, force_j (6): the forces on both movers by their coupling
-    step      V, y (6) -> step (6)
+    step              V, y (6) -> step (6)
     """
 
     factor: NamedFunction
@@ -51,7 +51,7 @@ def mover_functions() -> MoverFunctions:
 
 
 def advance_function(mobility: Mobility, method: Method) -> NamedFunction:
-    """Return the function of parts that the same number of movers move, in which its own comes last if it is one.
+    """Return the function of parts with the same number of movers; a part that is a mover is the last of its movers.
 
     Inputs: pose (12), movers (12, mover), centre (3), centres (3, mover), steps (6, mover), length; result: corrected (12).
     """
@@ -88,22 +88,22 @@ class CorrectedPoses:
             "pose": poses, "movers": poses, "steps": step, "centre": self._centres, "centres": self._centres,
             "length": self._length, "corrected": corrected,
         }  # fmt: skip
-        places = located(arrays)
+        shared = located(arrays)
         for function in self._functions:
-            function(len(poses), places)
+            function(len(poses), shared)
         return corrected
 
 
 def _of_parts(group: Group, method: Method, parts: np.ndarray) -> IndexedFunction:
-    """Return the function of parts that chains of equally many movers move."""
+    """Return the function of parts with equally many movers."""
     movers = np.array([group.mobilities[part].movers for part in parts])
     mover_parts = np.array([group.position(part) for part in group.free])[movers]
-    function, own = advance_function(group.mobilities[parts[0]], method), parts[:, None]
+    function, part_indices = advance_function(group.mobilities[parts[0]], method), parts[:, None]
     return function.at({
-        **dict.fromkeys(("pose", "corrected"), blocks(own, ENTRIES)),
+        **dict.fromkeys(("pose", "corrected"), blocks(part_indices, ENTRIES)),
         "movers": blocks(mover_parts, ENTRIES),
         "steps": blocks(movers, FREEDOMS),
-        "centre": blocks(own, 3),
+        "centre": blocks(part_indices, 3),
         "centres": blocks(mover_parts, 3),
-        "length": np.zeros(own.shape, dtype=int),
+        "length": np.zeros(part_indices.shape, dtype=int),
     })  # fmt: skip

@@ -38,9 +38,9 @@ POINTS = ("P_m", "P_r", "n_r")
 
 @dataclass(frozen=True, eq=False)
 class PairElement(Element):
-    """A pair of a group; its number is the pair's position.
+    """A pair of a group; its index is the position of the pair.
 
-    sides      numbers of the sides of the pair
+    sides      indices of the sides of the pair
     points     the contact points that always have a row, or the number of slots
     """
 
@@ -54,7 +54,7 @@ class PairElement(Element):
 
     @property
     def has_slots(self) -> bool:
-        """Whether changing points take the rows in turns."""
+        """Whether the rows are slots for changing points."""
         return isinstance(self.points, int)
 
     @property
@@ -69,18 +69,18 @@ class PairElement(Element):
 
     @cached_property
     def springs(self) -> list[int]:
-        """The rows that give way."""
+        """The compliant rows."""
         return np.flatnonzero(self.compliance).tolist()
 
     @cached_property
     def deviating(self) -> tuple[bool, bool]:
-        """Whether the moving and the reference face turn or shift in their parts."""
+        """Whether the moving and the reference face rotate or shift in their parts."""
         moving, reference = (face is not None and bool(face.twist.any()) for face in self.contact.deviating)
         return moving, reference
 
     @property
     def kind(self) -> Hashable:
-        """What elements share whose functions are the same; round faces have their constants within their functions."""
+        """The key under which elements share functions; functions of round faces contain their constants."""
         group, pair = self.group, self.contact
         round_points = () if pair.round is None else tuple(pickle.dumps(point) for point in pair.round)
         ends = group.position(pair.moving), None if pair.reference is None else group.position(pair.reference)
@@ -95,16 +95,16 @@ def pair_elements(nominal: Nominal, group: Group, standing: Sequence[np.ndarray 
 def _element(nominal: Nominal, group: Group, pair: int, points: np.ndarray | int) -> PairElement:
     contact = nominal.pairs[group.pairs[pair]]
     extent = Extent.around(group, [group.position(part) for part in (contact.moving, contact.reference) if part is not None])
-    numbers = tuple(k for k, side in enumerate(group.sides) if side.pair == pair)
-    sides = tuple(replace(group.sides[k], pair=0, part=extent.parts.index(group.sides[k].part)) for k in numbers)
+    indices = tuple(k for k, side in enumerate(group.sides) if side.pair == pair)
+    sides = tuple(replace(group.sides[k], pair=0, part=extent.parts.index(group.sides[k].part)) for k in indices)
     local = replace(extent.alone(group), pairs=(group.pairs[pair],), sides=sides)
-    return PairElement(nominal, local, pair, extent.parts, extent.movers, numbers, points)
+    return PairElement(nominal, local, pair, extent.parts, extent.movers, indices, points)
 
 
 def pair_functions(element: PairElement, method: Method, *, projects: bool) -> Functions:
-    """Return the functions of the pairs of a kind, of which `element` is one; see quadratic_terms for `projects`.
+    """Return the functions of the pairs of the same kind as `element`; see quadratic_terms for `projects`.
 
-    For p parts, r rows and z increments, with z and y those of the element's movers, they are those of term_functions, and:
+    They are the functions of term_functions, and the following, for p parts, r rows and z increments of the element's movers:
 
     terms     slopes (r, z), gaps (r)
     rows      slopes, gaps, filled, V (36, mover), idle (r, z), length, compliance, scale -> a (r, z), opening, lower,
@@ -132,11 +132,11 @@ def pair_functions(element: PairElement, method: Method, *, projects: bool) -> F
 
 
 def _inputs(element: PairElement) -> dict[str, ca.SX]:
-    """Return the inputs of `terms` by name: those of contact_qp for the element's sides and rows, and some more.
+    """Return the inputs of `terms` by name: the inputs of contact_qp for the element's sides and rows, and some more.
 
     faces (12, face)     poses of the deviating faces in their parts
-    heights (2)          of the moving and the reference face
-    compliance           of the rows that give way
+    heights (2)          growth of the moving and the reference face
+    compliance           compliance of the compliant rows
     """
     rows = element.rows
     shapes = common_shapes(element) | {
@@ -202,8 +202,8 @@ def _check_function(element: PairElement, inputs: Mapping[str, ca.SX]) -> NamedF
     return function_of("check", inputs, outputs)
 
 
-class Numbers(NamedTuple):
-    """The number of each pair's first row, deviating face, slot, bend and spring's slack among those of the group, (pair,)."""
+class FirstIndices(NamedTuple):
+    """The group-wide index (pair,) of each pair's first row, deviating face, slot, bend, and slack of a spring."""
 
     row: Int[Array, " pair"]
     face: Int[Array, " pair"]
@@ -212,8 +212,8 @@ class Numbers(NamedTuple):
     spring: Int[Array, " pair"]
 
     @classmethod
-    def of(cls, elements: Sequence[PairElement]) -> "Numbers":
-        """Return the numbers of all pairs of a group, in their order; slacks of springs follow those of the pairs."""
+    def of(cls, elements: Sequence[PairElement]) -> "FirstIndices":
+        """Return the indices of all pairs of a group, in their order; slacks of springs follow the slacks of the pairs."""
         counts = [(e.rows, sum(e.deviating), e.rows * e.has_slots, int(e.has_slots), len(e.springs)) for e in elements]
         row, face, slot, bend, spring = (np.cumsum([0, *column[:-1]]) for column in zip(*counts, strict=True))
         return cls(row, face, slot, bend, spring + len(elements))
@@ -225,24 +225,24 @@ class PairElements(Elements):
     slacks  (element, row) slack of each row
     """
 
-    def __init__(self, elements: Sequence[PairElement], functions: Functions, numbers: Numbers) -> None:
-        self._pairs, self._numbers = elements, numbers
-        pairs = np.array([element.number for element in elements])
-        super().__init__(elements, functions, numbers.row[pairs][:, None] + np.arange(elements[0].rows))
-        self._slots = numbers.slot[pairs][:, None] + np.arange(self.row_count)
+    def __init__(self, elements: Sequence[PairElement], functions: Functions, firsts: FirstIndices) -> None:
+        self._pairs, self._firsts = elements, firsts
+        pairs = np.array([element.index for element in elements])
+        super().__init__(elements, functions, firsts.row[pairs][:, None] + np.arange(elements[0].rows))
+        self._slots = firsts.slot[pairs][:, None] + np.arange(self.row_count)
         springs = elements[0].springs
-        self._springs = numbers.spring[pairs][:, None] + np.arange(len(springs))
+        self._springs = firsts.spring[pairs][:, None] + np.arange(len(springs))
         self.slacks = np.tile(pairs[:, None], self.row_count)
         self.slacks[:, springs] = self._springs
 
     @property
     def slots(self) -> Int[Array, "element row"]:
-        """The slots of its rows among those of the group; none if points always have a row."""
+        """The group-wide slot of each row; empty if points always have a row."""
         return self._slots if self._pairs[0].has_slots else self._slots[:, :0]
 
     def constants(self) -> Arrays:
-        """Return what never changes (1, column): constants, idle rows, and points that always have a row."""
-        # Columns of a matrix stand one after the other in the arrays of CasADi.
+        """Return the arrays (1, column) that never change: constants, idle rows, and points that always have a row."""
+        # CasADi stores matrices column by column.
         idle = [np.array([idle_row(row, self.size).full().ravel() for row in rows]).T for rows in self.rows.tolist()]
         constants = super().constants() | {
             "idle": flat_row(idle),
@@ -263,25 +263,25 @@ class PairElements(Elements):
             shifts[:, k] = heights[:, :, None] * element.contact.n_r[element.points]
         return {"P_r": constants["P_r"].array + shifts.reshape(len(deviations), -1)}
 
-    def places(self) -> dict[str, Columns]:
-        """Return the columns of what elements read from, or write into, the arrays of the whole group, by name."""
-        elements, own = self._pairs, np.arange(len(self))[:, None]
-        pairs = self.numbers[:, None]
-        faces = self._numbers.face[pairs] + np.arange(sum(elements[0].deviating))
+    def columns(self) -> dict[str, Columns]:
+        """Return the columns of the group's arrays that elements read or write, by array name."""
+        elements, indices = self._pairs, np.arange(len(self))[:, None]
+        pairs = self.indices[:, None]
+        faces = self._firsts.face[pairs] + np.arange(sum(elements[0].deviating))
         springs = len(elements[0].springs)
-        places = super().places() | {
+        columns = super().columns() | {
             "moments": blocks(np.array([element.sides for element in elements], dtype=int), MOMENTS),
             "faces": blocks(faces, ENTRIES),
             "heights": blocks(pairs, 2),
-            "compliance": blocks(own, springs),
-            "idle": blocks(own, self.row_count * self.size),
+            "compliance": blocks(indices, springs),
+            "idle": blocks(indices, self.row_count * self.size),
             **dict.fromkeys(("reactions", "gaps", "filled", "row_length", "multipliers"), self.rows),
             "slack_force": np.concatenate([pairs, self._springs], axis=1),
             **dict.fromkeys(("linearized", "relative"), blocks(pairs, ENTRIES)),
-            "bend": blocks(self._numbers.bend[pairs], ENTRIES),
+            "bend": blocks(self._firsts.bend[pairs], ENTRIES),
         }
-        points = blocks(own, 3 * self.row_count) if self._has_standing_points else blocks(self._slots, 3)
-        return places | dict.fromkeys(POINTS, points)
+        points = blocks(indices, 3 * self.row_count) if self._has_standing_points else blocks(self._slots, 3)
+        return columns | dict.fromkeys(POINTS, points)
 
     @property
     def _has_standing_points(self) -> bool:

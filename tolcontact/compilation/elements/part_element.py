@@ -34,7 +34,7 @@ class PartElement(Element):
     """A part of a group.
 
     first       index of its first locator among the bilateral locators of the group
-    locators    number of its locators that do not give way
+    locators    number of its rigid two-sided locators
     equations   number of equations of its locators
     """
 
@@ -44,12 +44,12 @@ class PartElement(Element):
 
     @property
     def kind(self) -> Hashable:
-        """What elements share whose functions are the same."""
+        """The key under which elements share functions."""
         return super().kind, self.equations
 
 
 def part_elements(nominal: Nominal, group: Group, method: Method) -> list[PartElement]:
-    """Return the elements of the parts of a group that forces press or locators hold; none if points are the objective."""
+    """Return the elements of the parts with forces or bilateral locators; none if points are the objective."""
     if method.minimizes.counts_points:
         return []
     presses = method.minimizes.presses
@@ -58,7 +58,7 @@ def part_elements(nominal: Nominal, group: Group, method: Method) -> list[PartEl
     return [_element(nominal, group, k, part, presses=presses) for k, part in enumerate(parts, start=len(group.pairs))]
 
 
-def _element(nominal: Nominal, group: Group, number: int, part: int, *, presses: bool) -> PartElement:
+def _element(nominal: Nominal, group: Group, index: int, part: int, *, presses: bool) -> PartElement:
     bilateral = [locators for locators in group.bilateral if locators.part == part]
     others = [other for locators in bilateral for other in (*locators.owners, locators.parent) if other is not None]
     extent = Extent.around(group, [part, *others])
@@ -71,7 +71,7 @@ def _element(nominal: Nominal, group: Group, number: int, part: int, *, presses:
     preceding = itertools.takewhile(lambda locators: locators.part != part, group.bilateral)
     first = sum(len(locators.owners) for locators in preceding)
     equations = locator_count if presses else 0
-    return PartElement(nominal, local, number, extent.parts, extent.movers, first, locator_count, equations)
+    return PartElement(nominal, local, index, extent.parts, extent.movers, first, locator_count, equations)
 
 
 def _local(locators: BilateralLocators, extent: Extent) -> BilateralLocators:
@@ -84,15 +84,15 @@ def _local(locators: BilateralLocators, extent: Extent) -> BilateralLocators:
 
 
 def part_functions(element: PartElement, method: Method, *, projects: bool) -> Functions:
-    """Return the functions of the parts of a kind, of which `element` is one; see quadratic_terms for `projects`.
+    """Return the functions of the parts of the same kind as `element`; see quadratic_terms for `projects`.
 
-    For e equations and z increments, with z and y those of the element's movers, they are those of term_functions, and, if
-    there are equations:
+    They are the functions of term_functions, and the following if there are equations, for e equations and z increments of the
+    element's movers:
 
-    terms     slopes (e, z), lower (e)
-    rows      slopes, V (36, mover) -> a (e, z)
-    check     a, y, lower, lam -> residual, force (z)
-    locator_residual    poses, raw, steps (e), constants -> locator_residual: the largest misfit
+    terms              slopes (e, z), lower (e)
+    rows               slopes, V (36, mover) -> a (e, z)
+    check              a, y, lower, lam -> residual, force (z)
+    locator_residual   poses, raw, steps (e), constants -> locator_residual: the largest misfit
     """
     size, count = element.size, element.equations
     inputs = symbols(common_shapes(element) | {"steps": (element.locators, 1)})
@@ -129,6 +129,6 @@ class PartElements(Elements):
         super().__init__(elements, functions, rows + firsts[:, None] + np.arange(equations))
         self._steps = firsts[:, None] + np.arange(elements[0].locators)
 
-    def places(self) -> dict[str, Columns]:
-        """Return the columns of what elements read from, or write into, the arrays of the whole group, by name."""
-        return super().places() | {"steps": self._steps, "locator_residual": self.numbers[:, None]}
+    def columns(self) -> dict[str, Columns]:
+        """Return the columns of the group's arrays that elements read or write, by array name."""
+        return super().columns() | {"steps": self._steps, "locator_residual": self.indices[:, None]}

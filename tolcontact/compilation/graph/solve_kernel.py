@@ -1,4 +1,4 @@
-"""Compiled solution of a batch of QPs on the graph of bodies, each from its data alone."""
+"""Compiled solution of a batch of independent QPs on the graph of bodies."""
 
 from tolcontact.compilation.graph.active_set_kernel import excess, refine
 from tolcontact.compilation.graph.factor_kernel import (
@@ -19,12 +19,12 @@ from tolcontact.compilation.graph.layout import JOINT, POSITION, ROW, SLACK, SOU
 from tolcontact.compilation.graph.search_kernel import find_active_rows
 from tolcontact.compiled import inlined_inner, uncounted
 
-MISSED = 1e-7  # mm: an equation that depends on others and is missed by more contradicts them
+MISSED = 1e-7  # mm: a dependent equation with a larger residual contradicts the others
 
 
 @inlined_inner
 def _load(layout, storage, work, problem, k, clears):  # type: ignore[no-untyped-def]
-    """Write the rows, bounds, gradient and prices of problem k into `work`, which is cleared if rows fill more of it."""
+    """Write the rows, bounds, gradient and prices of problem k into `work`; clear its slopes first if `clears`."""
     slopes, gradient, bounds, buffer = problem
     if clears:
         work.slopes[:] = 0.0
@@ -45,7 +45,7 @@ def _load(layout, storage, work, problem, k, clears):  # type: ignore[no-untyped
 
 @inlined_inner
 def _start(layout, work, reactions, slacks, k):  # type: ignore[no-untyped-def]
-    """Open the slacks that were open before, and let equations carry, and rows that did, as far as there are positions."""
+    """Open the guessed slacks, and activate equations and guessed rows, up to the number of positions."""
     for j in range(work.joints.shape[0]):
         slack = layout.joints[j, SLACK]
         work.joints[j, OPEN] = slack >= 0 and slacks[k, slack] > 0
@@ -58,7 +58,7 @@ def _start(layout, work, reactions, slacks, k):  # type: ignore[no-untyped-def]
 
 @inlined_inner
 def _holds_equations(layout, work):  # type: ignore[no-untyped-def]
-    """Return whether equations hold that do not carry, since they depend on others."""
+    """Return whether the inactive equations hold, which depend on others."""
     for j in range(work.joints.shape[0]):
         if layout.joints[j, SLACK] < 0:
             for row in range(layout.joints[j, ROW], layout.joints[j + 1, ROW]):
