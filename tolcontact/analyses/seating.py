@@ -12,7 +12,7 @@ from tolcontact.discretization import raised_places
 from tolcontact.errors import OptionError
 from tolcontact.method import Method
 from tolcontact.simulation import simulate_blocks
-from tolcontact.statics import TOUCH_SHARE, Balance, Touching, TouchingPlaces, balances, contacts_at, drawn_contacts
+from tolcontact.statics import TOUCH_SHARE, Balance, Touching, TouchingPoints, balances, contacts_at, drawn_contacts
 from tolcontact.variation import GivenDraws
 from tolcontact.workflow.models import Model
 
@@ -94,12 +94,12 @@ def seated_contacts(program: Program) -> Touching | None:
     return contacts_at(program.nominal, poses[0], places)
 
 
-def _in_assembly(places: TouchingPlaces, X_WR: np.ndarray) -> TouchingPlaces:
+def _in_assembly(places: TouchingPoints, X_WR: np.ndarray) -> TouchingPoints:
     """Return places of the frame of a reference part at X_WR (12,) in that of the assembly."""
-    return TouchingPlaces(pose.apply(X_WR, places.points), places.normals @ pose.rotation(X_WR).T)
+    return TouchingPoints(pose.apply(X_WR, places.points), places.normals @ pose.rotation(X_WR).T)
 
 
-def _touching(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray) -> TouchingPlaces:
+def _touching(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray) -> TouchingPoints:
     """Return the places at which pair k touches at X_RM (1, 12), in the frame of its reference part."""
     pair = program.nominal.pairs[k]
     assert pair.moving_face is not None and pair.reference_face is not None
@@ -109,12 +109,12 @@ def _touching(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray
     if k in program.meetings:
         raised = raised_places(pair, program.meetings[k], X_RM, deviations)
         is_near = raised.gaps[0] < nearness
-        return TouchingPlaces(pose.apply(X_RM[0], raised.places.P_m[0, is_near]), raised.places.n_r[0, is_near])
+        return TouchingPoints(pose.apply(X_RM[0], raised.places.P_m[0, is_near]), raised.places.n_r[0, is_near])
     gaps = ((pose.apply(X_RM, pair.P_m) - pair.P_r) * pair.n_r).sum(axis=2)[0]
-    return TouchingPlaces(pose.apply(X_RM[0], pair.P_m[gaps < nearness]), pair.n_r[gaps < nearness])
+    return TouchingPoints(pose.apply(X_RM[0], pair.P_m[gaps < nearness]), pair.n_r[gaps < nearness])
 
 
-def _touching_round(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray, nearness: float) -> TouchingPlaces:
+def _touching_round(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray, nearness: float) -> TouchingPoints:
     """Return the places at which balls and shafts touch walls; normals are the derivatives of the gaps by the translation."""
     pair = program.nominal.pairs[k]
     assert pair.round is not None
@@ -127,4 +127,4 @@ def _touching_round(program: Program, k: int, X_RM: np.ndarray, deviations: np.n
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     centres, radii, on_moving = (pair.round.points[name][is_near] for name in ("centre", "radius", "on_moving"))
     at_body = np.where(on_moving[:, None], pose.apply(X_RM[0], centres), centres)
-    return TouchingPlaces(at_body - np.where(on_moving, radii, -radii)[:, None] * normals, normals)
+    return TouchingPoints(at_body - np.where(on_moving, radii, -radii)[:, None] * normals, normals)

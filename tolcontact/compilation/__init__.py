@@ -43,8 +43,8 @@ Small steps seldom change the active set. So solvers that start from the previou
 called only if the active set of the realization's previous step does not satisfy the KKT conditions within 1e-9 mm. They always
 solve the first QP of a realization.
 
-On 1000 realizations of RA1 the corrected poses of all these solvers agree with those of daqp to 2e-13 mm, except proxqp (6e-11
-mm) and piqp (3e-8 mm). 8 solutions for highs and 3 for piqp came from another solver.
+On 1000 realizations of RA1 the corrected poses of all these solvers agree with daqp to 2e-13 mm, except proxqp (6e-11 mm) and
+piqp (3e-8 mm). 8 solutions for highs and 3 for piqp came from another solver.
 
 >>> float(first.kkt_residual.max()) < 1e-8
 True

@@ -19,7 +19,7 @@ TRIAL_SEED = 2_718_281_828
 ALLOWED_SHARE = 1 / 2000  # of the smallest tolerance range: accepted error of fixed planes
 FACET_FACTOR = 4  # times the deviation of triangles from the analytic surfaces: smaller errors are due to the triangles
 COARSE_SHARE = 1 / 20  # of the smallest tolerance range: triangles that deviate by more are taken as the body
-TRAVEL_FACTOR = 2  # times the largest travel of the trial: range in which contact points are searched
+TRAVEL_FACTOR = 2  # times the largest travel of the trial: search range of contact points
 POSES_AT_ONCE = 64
 THREADS = 2  # that compare poses: the search for contact points releases the interpreter lock
 MIN_TRAVEL_SHARE = 1e-6  # of the size of the face
@@ -28,13 +28,13 @@ MIN_TRAVEL_SHARE = 1e-6  # of the size of the face
 class Trial(NamedTuple):
     """The trial of a pair: the largest error of its fixed planes in the depth of contact, and the allowed error, both [mm].
 
-    `places` is the largest number of points at which its faces could touch. Errors are NaN for a pair without a choice: a
+    `max_points` is the largest number of points at which its faces could touch. Errors are NaN for a pair without a choice: a
     one-sided locator, round faces, springs, unbounded tolerances, or too many edges.
     """
 
     error: float
     allowed: float
-    places: int = 0
+    max_points: int = 0
 
 
 def push(pair: ContactPoints, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"], *, presses: bool) -> float:
@@ -84,9 +84,9 @@ def bounded_pair(
         overlap=pair.coordinate_error + _overlap(watch, pair),
         clearance=clearance(pair),
     )
-    places = meeting((pair.moving_face, pair.reference_face), bodies, reach)
-    if places is not None:
-        _check_corners(nominal, pair, places)
+    pair_meeting = meeting((pair.moving_face, pair.reference_face), bodies, reach)
+    if pair_meeting is not None:
+        _check_corners(nominal, pair, pair_meeting)
     else:
         warnings.warn(
             f'contact pair "{shown(pair.name)}": its faces have too many edges to find contact where they end; '
@@ -95,23 +95,23 @@ def bounded_pair(
             stacklevel=2,
         )
         return nothing
-    error, max_places = _error_of_planes(pair, places, X_RM, deviations, room)
+    error, max_points = _error_of_planes(pair, pair_meeting, X_RM, deviations, room)
     bulge = max(pair.moving_face.bulge, pair.reference_face.bulge)
     represents_curves = FACET_FACTOR * bulge <= COARSE_SHARE * smallest
     allowed = max(ALLOWED_SHARE * smallest, FACET_FACTOR * bulge if represents_curves else 0.0)
-    trial = Trial(error, allowed, max_places)
-    return (places if trial.error > trial.allowed else None), trial
+    trial = Trial(error, allowed, max_points)
+    return (pair_meeting if trial.error > trial.allowed else None), trial
 
 
 def _overlap(watch: Watch, pair: ContactPoints) -> float:
-    """Return the nominal penetration [mm] of the bodies of a pair: 0 if only the contact points of disjoint bodies suggest it."""
+    """Return the nominal penetration [mm] of the bodies of a pair; 0 for disjoint bodies, whatever contact points suggest."""
     depth = max(-float(pair.least_gap(pose.AT_REST[None])[0]), 0.0)
     return depth if depth > 0 and pair.reference is not None and watch.overlap(pair.moving, pair.reference) else 0.0
 
 
-def _check_corners(nominal: Nominal, pair: ContactPoints, places: Meeting) -> None:
+def _check_corners(nominal: Nominal, pair: ContactPoints, pair_meeting: Meeting) -> None:
     """Raise ModelError if a face has no corners: then more than two triangles of its body meet at each of its edges."""
-    for face, index in ((places.moving, pair.moving), (places.reference, pair.reference)):
+    for face, index in ((pair_meeting.moving, pair.moving), (pair_meeting.reference, pair.reference)):
         if index is not None and not len(face.vertices):
             part = nominal.parts[index].name
             fault = (
@@ -122,14 +122,14 @@ def _check_corners(nominal: Nominal, pair: ContactPoints, places: Meeting) -> No
 
 
 def _error_of_planes(
-    pair: ContactPoints, places: Meeting, X_RM: np.ndarray, deviations: np.ndarray, room: float
+    pair: ContactPoints, pair_meeting: Meeting, X_RM: np.ndarray, deviations: np.ndarray, room: float
 ) -> tuple[float, int]:
     """Return the largest error [mm] of the fixed planes in the depth of contact, and the largest number of contact points."""
     fixed = pair.least_gap(X_RM, deviations)
     room = max(room, float(np.ptp(fixed)))  # poses that are rarer than in the trial may be deeper by this range
 
     def compared(rows: slice) -> tuple[float, int]:
-        gaps = raised_places(pair, places, X_RM[rows], deviations[rows]).gaps
+        gaps = raised_places(pair, pair_meeting, X_RM[rows], deviations[rows]).gaps
         bounded = gaps.min(axis=1, initial=np.inf)
         differences = np.minimum(bounded, room) - np.minimum(fixed[rows], room)
         return float(np.abs(differences).max(initial=0)), int(np.isfinite(gaps).sum(axis=1).max())

@@ -39,7 +39,7 @@ MAX_BATCH = 1024  # realizations whose QPs fit into a processor's cache
 
 
 class Evaluators(NamedTuple):
-    """The functions of a QP for many realizations: of arrays by name, (realization, entry), to such arrays."""
+    """The functions of a QP for many realizations; inputs and outputs are arrays (realization, entry) by name."""
 
     assemble: Callable[..., dict[str, np.ndarray]]
     finish: Callable[..., dict[str, np.ndarray]]

@@ -25,8 +25,8 @@ class RowPoints(NamedTuple):
 
     points       empty for a round pair
     compliance   (row, 1) [mm/N]: of compliant points; 0 for rigid ones
-    bend         (12, 1): of the points in the slots of the previous step; None for points that always have a row, whose
-                 previous reactions are known
+    bend         (12, 1): of the points in the slots of the previous step; None for points that always have a row, since their
+                 previous reactions are available
     """
 
     points: Sequence[Point]

@@ -11,7 +11,7 @@ from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.placement import misfit
 from tolcontact.mechanics.pose import Number, Pose
 
-QP_ENTRIES = ("h", "g", "a", "lba", "to_z", "length")  # the QP as it was solved, whose residuals are computed
+QP_ENTRIES = ("h", "g", "a", "lba", "to_z", "length")  # of the solved QP, for its residuals
 SOLUTION = ("x", "lam_a", "lam_x")
 
 

@@ -22,24 +22,24 @@ def solve_conditions(problem, active, is_open, order, compliance, refinements, s
     """
     H, gradient, rows, bounds = problem
     for k in range(len(H)):
-        place, total = _places(active[k], H.shape[1] - is_open.shape[1], order)
-        K, right = _conditions(H[k], gradient[k], rows[k], bounds[k], is_open[k], place, total)
+        positions, total = _positions(active[k], H.shape[1] - is_open.shape[1], order)
+        K, right = _conditions(H[k], gradient[k], rows[k], bounds[k], is_open[k], positions, total)
         x = np.zeros(total)
-        if _solve(K, right, place[len(place) - rows.shape[1] :], compliance, refinements, x):
-            _write(x, place, gradient[k], rows[k], is_open[k], solution[k])
+        if _solve(K, right, positions[len(positions) - rows.shape[1] :], compliance, refinements, x):
+            _write(x, positions, gradient[k], rows[k], is_open[k], solution[k])
         else:
             solution[k] = np.nan
 
 
 @compiled
-def _places(active, size, order):  # type: ignore[no-untyped-def]
+def _positions(active, size, order):  # type: ignore[no-untyped-def]
     """Return the position of each variable and row among the unknowns, -1 for inactive rows, and the number of unknowns."""
-    place, total = np.full(len(order), -1), 0
+    positions, total = np.full(len(order), -1), 0
     for unknown in order:
         if unknown < size or active[unknown - size]:
-            place[unknown] = total
+            positions[unknown] = total
             total += 1
-    return place, total
+    return positions, total
 
 
 @compiled
@@ -61,16 +61,16 @@ def _solve(K, right, rows, compliance, refinements, x):  # type: ignore[no-untyp
 
 
 @uncounted
-def _write(x, place, gradient, rows, is_open, solution):  # type: ignore[no-untyped-def]
+def _write(x, positions, gradient, rows, is_open, solution):  # type: ignore[no-untyped-def]
     """Write variables, multipliers of rows and multipliers of slacks into a solution (n + row + slack,)."""
     size, slacks, count = len(gradient) - len(is_open), len(is_open), len(rows)
     solution[:] = 0.0
     for i in range(size):
-        solution[i] = x[place[i]]
+        solution[i] = x[positions[i]]
     multipliers = solution[size + slacks :]
     for row in range(count):
-        if place[size + row] >= 0:
-            multipliers[row] = x[place[size + row]]
+        if positions[size + row] >= 0:
+            multipliers[row] = x[positions[size + row]]
     for slack in range(slacks):
         value = -gradient[size + slack]
         for row in range(count):
@@ -82,32 +82,32 @@ def _write(x, place, gradient, rows, is_open, solution):  # type: ignore[no-unty
 
 
 @compiled
-def _conditions(H, gradient, rows, bounds, is_open, place, total):  # type: ignore[no-untyped-def]
-    """Return the matrix and the right side of the conditions; `place` is the position of each unknown, -1 if it is omitted."""
+def _conditions(H, gradient, rows, bounds, is_open, positions, total):  # type: ignore[no-untyped-def]
+    """Return the matrix and the right side of the conditions; `positions` is the position of each unknown, -1 if it is omitted."""
     size = H.shape[0] - len(is_open)
     K, right, sharing = np.zeros((total, total)), np.empty(total), np.empty(len(bounds), dtype=np.int64)
     for i in range(size):
-        right[place[i]] = -gradient[i]
+        right[positions[i]] = -gradient[i]
         for j in range(size):
-            K[place[i], place[j]] = H[i, j]
+            K[positions[i], positions[j]] = H[i, j]
     for row in range(len(bounds)):
-        p = place[size + row]
+        p = positions[size + row]
         if p >= 0:
             right[p] = bounds[row]
             for i in range(size):
-                K[p, place[i]], K[place[i], p] = rows[row, i], -rows[row, i]
+                K[p, positions[i]], K[positions[i], p] = rows[row, i], -rows[row, i]
     for slack in range(len(is_open)):
         if is_open[slack]:
             column, count = size + slack, 0
             for row in range(len(bounds)):
-                if place[size + row] >= 0 and rows[row, column] != 0:
+                if positions[size + row] >= 0 and rows[row, column] != 0:
                     sharing[count] = row
                     count += 1
             for row in sharing[:count]:
-                p = place[size + row]
+                p = positions[size + row]
                 right[p] += rows[row, column] * gradient[column]
                 for other in sharing[:count]:
-                    K[p, place[size + other]] += rows[row, column] * rows[other, column]
+                    K[p, positions[size + other]] += rows[row, column] * rows[other, column]
     return K, right
 
 

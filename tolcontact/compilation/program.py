@@ -215,7 +215,7 @@ def _meetings(
         for k in group.pairs:
             room = pushed if presses else pushed - pushes[k]
             decisions[k] = bounded_pair(watch, k, relative[:, k], deviations, pushed=pushed, room=room)
-    meetings = {k: places for k, (places, _) in decisions.items() if places is not None}
+    meetings = {k: meeting for k, (meeting, _) in decisions.items() if meeting is not None}
     return meetings, {k: trial for k, (_, trial) in decisions.items()}
 
 
@@ -266,7 +266,9 @@ def _contact_group(
 ) -> ContactGroup:
     # The contact points of a pair with a meeting change with every pose, so that none always has a row.
     standing = [
-        min(max(trials[k].places, MIN_SLOTS), SLOTS) if k in meetings else standing_points(nominal.pairs[k], gaps[k], method)
+        min(max(trials[k].max_points, MIN_SLOTS), SLOTS)
+        if k in meetings
+        else standing_points(nominal.pairs[k], gaps[k], method)
         for k in group.pairs
     ]
     build = ElementQP if has_elements(group, method) else contact_qp

@@ -41,9 +41,9 @@ def station_programs(nominal: Nominal, groups: Sequence[Group], method: Method) 
         parts = np.array([index for index, part in enumerate(nominal.parts) if part.station == scene.station])
         pairs = np.array([k for k, pair in enumerate(nominal.pairs) if pair.moving in parts], dtype=int)
         station_groups = tuple(k for k, group in enumerate(groups) if set(group.parts) <= set(parts.tolist()))
-        carried = [part.carried for part in nominal.parts if part.station == scene.station and part.carried is not None]
-        sources = np.unique(np.array(carried, dtype=int))
-        place = _place(nominal, scene.station, pairs, sources, method) if carried else None
+        joints = [part.carried for part in nominal.parts if part.station == scene.station and part.carried is not None]
+        sources = np.unique(np.array(joints, dtype=int))
+        place = _place(nominal, scene.station, pairs, sources, method) if joints else None
         yield StationProgram(scene.station, parts, pairs, station_groups, sources, place)
 
 

@@ -1,4 +1,4 @@
-"""Displacement energies of many points, from their ten moments.
+"""Displacement energies of sets of points, from their ten moments.
 
 The moments of points P about a nominal centre c are N, sum (P - c) and the six distinct entries of
 sum (P - c)(P - c)'. They suffice for every weighting and any number of points.

@@ -38,7 +38,7 @@ class Side:
 
     @property
     def spread_points(self) -> np.ndarray:
-        """Points (_, 3) [mm], equally many for each point, with the moments of the spheres."""
+        """Points (_, 3) [mm], the same number for each contact point, with the moments of the spheres."""
         if not self.radii.any():
             return self.points
         ends = np.vstack([np.eye(3), -np.eye(3)])
@@ -113,7 +113,7 @@ class Group:
 
 
 def curved_pairs(nominal: Nominal, group: Group) -> list[int]:
-    """Return the positions of a group's pairs in which fixed planes represent a curved reference face."""
+    """Return the positions of a group's pairs whose curved reference face is represented by fixed planes."""
     pairs = [nominal.pairs[index] for index in group.pairs]
     return [
         k

@@ -12,7 +12,7 @@ from tolcontact import poses
 
 ENTRIES = poses.ENTRIES
 
-Number = float | ca.SX  # a number of the model, or its symbol in a function that serves many pairs
+Number = float | ca.SX  # a number of the model, or its symbol in a function that several pairs share
 Vector = np.ndarray | ca.SX
 
 # Keeps sqrt differentiable at theta = 0. Its square root is far below any angle, so the formulas below stay exact.

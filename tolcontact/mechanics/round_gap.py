@@ -55,7 +55,7 @@ def round_gaps(points: RoundPoints, X_RM: ca.SX, growths: ca.SX, reactions: ca.S
         if body is None:
             bodies.append(body := _Body(point, X_RM, by_z))
         growths_of_point = growths if point.on_moving else growths[[1, 0]]
-        terms = round_terms(point, body.place, body.station(point), growths_of_point)
+        terms = round_terms(point, body.coordinates, body.station(point), growths_of_point)
         terms_of_points.append((body, terms))
         gap, slope = terms.gap, terms.slope
         distances.append(gap)
@@ -87,8 +87,8 @@ def round_gaps(points: RoundPoints, X_RM: ca.SX, growths: ca.SX, reactions: ca.S
 class _Body:
     """A ball or a shaft in the frame of the part that has the wall.
 
-    place             (n, 1): its centre, or a point of its axis and the axis
-    by_X, by_z        (n, 12), (n, z): the derivatives of `place`
+    coordinates       (n, 1): its centre, or a point of its axis and the axis
+    by_X, by_z        (n, 12), (n, z): the derivatives of `coordinates`
     squares           (n / 3, n / 3): by_X by_X' consists of 3 x 3 blocks, which are these numbers times the identity
     merged            see _merged
     hollow_curvature  (z, z): the part of the second derivative by z of the sum of load times gap that closing walls subtract
@@ -96,16 +96,16 @@ class _Body:
 
     def __init__(self, point: RoundPoint, X_RM: ca.SX, by_z: ca.SX) -> None:
         self._point, self._X, self._X_by_z = point, X_RM, by_z
-        self._function = _place(bool(point.on_moving), bool(point.axis.any()))
-        self.place, self.by_X, _ = self._placed(ca.SX(self._function.size1_in("weights"), 1))
+        self._function = _coordinates(bool(point.on_moving), bool(point.axis.any()))
+        self.coordinates, self.by_X, _ = self._evaluated(ca.SX(self._function.size1_in("weights"), 1))
         self.by_z = self.by_X @ by_z
         rows = self.by_X[::3, :]
         self.squares, self.merged = rows @ rows.T, _merged(rows.size1())
-        size, freedoms = self.place.numel(), by_z.size2()
+        size, freedoms = self.coordinates.numel(), by_z.size2()
         self._slope, self._bend, self.hollow_curvature = ca.SX(1, size), ca.SX(size, size), ca.SX(freedoms, freedoms)
 
-    def _placed(self, weights: ca.SX) -> Sequence[ca.SX]:
-        """Return the place, its derivative and its weighted second derivative (see _place) for weights (n, 1)."""
+    def _evaluated(self, weights: ca.SX) -> Sequence[ca.SX]:
+        """Return the coordinates, their derivatives and weighted second derivative (see _coordinates) for weights (n, 1)."""
         return self._function.call([self._X, ca.SX(ca.DM(self._point.centre)), ca.SX(ca.DM(self._point.axis)), weights])
 
     def has(self, point: RoundPoint) -> bool:
@@ -134,30 +134,30 @@ class _Body:
 
     def curvature(self) -> ca.SX:
         """Return the second derivative (z, z) of the sum of load times gap, without closing walls."""
-        *_, place_curvature = self._placed(self._slope.T)
-        one_sided = self._X_by_z.T @ ca.triu(place_curvature) @ self._X_by_z  # each entry of X_RM enters linearly
+        *_, coordinate_curvature = self._evaluated(self._slope.T)
+        one_sided = self._X_by_z.T @ ca.triu(coordinate_curvature) @ self._X_by_z  # each entry of X_RM enters linearly
         return one_sided + one_sided.T + congruent(self._bend, self.by_z)
 
 
 @functools.cache
-def _place(on_moving: bool, has_axis: bool) -> ca.Function:
+def _coordinates(on_moving: bool, has_axis: bool) -> ca.Function:
     """Return a Function of X_RM (12), the nominal centre (3) and axis (3) of a ball or shaft, and weights (n).
 
-    Its results are the place (n) and by_X (n, 12) of _Body, and place_curvature (12, 12), the second derivative by X_RM of
-    weights'place.
+    Its results are the coordinates (n) and by_X (n, 12) of _Body, and coordinate_curvature (12, 12), the second derivative by
+    X_RM of weights'coordinates.
     """
     X, centre, axis = ca.SX.sym("X_RM", ENTRIES), ca.SX.sym("centre", 3), ca.SX.sym("axis", 3)
     pose = pose_of(X)
     if not on_moving:
         pose = Pose(pose.R.T, -(pose.R.T @ pose.t))
-    place = pose.apply(centre)
+    coordinates = pose.apply(centre)
     if has_axis:
-        place = ca.vertcat(place, pose.R @ axis)
-    weights = ca.SX.sym("weights", place.numel())
-    place_curvature, _ = ca.hessian(ca.dot(weights, place), X)
+        coordinates = ca.vertcat(coordinates, pose.R @ axis)
+    weights = ca.SX.sym("weights", coordinates.numel())
+    coordinate_curvature, _ = ca.hessian(ca.dot(weights, coordinates), X)
     inputs = {"X_RM": X, "centre": centre, "axis": axis, "weights": weights}
-    outputs = {"place": place, "by_X": ca.jacobian(place, X), "place_curvature": place_curvature}
-    return ca.Function("place", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs])
+    outputs = {"coordinates": coordinates, "by_X": ca.jacobian(coordinates, X), "coordinate_curvature": coordinate_curvature}
+    return ca.Function("coordinates", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs])
 
 
 def _is_at(point: RoundPoint, other: RoundPoint) -> bool:
@@ -182,15 +182,15 @@ def _merged(vectors: int) -> ca.Function:
 
     Its results are the gap and slope of the fixed tangent, the load that it passes to the nearest tangent, and the load that it
     keeps. If both tangents have nearly the same direction, the fixed one takes gap and slope of the nearest one, and passes its
-    load. The place consists of `vectors` vectors, the centre and the axis. `squares` (vector, vector) gives their derivatives
-    by X_RM.
+    load. The coordinates are those of one or two `vectors`, the centre and the axis. `squares` (vector, vector) are the
+    products of their derivatives by X_RM (see _Body).
     """
     gap, nearest_gap, load = (ca.SX.sym(name) for name in ("gap", "nearest_gap", "load"))
     slope, nearest_slope = (ca.SX.sym(name, 1, 3 * vectors) for name in ("slope", "nearest_slope"))
     squares = ca.SX.sym("squares", vectors, vectors)
 
-    def square(by_place: ca.SX) -> ca.SX:
-        by_vector = ca.reshape(by_place, 3, vectors)
+    def square(by_coordinates: ca.SX) -> ca.SX:
+        by_vector = ca.reshape(by_coordinates, 3, vectors)
         return ca.dot(squares, by_vector.T @ by_vector)
 
     is_parallel = square(slope - nearest_slope) < TANGENT_TOLERANCE**2 * square(slope)

@@ -1,4 +1,4 @@
-"""The gap of one ball or shaft against a wall, and its derivatives by the place of the ball or shaft.
+"""The gap of one ball or shaft against a wall, and its derivatives by the coordinates of the ball or shaft.
 
 A flat wall, or one around a shaft, keeps the shaft on one side of its tangent planes. Let e be the direction from the shaft to
 a tangent plane. A shaft that ends in a circle with centre c, axis a and radius r extends to e.c + r sqrt(1 - (e.a)^2) along e:
@@ -25,7 +25,7 @@ MIN_MISSING = 1e-9  # rad: smallest missing half arc of an incomplete wall
 
 
 class Terms(NamedTuple):
-    """The gap [mm] of a point, and its derivatives by the `n` numbers of the ball's or shaft's place.
+    """The gap [mm] of a point, and its derivatives by the `n` coordinates of the ball or shaft.
 
     slope     (1, n)
     bend      (n, n): the second derivative, without the term that a closing wall subtracts: closing * sliding' sliding
@@ -40,36 +40,36 @@ class Terms(NamedTuple):
     closing: ca.SX
 
 
-def round_terms(point: RoundPoint, place: ca.SX, station: float, growths: ca.SX) -> Terms:
+def round_terms(point: RoundPoint, coordinates: ca.SX, station: float, growths: ca.SX) -> Terms:
     """Return the terms of a point of a ball or a shaft.
 
-    place     (n, 1): the ball's centre, or an axis point of the shaft and the axis
-    station   [mm]: coordinate of the point along the axis, from the axis point in `place`
-    growths   (2, 1) [mm]: growth of the body, ball or shaft, and of the wall
+    coordinates   (n, 1): the ball's centre, or an axis point of the shaft and the axis
+    station       [mm]: position of the point along the axis, from the axis point in `coordinates`
+    growths       (2, 1) [mm]: growth of the body, ball or shaft, and of the wall
     """
     if point.wall.kind == "plane" or point.axis.any():
-        return _tangent_terms(point, place, station, growths)
-    return _ball_terms(point, place, growths)
+        return _tangent_terms(point, coordinates, station, growths)
+    return _ball_terms(point, coordinates, growths)
 
 
-def _tangent_terms(point: RoundPoint, place: ca.SX, station: float, growths: ca.SX) -> Terms:
+def _tangent_terms(point: RoundPoint, coordinates: ca.SX, station: float, growths: ca.SX) -> Terms:
     """Return the terms of a point against a plane, or of a shaft in a hollow cylinder."""
     wall = point.wall
     tangent = _tangent(wall.kind == "plane", bool(point.cut.any()), bool(point.axis.any()), _arc(point) is None)
     sizes = [point.radius, wall.radius, point.opening, station]
     numbers = np.concatenate([point.centre, point.cut, wall.origin, wall.axis, point.towards, sizes])
-    return Terms(*tangent.call([place, growths, ca.SX(ca.DM(numbers))]))
+    return Terms(*tangent.call([coordinates, growths, ca.SX(ca.DM(numbers))]))
 
 
 @functools.cache
 def _tangent(is_flat: bool, is_cut: bool, has_axis: bool, is_whole: bool) -> ca.Function:
-    """Return the terms of a point at a plane or a hollow cylinder as a Function of the place, both growths, and constants.
+    """Return the terms of a point at a plane or a hollow cylinder as a Function of coordinates, both growths, and constants.
 
     The gap is written for a tangent plane with normal e, rotated by `delta` towards t. A plane is its own tangent plane. For a
-    hollow wall it is the nearest tangent plane: e* with d gap / d delta = 0. As the shaft's place s changes, e* rotates, which
-    lowers the second derivative by (d2 gap / ds d delta)^2 / (d2 gap / d delta2), unless e* is at the end of the wall.
+    hollow wall it is the nearest tangent plane: e* with d gap / d delta = 0. As the shaft's coordinates s change, e* rotates,
+    which lowers the second derivative by (d2 gap / ds d delta)^2 / (d2 gap / d delta2), unless e* is at the end of the wall.
     """
-    s, growths, numbers = ca.SX.sym("place", 6 if has_axis else 3), ca.SX.sym("growths", 2), ca.SX.sym("numbers", 19)
+    s, growths, numbers = ca.SX.sym("coordinates", 6 if has_axis else 3), ca.SX.sym("growths", 2), ca.SX.sym("numbers", 19)
     centre, u, o, w, x, sizes = ca.vertsplit(numbers, [0, 3, 6, 9, 12, 15, 19])
     r, wall_radius, opening, station = ca.vertsplit(sizes)
     c, a, tilt = s[:3], s[3:] if has_axis else ca.SX(3, 1), ca.SX(0)

@@ -130,7 +130,7 @@ class _Buffers:
 
 
 # Evaluations, in all processes, after which a Function is compiled. Compiling takes as long as interpreting this number of
-# evaluations once or twice. So the total time is at most about three times that of the best choice in hindsight.
+# evaluations once or twice. So the total time is at most about three times the time of the best choice in hindsight.
 MIN_COMPILED_CALLS = 10_000
 MAX_INSTRUCTIONS = 300_000  # that are compiled; more are interpreted, since compiling them takes more than a gigabyte
 
@@ -151,7 +151,7 @@ class Evaluations:
 class AdaptiveFunction:
     """A Function of scalar expressions that is interpreted first, and compiled after many evaluations. Threads may share it.
 
-    Both ways give the same results to the last bit. Evaluations of earlier processes count, too.
+    Both give the same results to the last bit. Evaluations of earlier processes count, too.
 
     native   the machine code, or None while CasADi interprets the Function
     """

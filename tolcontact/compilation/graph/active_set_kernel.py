@@ -153,7 +153,7 @@ def scan(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-d
         if layout.joints[j, SLACK] < 0:
             continue
         for row in range(layout.joints[j, ROW], layout.joints[j + 1, ROW]):
-            if work.place[row] < 0:
+            if work.position[row] < 0:
                 value = excess(layout, work, row)
                 if value < depths[j]:
                     depths[j], deepest[j], violated = value, row, True
@@ -168,7 +168,7 @@ def most_violated(work, tolerance, depths, deepest):  # type: ignore[no-untyped-
         if depths[j] < lowest:
             lowest, target = depths[j], deepest[j]
         if work.joints[j, OPEN] and work.slacks[VALUE, j] < min(lowest, -CLOSED * tolerance):
-            lowest, target = work.slacks[VALUE, j], work.place.size + j
+            lowest, target = work.slacks[VALUE, j], work.position.size + j
     return target
 
 
@@ -179,8 +179,8 @@ def _aim(layout, work, target):  # type: ignore[no-untyped-def]
     The change is zero if the target is linearly dependent on the active rows.
     """
     change, scatter, direction = work.positions[STEP], work.vectors[SCATTER], work.vectors[DIRECTION]
-    is_row = target < work.place.size
-    joint = layout.rows[target, JOINT] if is_row else target - work.place.size
+    is_row = target < work.position.size
+    joint = layout.rows[target, JOINT] if is_row else target - work.position.size
     opening, square = 1.0, 0.0
     if is_row:
         set_row(layout.blocks, work.slopes, target, 1.0, scatter)
@@ -205,7 +205,7 @@ def _aim(layout, work, target):  # type: ignore[no-untyped-def]
         rate += product(layout.blocks, work.slopes, target, direction)
         set_row(layout.blocks, work.slopes, target, 0.0, scatter)
     else:
-        # If the slack closes, the relative pivot of its rows is that of the slack times the square of their openings.
+        # If the slack closes, its rows have the relative pivot of the slack times the square of their openings.
         largest = 0.0
         for t in range(layout.joints[joint, POSITION], layout.joints[joint, POSITION] + work.joints[joint, COUNT]):
             largest = max(largest, work.rows[work.active[t], OPENING] ** 2)
@@ -226,7 +226,7 @@ def _block(layout, work):  # type: ignore[no-untyped-def]
                 step, blocking = max(work.positions[MULTIPLIER, t], 0.0) / change, work.active[t]
         change = work.slacks[CHANGE, j]
         if not work.joints[j, OPEN] and change > RELIEVED and -work.slacks[VALUE, j] < step * change:
-            step, blocking = max(-work.slacks[VALUE, j], 0.0) / change, work.place.size + j
+            step, blocking = max(-work.slacks[VALUE, j], 0.0) / change, work.position.size + j
     return step, blocking
 
 
@@ -256,7 +256,7 @@ def step_towards(layout, work, target, growth):  # type: ignore[no-untyped-def]
 
     Returns ENTERED, PARTIAL or STUCK, and the growth of the target's multiplier.
     """
-    rows = work.place.size
+    rows = work.position.size
     rate = _aim(layout, work, target)
     gap = excess(layout, work, target) if target < rows else work.slacks[VALUE, target - rows]
     step, blocking = _block(layout, work)
@@ -268,12 +268,12 @@ def step_towards(layout, work, target, growth):  # type: ignore[no-untyped-def]
     if whole <= step:
         if target < rows:
             append(layout, work, target)
-            work.positions[MULTIPLIER, work.place[target]] = growth
+            work.positions[MULTIPLIER, work.position[target]] = growth
         else:
             toggle(layout, work, target - rows)
         return ENTERED, growth
     if blocking < rows:
-        remove(layout, work, work.place[blocking])
+        remove(layout, work, work.position[blocking])
     else:
         toggle(layout, work, blocking - rows)
     return PARTIAL, growth

@@ -27,7 +27,7 @@ class Work(NamedTuple):
 
     slopes      (row, block, 6)
     rows        (row, 2) openings and bounds
-    place       (row,) positions of the active rows, -1 for inactive rows
+    position    (row,) position of each active row, -1 for inactive rows
     vectors     (4, body, 6) the gradient, the solution y, one row among zeros, the direction of y
     joints      (joint, 4) number of active rows of the joint, which take its first positions; number of these rows with valid
                 entries of the factor; whether other entries have changed; whether the slack is open
@@ -39,7 +39,7 @@ class Work(NamedTuple):
 
     slopes: np.ndarray
     rows: np.ndarray
-    place: np.ndarray
+    position: np.ndarray
     vectors: np.ndarray
     joints: np.ndarray
     slacks: np.ndarray
@@ -94,7 +94,7 @@ def append(layout, work, row):  # type: ignore[no-untyped-def]
     """Activate a row, after the other active rows of its joint."""
     j = layout.rows[row, JOINT]
     position = layout.joints[j, POSITION] + work.joints[j, COUNT]
-    work.active[position], work.place[row] = row, position
+    work.active[position], work.position[row] = row, position
     work.positions[MULTIPLIER, position] = 0.0
     work.joints[j, COUNT] += 1
 
@@ -103,11 +103,11 @@ def append(layout, work, row):  # type: ignore[no-untyped-def]
 def remove(layout, work, position):  # type: ignore[no-untyped-def]
     """Deactivate the row at a position."""
     j = layout.rows[work.active[position], JOINT]
-    work.place[work.active[position]] = -1
+    work.position[work.active[position]] = -1
     work.joints[j, COUNT] -= 1
     for s in range(position, layout.joints[j, POSITION] + work.joints[j, COUNT]):
         work.active[s], work.positions[MULTIPLIER, s] = work.active[s + 1], work.positions[MULTIPLIER, s + 1]
-        work.place[work.active[s]] = s
+        work.position[work.active[s]] = s
     work.joints[j, FRESH] = min(work.joints[j, FRESH], position - layout.joints[j, POSITION])
     work.joints[j, CHANGED] = 1
 

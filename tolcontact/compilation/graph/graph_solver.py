@@ -98,7 +98,7 @@ class _Search:
         self._work = Work(
             slopes=self._buffer[:cut].reshape(rows, width, FREEDOMS),
             rows=self._buffer[cut:].reshape(rows, 2),
-            place=np.zeros(rows, dtype=np.int64),
+            position=np.zeros(rows, dtype=np.int64),
             vectors=np.zeros((4, bodies, FREEDOMS)),
             joints=np.zeros((joints, 4), dtype=np.int64),
             slacks=np.zeros((3, joints)),

@@ -50,8 +50,8 @@ def load_hessian(storage, nonzeros, k, blocks):  # type: ignore[no-untyped-def]
     blocks[:] = 0.0
     for entry in range(storage.hessian_entries.size):
         if storage.hessian_entries[entry] >= 0:
-            block, place = divmod(storage.hessian_entries[entry], 36)
-            blocks[block, place // 6, place % 6] = nonzeros[k, entry]
+            block, offset = divmod(storage.hessian_entries[entry], 36)
+            blocks[block, offset // 6, offset % 6] = nonzeros[k, entry]
     starts, columns, block_of = storage.starts, storage.columns, storage.block_of
     for body in range(starts.size - 1):
         diagonal = starts[body + 1] - 1

@@ -32,7 +32,7 @@ def _load(layout, storage, work, problem, k, clears):  # type: ignore[no-untyped
         buffer[storage.entries[entry]] = slopes[k, entry]
     for row in range(layout.rows.shape[0]):
         work.rows[row, BOUND] = bounds[k, layout.rows[row, SOURCE]]
-        work.place[row] = -1
+        work.position[row] = -1
     bodies = storage.bodies.size
     for body in range(bodies):
         for c in range(6):
@@ -62,7 +62,7 @@ def _holds_equations(layout, work):  # type: ignore[no-untyped-def]
     for j in range(work.joints.shape[0]):
         if layout.joints[j, SLACK] < 0:
             for row in range(layout.joints[j, ROW], layout.joints[j + 1, ROW]):
-                if work.place[row] < 0 and abs(excess(layout, work, row)) > MISSED:
+                if work.position[row] < 0 and abs(excess(layout, work, row)) > MISSED:
                     return False
     return True
 
