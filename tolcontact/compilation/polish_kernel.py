@@ -83,7 +83,7 @@ def _write(x, positions, gradient, rows, is_open, solution):  # type: ignore[no-
 
 @compiled
 def _conditions(H, gradient, rows, bounds, is_open, positions, total):  # type: ignore[no-untyped-def]
-    """Return the matrix and the right side of the conditions; `positions` is the position of each unknown, -1 if it is omitted."""
+    """Return the matrix and the right side of the conditions; `positions` of unknowns are -1 if they are omitted."""
     size = H.shape[0] - len(is_open)
     K, right, sharing = np.zeros((total, total)), np.empty(total), np.empty(len(bounds), dtype=np.int64)
     for i in range(size):

@@ -21,11 +21,11 @@ from tolcontact.vocabulary import CORRECTED, RAW, Status
 class Stage(NamedTuple):
     """A station in the sequence of a program; a program without stations has one stage, which places nothing again.
 
-    index    its index among the stations
-    groups   indices of its contact groups
+    position   its position among the stations
+    groups     indices of its contact groups
     """
 
-    index: int
+    position: int
     groups: tuple[int, ...]
 
 
@@ -44,7 +44,7 @@ def stages(program: Program) -> list[Stage]:
     """Return the stages of a program, in their order."""
     if not program.stations:
         return [Stage(0, tuple(range(len(program.groups))))]
-    return [Stage(index, station.groups) for index, station in enumerate(program.stations)]
+    return [Stage(position, station.groups) for position, station in enumerate(program.stations)]
 
 
 def hand_over(
@@ -61,7 +61,7 @@ def hand_over(
     initial     initial poses; the poses of this station are replaced
     corrected   corrected poses of earlier stations, and raw poses of this station, which are replaced, too
     """
-    station = program.stations[stage.index] if program.stations else None
+    station = program.stations[stage.position] if program.stations else None
     if station is None or station.place is None or not rows.size:
         return False
     placed = station.place(poses=corrected[rows[:, None], station.sources], deviations=deviations[rows])
@@ -195,7 +195,7 @@ def simulate_block(
     initial, is_unknown = InitialPoses(raw, relative), ~np.isfinite(raw).all(axis=(1, 2))
     raw_relative = relative.copy() if program.stations else relative
     for stage in sequence:
-        worst = outcomes_by_stage[:, stage.index]
+        worst = outcomes_by_stage[:, stage.position]
         changed = np.flatnonzero(outcomes_by_stage.any(axis=1))
         is_placed_again = hand_over(program, stage, changed, initial, block.poses[:, CORRECTED], deviations)
         for resolver in (resolvers[index] for index in stage.groups):

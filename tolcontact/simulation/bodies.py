@@ -35,7 +35,7 @@ class WatchedBodies:
         return cls(np.zeros(count, dtype=int), np.zeros(count), np.full(count, -1), np.full(count, -1))
 
     def name(self, rows: Int[Array, " k"], depths: Float[Array, " k"], parts: tuple[int, int]) -> None:
-        """Record two parts as the deepest pair in each of the rows (k,) where no recorded depth exceeds their depth (k,) [mm]."""
+        """Record two parts, with depths (k,) [mm], as the deepest pair in each of the rows (k,) where they are."""
         is_deeper = (self.part[rows] < 0) | (np.nan_to_num(depths) > np.nan_to_num(self.depth[rows]))
         deepest = rows[is_deeper]
         self.depth[deepest], self.part[deepest], self.other[deepest] = depths[is_deeper], *parts
@@ -55,7 +55,7 @@ def watched_bodies(
 
     Pairs of bodies that were already `tested` are skipped where answers are certified. A pair of parts counts once, even if it
     penetrates in several stations. Pairs that penetrate nominally do not count. If no pair counts, bodies with declared contact
-    are named where the answer is doubtful, or becomes doubtful by them.
+    are named where the answer is doubtful, or becomes doubtful because of them.
     """
     watch, nominal, count = program.watch, program.nominal, len(poses)
     stations = [scene.station for scene in nominal.scenes] or [""]
