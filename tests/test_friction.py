@@ -13,7 +13,7 @@ from tests import cases
 from tests.cases.frames import STILL
 from tests.cases.measured import ring, shaft
 from tests.helpers import call, nightly
-from tolcontact.report.html.analyses import tables_of
+from tolcontact.report.html.page import tables_of
 
 PADS = np.array([(10, 10, 0), (90, 15, 0), (45, 50, 0)], dtype=float)
 STOPS = {"left": ((0, 20, 12), (1, 0, 0)), "front": ((60, 0, 8), (0, 1, 0))}

@@ -12,7 +12,7 @@ import pytest
 import tolcontact as tc
 from tests import cases
 from tests.helpers import SEATED, nightly, run, script
-from tolcontact.analyses.c_stdout import muted_c_stdout
+from tolcontact.analyses.farthest_pose import muted_c_stdout
 from tolcontact.compilation import usable_plugins
 from tolcontact.mechanics.quiet import quiet
 

@@ -34,7 +34,7 @@ def check_gaps(points, rng, turn):
     for _ in range(3):
         R, t = Rotation.from_rotvec(rng.normal(scale=turn, size=3)).as_matrix(), rng.normal(scale=0.2, size=3)
         X, grown, reactions = np.concatenate([R.ravel(), t]), heights.normal(scale=0.01, size=2), rng.uniform(size=count)
-        gaps, slopes, bends, bow, wrap, _ = (each.full() for each in evaluate(X, grown, reactions, AS_IT_IS))
+        gaps, slopes, bends, curvature, hollow_curvature, _ = (each.full() for each in evaluate(X, grown, reactions, AS_IT_IS))
         archived = np.array([point.gaps(R, t, *grown) for point in again])
         # A fixed tangent of a hollow wall is the nearest one where the two are in one direction.
         replaced = (gaps.ravel()[:, None] == gaps.ravel()).sum(axis=1) > 1
@@ -50,11 +50,11 @@ def check_gaps(points, rng, turn):
         by_three = [each.full() for each in evaluation(points, 3)(X, grown, reactions, by_z)]
         assert np.abs(rates - slopes).max() < 1e-6 * max(1, np.abs(slopes).max())
         assert np.abs(slopes.T @ reactions - bends.ravel()).max() < 1e-9 * max(1, np.abs(bends).max())
-        assert np.abs(turns - bow + wrap).max() < 1e-6 * max(1, np.abs(bow - wrap).max())
-        for found, expected in zip(by_three[3:5], (bow, wrap), strict=True):
+        assert np.abs(turns - curvature + hollow_curvature).max() < 1e-6 * max(1, np.abs(curvature - hollow_curvature).max())
+        for found, expected in zip(by_three[3:5], (curvature, hollow_curvature), strict=True):
             assert np.abs(found - by_z.T @ expected @ by_z).max() < 1e-9 * max(1, np.abs(found).max())
         assert np.abs(by_three[1] - slopes @ by_z).max() < 1e-9 * max(1, np.abs(slopes).max())
-        assert np.linalg.eigvalsh(wrap).min() > -1e-9 * max(1, np.abs(wrap).max())
+        assert np.linalg.eigvalsh(hollow_curvature).min() > -1e-9 * max(1, np.abs(hollow_curvature).max())
 
 
 @pytest.mark.slow
@@ -152,6 +152,6 @@ def test_curvature_on_an_axis_is_that_of_some_room_beside_it():
     ):
         evaluate = evaluation(RoundPoints.of([RoundPoint(wall, True, centre, NONE, NONE, 2.0, True, x, np.pi)]), ENTRIES)
         at_rest = np.concatenate([np.eye(3).ravel(), np.zeros(3)])
-        *_, bow, wrap, _ = (each.full() for each in evaluate(at_rest, np.zeros(2), [1], AS_IT_IS))
-        assert np.isfinite(bow).all()
-        assert np.abs(wrap)[9:, 9:].max() == pytest.approx(expected / (1e-3 * 2.0), rel=1e-6)
+        *_, curvature, hollow_curvature, _ = (each.full() for each in evaluate(at_rest, np.zeros(2), [1], AS_IT_IS))
+        assert np.isfinite(curvature).all()
+        assert np.abs(hollow_curvature)[9:, 9:].max() == pytest.approx(expected / (1e-3 * 2.0), rel=1e-6)

@@ -21,8 +21,7 @@ from tolcontact.analyses.allowed_space import AllowedRegion
 from tolcontact.analyses.analysis import Analysis
 from tolcontact.analyses.engine import Engine
 from tolcontact.analyses.extreme_search import Effort, Evaluation
-from tolcontact.analyses.influences import Influences
-from tolcontact.analyses.worst_case import search_worst_case
+from tolcontact.analyses.worst_case import Influences, search_worst_case
 from tolcontact.simulation import map_blocks
 
 

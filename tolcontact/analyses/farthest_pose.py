@@ -14,6 +14,13 @@ no bound.
 To first order in deviations and motions. Pairs of round faces and springy supports have no rows, which only widens the bounds.
 """
 
+import contextlib
+import ctypes
+import functools
+import os
+import platform
+import threading
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +28,6 @@ import scipy
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.allowed_space import AllowedRegion
-from tolcontact.analyses.c_stdout import muted_c_stdout
 from tolcontact.analyses.linear_model import LinearModel
 from tolcontact.compilation import Program
 
@@ -29,6 +35,9 @@ MAX_ROUNDS = 30
 SLACK = 1e-7  # of a zone's width
 MAX_BINARY, MAX_SECONDS = 64, 30.0  # rows that may carry or be open; time for one bound
 MAX_CONDITION = 1e8  # of the objective's quadratic term: contact points with a larger one do not hold all freedoms
+_LOCK = threading.Lock()
+_inside = 0  # how many times threads are in `muted_c_stdout`
+_stream: int | None = None  # the address of the stream that was replaced
 
 
 def farthest_poses(program: Program, region: AllowedRegion, model: LinearModel) -> np.ndarray:
@@ -173,3 +182,36 @@ class _Problem:
             if not len(planes):
                 break
         return bound
+
+
+@functools.cache
+def _null_stream() -> int | None:
+    """Return the address of a C stream to the null device; it stays open, as another thread may be printing to it."""
+    library = ctypes.CDLL(None)
+    library.fopen.restype = ctypes.c_void_p
+    return library.fopen(os.devnull.encode(), b"w")
+
+
+@contextlib.contextmanager
+def muted_c_stdout() -> Iterator[None]:
+    """Drop what C code prints to its stream `stdout`, such as HiGHS in integer programs; without glibc, drop nothing.
+
+    With glibc this stream is a variable. It leads to the null device while any thread is in this context. The file descriptor
+    stays as it is, so that Python's own output, of this thread and of all others, is not touched.
+    """
+    global _inside, _stream  # noqa: PLW0603  the stream is global, so is its replacement
+    if platform.libc_ver()[0] != "glibc":
+        yield
+        return
+    variable = ctypes.c_void_p.in_dll(ctypes.CDLL(None), "stdout")
+    with _LOCK:
+        _inside += 1
+        if _inside == 1:
+            _stream, variable.value = variable.value, _null_stream()
+    try:
+        yield
+    finally:
+        with _LOCK:
+            _inside -= 1
+            if not _inside:
+                variable.value = _stream

@@ -12,7 +12,6 @@ from tolcontact.analyses.analysis import Analysis
 from tolcontact.analyses.engine import Engine, Progress
 from tolcontact.analyses.extreme_search import Effort, Evaluation, Searcher, Searches
 from tolcontact.analyses.farthest_pose import farthest_poses
-from tolcontact.analyses.influences import Influences
 from tolcontact.analyses.linear_model import LinearModel, linear_model
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
@@ -26,6 +25,68 @@ PER_POLISH, PER_POLISHED_CONTRIBUTOR = 110.0, 22.0  # combinations that polishin
 EXCHANGES = 24  # combinations that influences are looked for at
 MAX_RESTARTS, RESTART_STEP = 3, 0.25  # of searches that continue, and the step that they begin with
 END_TOLERANCE = 1e-3  # of a measure's spread: searches that end at values closer than this have the same end
+NEGLIGIBLE = 1e-6  # of a measure's spread: smaller changes are no influence
+SINGLE = 2  # combinations in which contributors are exchanged one at a time
+MAX_ROUNDS = 8
+
+
+class Influences:
+    """The contributors of a region that have an influence on each measure with contact, as far as is known.
+
+    They are found by exchanging deviations between combinations. Contributors that vary together, such as the components of a
+    feature in a zone, are exchanged together, so that the combinations that result lie in the region, too. A contributor
+    without influence anywhere is found by exchanging all of them at once.
+
+    spread     (measure,) difference between the largest and the least value of random points
+    is_active  (measure, contributor)
+    """
+
+    def __init__(self, region: AllowedRegion, evaluation: Evaluation, spread: np.ndarray) -> None:
+        self._evaluation, self._units = evaluation, region.independent_columns
+        self._tolerances = NEGLIGIBLE * spread
+        self.is_active = np.zeros((len(spread), len(region.lower)), dtype=bool)
+
+    def explore(self, points: np.ndarray, partners: np.ndarray) -> np.ndarray:
+        """Find influences at points (n, contributor), by exchange with partners (n, contributor).
+
+        Return whether there is one that was not known, (measure,).
+        """
+        before = self.is_active.copy()
+        for _ in range(MAX_ROUNDS):
+            hits = self._hidden(points, partners)
+            if not hits.any():
+                break
+            rows = np.flatnonzero(hits.any(axis=1))[:SINGLE]
+            unchanged = self.is_active.copy()
+            self._explore_one_at_a_time(points[rows], partners[rows])
+            interacts = hits[rows].any(axis=0) & (self.is_active == unchanged).all(axis=1)
+            self.is_active[interacts] = True
+        else:
+            self.is_active[hits.any(axis=0)] = True
+        return np.asarray((self.is_active != before).any(axis=1))
+
+    def _hidden(self, points: np.ndarray, partners: np.ndarray) -> np.ndarray:
+        """Return whether all contributors without known influence, exchanged together, change a measure, (n, measure)."""
+        mixed = np.where(self.is_active[:, None], points, partners)
+        changes = self._changes(self._corrected(points)[None], self._corrected(mixed))
+        return np.asarray(changes[np.arange(len(mixed)), :, np.arange(len(mixed))].T)
+
+    def _explore_one_at_a_time(self, points: np.ndarray, partners: np.ndarray) -> None:
+        """Mark the contributors as active whose exchange changes a measure in any of the points (n, contributor)."""
+        mixed = np.repeat(points[:, None], len(self._units), axis=1)
+        for unit, columns in enumerate(self._units):
+            mixed[:, unit, columns] = partners[:, columns]
+        changes = np.any(self._changes(self._corrected(points)[:, None], self._corrected(mixed)), axis=0)
+        for unit, columns in enumerate(self._units):
+            self.is_active[np.ix_(np.flatnonzero(changes[unit]), columns)] = True
+
+    def _corrected(self, points: np.ndarray) -> np.ndarray:
+        return self._evaluation.corrected(points)[..., terms.CORRECTED, :]
+
+    def _changes(self, values: np.ndarray, exchanged: np.ndarray) -> np.ndarray:
+        """Return whether measures (..., measure) differ; also if one of them is certified and the other is not."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray((np.abs(values - exchanged) > self._tolerances) | (np.isnan(values) != np.isnan(exchanged)))
 
 
 def worst_case(
@@ -55,7 +116,7 @@ def worst_case(
     tolcontact.analyses.allowed_space describes the region that combinations lie in. With contact a measure is neither smooth
     nor concave, and the linearized resolution jumps: the searches may miss a worse combination, and `agreeing` says how many
     of them met. Each measure is searched along the contributors that have an influence on it; the others change nothing when
-    they are exchanged all at once, in 24 random combinations and at each end (see tolcontact.analyses.influences).
+    they are exchanged all at once, in 24 random combinations and at each end (see tolcontact.analyses.worst_case).
     `samples` / 256 searches begin at the best of all combinations tried: random ones, the far ends along nominal sensitivities,
     and those along the slopes of a regression; `samples` / 128 begin at any of them (see tolcontact.analyses.extreme_search).
     The best one continues in other random directions until it gains no more. `unseen` is the estimate w (w + 1) / (n (n - 1))

@@ -33,9 +33,9 @@ from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError, OptionError, shown
 from tolcontact.geometry import parts_from
 from tolcontact.report import nominal_and_faults, population_text, write_page, write_view
+from tolcontact.workflow.accessor import summarize
 from tolcontact.workflow.models import DEFAULT_SOLVER, build, check_counts
 from tolcontact.workflow.population import check_population
-from tolcontact.workflow.summaries import summarize
 
 STARTER = Path(__file__).with_name("starter.py")
 

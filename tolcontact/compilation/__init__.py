@@ -1,7 +1,7 @@
-"""Compilation of a model: its equations become functions, its contact problem a QP that is built once. A chapter of the guide.
+"""Compilation of a model: its equations become functions, and its contact QP is built once. A chapter of the guide.
 
-`tc.build(model, solver=..., method=...)` returns a `tc.Program`. `tc.run` and `tc.simulate_blocks` accept it in place of a
-model, so that a model is compiled once for many runs.
+`tc.build(model, solver=..., method=...)` returns a `tc.Program`. `tc.run` and `tc.simulate_blocks` accept a program in place of
+a model, so that a model is compiled once for many runs.
 
 >>> import tolcontact as tc
 >>> stand = tc.Assembly("stand")
@@ -21,7 +21,7 @@ model, so that a model is compiled once for many runs.
 |---|---|
 | `qpoases` (default) | you want the safe choice: correct on every problem of the study, two to three times slower than daqp |
 | `daqp` | you want speed |
-| `graph` | you want speed, above all with many bodies; it follows the graph of bodies, and asks daqp where it fails |
+| `graph` | you want speed, above all with many bodies; it exploits the graph of bodies, and falls back to daqp where it fails |
 | `osqp` | you compare with a first-order method; a hundred times slower on hard problems |
 | `proxqp`, `highs`, `piqp` | you compare solvers |
 
@@ -35,31 +35,31 @@ tolcontact.errors.OptionError: solver "superscs" is refused: it reports success 
 
 ## Accuracy, for every solver
 
-Each answer is judged by its own KKT residual in mm, computed from the QP that was solved. An answer whose residual exceeds 1e-9
-mm is polished: the rows that carry are solved as one linear system. (For steps below 1e-3 mm the limit is 1e-10 mm.) If the
-residual then still exceeds 1e-8 mm, `qpoases` or `daqp` answers instead, and the archive counts it in `second_answers`.
+Each answer is judged by its KKT residual in mm, computed from the QP that was solved. An answer whose residual exceeds 1e-9 mm
+is polished: the active set is solved as one linear system. (For steps below 1e-3 mm the limit is 1e-10 mm.) If the residual
+then still exceeds 1e-8 mm, `qpoases` or `daqp` answers instead, and the archive counts it in `second_answers`.
 
-Small steps seldom change which rows carry. So solvers that start from the previous problem (`qpoases`, `osqp` and `highs`) are
-asked only where the rows that carried in the realization's last step, as one linear system, do not give an answer within 1e-9
-mm. The first QP of a realization is always theirs.
+Small steps seldom change the active set. So solvers that start from the previous problem (`qpoases`, `osqp` and `highs`) are
+called only if the active set of the realization's previous step does not satisfy the KKT conditions within 1e-9 mm. They always
+solve the first QP of a realization.
 
-On 1000 realizations of RA1 the corrected poses of all these solvers agree with those of daqp to 2e-13 mm, except proxqp (6e-11
-mm) and piqp (3e-8 mm); 8 solutions for highs and 3 for piqp came from another solver.
+On 1000 realizations of RA1 the corrected poses of all these solvers agree with daqp to 2e-13 mm, except proxqp (6e-11 mm) and
+piqp (3e-8 mm). 8 solutions for highs and 3 for piqp came from another solver.
 
 >>> float(first.kkt_residual.max()) < 1e-8
 True
 
 Each QP covers the parts that contact couples: parts that touch no common free part have separate QPs. Rows are scaled to
 length 1 and increments to mm, so that residuals and tolerances are lengths. Functions that are evaluated more than 10 000
-times, in one process or several, are compiled to machine code, which gives the same results to the last bit as CasADi's
-interpreter. The machine code is kept in the user's cache folder (`~/.cache/tolcontact` on Linux, 268 MB at most), so the next
+times, in one process or several, are compiled to machine code. The machine code gives the same results to the last bit as
+CasADi's interpreter. It is stored in the user's cache folder (`~/.cache/tolcontact` on Linux, 268 MB at most), so the next
 process that simulates the same model need not compile it again.
 
-A group of few bodies has one function that assembles its QP, and one that judges the answer. From six coupled bodies on, a QP
-is assembled from its elements: each pair of faces with the parts that its increments move, and, if forces press, each part with
-its forces and two-sided locators. Elements of one kind share their functions, whose inputs are the constants of the element,
-too. So thirty blocks in a tower are compiled as fast as six. Pairs are of one kind if they have equally many rows, and pairs of
-round faces only if they are equal. Both ways agree to 1e-11 mm. The regularization "identity" has no elements.
+A group of few bodies has one function that assembles its QP, and one that judges the answer. With six or more coupled bodies, a
+QP is assembled from elements. An element is a pair of faces with the parts that its increments move or, if forces press, a part
+with its forces and two-sided locators. Elements of one kind share their functions, which take the constants of the element as
+inputs. So thirty blocks in a tower are compiled as fast as six. Pairs are of one kind if they have equally many rows; pairs of
+round faces must be equal. Both ways agree to 1e-11 mm. The regularization "identity" has no elements.
 """
 
 from tolcontact.compilation.contact_rows import SLOTS

@@ -1,4 +1,4 @@
-"""Which pairs need contact of bodies as they end: a trial at raw poses, pair by pair, when the model is compiled."""
+"""The choice between fixed planes and bounded faces for each pair: a trial at raw poses when the model is compiled."""
 
 import warnings
 from concurrent.futures import ThreadPoolExecutor
@@ -16,32 +16,32 @@ from tolcontact.interference import Watch
 
 TRIALS = 1024  # raw poses
 TRIAL_SEED = 2_718_281_828
-ALLOWED_SHARE = 1 / 2000  # of the smallest tolerance range: error of fixed planes that is accepted
-FACET_FACTOR = 4  # times the distance of triangles from the analytic surfaces for which they stand: smaller errors are theirs
-COARSE_SHARE = 1 / 20  # of the smallest tolerance range: where triangles are off by more, they are the body
-TRAVEL_FACTOR = 2  # times the largest travel of the trial: how far places are looked for
+ALLOWED_SHARE = 1 / 2000  # of the smallest tolerance range: accepted error of fixed planes
+FACET_FACTOR = 4  # times the deviation of triangles from the analytic surfaces: smaller errors are due to the triangles
+COARSE_SHARE = 1 / 20  # of the smallest tolerance range: triangles that deviate by more are taken as the body
+TRAVEL_FACTOR = 2  # times the largest travel of the trial: search range of contact points
 POSES_AT_ONCE = 64
-THREADS = 2  # that compare poses: the search for places releases the interpreter
+THREADS = 2  # that compare poses: the search for contact points releases the interpreter lock
 MIN_TRAVEL_SHARE = 1e-6  # of the size of the face
 
 
 class Trial(NamedTuple):
-    """The trial of a pair: the largest error of its fixed planes in the depth of contact, and the one allowed, both [mm].
+    """The trial of a pair: the largest error of its fixed planes in the depth of contact, and the allowed error, both [mm].
 
-    `places` is the largest number of places at which its faces could touch. Errors are NaN for a pair that has no choice:
-    one-sided locators, round faces, springs, tolerances without an end, or too many edges.
+    `max_points` is the largest number of points at which its faces could touch. Errors are NaN for a pair without a choice: a
+    one-sided locator, round faces, springs, unbounded tolerances, or too many edges.
     """
 
     error: float
     allowed: float
-    places: int = 0
+    max_points: int = 0
 
 
 def push(pair: ContactPoints, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"], *, presses: bool) -> float:
-    """Return how far [mm] contact of a pair may push its parts, from raw trial poses X_RM (n, 12).
+    """Return the distance [mm] by which contact of a pair may push its parts, from raw trial poses X_RM (n, 12).
 
     deviations   (n, contributor)
-    presses      whether forces close the gaps, too
+    presses      whether forces also close the gaps
     """
     depth = _travel(pair, X_RM) if pair.round is not None else max(-float(pair.least_gap(X_RM, deviations).min()), 0.0)
     return depth + (clearance(pair) if presses else 0.0)
@@ -56,11 +56,11 @@ def bounded_pair(
     pushed: float,
     room: float,
 ) -> tuple[Meeting | None, Trial]:
-    """Return where the faces of a pair can touch as they end, or None if fixed planes represent its reference face well.
+    """Return where the bounded faces of a pair can touch, or None if fixed planes represent its reference face well.
 
-    X_RM      (n, 12), raw, at trial poses, for `deviations` (n, contributor)
-    pushed    [mm]: how far all contact together may push its parts
-    room      [mm]: how far other contact, or forces, may: gaps below it are compared, and below the range of all gaps
+    X_RM      (n, 12): raw trial poses, for `deviations` (n, contributor)
+    pushed    [mm]: distance by which all contact of the group may push its parts
+    room      [mm]: distance by which other contact, or forces, may; gaps below it are compared, and below the range of all gaps
     """
     nominal, pair = watch.nominal, watch.nominal.pairs[index]
     smallest = nominal.assembly.smallest_zone()
@@ -84,9 +84,9 @@ def bounded_pair(
         overlap=pair.coordinate_error + _overlap(watch, pair),
         clearance=clearance(pair),
     )
-    places = meeting((pair.moving_face, pair.reference_face), bodies, reach)
-    if places is not None:
-        _check_corners(nominal, pair, places)
+    pair_meeting = meeting((pair.moving_face, pair.reference_face), bodies, reach)
+    if pair_meeting is not None:
+        _check_corners(nominal, pair, pair_meeting)
     else:
         warnings.warn(
             f'contact pair "{shown(pair.name)}": its faces have too many edges to find contact where they end; '
@@ -95,25 +95,25 @@ def bounded_pair(
             stacklevel=2,
         )
         return nothing
-    error, most = _error_of_planes(pair, places, X_RM, deviations, room)
+    error, max_points = _error_of_planes(pair, pair_meeting, X_RM, deviations, room)
     bulge = max(pair.moving_face.bulge, pair.reference_face.bulge)
-    stands_for_curves = FACET_FACTOR * bulge <= COARSE_SHARE * smallest
-    allowed = max(ALLOWED_SHARE * smallest, FACET_FACTOR * bulge if stands_for_curves else 0.0)
-    trial = Trial(error, allowed, most)
-    return (places if trial.error > trial.allowed else None), trial
+    represents_curves = FACET_FACTOR * bulge <= COARSE_SHARE * smallest
+    allowed = max(ALLOWED_SHARE * smallest, FACET_FACTOR * bulge if represents_curves else 0.0)
+    trial = Trial(error, allowed, max_points)
+    return (pair_meeting if trial.error > trial.allowed else None), trial
 
 
 def _overlap(watch: Watch, pair: ContactPoints) -> float:
-    """Return how deep [mm] the bodies of a pair lie in each other nominally: contact points of whole bodies only seem to."""
+    """Return the nominal penetration [mm] of the bodies of a pair; 0 for disjoint bodies, whatever contact points suggest."""
     depth = max(-float(pair.least_gap(pose.AT_REST[None])[0]), 0.0)
     return depth if depth > 0 and pair.reference is not None and watch.overlap(pair.moving, pair.reference) else 0.0
 
 
-def _check_corners(nominal: Nominal, pair: ContactPoints, places: Meeting) -> None:
+def _check_corners(nominal: Nominal, pair: ContactPoints, pair_meeting: Meeting) -> None:
     """Raise ModelError if a face has no corners: then more than two triangles of its body meet at each of its edges."""
-    for face, number in ((places.moving, pair.moving), (places.reference, pair.reference)):
-        if number is not None and not len(face.vertices):
-            part = nominal.parts[number].name
+    for face, index in ((pair_meeting.moving, pair.moving), (pair_meeting.reference, pair.reference)):
+        if index is not None and not len(face.vertices):
+            part = nominal.parts[index].name
             fault = (
                 f'contact pair "{shown(pair.name)}": the face of part "{shown(part)}" has no ends, since more than two '
                 "triangles meet at each of its edges; the mesh holds several bodies in one place: export one of them"
@@ -122,31 +122,31 @@ def _check_corners(nominal: Nominal, pair: ContactPoints, places: Meeting) -> No
 
 
 def _error_of_planes(
-    pair: ContactPoints, places: Meeting, X_RM: np.ndarray, deviations: np.ndarray, room: float
+    pair: ContactPoints, pair_meeting: Meeting, X_RM: np.ndarray, deviations: np.ndarray, room: float
 ) -> tuple[float, int]:
-    """Return the largest error [mm] of the fixed planes of a pair in the depth of contact, and the largest number of places."""
+    """Return the largest error [mm] of the fixed planes in the depth of contact, and the largest number of contact points."""
     fixed = pair.least_gap(X_RM, deviations)
-    room = max(room, float(np.ptp(fixed)))  # rarer poses than those of the trial may be as much deeper
+    room = max(room, float(np.ptp(fixed)))  # poses that are rarer than in the trial may be deeper by this range
 
-    def judged(rows: slice) -> tuple[float, int]:
-        gaps = raised_places(pair, places, X_RM[rows], deviations[rows]).gaps
+    def compared(rows: slice) -> tuple[float, int]:
+        gaps = raised_places(pair, pair_meeting, X_RM[rows], deviations[rows]).gaps
         bounded = gaps.min(axis=1, initial=np.inf)
         differences = np.minimum(bounded, room) - np.minimum(fixed[rows], room)
         return float(np.abs(differences).max(initial=0)), int(np.isfinite(gaps).sum(axis=1).max())
 
     blocks = [slice(k, k + POSES_AT_ONCE) for k in range(0, len(X_RM), POSES_AT_ONCE)]
     with ThreadPoolExecutor(THREADS) as pool:
-        errors, counts = zip((0.0, 0), *pool.map(judged, blocks), strict=True)
+        errors, counts = zip((0.0, 0), *pool.map(compared, blocks), strict=True)
     return max(errors), max(counts)
 
 
 def _travel(pair: ContactPoints, X_RM: np.ndarray) -> float:
-    """Return how far [mm] the moving face, or the contact points of a pair without one, travel from their nominal places."""
+    """Return the travel [mm] of the moving face, or of the contact points of a pair without one, from the nominal position."""
     bounds = pair.moving_face.mesh.bounds if pair.moving_face is not None else [pair.P_m.min(axis=0), pair.P_m.max(axis=0)]
     corners = np.array(np.meshgrid(*np.array(bounds).T)).reshape(3, -1).T
     return float(np.linalg.norm(pose.apply(X_RM - pose.AT_REST, corners), axis=2).max())
 
 
 def clearance(pair: ContactPoints) -> float:
-    """Return the least nominal distance [mm] of contact points from their feet."""
+    """Return the smallest nominal distance [mm] of contact points from their projections."""
     return float(np.linalg.norm(pair.P_m - pair.P_r, axis=1).min())

@@ -1,4 +1,4 @@
-"""Conditioning of the QP: its objective has unit diagonal blocks, its rows have length 1, and slacks make it solvable."""
+"""Conditioning of the QP: unit diagonal blocks in its objective, rows of length 1, and slacks that make it feasible."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -9,15 +9,15 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Int
 from tolcontact.compilation.contact_rows import Rows, springs_of
 from tolcontact.mechanics.correction import FREEDOMS
+from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.pose import Number
-from tolcontact.mechanics.setting import Setting
 
-SLACK = 1e-3  # mm of gap that a slack of 1 mm opens, unless its row gives way
-IDLE_DISTANCE = 1e3  # lengths of the group: bound of an empty row, which never binds
+SLACK = 1e-3  # mm of gap for a slack of 1 mm, unless its row is compliant
+IDLE_DISTANCE = 1e3  # lengths of the group: bound of an empty row, which is never active
 
 
 class ConditionedRows(NamedTuple):
-    """Rows A y + opening s >= lower of length 1 in y; `length` (row, 1) is that of the unscaled rows."""
+    """Rows A y + opening s >= lower of length 1 in y; `length` (row, 1) is the length of the unscaled rows."""
 
     A: ca.SX
     opening: ca.SX
@@ -25,25 +25,25 @@ class ConditionedRows(NamedTuple):
     length: ca.SX
 
 
-def conditioned(setting: Setting, Q: ca.SX, pull: ca.SX, rows: Rows, misfit: ca.SX, scale: ca.SX) -> dict[str, ca.SX]:
+def conditioned(system: GroupEquations, Q: ca.SX, gradient: ca.SX, rows: Rows, misfit: ca.SX, scale: ca.SX) -> dict[str, ca.SX]:
     """Return the QP min 1/2 y'Hy + g'y with lba <= a y <= uba, in y = (U z, slacks), and the `length` of the unscaled rows.
 
-    `misfit` (locator, 1) [mm] of exact two-sided locators gives the last rows, which are equations. A row that gives way has a
-    slack of its own without a price, after those of the pairs: with the opening sqrt(C) it opens the gap by C times the
-    multiplier. `scale` is that of the objective.
+    The `misfit` (locator, 1) [mm] of exact two-sided locators gives the last rows, which are equations. A compliant row has its
+    own slack without a price, after the slacks of the pairs. With the opening sqrt(C), this slack adds C times the multiplier
+    to the gap. `scale` is the scale of the objective.
     """
-    pairs, equations = len(setting.group.pairs), misfit.numel()
+    pairs, equations = len(system.group.pairs), misfit.numel()
     H, to_z = unit_blocks(Q)
     A = rows.slopes @ to_z
     idle = [idle_row(k, A[k, :].nnz()) for k in range(len(rows))]
-    gap_rows = conditioned_rows(A, rows.gaps, rows.filled, idle, setting.group.length, openings(rows.compliance, scale))
-    B = setting.slope(misfit) @ to_z
+    gap_rows = conditioned_rows(A, rows.gaps, rows.filled, idle, system.group.length, openings(rows.compliance, scale))
+    B = system.slope(misfit) @ to_z
     owners, priced = slack_owners(rows.pairs, rows.springs, pairs)
     opens = ca.sparsify(ca.DM(np.equal.outer(owners, range(len(priced))).astype(float)))
-    targets = -setting.at_rest(misfit)
+    targets = -system.at_rest(misfit)
     return {
         "h": ca.diagcat(H, ca.SX.eye(len(priced))),
-        "g": ca.vertcat(to_z.T @ pull, ca.DM(priced.astype(float)) * setting.group.length),
+        "g": ca.vertcat(to_z.T @ gradient, ca.DM(priced.astype(float)) * system.group.length),
         "a": ca.blockcat([[gap_rows.A, ca.diag(gap_rows.opening) @ opens], [B, ca.SX(equations, len(priced))]]),
         "lba": ca.vertcat(gap_rows.lower, targets),
         "uba": ca.vertcat(ca.DM(np.full(len(rows), np.inf)), targets),
@@ -55,9 +55,9 @@ def conditioned(setting: Setting, Q: ca.SX, pull: ca.SX, rows: Rows, misfit: ca.
 def slack_owners(
     pairs: Int[Array, " row"], springs: Sequence[int], pair_count: int
 ) -> tuple[Int[Array, " row"], Bool[Array, " slack"]]:
-    """Return the slack of each row, for the `pairs` and the `springs` among the rows; and which slacks have a price.
+    """Return the slack of each row, and which slacks have a price, from the `pairs` of the rows and the `springs` among them.
 
-    Slacks of springs follow those of the pairs. The slack of a pair without rigid rows opens nothing, and has no price.
+    Slacks of springs follow the slacks of the pairs. The slack of a pair without rigid rows is in no row, and has no price.
     """
     owners, is_rigid = pairs.copy(), np.ones(len(pairs), dtype=bool)
     owners[springs] = pair_count + np.arange(len(springs))
@@ -66,7 +66,7 @@ def slack_owners(
 
 
 def openings(compliance: ca.SX, scale: ca.SX) -> ca.SX:
-    """Return the gap (row, 1) [mm] that a slack of 1 mm opens, for the compliance (row, 1) [mm/N] of the rows."""
+    """Return the opening (row, 1) of the rows: gap [mm] for a slack of 1 mm, from their compliance (row, 1) [mm/N]."""
     opening = ca.SX.ones(compliance.numel()) * SLACK
     for k in springs_of(compliance):
         opening[k] = ca.sqrt(compliance[k] * scale)
@@ -76,10 +76,10 @@ def openings(compliance: ca.SX, scale: ca.SX) -> ca.SX:
 def conditioned_rows(
     A: ca.SX, gaps: ca.SX, filled: ca.SX, idle: Sequence[ca.DM | ca.SX], group_length: Number, opening: ca.SX
 ) -> ConditionedRows:
-    """Return rows of length 1 from the derivatives A (row, y) of gaps (row, 1) [mm]; rows whose slot is empty are `idle`.
+    """Return rows of length 1 from the derivatives A (row, y) of gaps (row, 1) [mm]; rows of empty slots are `idle`.
 
-    Multipliers are then in the norm of the objective, however weakly that holds a freedom. A slack of 1 mm opens a gap by
-    `opening` (row, 1) [mm].
+    Multipliers are then in the norm of the objective, however weakly it constrains a degree of freedom. A slack of 1 mm adds
+    `opening` (row, 1) [mm] to a gap.
     """
     length = ca.sqrt(ca.sum2(A**2))
     length = ca.if_else(length > 0, length, 1)
@@ -117,8 +117,8 @@ def coupling(Q: ca.SX, V_i: ca.SX, V_j: ca.SX) -> ca.SX:
 def idle_row(seed: int, size: int) -> ca.DM:
     """Return the entries of a row (size, 1) of length 1 in general position.
 
-    Its bound is far away, so it does not bind. Most plugins accept rows of zeros. qpOASES starts from the rows that carried in
-    the previous problem, and fails if one of them has become zero.
+    Its bound is far away, so it is never active. Most plugins accept rows of zeros. qpOASES starts from the active set of the
+    previous problem, and fails if one of its rows has become zero.
     """
     entries = np.random.default_rng(seed).normal(size=size)
     return ca.DM(entries / np.linalg.norm(entries))

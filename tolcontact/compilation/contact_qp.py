@@ -2,12 +2,11 @@
 
 min 1/2 y'Hy + f'y + sum (L s_k + 1/2 s_k^2)   subject to   g_i + A_i y + SLACK s_k >= 0,  h_j + B_j y = 0,  s_k >= 0
 
-The increments z = (dt, L w) of a mover, all in mm (L is a length of the group's size), are z = U^-1 y, where U'U is the
-mover's own block of (11): H then has unit blocks on its diagonal, and the few freedoms that only the regularization holds
-are as well conditioned as the others. s_k, one for each pair k, make the problem solvable for all gaps; their
-price is so high that they stay zero unless the rows contradict each other (an exact penalty). f, the pull of the
-objective at the present poses, is zero in the raw state but for forces; h are the two-sided locators, if the
-objective holds them."""
+The increments z = (dt, L w) of a mover, all in mm (L is the length of the group), are z = U^-1 y, where U'U is the diagonal
+block of the mover in (11). H then has unit blocks on its diagonal, and degrees of freedom that only the regularization
+constrains are as well conditioned as the others. The slacks s_k, one for each pair k, make the problem feasible for all gaps.
+Their exact penalty keeps them zero unless the rows contradict each other. f is the gradient of the objective at the present
+poses; without forces, it is zero in the raw state. h are the two-sided locators, if the objective makes them exact."""
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
@@ -27,11 +26,11 @@ from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import FREEDOMS, linear, published, rigid
 from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.gap import GapMap
+from tolcontact.mechanics.group_equations import GroupEquations, face_heights, face_poses
 from tolcontact.mechanics.groups import Group, curved_pairs
 from tolcontact.mechanics.objective import energy
-from tolcontact.mechanics.placement import hold_steps, misfit
+from tolcontact.mechanics.placement import bilateral_steps, misfit
 from tolcontact.mechanics.pose import ENTRIES, poses_of
-from tolcontact.mechanics.setting import Setting, face_heights, face_poses
 from tolcontact.method import Method
 
 Standing = Sequence[np.ndarray | int]  # see ContactQP
@@ -40,7 +39,7 @@ MAX_BATCH = 1024  # realizations whose QPs fit into a processor's cache
 
 
 class Evaluators(NamedTuple):
-    """The functions of a QP for many realizations: of arrays by name, (realization, entry), to such arrays."""
+    """The functions of a QP for many realizations; inputs and outputs are arrays (realization, entry) by name."""
 
     assemble: Callable[..., dict[str, np.ndarray]]
     finish: Callable[..., dict[str, np.ndarray]]
@@ -52,10 +51,10 @@ class Evaluators(NamedTuple):
 class ContactQP:
     """The Functions of a group: `assemble` makes the QP of the inputs, `plugin` solves it, `finish` makes the outputs.
 
-    energy       the objective at `poses` (realization, 1) [mm^2], or [mm] for seating: of poses, raw, moments, deviations
-    relate       X_RM of the pairs at `poses`: of poses, deviations
+    energy       poses, raw, moments, deviations -> the objective at `poses` (realization, 1) [mm^2], or [mm] for seating
+    relate       poses, deviations -> X_RM of the pairs at `poses`
     slacks       number of slacks: the QP's last variables, which are not negative
-    has_springs  whether rows give way
+    has_springs  whether any row is compliant
     equations    number of equations: the QP's last rows, for two-sided locators that the objective makes exact
     standing     for each pair of the group the contact points that always have a row, or the number of its slots
     """
@@ -87,12 +86,12 @@ class ContactQP:
 
     @property
     def spans(self) -> list[slice]:
-        """The rows of each pair among those of the group."""
+        """The range of rows of each pair in the group."""
         return row_spans(self.standing)
 
 
 def row_spans(standing: Standing) -> list[slice]:
-    """Return the rows of each pair among those of a group."""
+    """Return the range of rows of each pair in the group."""
     ends = np.cumsum([0, *(_row_count(points) for points in standing)])
     return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
 
@@ -106,40 +105,42 @@ def contact_qp(
 ) -> ContactQP:
     """Return the Functions of a group.
 
-    `standing` holds the points of each pair of the group that always have a row, by default those of `standing_points`.
+    `standing` lists the points of each pair of the group that always have a row, by default from `standing_points`.
     `_inputs` describes the inputs. The outputs for `p` parts, `q` pairs and `k` rows are:
 
-    corrected (12 p)     poses after the correction; in an exact resolution after the part of it that `stride` allows
+    corrected (12 p)     poses after the correction; in an exact resolution after the share of it that `stride` allows
     linearized (12 q)    X_RM of every pair, linear in the increments, as the QP constrains it
     relative (12 q)      X_RM of every pair at `corrected`
-    multipliers (k)      reactions: of the rows, >= 0, in the units of the objective (see Objective)
-    residual             KKT residual [mm], in y: the larger of max |Hy + f - A'lambda|, and max |min(row, lambda)| with rows
-                         of length 1, or the depth of a gap that remains negative
+    multipliers (k)      reactions of the rows, >= 0, in the units of the objective (see Objective)
+    residual             KKT residual [mm], in y: the largest of max |Hy + f - A'lambda|, max |min(row, lambda)| with rows of
+                         length 1, and the depth of any gap that remains negative
     slack (q)            penetration of each pair that no increment could remove, to first order [mm]
     step (2)             largest increment (dt, L w) of a mover [mm], and the same in the norm of the objective, max |y|, of
                          the whole correction
-    astray               largest misfit [mm] of exact two-sided locators at `corrected`
+    locator_residual     largest misfit [mm] of exact two-sided locators at `corrected`
     """
     standing = standing or [standing_points(nominal.pairs[k], gaps[k], method) for k in group.pairs]
     inputs = _inputs(nominal, group, standing)
     pairs = [nominal.pairs[index] for index in group.pairs]
-    setting = Setting(
+    system = GroupEquations(
         nominal, group, method, raw=poses_of(inputs["raw"]), z=ca.SX.sym("z", FREEDOMS * len(group.free)),
-        **{name: inputs[name] for name in ("moments", "deviations", "firmness")},
+        **{name: inputs[name] for name in ("moments", "deviations", "regularization_factor")},
         faces=[face_poses(pair, inputs["deviations"]) for pair in pairs],
         heights=[face_heights(pair, inputs["deviations"]) for pair in pairs],
-        steps=[hold_steps(nominal, group.parts[hold.part], inputs["deviations"]) for hold in group.holds],
+        steps=[bilateral_steps(nominal, group.parts[locators.part], inputs["deviations"]) for locators in group.bilateral],
     )  # fmt: skip
-    motion = setting.motion(poses_of(inputs["poses"]))
+    motion = system.motion(poses_of(inputs["poses"]))
     current, moved, reactions = motion.poses, motion.by(linear), inputs["reactions"]
-    rows = contact_rows(setting, row_points(setting, standing, inputs), current, moved, reactions)
+    rows = contact_rows(system, row_points(system, standing, inputs), current, moved, reactions)
     projects = method.is_iterated or bool(curved_pairs(nominal, group))
-    terms = quadratic_terms(setting, rows, motion, reactions, ca.sum1(reactions), projects=projects)
-    exact = misfit(setting, moved, linear=True) if method.minimizes.presses else ca.SX(0, 1)
-    problem = conditioned(setting, *terms.summed(inputs["newton"], inputs["caution"]), rows, exact, terms.scale)
+    terms = quadratic_terms(system, rows, motion, reactions, ca.sum1(reactions), projects=projects)
+    exact = misfit(system, moved, linear=True) if method.minimizes.presses else ca.SX(0, 1)
+    problem = conditioned(system, *terms.summed(inputs["newton"], inputs["proximal_weight"]), rows, exact, terms.scale)
     poses = motion.by(rigid if method.is_exact else published)
-    solution_symbols, results = outcome(setting, terms.scale, rows, poses, problem, inputs["stride"])
-    pure_energy = ca.substitute(energy(setting, current).value, setting.firmness, 1) + rows.spring_energy() / terms.scale
+    solution_symbols, results = outcome(system, terms.scale, rows, poses, problem, inputs["stride"])
+    pure_energy = (
+        ca.substitute(energy(system, current).value, system.regularization_factor, 1) + rows.spring_energy() / terms.scale
+    )
     return ContactQP(
         assemble=_function("assemble", inputs, problem),
         plugin=plugin,
@@ -148,7 +149,7 @@ def contact_qp(
         relate=_function(
             "relate",
             {name: inputs[name] for name in ("poses", "deviations")},
-            {"relative": ca.vertcat(*(X.vector() for X in setting.relative(current)))},
+            {"relative": ca.vertcat(*(X.vector() for X in system.relative(current)))},
         ),
         slacks=len(group.pairs) + len(rows.springs),
         has_springs=group.has_springs,
@@ -163,17 +164,18 @@ def _inputs(nominal: Nominal, group: Group, standing: Standing) -> dict[str, ca.
     If only few points of a pair can be the deepest, each of them always has a row. The `v` other pairs have slots, `m` in all,
     for changing points.
 
-    poses (12 p)         poses of the group's parts about which the gaps are linearized
-    raw (12 p)           their raw poses, from which displacements count
-    moments (10, sides)  moments of the points of each side that count in the objective
-    deviations (c)       of all contributors of the model
-    firmness             factor of the regularization: 1, or more in early steps
+    poses (12 p)         poses of the group's parts: the gaps are linearized about them
+    raw (12 p)           raw poses of the group's parts, which displacements are measured from
+    moments (10, sides)  moments of the weighted points of each side in the objective
+    deviations (c)       deviations of all contributors of the model
+    regularization_factor    factor of the regularization: 1, or more in early steps
     newton               1 to count the curvature of objective and gaps, 0 for the linear step of the paper
-    stride               in an exact resolution: the largest angle [rad] by which a step turns a mover
-    caution              if points are projected in each step: weight of the step, in all contact points, beside the objective
+    stride               in an exact resolution: step bound, the largest rotation angle [rad] of a mover
+    proximal_weight      if points are projected in each step: weight of the proximal term, the squared motion of all contact
+                         points in the step
     reactions (k)        if `newton`: the reaction of each row's point in the previous step
-    bend (12 v)          if `newton`: the sum, over the points in the slots of the previous step, of reaction times the gap's
-                         gradient by the entries of X_RM
+    bend (12 v)          if `newton`: sum, over the points in the slots of the previous step, of reaction times gap gradient by
+                         the entries of X_RM
     P_m, P_r, n_r (3, m) the contact points in the slots
     filled (m)           1 if a slot holds a point, 0 if it is empty
     """
@@ -184,10 +186,10 @@ def _inputs(nominal: Nominal, group: Group, standing: Standing) -> dict[str, ca.
         "raw": (ENTRIES * len(group.parts), 1),
         "moments": (MOMENTS, len(group.sides)),
         "deviations": (len(nominal.contributors), 1),
-        "firmness": (1, 1),
+        "regularization_factor": (1, 1),
         "newton": (1, 1),
         "stride": (1, 1),
-        "caution": (1, 1),
+        "proximal_weight": (1, 1),
         "reactions": (rows, 1),
         "bend": (ENTRIES * varying, 1),
         "P_m": (3, slots),

@@ -10,12 +10,12 @@ import numpy as np
 
 from tolcontact.discretization import ContactPoints
 from tolcontact.mechanics.gap import GapMap, gap
+from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
 from tolcontact.mechanics.round_gap import round_gaps
-from tolcontact.mechanics.setting import Setting
 from tolcontact.method import Method
 
-SLOTS, LEAST_SLOTS = 12, 8  # of a pair: at most, and at least; six rows can carry
+SLOTS, MIN_SLOTS = 12, 8  # largest and smallest number of slots of a pair; at most six independent rows can be active
 
 Point = tuple[ca.SX, ca.SX, ca.SX, ca.SX]  # P^m, P^r, n^r, and 1 if it has a row
 
@@ -23,10 +23,10 @@ Point = tuple[ca.SX, ca.SX, ca.SX, ca.SX]  # P^m, P^r, n^r, and 1 if it has a ro
 class RowPoints(NamedTuple):
     """The points of a pair that have rows.
 
-    points       none of a round pair
-    compliance   (row, 1) [mm/N]: of points that give way; 0 for rigid ones
-    bend         (12, 1): of the points in the slots of the previous step; None for points that always have a row, whose
-                 previous reactions are known
+    points       empty for a round pair
+    compliance   (row, 1) [mm/N]: of compliant points; 0 for rigid ones
+    bend         (12, 1): of the points in the slots of the previous step; None for points that always have a row, since their
+                 previous reactions are available
     """
 
     points: Sequence[Point]
@@ -36,16 +36,16 @@ class RowPoints(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """One row for each slot, and for each point that always has one; the pairs of a group one after the other.
+    """One row for each slot, and for each point that always has one; rows are ordered by pair.
 
-    slopes      (row, z): the gaps' derivatives
+    slopes      (row, z): derivatives of the gaps
     gaps        (row, 1) [mm] at z = 0
     filled      (row, 1): 0 if a slot is empty
     pairs       (row,): position of the row's pair in the group
     relative    (12 * pair, 1): X_RM of every pair, to first order in z
-    bends       (12 * pair, 1): sums of the previous reactions times the gaps' gradients by the entries of X_RM
-    compliance  (row, 1) [mm/N]: of points that give way; 0 for rigid rows
-    bow, wrap   (z, z): sums of the previous reactions times the second derivatives of gaps that are not linear in X_RM
+    bends       (12 * pair, 1): sums of previous reaction times gap gradient by the entries of X_RM
+    compliance  (row, 1) [mm/N]: of compliant points; 0 for rigid rows
+    curvature, hollow_curvature   (z, z): sums of previous reaction times second derivative of gaps that are not linear in X_RM
                 (see round_gaps)
     """
 
@@ -56,15 +56,15 @@ class Rows:
     compliance: ca.SX
     relative: ca.SX
     bends: ca.SX
-    bow: ca.SX
-    wrap: ca.SX
+    curvature: ca.SX
+    hollow_curvature: ca.SX
 
     def __len__(self) -> int:
         return len(self.pairs)
 
     @property
     def springs(self) -> list[int]:
-        """The rows that give way."""
+        """The compliant rows."""
         return springs_of(self.compliance)
 
     def spring_energy(self) -> ca.SX:
@@ -73,14 +73,14 @@ class Rows:
 
 
 def springs_of(compliance: ca.SX) -> list[int]:
-    """Return the rows with a compliance (row, 1) other than 0."""
+    """Return the rows with a nonzero compliance (row, 1)."""
     return [k for k in range(compliance.numel()) if not compliance[k].is_zero()]
 
 
 def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) -> np.ndarray | int:
-    """Return the points of a pair that always have a row, or the number of slots if these hold changing points.
+    """Return the points of a pair that always have a row, or the number of its slots for changing points.
 
-    Points of round faces always have a row. So have the points that can be the deepest, if they are few and fixed.
+    Points of round faces always have a row. The same holds for points that can be the deepest, if they are few and fixed.
     """
     if gaps is None or pair.is_springy:
         return np.arange(len(pair.P_m))
@@ -89,7 +89,7 @@ def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) ->
 
 
 def contact_rows(
-    setting: Setting,
+    system: GroupEquations,
     points_of_pairs: Sequence[RowPoints],
     start_poses: Sequence[Pose],
     end_poses: Sequence[Pose],
@@ -97,29 +97,29 @@ def contact_rows(
 ) -> Rows:
     """Return the rows about `start_poses`, which the increments change to `end_poses`.
 
-    `reactions` (row, 1) are those of the points in the previous step, see contact_qp.
+    `reactions` (row, 1) are the reactions of the points in the previous step, see contact_qp.
     """
     slopes: list[ca.SX] = []
     pairs: list[int] = []
     gaps, filled, compliance, relative, bends = ([] for _ in range(5))
-    bow, wrap = (ca.SX(setting.z.numel(), setting.z.numel()) for _ in range(2))
-    for k, (start, end) in enumerate(zip(setting.relative(start_poses), setting.relative(end_poses), strict=True)):
-        by_z = setting.slope(end.vector())
-        relative.append(start.vector() + by_z @ setting.z)
-        (points, gives, bend), pair = points_of_pairs[k], setting.nominal.pairs[setting.group.pairs[k]]
-        compliance.append(gives)
+    curvature, hollow_curvature = (ca.SX(system.z.numel(), system.z.numel()) for _ in range(2))
+    for k, (start, end) in enumerate(zip(system.relative(start_poses), system.relative(end_poses), strict=True)):
+        by_z = system.slope(end.vector())
+        relative.append(start.vector() + by_z @ system.z)
+        (points, pair_compliance, bend), pair = points_of_pairs[k], system.nominal.pairs[system.group.pairs[k]]
+        compliance.append(pair_compliance)
         if pair.round is not None:
-            of_pair = reactions[len(pairs) : len(pairs) + len(pair.round)]
-            z = sorted(set(by_z.sparsity().get_triplet()[1]))  # of the two parts of the pair
-            of_points = round_gaps(pair.round, start.vector(), setting.heights[k], of_pair, by_z[:, z])
-            slopes.append(ca.SX(len(pair.round), setting.z.numel()))
-            slopes[-1][:, z] = of_points.slopes
-            gaps.append(of_points.gaps)
+            pair_reactions = reactions[len(pairs) : len(pairs) + len(pair.round)]
+            z = sorted(set(by_z.sparsity().get_triplet()[1]))  # increments of the two parts of the pair
+            pair_gaps = round_gaps(pair.round, start.vector(), system.heights[k], pair_reactions, by_z[:, z])
+            slopes.append(ca.SX(len(pair.round), system.z.numel()))
+            slopes[-1][:, z] = pair_gaps.slopes
+            gaps.append(pair_gaps.gaps)
             filled.append(ca.SX.ones(len(pair.round)))
             pairs += [k] * len(pair.round)
-            bends.append(of_points.bends)
-            bow[z, z] += of_points.bow
-            wrap[z, z] += of_points.wrap
+            bends.append(pair_gaps.bends)
+            curvature[z, z] += pair_gaps.curvature
+            hollow_curvature[z, z] += pair_gaps.hollow_curvature
             continue
         total = ca.SX.zeros(ENTRIES) if bend is None else bend
         for P_m, P_r, n_r, is_filled in points:
@@ -134,15 +134,15 @@ def contact_rows(
             pairs.append(k)
         bends.append(total)
     return Rows(
-        slopes=ca.vertcat(ca.SX(0, setting.z.numel()), *slopes),
+        slopes=ca.vertcat(ca.SX(0, system.z.numel()), *slopes),
         gaps=ca.vertcat(ca.SX(0, 1), *gaps),
         filled=ca.vertcat(ca.SX(0, 1), *filled),
         pairs=np.array(pairs),
         compliance=ca.vertcat(ca.SX(0, 1), *compliance),
         relative=ca.vertcat(ca.SX(0, 1), *relative),
         bends=ca.vertcat(ca.SX(0, 1), *bends),
-        bow=bow,
-        wrap=wrap,
+        curvature=curvature,
+        hollow_curvature=hollow_curvature,
     )
 
 
@@ -151,16 +151,16 @@ def compliance_of(pair: ContactPoints) -> np.ndarray:
     return np.zeros(len(pair.P_m)) if pair.stiffness is None else 1 / pair.stiffness
 
 
-def row_points(setting: Setting, standing: Sequence[np.ndarray | int], inputs: Mapping[str, ca.SX]) -> list[RowPoints]:
+def row_points(system: GroupEquations, standing: Sequence[np.ndarray | int], inputs: Mapping[str, ca.SX]) -> list[RowPoints]:
     """Return the points of the group's pairs that have rows, see contact_qp for `standing` and `inputs`."""
     slots, bends = slot_points(inputs), iter(ca.vertsplit(inputs["bend"], ENTRIES) if inputs["bend"].numel() else [])
     points_of_pairs = []
-    for index, points in zip(setting.group.pairs, standing, strict=True):
-        pair = setting.nominal.pairs[index]
+    for index, points in zip(system.group.pairs, standing, strict=True):
+        pair = system.nominal.pairs[index]
         if isinstance(points, int):
             points_of_pairs.append(RowPoints(list(itertools.islice(slots, points)), ca.SX.zeros(points), next(bends)))
         else:
-            rows = [] if pair.round is not None else _standing_rows(pair, points, setting.deviations)
+            rows = [] if pair.round is not None else _standing_rows(pair, points, system.deviations)
             points_of_pairs.append(RowPoints(rows, ca.SX(ca.DM(compliance_of(pair)[points]))))
     return points_of_pairs
 
@@ -172,7 +172,7 @@ def slot_points(inputs: Mapping[str, ca.SX]) -> Iterator[Point]:
 
 
 def _standing_rows(pair: ContactPoints, points: np.ndarray, deviations: ca.SX) -> list[Point]:
-    """Return points that always have a row: constants, except for the heights that depend on deviations."""
+    """Return points that always have a row: constants, except for the offsets that depend on deviations."""
     P_m, P_r, n_r = (ca.SX(ca.DM(values[points].T)) for values in (pair.P_m, pair.P_r, pair.n_r))
     offsets = pair.offsets.take(points)
     if offsets.columns.size:

@@ -1,12 +1,11 @@
-"""The contact QP of one group, solved for many realizations: assemble, foresee, solve, polish, finish."""
+"""The contact QP of one group for many realizations: assemble, predict the active set, solve, polish, evaluate."""
 
 import copy
 
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float
-from tolcontact.compilation.active_set import ActiveSet
-from tolcontact.compilation.band_order import band_order
+from tolcontact.compilation.active_set import ActiveSet, band_order
 from tolcontact.compilation.contact_qp import ContactQP
 from tolcontact.compilation.elements import ElementQP
 from tolcontact.compilation.functions import InterpretedFunction, flat
@@ -18,8 +17,8 @@ from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 QP = ("h", "g", "a", "lba", "uba")  # outputs of `assemble` that a solver needs
 MAX_DENSE_ENTRIES = 4_000_000  # of the linear systems that are solved together
 POLISHED_RESIDUAL = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is rough
-SMALL_STEP, SMALL_STEP_RESIDUAL = 1e-3, 1e-2 * ACCURACY  # mm: limits for small steps, which show noise
-CONFLICT_SHARE = 1e-3  # of the slack, which parts that contradict each other leave: a smaller residual needs no other plugin
+SMALL_STEP, SMALL_STEP_RESIDUAL = 1e-3, 1e-2 * ACCURACY  # mm: limits for small steps, where noise matters
+CONFLICT_SHARE = 1e-3  # of the slack that remains if rows contradict each other: a smaller residual needs no other plugin
 
 Arrays = dict[str, Float[Array, "_ _"]]  # by name, (realization, entry)
 
@@ -43,7 +42,7 @@ class ContactSolver:
         return twin
 
     def start_over(self) -> None:
-        """Forget all previous problems: some plugins start from the last one."""
+        """Forget all previous problems: some plugins start from the previous one."""
         if not self._is_new:
             self._renew()
 
@@ -55,11 +54,10 @@ class ContactSolver:
     def __call__(self, **arrays: Float[Array, "realization ..."]) -> Arrays:
         """Return the outputs of contact_qp by name, (realization, entry), for its inputs by name, (realization, ...).
 
-        Further inputs are `guess` (realization, row) and `guessed_slack` (realization, pair): reactions and slacks that are
-        probable, from which a solver may start.
-        A further output is `second` (realization, 1): whether another plugin had to answer. Problems that this plugin misses
-        are solved without curvature, which may leave no minimum: by this plugin, and then by others. If all fail, `residual` is
-        infinite, and other outputs may be NaN.
+        Further inputs are `guess` (realization, row) and `guessed_slack` (realization, pair): probable reactions and slacks,
+        which a solver may start from. A further output is `second` (realization, 1): whether another plugin had to answer.
+        Problems that this plugin fails to solve are solved without curvature, since with it they may have no minimum: by this
+        plugin, and then by others. If all fail, `residual` is infinite, and other outputs may be NaN.
         """
         inputs = {name: flat(values) for name, values in arrays.items()}
         self._is_new = False
@@ -80,7 +78,7 @@ class ContactSolver:
     def _retry(
         self, solver: "_Solver", answer: Arrays, inputs: Arrays, lost: Bool[Array, " realization"], *, second: float
     ) -> None:
-        """Solve the `lost` problems without curvature, and write what is better into `answer`."""
+        """Solve the `lost` problems without curvature, and write better answers into `answer`."""
         rows = np.flatnonzero(lost)
         if not rows.size:
             return
@@ -105,42 +103,42 @@ class ContactSolver:
 
     def _solved_batch(self, solver: "_Solver", inputs: Arrays) -> Arrays:
         problem = self._assemble(**inputs)
-        slacks = np.ones((len(inputs["guess"]), self._qp.slacks))  # what gives way opens whenever it carries
+        slacks = np.ones((len(inputs["guess"]), self._qp.slacks))  # an active compliant row has a positive slack
         slacks[:, : inputs["guessed_slack"].shape[1]] = inputs["guessed_slack"]
         if not solver.remembers:
             return self._polished(inputs, problem, *solver(problem, inputs["guess"], slacks))
-        outputs, foreseen = self._foreseen(inputs, problem, slacks)
-        if foreseen.all():
+        outputs, predicted = self._predicted(inputs, problem, slacks)
+        if predicted.all():
             return outputs
-        rest = np.flatnonzero(~foreseen)
-        inputs, problem = _of(inputs, rest), _of(problem, rest)
-        answer = self._polished(inputs, problem, *solver(problem, inputs["guess"], slacks[rest]))
-        if not foreseen.any():
+        remaining = np.flatnonzero(~predicted)
+        inputs, problem = _of(inputs, remaining), _of(problem, remaining)
+        answer = self._polished(inputs, problem, *solver(problem, inputs["guess"], slacks[remaining]))
+        if not predicted.any():
             return answer
-        _replace(outputs, rest, answer)
+        _replace(outputs, remaining, answer)
         return outputs
 
-    def _foreseen(self, inputs: Arrays, problem: Arrays, slacks: np.ndarray) -> tuple[Arrays, Bool[Array, " realization"]]:
-        """Return the outputs with the rows and slacks of the guess as the active set, and of which problems it is.
+    def _predicted(self, inputs: Arrays, problem: Arrays, slacks: np.ndarray) -> tuple[Arrays, Bool[Array, " realization"]]:
+        """Return the outputs for the predicted active set, and which problems it is optimal for.
 
-        Small steps seldom change the active set. Outputs of other problems are arbitrary.
+        The guess predicts the active set, since small steps seldom change it. Outputs of other problems are arbitrary.
         """
-        carries = np.zeros((len(slacks), self._qp.sparsity("a").size1()), dtype=np.bool_)
-        carries[:, : inputs["guess"].shape[1]] = inputs["guess"] > 0
-        carries[:, carries.shape[1] - self._qp.equations :] = True
+        active = np.zeros((len(slacks), self._qp.sparsity("a").size1()), dtype=np.bool_)
+        active[:, : inputs["guess"].shape[1]] = inputs["guess"] > 0
+        active[:, active.shape[1] - self._qp.equations :] = True
         outputs: Arrays = {}
-        foreseen = np.zeros(len(slacks), dtype=np.bool_)
+        predicted = np.zeros(len(slacks), dtype=np.bool_)
         for rows in self._parts(np.flatnonzero(inputs["guess"].any(axis=1))):
             systems = self._dense_problem(problem, rows)
-            solution = ActiveSet(carries[rows], slacks[rows] > 0).answer(systems, self._order)
+            solution = ActiveSet(active[rows], slacks[rows] > 0).answer(systems, self._order)
             answer = self._finished(_of(inputs, rows) | _of(problem, rows) | solution)
             outputs = outputs or {name: np.empty((len(slacks), values.shape[1])) for name, values in answer.items()}
             _replace(outputs, rows, answer)
-            foreseen[rows] = ~_is_rough(answer)
-        return outputs, foreseen
+            predicted[rows] = ~_is_rough(answer)
+        return outputs, predicted
 
     def _polished(self, inputs: Arrays, problem: Arrays, solution: Arrays, failed: Bool[Array, " realization"]) -> Arrays:
-        """Return the outputs for a solver's solutions; those that are rough are polished."""
+        """Return the outputs for a solver's solutions; rough solutions are polished."""
         outputs = self._finished(inputs | problem | solution)
         outputs["residual"][failed] = np.inf
         for rows in self._parts(np.flatnonzero(_is_rough(outputs) & np.isfinite(outputs["residual"][:, 0]))):
@@ -159,7 +157,7 @@ class ContactSolver:
         return outputs
 
     def _parts(self, rows: np.ndarray) -> list[np.ndarray]:
-        """Return the rows in parts whose dense matrices take little memory."""
+        """Return the rows in parts, so that the dense matrices of a part take little memory."""
         return np.split(rows, range(self._max_dense, len(rows), self._max_dense)) if rows.size else []
 
     def _dense_problem(self, problem: Arrays, rows: np.ndarray) -> dict[str, np.ndarray]:
@@ -176,7 +174,7 @@ class ContactSolver:
 
 
 class _PluginSolver:
-    """A plugin's solver with its own memory."""
+    """The solver of a plugin, with its own memory."""
 
     def __init__(self, qp: ContactQP | ElementQP, plugin: Plugin) -> None:
         self.remembers = plugin.remembers
@@ -187,16 +185,16 @@ class _PluginSolver:
         lower_bounds = np.zeros(conic.numel_in("g"))
         lower_bounds[: -qp.slacks] = -np.inf
         bounds = {"lbx": lower_bounds, "ubx": np.full(lower_bounds.shape, np.inf)}
-        # The other inputs are zero: starting points that no plugin uses.
+        # The other inputs, initial guesses, are zero: no plugin uses them.
         fixed_inputs = {i: bounds.get(name, np.zeros(1)) for i, name in enumerate(conic.name_in()) if name not in QP}
         with CONSTRUCTION_LOCK, quiet():
             self._solve = InterpretedFunction(conic, fixed_inputs)
 
     def __call__(self, problem: Arrays, reactions: np.ndarray, slacks: np.ndarray) -> tuple[Arrays, np.ndarray]:
-        """Return x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the solver gave up.
+        """Return x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the solver failed.
 
         A solver that starts from the previous problem is faster if similar problems follow each other. So they are sorted by
-        the rows that probably carry: rows with `reactions` (realization, row), or in a first step violated rows.
+        their probable active set: rows with `reactions` (realization, row), or in a first step violated rows.
         """
         inputs = [problem[name] for name in self._inputs]
         if not self.remembers:
@@ -221,13 +219,13 @@ def _new_solver(qp: ContactQP | ElementQP, plugin: Plugin, layouts: Layouts) -> 
 
 
 def _is_rough(answer: Arrays) -> Bool[Array, " realization"]:
-    """Return which answers are polished."""
+    """Return which answers need polishing."""
     small = answer["step"][:, 0] < SMALL_STEP
     return ~(answer["residual"][:, 0] <= np.where(small, SMALL_STEP_RESIDUAL, POLISHED_RESIDUAL))
 
 
 def _is_lost(answer: Arrays) -> Bool[Array, " realization"]:
-    """Return which answers miss ACCURACY. Parts that contradict each other push so hard that rounding alone may exceed it."""
+    """Return which answers miss ACCURACY. Rows in conflict have such large multipliers that rounding alone may exceed it."""
     slack = answer["slack"].max(axis=1, initial=0)
     return ~(answer["residual"][:, 0] <= np.maximum(ACCURACY, CONFLICT_SHARE * slack))
 

@@ -1,4 +1,4 @@
-"""The outcome of a QP: poses, reactions, and residuals that judge them."""
+"""The outcome of a QP: poses, reactions, and their residuals."""
 
 from collections.abc import Mapping, Sequence
 
@@ -7,16 +7,16 @@ import casadi as ca
 from tolcontact.compilation.conditioning import SLACK
 from tolcontact.compilation.contact_rows import Rows
 from tolcontact.mechanics.correction import FREEDOMS
+from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.placement import misfit
 from tolcontact.mechanics.pose import Number, Pose
-from tolcontact.mechanics.setting import Setting
 
-QP_ENTRIES = ("h", "g", "a", "lba", "to_z", "length")  # the QP as it was solved, whose residuals are computed
+QP_ENTRIES = ("h", "g", "a", "lba", "to_z", "length")  # of the solved QP, for its residuals
 SOLUTION = ("x", "lam_a", "lam_x")
 
 
 def outcome(
-    setting: Setting,
+    system: GroupEquations,
     scale: ca.SX,
     rows: Rows,
     poses: Sequence[Pose],
@@ -25,10 +25,10 @@ def outcome(
 ) -> tuple[dict[str, ca.SX], dict[str, ca.SX]]:
     """Return symbols of the QP and its solution, and the outputs of contact_qp as expressions of them.
 
-    `poses` are those after z. The QP's matrices are inputs, so that nothing is computed twice and the residuals are those of
+    `poses` are the poses after z. The QP's matrices are inputs, so that nothing is computed twice and the residuals belong to
     the QP that was solved.
     """
-    group, z, count = setting.group, setting.z, len(rows)
+    group, z, count = system.group, system.z, len(rows)
     slacks = len(group.pairs) + len(rows.springs)
     size, equations = z.numel() + slacks, problem["a"].size1() - count
     symbols = {name: ca.SX.sym(name, problem[name].sparsity()) for name in QP_ENTRIES}
@@ -41,12 +41,12 @@ def outcome(
     residuals = [stationarity, ca.norm_inf(natural), *([ca.norm_inf(excess[count:])] if equations else [])]
     step = symbols["to_z"] @ y
     taken_step = step
-    if setting.method.is_exact:
+    if system.method.is_exact:
         taken_step = step * step_share(step, stride, group.length)
     end_values = {
         "corrected": ca.vertcat(*(pose.vector() for pose in poses)),
-        "relative": ca.vertcat(*(X_RM.vector() for X_RM in setting.relative(poses))),
-        "astray": ca.norm_inf(misfit(setting, poses)) if equations else ca.SX(0),
+        "relative": ca.vertcat(*(X_RM.vector() for X_RM in system.relative(poses))),
+        "locator_residual": ca.norm_inf(misfit(system, poses)) if equations else ca.SX(0),
     }
     results = {
         "linearized": ca.substitute(rows.relative, z, step),
@@ -60,7 +60,7 @@ def outcome(
 
 
 def row_residuals(excess: ca.SX, lam: ca.SX, length: ca.SX) -> ca.SX:
-    """Return what is left of min(row, multiplier) = 0, and the depth of gaps that remain negative, of rows (row, 1)."""
+    """Return the residuals of rows (row, 1): of min(row, multiplier) = 0, and the depth of gaps that remain negative."""
     return ca.vertcat(ca.fmin(excess, -lam), ca.fmin(excess * length, 0))
 
 
@@ -70,6 +70,6 @@ def reactions(lam: ca.SX, length: ca.SX, filled: ca.SX, scale: ca.SX) -> ca.SX:
 
 
 def step_share(step: ca.SX, stride: ca.SX, length: Number) -> ca.SX:
-    """Return the share of a step (z, 1) [mm] in which no mover turns by more than `stride` [rad]."""
-    turns = ca.vertcat(*(step[k + 3 : k + FREEDOMS] for k in range(0, step.numel(), FREEDOMS)))
-    return ca.fmin(1, stride * length / ca.norm_inf(turns))
+    """Return the share of a step (z, 1) [mm] that rotates no mover by more than `stride` [rad] about any axis."""
+    rotations = ca.vertcat(*(step[k + 3 : k + FREEDOMS] for k in range(0, step.numel(), FREEDOMS)))
+    return ca.fmin(1, stride * length / ca.norm_inf(rotations))

@@ -1,4 +1,4 @@
-"""The QP solvers: plugins of CasADi with their options, the solver of this package, and why some are refused."""
+"""The QP solvers: CasADi plugins with their options, this package's solver, and the reasons to refuse others."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,9 +17,9 @@ class Plugin:
 
     is_conic    whether it is a plugin of CasADi; if not, it is a GraphSolver
     options     its options in CasADi
-    springs     options that replace them for QPs with rows that give way
-    fallbacks   names of the plugins that answer in its place, one after the other, if its answer misses ACCURACY
-    remembers   whether it starts each problem from the answer to the previous one
+    springs     options that replace `options` for QPs with compliant rows
+    fallbacks   names of the plugins that answer in its place, tried in order, if its answer misses ACCURACY
+    remembers   whether it starts each problem from the previous answer
     """
 
     name: str
@@ -34,13 +34,13 @@ QPOASES = {
     "printLevel": "none",
     "terminationTolerance": 1e-14,
     "boundTolerance": 1e-14,
-    "enableNZCTests": False,  # a tenth of its time; of problems that are not convex the residual tells as much
+    "enableNZCTests": False,  # they take a tenth of its time; the residual reveals nonconvex problems just as well
 }
 DAQP = {"primal_tol": 1e-12, "dual_tol": 1e-13}
 PLUGINS = {
     plugin.name: plugin
     for plugin in (
-        # Rarely (about 1e-5 of all problems) it fails to get there from the previous problem; with a new memory it succeeds.
+        # Rarely (about 1e-5 of all problems) it does not converge from the previous problem; with a new memory it succeeds.
         Plugin("qpoases", QPOASES, remembers=True),
         Plugin(
             "osqp",
@@ -48,7 +48,7 @@ PLUGINS = {
             remembers=True,
         ),
         # It cycles if rows contradict each other and two-sided locators are exact.
-        # Parallel rows that stiff springs tell apart are no dependent rows: its usual limit of 1e-11 would drop some.
+        # Parallel rows that differ only by stiff springs are not dependent: its default limit of 1e-11 would drop some.
         Plugin("daqp", {"daqp": DAQP}, {"daqp": {**DAQP, "zero_tol": 1e-15}}, fallbacks=("qpoases",)),
         Plugin("graph", fallbacks=("daqp", "qpoases"), is_conic=False),
         Plugin("piqp", {"piqp": {"eps_abs": 1e-12, "eps_rel": 1e-12}}),
@@ -63,12 +63,12 @@ PLUGINS = {
 REFUSED = {
     "ipqp": "its answers can be off by about 0.01 mm, with residuals that pass as solved",
     "superscs": "it reports success with wrong answers",
-    "fatrop": "its cost output is always 0 and it fails assertions of its own",
+    "fatrop": "its cost output is always 0, and its assertions fail",
     "hpipm": "it only takes problems with the structure of optimal control",
-    "qrqp": "it gives wrong answers, or hangs, with more than some tens of rows",
+    "qrqp": "it gives wrong answers, or hangs, with more than a few dozen rows",
     "clp": "it only solves linear programs",
     "cbc": "it only solves linear programs",
-    "nlpsol": "it is an adapter for nonlinear solvers, too slow to be of use here",
+    "nlpsol": "it is an adapter for nonlinear solvers, which are too slow here",
 }
 
 
@@ -95,7 +95,7 @@ def usable_plugins() -> list[str]:
 
 
 def solver(plugin: Plugin, h: ca.Sparsity, a: ca.Sparsity, *, springs: bool = False) -> ca.Function:
-    """Return a QP solver for these sparsities, of rows with `springs` or without.
+    """Return a QP solver for these sparsities, with the plugin's options for `springs` if rows are compliant.
 
     It reports failure in its outputs, never by an exception.
     """

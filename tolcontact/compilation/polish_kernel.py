@@ -1,6 +1,6 @@
-"""Compiled solution of the optimality conditions with the rows that carry as equations.
+"""Compiled solution of the optimality conditions with the active rows as equations.
 
-BLAS would share such small systems among threads that wait for each other, and its sums depend on the number of threads.
+BLAS would distribute such small systems over threads that wait for each other, and its sums depend on the number of threads.
 """
 
 import numpy as np
@@ -9,42 +9,42 @@ from tolcontact.compiled import compiled, uncounted
 
 
 @compiled
-def solve_conditions(problem, carries, is_open, order, compliance, refinements, solution):  # type: ignore[no-untyped-def]
-    """Solve H x + g - C'm - (0, p) = 0, C x = b, C the rows that carry; write x, m (QP, n + row), 0 of other rows, and p.
+def solve_conditions(problem, active, is_open, order, compliance, refinements, solution):  # type: ignore[no-untyped-def]
+    """Solve H x + g - C'm - (0, p) = 0, C x = b, with the active rows C; write x, m (QP, n + row), 0 for other rows, and p.
 
     problem    H (QP, n, n), g (QP, n), rows (QP, row, n), b (QP, row); H is the identity for slacks, the last variables
-    carries    (QP, row)
-    is_open    (QP, slack): other slacks are 0, and have a multiplier p
-    order      (n - slack + row,): variables but slacks, and rows after them, in an order that makes the system a narrow band
+    active     (QP, row)
+    is_open    (QP, slack): whether a slack is positive; other slacks are 0, and have a multiplier p
+    order      (n - slack + row,): variables without slacks, and rows after them, in an order that gives a narrow band matrix
 
-    An open slack is s = C'm - g, and leaves entries C C' of rows that share it. The rows yield by a `compliance` in the
-    factorization, whose effect refinements remove. Without a solution all is NaN.
+    Positive slacks s = C'm - g are eliminated, which leaves entries C C' for rows that share a slack. The rows have a small
+    `compliance` in the factorization, and iterative refinement removes its effect. Without a solution, all results are NaN.
     """
     H, gradient, rows, bounds = problem
     for k in range(len(H)):
-        place, total = _places(carries[k], H.shape[1] - is_open.shape[1], order)
-        K, right = _conditions(H[k], gradient[k], rows[k], bounds[k], is_open[k], place, total)
+        positions, total = _positions(active[k], H.shape[1] - is_open.shape[1], order)
+        K, right = _conditions(H[k], gradient[k], rows[k], bounds[k], is_open[k], positions, total)
         x = np.zeros(total)
-        if _solve(K, right, place[len(place) - rows.shape[1] :], compliance, refinements, x):
-            _write(x, place, gradient[k], rows[k], is_open[k], solution[k])
+        if _solve(K, right, positions[len(positions) - rows.shape[1] :], compliance, refinements, x):
+            _write(x, positions, gradient[k], rows[k], is_open[k], solution[k])
         else:
             solution[k] = np.nan
 
 
 @compiled
-def _places(carries, size, order):  # type: ignore[no-untyped-def]
-    """Return the place of each variable and row among the unknowns, -1 for rows that do not carry, and their number."""
-    place, total = np.full(len(order), -1), 0
+def _positions(active, size, order):  # type: ignore[no-untyped-def]
+    """Return the position of each variable and row among the unknowns, -1 for inactive rows, and the number of unknowns."""
+    positions, total = np.full(len(order), -1), 0
     for unknown in order:
-        if unknown < size or carries[unknown - size]:
-            place[unknown] = total
+        if unknown < size or active[unknown - size]:
+            positions[unknown] = total
             total += 1
-    return place, total
+    return positions, total
 
 
 @compiled
 def _solve(K, right, rows, compliance, refinements, x):  # type: ignore[no-untyped-def]
-    """Add to x the solution of K x = right, whose `rows` yield in the factorization; return whether there is one."""
+    """Add the solution of K x = right to x, with compliant `rows` in the factorization; return whether a solution exists."""
     factor, pivots, remainder, width = K.copy(), np.arange(len(x)), np.empty(len(x)), _half_width(K)
     for row in rows:
         if row >= 0:
@@ -61,53 +61,53 @@ def _solve(K, right, rows, compliance, refinements, x):  # type: ignore[no-untyp
 
 
 @uncounted
-def _write(x, place, gradient, rows, is_open, solution):  # type: ignore[no-untyped-def]
+def _write(x, positions, gradient, rows, is_open, solution):  # type: ignore[no-untyped-def]
     """Write variables, multipliers of rows and multipliers of slacks into a solution (n + row + slack,)."""
     size, slacks, count = len(gradient) - len(is_open), len(is_open), len(rows)
     solution[:] = 0.0
     for i in range(size):
-        solution[i] = x[place[i]]
+        solution[i] = x[positions[i]]
     multipliers = solution[size + slacks :]
     for row in range(count):
-        if place[size + row] >= 0:
-            multipliers[row] = x[place[size + row]]
+        if positions[size + row] >= 0:
+            multipliers[row] = x[positions[size + row]]
     for slack in range(slacks):
-        pull = -gradient[size + slack]
+        value = -gradient[size + slack]
         for row in range(count):
-            pull += rows[row, size + slack] * multipliers[row]
+            value += rows[row, size + slack] * multipliers[row]
         if is_open[slack]:
-            solution[size + slack] = pull
+            solution[size + slack] = value
         else:
-            multipliers[count + slack] = -pull
+            multipliers[count + slack] = -value
 
 
 @compiled
-def _conditions(H, gradient, rows, bounds, is_open, place, total):  # type: ignore[no-untyped-def]
-    """Return the matrix and the right side of the conditions, whose unknowns have a `place`, or -1 if they are left out."""
+def _conditions(H, gradient, rows, bounds, is_open, positions, total):  # type: ignore[no-untyped-def]
+    """Return the matrix and the right side of the conditions; `positions` of unknowns are -1 if they are omitted."""
     size = H.shape[0] - len(is_open)
     K, right, sharing = np.zeros((total, total)), np.empty(total), np.empty(len(bounds), dtype=np.int64)
     for i in range(size):
-        right[place[i]] = -gradient[i]
+        right[positions[i]] = -gradient[i]
         for j in range(size):
-            K[place[i], place[j]] = H[i, j]
+            K[positions[i], positions[j]] = H[i, j]
     for row in range(len(bounds)):
-        p = place[size + row]
+        p = positions[size + row]
         if p >= 0:
             right[p] = bounds[row]
             for i in range(size):
-                K[p, place[i]], K[place[i], p] = rows[row, i], -rows[row, i]
+                K[p, positions[i]], K[positions[i], p] = rows[row, i], -rows[row, i]
     for slack in range(len(is_open)):
         if is_open[slack]:
             column, count = size + slack, 0
             for row in range(len(bounds)):
-                if place[size + row] >= 0 and rows[row, column] != 0:
+                if positions[size + row] >= 0 and rows[row, column] != 0:
                     sharing[count] = row
                     count += 1
             for row in sharing[:count]:
-                p = place[size + row]
+                p = positions[size + row]
                 right[p] += rows[row, column] * gradient[column]
                 for other in sharing[:count]:
-                    K[p, place[size + other]] += rows[row, column] * rows[other, column]
+                    K[p, positions[size + other]] += rows[row, column] * rows[other, column]
     return K, right
 
 
@@ -124,9 +124,9 @@ def _half_width(K):  # type: ignore[no-untyped-def]
 
 @uncounted
 def _factorize(factor, pivots, width):  # type: ignore[no-untyped-def]
-    """Replace a band matrix by its factors L and U; `pivots` are the rows with which each row was exchanged.
+    """Replace a band matrix by its factors L and U; write the row exchanged with each row into `pivots`.
 
-    Return whether the matrix is regular. Columns of L stay as they were before later exchanges.
+    Return whether the matrix is regular. Later exchanges do not affect columns of L.
     """
     total = factor.shape[0]
     for c in range(total):
@@ -134,7 +134,7 @@ def _factorize(factor, pivots, width):  # type: ignore[no-untyped-def]
         for i in range(c + 1, below):
             if abs(factor[i, c]) > abs(factor[best, c]):
                 best = i
-        if not abs(factor[best, c]) > 0:  # nor for numbers that are none
+        if not abs(factor[best, c]) > 0:  # also rejects NaN
             return False
         pivots[c] = best
         if best != c:
@@ -151,7 +151,7 @@ def _factorize(factor, pivots, width):  # type: ignore[no-untyped-def]
 
 @uncounted
 def _add_solution(factor, pivots, width, right, x):  # type: ignore[no-untyped-def]
-    """Add to x the solution of the factorized system for a right side, which is overwritten."""
+    """Add the solution of the factorized system for a right side, which is overwritten, to x."""
     total = factor.shape[0]
     for c in range(total):
         right[c], right[pivots[c]] = right[pivots[c]], right[c]

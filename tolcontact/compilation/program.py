@@ -1,4 +1,4 @@
-"""The compiled model: it is built once, and evaluated by name for blocks of realizations."""
+"""The compiled model: built once, and evaluated by name for blocks of realizations."""
 
 import itertools
 import logging
@@ -11,7 +11,7 @@ import numpy as np
 
 from tolcontact.compilation.bounded_pairs import TRIAL_SEED, TRIALS, Trial, bounded_pair, push
 from tolcontact.compilation.contact_qp import ContactQP, contact_qp
-from tolcontact.compilation.contact_rows import LEAST_SLOTS, SLOTS, standing_points
+from tolcontact.compilation.contact_rows import MIN_SLOTS, SLOTS, standing_points
 from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.elements import ElementQP, has_elements
 from tolcontact.compilation.functions import NamedFunction
@@ -27,21 +27,21 @@ from tolcontact.interference import Watch, ordered
 from tolcontact.limits import Limits
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.gap import GapMap, gap_map, gap_matrix
+from tolcontact.mechanics.group_equations import face_heights, face_poses, facing_pose
 from tolcontact.mechanics.groups import Group, contact_groups
 from tolcontact.mechanics.measures import measured, record
 from tolcontact.mechanics.placement import raw_poses
 from tolcontact.mechanics.pose import ENTRIES, Pose, poses_of
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 from tolcontact.mechanics.round_gap import round_gaps
-from tolcontact.mechanics.setting import face_heights, face_poses, facing_pose
 from tolcontact.method import Method
 from tolcontact.poses import AT_REST
 from tolcontact.readable import Pictured
 from tolcontact.variation import Draws
 
 log = logging.getLogger(__name__)
-WATCH_DRAWS = 64  # that tell how far bodies move
-PLANES_FACTOR = 3.0  # times the error that a trial allows: how deep faces on fixed planes may lie in each other
+WATCH_DRAWS = 64  # that bound the motion of bodies
+PLANES_FACTOR = 3.0  # times the error that a trial allows: allowed penetration of faces on fixed planes
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,15 +61,15 @@ class Program(Pictured):
     place        deviations (realization, contributor) -> poses (realization, 12 * part)
     observe      poses, deviations -> measured (realization, measure), relative (realization, 12 * pair): X_RM of every pair
     gaps         gaps of each pair at X_RM, which are affine in it; None for round faces
-    round_gaps   X_RM, deviations -> gaps (realization, point), distances (realization, point) by number of the pair
-    meetings     by number of the pair: where its bodies can touch, if fixed planes do not represent its reference face
-    trials       by number of the pair: the trial that decided this; none unless the search is bounded
+    round_gaps   X_RM, deviations -> gaps (realization, point), distances (realization, point) by pair index
+    meetings     by pair index: where its bodies can touch, if fixed planes do not represent its reference face
+    trials       by pair index: the trial that decided this; none unless the search is bounded
     groups       the contact QPs
     nominal_measures  values of the measures in the nominal assembly
-    accuracies   of the measures, in their units (see measure_accuracies)
-    stations     of an assembly that is built in steps, in their order; `place` then places the parts of all of them
-    watch        the bodies, which may lie in each other
-    tapes        the users' own expressions by measure name
+    accuracies   accuracies of the measures, in their units (see measure_accuracies)
+    stations     stations of an assembly that is built in steps, in their order; `place` then places the parts of all stations
+    watch        detects bodies that lie in each other
+    tapes        user-defined expressions by measure name
     """
 
     nominal: Nominal
@@ -107,16 +107,16 @@ class Program(Pictured):
 
     @property
     def stored_coordinates(self) -> str:
-        """How exactly files store the coordinates of parts in contact, and what contact allows; empty if it hardly matters."""
+        """The accuracy of stored coordinates of parts in contact, and what contact allows; empty if it hardly matters."""
         return coordinates_in_words(self.nominal)
 
     def limits(self, measure: int) -> Limits:
-        """Return the limits of a measure, given by number, with its accuracy."""
+        """Return the limits of a measure, given by index, with its accuracy."""
         nominal, accuracy = float(self.nominal_measures[measure]), float(self.accuracies[measure])
         return Limits(*self.nominal.measures[measure].bounds(nominal), accuracy)
 
     def contact_in_words(self, k: int) -> str:
-        """Return the contact of pair k in a few words: its points, and whether places are found where its faces end."""
+        """Return a short description of contact pair k: its points, and whether they are fixed or searched at every pose."""
         words, trial = self.nominal.pairs[k].in_words, self.trials.get(k)
         if trial is None or math.isnan(trial.error):
             return words
@@ -128,12 +128,12 @@ class Program(Pictured):
 def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     """Build all Functions of a model.
 
-    Raises OptionError for a solver that cannot be used, ModelError for a user's measure that fails, or, if the objective
-    is seating, for forces that are missing or move nothing.
+    Raises OptionError for a solver that cannot be used, ModelError for a user-defined measure that fails, or, if the objective
+    is seating, for forces that are missing or act on parts that contact cannot move.
     """
     _check_method(nominal, method)
     draws = Draws(nominal)
-    with CONSTRUCTION_LOCK:  # users' functions run here, too, and may print
+    with CONSTRUCTION_LOCK:  # user-defined functions run here, too, and may print
         with quiet():
             conic_plugin = plugin(solver)
         d = ca.SX.sym("deviations", len(nominal.contributors))
@@ -191,8 +191,8 @@ def _facing_poses(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) ->
 
 def _round_gap_function(pair: ContactPoints, points: RoundPoints, deviations: ca.SX) -> ca.Function:
     X_RM = ca.SX.sym("X_RM", ENTRIES)
-    of_points = round_gaps(points, X_RM, face_heights(pair, deviations), ca.SX(len(points), 1), ca.SX(ENTRIES, 0))
-    outputs = {"gaps": of_points.gaps, "distances": of_points.distances}
+    results = round_gaps(points, X_RM, face_heights(pair, deviations), ca.SX(len(points), 1), ca.SX(ENTRIES, 0))
+    outputs = {"gaps": results.gaps, "distances": results.distances}
     return ca.Function("round_gaps", [X_RM, deviations], [*outputs.values()], ["X_RM", "deviations"], [*outputs])
 
 
@@ -206,8 +206,8 @@ def _meetings(
     deviations = draws(seed=TRIAL_SEED, start=0, stop=TRIALS)
     poses = place(deviations=deviations)["poses"]
     relative = observe(poses=poses, deviations=deviations)["relative"].reshape(len(poses), len(nominal.pairs), ENTRIES)
-    known = np.isfinite(relative).all(axis=(1, 2))
-    relative, deviations, presses = relative[known], deviations[known], method.minimizes.presses
+    is_finite = np.isfinite(relative).all(axis=(1, 2))
+    relative, deviations, presses = relative[is_finite], deviations[is_finite], method.minimizes.presses
     pushes = [push(pair, relative[:, k], deviations, presses=presses) for k, pair in enumerate(nominal.pairs)]
     decisions = {}
     for group in groups:
@@ -215,7 +215,7 @@ def _meetings(
         for k in group.pairs:
             room = pushed if presses else pushed - pushes[k]
             decisions[k] = bounded_pair(watch, k, relative[:, k], deviations, pushed=pushed, room=room)
-    meetings = {k: places for k, (places, _) in decisions.items() if places is not None}
+    meetings = {k: meeting for k, (meeting, _) in decisions.items() if meeting is not None}
     return meetings, {k: trial for k, (_, trial) in decisions.items()}
 
 
@@ -228,11 +228,11 @@ def _watch(nominal: Nominal, draws: Draws, place: NamedFunction) -> Watch:
 def _allowed_depths(
     nominal: Nominal, meetings: Mapping[int, Meeting], trials: Mapping[int, Trial]
 ) -> dict[tuple[int, int], float]:
-    """Return how deep [mm] bodies of contact pairs may lie in each other, where that is more than usual.
+    """Return the allowed penetration [mm] of bodies of contact pairs, where it exceeds the default.
 
-    Fixed planes err by what was allowed in their trial, of raw poses; other contact tilts parts more. Springs let faces into
-    each other, and form is not part of a solid. Parts that are declared to overlap may lie in each other at any depth. Bodies
-    in the watch have flat planes; where contact points are fixed, they lie on triangles as files round them.
+    Fixed planes err by the error allowed in their trial, at raw poses; other contact tilts parts more. Faces on springs
+    penetrate each other, and form is not part of a solid. Parts that are declared to overlap may penetrate to any depth. Bodies
+    in the watch have flat planes, but fixed contact points lie on triangles, with coordinates rounded by the file.
     """
     depths = dict[tuple[int, int], float]()
     for k, pair in enumerate(nominal.pairs):
@@ -243,14 +243,14 @@ def _allowed_depths(
             planes = PLANES_FACTOR * trials[k].allowed if is_fixed else 0.0
             rounding = 0.0 if k in meetings else pair.coordinate_error
             depths[bodies] = max(depths.get(bodies, 0.0), np.inf if is_free else planes + rounding)
-    return depths | dict.fromkeys(_meant_overlaps(nominal), np.inf)
+    return depths | dict.fromkeys(_declared_overlaps(nominal), np.inf)
 
 
-def _meant_overlaps(nominal: Nominal) -> Iterator[tuple[int, int]]:
+def _declared_overlaps(nominal: Nominal) -> Iterator[tuple[int, int]]:
     """Yield the pairs of bodies, of one station, that are declared to overlap."""
     for overlap in nominal.assembly.overlaps:
-        numbers = [number for number, part in enumerate(nominal.parts) if part.part in overlap.parts]
-        for left, right in itertools.combinations(numbers, 2):
+        indices = [index for index, part in enumerate(nominal.parts) if part.part in overlap.parts]
+        for left, right in itertools.combinations(indices, 2):
             if nominal.parts[left].station == nominal.parts[right].station:
                 yield left, right
 
@@ -264,9 +264,11 @@ def _contact_group(
     meetings: Mapping[int, Meeting],
     trials: Mapping[int, Trial],
 ) -> ContactGroup:
-    # Where bodies meet changes with every pose, so that no row of such a pair stands.
+    # The contact points of a pair with a meeting change with every pose, so that none always has a row.
     standing = [
-        min(max(trials[k].places, LEAST_SLOTS), SLOTS) if k in meetings else standing_points(nominal.pairs[k], gaps[k], method)
+        min(max(trials[k].max_points, MIN_SLOTS), SLOTS)
+        if k in meetings
+        else standing_points(nominal.pairs[k], gaps[k], method)
         for k in group.pairs
     ]
     build = ElementQP if has_elements(group, method) else contact_qp
@@ -281,7 +283,7 @@ def _check_method(nominal: Nominal, method: Method) -> None:
 
 
 def _check_forms(nominal: Nominal, method: Method) -> None:
-    """Raise ModelError for a search that would not know the form of a reference face where it projects points again."""
+    """Raise ModelError for a search that ignores the form of a reference face when it projects points again."""
     faults = [
         f'contact pair "{pair.name}": the search is "iterated", and the reference face of feature {pair.deviating[1].name} has '
         'form; choose the search "bounded" or "fixed"'
@@ -293,7 +295,7 @@ def _check_forms(nominal: Nominal, method: Method) -> None:
 
 
 def _check_placing(nominal: Nominal, method: Method) -> None:
-    """Raise ModelError for placed parts that forces would press, if springs, or too many locators, hold them."""
+    """Raise ModelError for placed parts under forces, if they are located by springs or by too many locators."""
     faults = [
         f'part "{part.name}": its locators are placed by "{part.locators.placing}", and if forces press, they have to be at '
         "most six, without a stiffness; leave placing out, or declare the part fixed=True"
@@ -306,19 +308,19 @@ def _check_placing(nominal: Nominal, method: Method) -> None:
 
 
 def _check_springs(nominal: Nominal, method: Method) -> None:
-    """Raise ModelError for a stiffness without effect, or where no forces weigh it, or steps do not look at true gaps."""
+    """Raise ModelError for a stiffness without effect, without forces that load it, or without steps that use true gaps."""
     faults = [
-        f'locator "{part.locators.labels[number]}": it has a stiffness, but part "{part.name}" is fixed=True, so forces do not '
+        f'locator "{part.locators.labels[index]}": it has a stiffness, but part "{part.name}" is fixed=True, so forces do not '
         "move it; leave stiffness out, or declare the part fixed=False"
         for part in nominal.parts
-        for number in (np.flatnonzero(part.locators.springy)[:1] if not part.free else ())
+        for index in (np.flatnonzero(part.locators.springy)[:1] if not part.free else ())
     ]
     if faults:
         raise ModelError(nominal.assembly.name, faults)
     if method.minimizes.presses and method.is_exact and not method.is_iterated:
         return
     faults = [
-        f'{_springy_name(pair)} has a stiffness, which needs the objective "seating", the resolution "exact", and a search '
+        f'{_compliant_name(pair)} has a stiffness, which needs the objective "seating", the resolution "exact", and a search '
         f'that is not iterated; here they are "{method.objective}", "{method.resolution}" and "{method.search}"; choose '
         "those, or leave stiffness out"
         for pair in nominal.pairs
@@ -328,7 +330,7 @@ def _check_springs(nominal: Nominal, method: Method) -> None:
         raise ModelError(nominal.assembly.name, faults)
 
 
-def _springy_name(pair: ContactPoints) -> str:
+def _compliant_name(pair: ContactPoints) -> str:
     if pair.pulls is not None:
         return f'locator "{pair.name}": it'
     return f"{pair.name}: a support" if pair.is_supports else f'contact pair "{pair.name}": it'

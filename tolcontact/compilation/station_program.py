@@ -1,4 +1,4 @@
-"""The stations of a program: where contact in earlier stations leaves the parts that a station places again."""
+"""The stations of a program: joints are placed again where contact in earlier stations has left their parts."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -8,21 +8,21 @@ import numpy as np
 
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.discretization import Nominal
+from tolcontact.mechanics.group_equations import face_poses, facing_pose
 from tolcontact.mechanics.groups import Group
 from tolcontact.mechanics.placement import placed_poses
 from tolcontact.mechanics.pose import ENTRIES, Pose, nearest_rotation, poses_of
-from tolcontact.mechanics.setting import face_poses, facing_pose
 from tolcontact.method import Method
 
 
 @dataclass(frozen=True, eq=False)
 class StationProgram:
-    """A station: a stretch of the parts, and the contact groups among them.
+    """A station: a range of the parts, and the contact groups among them.
 
-    parts    (part,) indices of its parts, which follow each other
+    parts    (part,) indices of its parts, which are consecutive
     pairs    (pair,) indices of its pairs
-    groups   numbers of its contact groups
-    sources  (source,) indices of the parts, in earlier stations, whose poses decide where its joints are placed
+    groups   indices of its contact groups
+    sources  (source,) indices of the parts, in earlier stations, whose poses determine the poses of its joints
     place    poses (realization, 12 * source), deviations -> placed (realization, 12 * part) before contact in this station,
              relative (realization, 12 * pair): X_RM of its pairs there; None if it locates no joint
     """
@@ -40,24 +40,24 @@ def station_programs(nominal: Nominal, groups: Sequence[Group], method: Method) 
     for scene in nominal.scenes:
         parts = np.array([index for index, part in enumerate(nominal.parts) if part.station == scene.station])
         pairs = np.array([k for k, pair in enumerate(nominal.pairs) if pair.moving in parts], dtype=int)
-        own_groups = tuple(number for number, group in enumerate(groups) if set(group.parts) <= set(parts.tolist()))
-        carried = [part.carried for part in nominal.parts if part.station == scene.station and part.carried is not None]
-        sources = np.unique(np.array(carried, dtype=int))
-        place = _place(nominal, scene.station, pairs, sources, method) if carried else None
-        yield StationProgram(scene.station, parts, pairs, own_groups, sources, place)
+        station_groups = tuple(k for k, group in enumerate(groups) if set(group.parts) <= set(parts.tolist()))
+        joints = [part.carried for part in nominal.parts if part.station == scene.station and part.carried is not None]
+        sources = np.unique(np.array(joints, dtype=int))
+        place = _place(nominal, scene.station, pairs, sources, method) if joints else None
+        yield StationProgram(scene.station, parts, pairs, station_groups, sources, place)
 
 
 def _rigid(X: Pose, vertices: np.ndarray) -> Pose:
-    """Return the rigid pose nearest to a pose that stretches a part of these vertices (vertex, 3) [mm]: its middle stays."""
-    middle, R = ca.DM((vertices.min(axis=0) + vertices.max(axis=0)) / 2), nearest_rotation(X.R)
-    return Pose(R, X.t + (X.R - R) @ middle)
+    """Return the nearest rigid pose of a stretched part with vertices (vertex, 3) [mm]; it keeps the centre of the part."""
+    centre, R = ca.DM((vertices.min(axis=0) + vertices.max(axis=0)) / 2), nearest_rotation(X.R)
+    return Pose(R, X.t + (X.R - R) @ centre)
 
 
 def _place(nominal: Nominal, station: str, pairs: np.ndarray, sources: np.ndarray, method: Method) -> NamedFunction:
     """Return the function that places the parts of a station; see StationProgram."""
     entries = ca.SX.sym("poses", ENTRIES * len(sources))
     deviations = ca.SX.sym("deviations", len(nominal.contributors))
-    # The published step stretches parts a little, and a joint keeps their shape.
+    # The published step stretches parts slightly, but a joint keeps their shape.
     handed_over = poses_of(entries)
     if not method.is_exact:
         handed_over = [_rigid(X, nominal.parts[k].vertices) for X, k in zip(handed_over, sources.tolist(), strict=True)]

@@ -80,7 +80,8 @@ class LinearStep:
             slots.only(changing(task.scans[k]).holds(slots.points)) for k, slots in zip(self.varying, state.slots, strict=True)
         ]
         inputs = self._inputs(task, state, start_slots, newton)
-        for name, value in {"stride": stride, "caution": caution, "firmness": firmness, "newton": float(newton)}.items():
+        weights = {"proximal_weight": caution, "regularization_factor": firmness}
+        for name, value in {"stride": stride, "newton": float(newton), **weights}.items():
             inputs[name] = np.broadcast_to(value, len(task))
         size = np.zeros((2, len(task)))
         rows, part, part_inputs = np.arange(len(task)), (task, state), inputs
@@ -161,7 +162,7 @@ class LinearStep:
             "poses": answer["corrected"].reshape(state.poses.shape),
             "relative": answer["relative"].reshape(state.relative.shape),
             "slack": slack,
-            "astray": answer["astray"][:, 0],
+            "astray": answer["locator_residual"][:, 0],
             "multipliers": multipliers,
         }
         for name, values in results.items():

@@ -1,13 +1,13 @@
 """The equations: poses, gaps, the contact QP, and the objectives of the corrected pose. A chapter of the guide.
 
-Numbers in parentheses are those of the method paper (Sadeghi Tabar, Lindkvist, Wärmefjord, Söderberg, *Variation Simulation of
-Rigid Bodies with Contact Representation*). Each equation is written once, as a CasADi expression, in a file of this package;
-the rows of the QP come from the derivatives of these expressions.
+Numbers in parentheses are equation numbers of the method paper (Sadeghi Tabar, Lindkvist, Wärmefjord, Söderberg, *Variation
+Simulation of Rigid Bodies with Contact Representation*). Each equation is written once, as a CasADi expression, in a file of
+this package. The rows of the QP come from the derivatives of these expressions.
 
 ## Poses
 
-The pose X = (R, t) moves a point from its nominal place x0 in the assembly frame to x = R x0 + t (1). The nominal pose is the
-identity. In the *raw* state, parts are where their locators put them; in the *corrected* state, contact has been resolved.
+The pose X = (R, t) moves a point from its nominal position x0 in the assembly frame to x = R x0 + t (1). The nominal pose is
+the identity. In the *raw* state, parts are where their locators put them. In the *corrected* state, contact has been resolved.
 
 A locator is a point p, a unit direction n into the part, and a deviation d. With c the centroid of the locators, the rows
 [n', ((p - c) x n)'] form the locator matrix J, and
@@ -15,9 +15,9 @@ A locator is a point p, a unit direction n into the part, and a deviation d. Wit
     (delta, theta) = J^-1 d        R = exp([theta]x)        t = c + delta - R c
 
 If there are more than six locators, the two-sided ones are satisfied exactly, and the one-sided ones in the least-squares
-sense. A part that is located on another part follows its raw pose. The deviation d of a locator that stands against a feature
-is larger by the height to which the feature rises there. If a floating part has fewer than six locators, q is the least motion
-(rotations times the part's size) that meets them.
+sense. A part that is located on another part follows its raw pose. If a locator rests on a feature, the height of the feature
+at that point is added to the deviation d. If a floating part has fewer than six locators, q is the least motion that meets
+them, with rotations scaled by the part's size.
 
 ## Gaps
 
@@ -26,11 +26,10 @@ The gap of a contact point is (2) to (5)
     g = n . (x_m - x_r)        x_m = R_m P_m + t_m        x_r = R_r P_r + t_r        n = R_r n_r
 
 It is negative if the moving point lies inside the reference part. The face of a feature has a small pose in its part, to first
-order p -> p + tau + rho x (p - centre), with tau and rho linear in the deviations. It is composed into the relative pose, so it
-adds no rows. A variation of size is subtracted from the gap, or added to the radius of a ball or shaft.
-The gap is affine in the relative pose X_RM, so that all gaps of a pair are one product of 13 numbers with a
-constant matrix. A one-sided locator is a contact point against the part that it stands on, or the ground, raised by its
-deviation.
+order p -> p + tau + rho x (p - centre), with tau and rho linear in the deviations. This pose is composed into the relative
+pose, so it adds no rows. A variation of size is subtracted from the gap, or added to the radius of a ball or shaft.
+The gap is affine in the relative pose X_RM. All gaps of a pair are therefore one product of 13 numbers with a constant matrix.
+A one-sided locator is a contact point against the part that it locates on, or the ground, raised by its deviation.
 
 ## The QP
 
@@ -38,10 +37,10 @@ The variables are the increments dq = (dt, w) of all parts that contact can move
 
     minimize  1/2 dq' Q dq + f' dq     subject to     g_i + A_i dq >= 0
 
-with a slack for each pair. Its price is so high that it stays zero unless rows contradict each other. The QP always has a
+with a slack for each pair. The slack has an exact penalty: it stays zero unless rows contradict each other. The QP always has a
 solution, and no realization is dropped. The paper's step ends with R <- (I + [w]x) R (12), which keeps the linearized gap
-exactly, but stretches the part by the order of |w|^2. A part that carries other parts turns by exp([w]x) instead. The exact
-resolution repeats steps with exp([w]x) until the true gaps are open and the objective is minimal.
+exactly, but stretches the part by the order of |w|^2. A part that supports other parts is rotated by exp([w]x) instead. The
+exact resolution repeats steps with exp([w]x) until no true gap is negative and the objective is minimal.
 
 >>> import numpy as np
 >>> import tolcontact as tc
@@ -72,29 +71,31 @@ measured from the raw state.
 
 | objective | choose it if |
 |---|---|
-| "all points" | nothing else is asked: this also holds parts that barely penetrate |
+| "all points" | you have no other requirement: this also constrains parts that barely penetrate |
 | "active points" | you compare with the paper |
 | "locator stiffness" | parts are clamped to their locators |
 | "seating" | parts are pressed onto supports and neighbours; reactions are in N |
 
-A ball beside a wall counts by its centre, as a sphere with its radius, and a shaft by the ends of its axis: a point on the face
-would let it roll aside at no cost. So does a round wall by its own centre, and a flat one by the point of contact.
+The displacement of a ball is measured at its centre, as a sphere with its radius. The displacement of a shaft is measured at
+the ends of its axis. A point on the face would let the ball or shaft roll aside at no cost. A round wall likewise counts by its
+own centre, and a flat one by the contact point.
 
-In the exact resolution points count by the areas of the moving face that they stand for, with its centre and its second
-moments. All points together then count as the face itself does, whatever their number. In a linearized one each counts once,
-as in the paper (`weighting` in the archive).
+In the exact resolution each point is weighted by its share of the moving face's area, with the centre and the second moments of
+that share. All points together are then equivalent to the face, independently of their number. In the linearized resolution
+each point counts once, as in the paper (`weighting` in the archive).
 
 The objective determines the result, so every archive states it. For "seating" a small multiple (1e-3) of the displacement of
 all contact points keeps the problem convex. This term takes over part of the load: about 0.1 % times (travel / size of the
 contact).
 
-A one-sided locator with a `stiffness` k [N/mm] is a spring that pushes only, and so is each point of a contact pair with a
-`stiffness`, by the share of the area that it stands for. A two-sided locator with a `stiffness` is two springs at its point, of
-which one pushes and one pulls. With the reactions lambda [N] and C = 1/k, the QP has 1/2 lambda' C lambda more in its
-objective, and the row g + A dq + C lambda >= 0. So `gap_min` of such a pair is negative by the largest compression, and a
-realization is resolved only if poses and reactions obey lambda = k max(0, -g). The small multiple then counts from the pose of
-the last step, and takes no load. Springs of a pair stay at their points of the moving face, and push against the plane of the
-other face, also beyond its end. A load beside the middle of a pad sinks and tilts a machine:
+A one-sided locator with a `stiffness` k [N/mm] is a spring that only pushes. Each point of a contact pair with a `stiffness` is
+such a spring, too, with the point's share of the area. A two-sided locator with a `stiffness` is two springs at its point: one
+pushes and one pulls. With the reactions lambda [N] and C = 1/k, the objective of the QP has the additional term
+1/2 lambda' C lambda, and the row is g + A dq + C lambda >= 0. So `gap_min` of such a pair is negative by the largest
+compression, and a realization is resolved only if poses and reactions obey lambda = k max(0, -g). The small multiple is then
+measured from the pose of the last step, and takes no load. Springs of a pair stay at their points of the moving face. They push
+against the plane of the other face, even beyond the edge of that face. A load off the centre of a pad sinks and tilts a
+machine:
 
 >>> pads = tc.Assembly("pads", method=tc.Method(objective="seating"))
 >>> floor = pads.part("floor", tc.Box(400, 300, 20), fixed=True)
@@ -109,8 +110,8 @@ other face, also beyond its end. A load beside the middle of a pad sinks and til
 >>> [round(float(height), 3) for height in sunk]  # F/k, and F e (b/2) / (k b^2/12)
 [-0.08, -0.32]
 
-`regularization` holds the degrees of freedom that the objective leaves open. "points" (default) adds `eta` = 1e-6 times the
-squared displacements of all contact points, and does not depend on where the assembly lies in space. "identity" is the paper's
+`regularization` fixes the degrees of freedom that the objective leaves open. "points" (default) adds `eta` = 1e-6 times the
+squared displacements of all contact points, and does not depend on the position of the origin. "identity" is the paper's
 eta I of (11), which mixes mm and rad and therefore depends on the origin. With the origin 1 m away, RA1's 6 sigma is 6 %
 larger and a single realization differs by up to 29 mm. `active_set="closed"` (default) also constrains points that the
 correction itself drives into contact; `"initial"` is the paper's choice: only the points that penetrate in the raw state.

@@ -15,7 +15,7 @@ class Mobility:
     """How a part of a group can move: by the increments of free parts.
 
     movers    positions, among the group's movers, of the free parts whose increments move it; parts it is located on come first
-    centre    nominal point (3,) [mm] about which its increments turn: the centroid of its contact points
+    centre    nominal centre of rotation (3,) [mm] of its increments: the centroid of its contact points
     is_reference  whether other parts rest on it
     """
 
@@ -36,9 +36,9 @@ class Twist:
         """Return the displacement of a point at x (3, 1) [mm]."""
         return self.d + ca.cross(self.W, x - self.c)
 
-    def moving(self, X: Pose, turn: ca.SX) -> Pose:
-        """Return a pose after the motion x -> c + d + turn (x - c)."""
-        return Pose(turn @ X.R, turn @ (X.t - self.c) + self.c + self.d)
+    def moving(self, X: Pose, dR: ca.SX) -> Pose:
+        """Return a pose after the motion x -> c + d + dR (x - c)."""
+        return Pose(dR @ X.R, dR @ (X.t - self.c) + self.c + self.d)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ def linear(part: Mobility, X: Pose, movers: Sequence[Twist]) -> Pose:
 
 
 def rigid(part: Mobility, X: Pose, movers: Sequence[Twist]) -> Pose:
-    """Return the pose after rigid motions R <- exp([w]x) R: the part's own first, then those of the parts below it."""
+    """Return the pose after rigid motions R <- exp([w]x) R: first of the part, then of the parts that it is located on."""
     for mover in reversed(part.movers):
         X = movers[mover].moving(X, rotation(movers[mover].W))
     return X
@@ -81,7 +81,7 @@ def quadratic(part: Mobility, X: Pose, movers: Sequence[Twist]) -> Pose:
 
 
 def published(part: Mobility, X: Pose, movers: Sequence[Twist]) -> Pose:
-    """Return the pose of paper (12), which keeps the linearized gap exactly; a part that others rest on turns by exp([W]x).
+    """Return the pose of paper (12), which keeps the linearized gap exactly; a reference part is rotated by exp([W]x).
 
     Equation (12) would stretch a reference part, and its normals (4) would no longer be normal to it. To first order both
     updates agree.
@@ -93,7 +93,7 @@ def published(part: Mobility, X: Pose, movers: Sequence[Twist]) -> Pose:
 
 
 def _total(part: Mobility, X: Pose, movers: Sequence[Twist]) -> Twist:
-    """Return the sum of the twists of all movers of a part, about the part's own centre."""
+    """Return the sum of the twists of all movers of a part, about the part's centre."""
     c = X.apply(constant(part.centre))
     d, W = ca.SX.zeros(3), ca.SX.zeros(3)
     for mover in part.movers:

@@ -1,4 +1,4 @@
-"""Displacement energies of many points, from ten moments of them.
+"""Displacement energies of sets of points, from their ten moments.
 
 The moments of points P about a nominal centre c are N, sum (P - c) and the six distinct entries of
 sum (P - c)(P - c)'. They suffice for every weighting and any number of points.
@@ -16,23 +16,24 @@ _UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 def moment_table(P: np.ndarray, centre: np.ndarray, radii: np.ndarray | float = 0.0) -> np.ndarray:
     """Return the moments (moment, point) of each of the points P (point, 3) [mm] about `centre`.
 
-    A point stands for all points of a sphere around it, of which `radii` (point,) [mm] are the radii.
+    A point represents all points of a sphere around it, with a radius from `radii` (point,) [mm].
     """
-    p, inside = (P - centre).T, np.asarray(radii) ** 2 / 3  # the mean square of a coordinate on a sphere
-    return np.vstack([np.ones(len(P)), p, *(p[i] * p[j] + (inside if i == j else 0.0) for i, j in _UPPER)])
+    p, mean_square = (P - centre).T, np.asarray(radii) ** 2 / 3  # of a coordinate on a sphere
+    return np.vstack([np.ones(len(P)), p, *(p[i] * p[j] + (mean_square if i == j else 0.0) for i, j in _UPPER)])
 
 
 def moments_about(centre: np.ndarray, moments: np.ndarray, other_centre: np.ndarray) -> np.ndarray:
-    """Return the moments (10,) about a centre (3,) [mm] of points whose `moments` (10,) are those about another one (3,)."""
-    count, first, offset = moments[0], moments[1:4], other_centre - centre
-    second = np.outer(offset, first) + np.outer(first, offset) + count * np.outer(offset, offset)
-    return np.concatenate([[count], first + count * offset, moments[4:] + [second[i, j] for i, j in _UPPER]])
+    """Return the moments (10,) of points about a centre (3,) [mm] from their `moments` (10,) about another centre (3,)."""
+    count, first_moment, offset = moments[0], moments[1:4], other_centre - centre
+    change = np.outer(offset, first_moment) + np.outer(first_moment, offset) + count * np.outer(offset, offset)
+    return np.concatenate([[count], first_moment + count * offset, moments[4:] + [change[i, j] for i, j in _UPPER]])
 
 
 def displacement_energy(moments: ca.SX, centre: Vector, start: Pose, end: Pose) -> ca.SX:
     """Return 1/2 sum |x_end - x_start|^2 [mm^2] over the points with the given `moments` (10, 1); it is quadratic in `end`.
 
-    It is x_end - x_start = a + D (P - c), where a is the displacement of the centre and D the difference of the rotations.
+    The displacement is x_end - x_start = a + D (P - c), with the displacement a of the centre and the difference D of the
+    rotations.
     """
     count, first_moment = moments[0], moments[1:4]
     second_moment = ca.SX.zeros(3, 3)

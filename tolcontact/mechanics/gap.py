@@ -3,8 +3,8 @@
 In the frame of the reference part the gap is affine in the relative pose X_RM, so all gaps of a pair are one product of 13
 numbers (the entries of the pose, and 1) with a constant matrix G, the Jacobian of the expression. Where both faces are planes,
 gaps are affine in two coordinates of the points: G = basis @ coordinates, with three rows of coordinates instead of thirteen.
-An affine function has its least value at a corner of the points' convex hull, so that only the corners can be the deepest, at
-any pose.
+An affine function has its minimum at a corner of the points' convex hull, so that only hull corners can be the deepest point,
+at any pose.
 """
 
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ def gap_matrix(pair: ContactPoints) -> np.ndarray:
     return np.vstack([gradient.full(), constant.full()])
 
 
-FLATNESS = 1e-13  # of the largest entry: normals of flat faces differ by that much
+FLATNESS = 1e-13  # of the largest entry: normals of flat faces differ by up to this
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class GapMap:
     basis         (13, r)
     columns       (k,) of the deviations that raise points above their faces
     coordinates   (r + k, point): the first row is 1, the last k rows are the derivatives of the gaps by these deviations
-    corners       numbers of the points that can be the deepest: corners of the hull in up to two coordinates, else all points
+    corners       indices of the points that can be the deepest: corners of the hull in up to two coordinates, else all points
     """
 
     basis: np.ndarray

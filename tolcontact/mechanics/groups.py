@@ -1,4 +1,4 @@
-"""Contact groups: parts that contact couples to each other. Each group has a QP of its own."""
+"""Contact groups: parts that contact couples to each other. Each group has its own QP."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,9 +18,9 @@ BALL_SHARE = 0.01  # of the group's length: radius of the ball that a point repr
 class Side:
     """One side of a pair whose points can be displaced: its points, and the position of their part in the group.
 
-    radii         (point,) [mm]: of the spheres that the points stand for (see counted_points)
-    centre        (3,) [mm]: nominal point about which moments are taken
-    all_moments   (10,): the moments of all points as small balls, so that points on a line hold all rotations, too
+    radii         (point,) [mm]: of the spheres that the points represent (see counted_points)
+    centre        (3,) [mm]: nominal reference point of the moments
+    all_moments   (10,): the moments of all points as small balls, so that points on a line constrain all rotations, too
     """
 
     pair: int
@@ -38,7 +38,7 @@ class Side:
 
     @property
     def spread_points(self) -> np.ndarray:
-        """Points (_, 3) [mm], equally many for each point, that have the moments of the spheres together."""
+        """Points (_, 3) [mm], the same number for each contact point, with the moments of the spheres."""
         if not self.radii.any():
             return self.points
         ends = np.vstack([np.eye(3), -np.eye(3)])
@@ -60,16 +60,16 @@ class Load:
 
 
 @dataclass(frozen=True, eq=False)
-class Hold:
-    """The two-sided locators of a mover that do not give way. Parts are given by their positions in the group.
+class BilateralLocators:
+    """The rigid two-sided locators of a mover: bilateral constraints. Parts are given by their positions in the group.
 
     part         the mover
-    owners       of each locator the part that it is on: the mover, or parts of its joint
+    owners       the part that each locator is on: the mover, or parts of its joint
     parent       the part that the mover is located on, or None for the ground
-    points       of each locator, (3,) [mm], nominal
-    directions   of each locator, (3,)
-    stiffness    of each locator [N/mm]
-    is_placed    whether the mover is held where it was placed, and not by the deviations of its locators
+    points       nominal point (3,) [mm] of each locator
+    directions   direction (3,) of each locator
+    stiffness    stiffness [N/mm] of each locator
+    is_placed    whether the locators fix the mover where it was placed, and not by their deviations
     """
 
     part: int
@@ -86,11 +86,12 @@ class Group:
     """Parts that contact couples to each other, and the fixed parts that they touch.
 
     parts, pairs     indices into the nominal model's
-    free             indices of the movers among all parts
+    free             indices of the movers among all parts of the model
     mobilities       one per part of `parts`
-    sides            sides of pairs that enter the objective, in the order of the Function's moments
-    loads, holds     forces, and two-sided locators of movers
-    has_springs      whether contact points give way
+    sides            sides of pairs in the objective, in the order of the Function's moments
+    loads            forces on the parts
+    bilateral        bilateral locators of the movers
+    has_springs      whether any contact point is compliant
     length           root mean square distance of the contact points from their centroid [mm]
     count            number of points on all sides
     """
@@ -101,7 +102,7 @@ class Group:
     mobilities: tuple[Mobility, ...]
     sides: tuple[Side, ...]
     loads: tuple[Load, ...]
-    holds: tuple[Hold, ...]
+    bilateral: tuple[BilateralLocators, ...]
     has_springs: bool
     length: Number
     count: Number
@@ -112,7 +113,7 @@ class Group:
 
 
 def curved_pairs(nominal: Nominal, group: Group) -> list[int]:
-    """Return the positions of a group's pairs in which fixed planes stand for a curved reference face."""
+    """Return the positions of a group's pairs whose curved reference face is represented by fixed planes."""
     pairs = [nominal.pairs[index] for index in group.pairs]
     return [
         k
@@ -124,7 +125,7 @@ def curved_pairs(nominal: Nominal, group: Group) -> list[int]:
 def contact_groups(nominal: Nominal, *, weighs_areas: bool) -> list[Group]:
     """Return the groups of parts that contact couples. Parts that share only a fixed neighbour are in different groups.
 
-    Contact points count by the areas that they stand for if `weighs_areas`; in the paper each counts once.
+    If `weighs_areas`, contact points are weighted by the areas that they represent; in the paper each counts once.
     """
     chains = [part.movers for part in nominal.parts]
     clusters: list[set[int]] = []
@@ -169,7 +170,7 @@ def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int,
         for part, of_moving in ((pair.moving, True), (pair.reference, False))
         if part is not None and chains[part]
     ]
-    holds = [_hold(nominal, part, parts) for part in free if nominal.parts[part].locators.exact.any()]
+    bilateral = [_bilateral_locators(nominal, part, parts) for part in free if nominal.parts[part].locators.exact.any()]
     return Group(
         parts=parts,
         pairs=tuple(index for index, _ in members),
@@ -179,7 +180,7 @@ def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int,
         ),
         sides=tuple(sides),
         loads=tuple(_loads(nominal, parts, [part for part in parts if chains[part]])),
-        holds=tuple(holds),
+        bilateral=tuple(bilateral),
         has_springs=any(pair.is_springy for _, pair in members),
         length=length,
         count=sum(len(side.points) for side in sides),
@@ -194,11 +195,11 @@ def _loads(nominal: Nominal, parts: tuple[int, ...], moved: Sequence[int]) -> It
             yield Load(parts.index(part), nominal.position(force.at), np.array(force.vector))
 
 
-def _hold(nominal: Nominal, part: int, parts: tuple[int, ...]) -> Hold:
+def _bilateral_locators(nominal: Nominal, part: int, parts: tuple[int, ...]) -> BilateralLocators:
     entry = nominal.parts[part]
     locators, exact = entry.locators, np.flatnonzero(entry.locators.exact)
     owners = entry.owners or (part,) * len(locators)
-    return Hold(
+    return BilateralLocators(
         part=parts.index(part),
         owners=tuple(parts.index(owners[k]) for k in exact),
         parent=None if entry.parent is None else parts.index(entry.parent),
@@ -212,17 +213,17 @@ def _hold(nominal: Nominal, part: int, parts: tuple[int, ...]) -> Hold:
 def _points_near(
     part: int, points: Mapping[int, list[np.ndarray]], chains: Sequence[tuple[int, ...]], free: tuple[int, ...]
 ) -> list[np.ndarray]:
-    """Return contact points of a part; without any, those of the last part that moves it, or of its joint."""
+    """Return contact points of a part; without any, points of the last part that moves it, or of its joint."""
     mover = (chains[part] or free)[-1]
     return points[part] or points[mover] or [P for other in points if chains[other] == chains[mover] for P in points[other]]
 
 
 def _side(
-    number: int, pair: ContactPoints, part: int, of_moving: bool, weighs_areas: bool, centre: np.ndarray, radius: float
+    position: int, pair: ContactPoints, part: int, of_moving: bool, weighs_areas: bool, centre: np.ndarray, radius: float
 ) -> Side:
     """Return one side of a pair; in the regularization its contact points are balls of a radius [mm]."""
     counted, points = counted_points(pair)[0 if of_moving else 1], pair.P_m if of_moving else pair.P_r
     weights = pair.weights if weighs_areas else np.ones(len(points))
     all_moments = (moment_table(points, centre) * weights).sum(axis=1)
     all_moments[[4, 7, 9]] += weights.sum() * radius**2
-    return Side(number, part, *counted, weights, centre, all_moments)
+    return Side(position, part, *counted, weights, centre, all_moments)

@@ -1,4 +1,4 @@
-"""Measurements as expressions of poses and deviations: heights over walls, distances of axes, angles, and combinations."""
+"""Measurements as expressions of poses and deviations: heights over walls, axis distances, angles, and combinations."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,17 +23,16 @@ from tolcontact.discretization.measured_geometry import (
 )
 from tolcontact.features import FaceDeviation
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere, Torus
-from tolcontact.mechanics.mesh_clearance import mesh_clearance
+from tolcontact.mechanics.group_equations import face_height, face_pose
+from tolcontact.mechanics.mesh_clearance import mesh_clearance, minimum, segment_distance
 from tolcontact.mechanics.plane_clearance import plane_clearance
 from tolcontact.mechanics.pose import ENTRIES, Pose, relative
 from tolcontact.mechanics.round_gap import round_gaps
-from tolcontact.mechanics.segments import least, segment_distance
-from tolcontact.mechanics.setting import face_height, face_pose
 
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """What measurements are expressions of: poses of the parts, deviations (contributor, 1), and the measures before."""
+    """The arguments of measurements: poses of the parts, deviations (contributor, 1), and the preceding measures."""
 
     poses: Sequence[Pose]
     deviations: ca.SX
@@ -45,7 +44,7 @@ class Observed:
         return self.poses[part] if X_face is None else self.poses[part] @ X_face
 
     def position(self, point: MeasuredPoint) -> ca.SX:
-        """Return the position (3, 1) [mm] of a point, which moves with the face that it is on."""
+        """Return the position (3, 1) [mm] of a point, which moves with its face."""
         height = face_height(point.deviation, self.deviations, point.position)
         return self.pose(point.part, point.deviation).apply(ca.DM(point.position) + height * ca.DM(point.outward))
 
@@ -57,11 +56,11 @@ def value_of(measurement: NominalMeasurement, observed: Observed) -> ca.SX:
 
 def _least_height(heights: Heights, observed: Observed) -> ca.SX:
     over_walls = [_height(point, wall, observed) for point, wall in heights.points]
-    return least([*over_walls, *(_edge_height(crossing, observed) for crossing in heights.crossings)])
+    return minimum([*over_walls, *(_edge_height(crossing, observed) for crossing in heights.crossings)])
 
 
 def _face_gap(gap: FaceGap, observed: Observed) -> ca.SX:
-    """Return the largest gap of all points, or their mean by area [mm]."""
+    """Return the largest gap of all points, or their area-weighted mean [mm]."""
     heights = ca.vertcat(*(_height(point, wall, observed) for point, wall in gap.points))
     return ca.mmax(heights) if gap.is_largest else ca.dot(ca.DM(gap.weights), heights)
 
@@ -87,16 +86,16 @@ def _edge_height(crossing: Crossing, observed: Observed) -> ca.SX:
 
 
 def _height(point: MeasuredPoint, wall: Wall, observed: Observed) -> ca.SX:
-    """Return the height of a point over a wall, which may have grown [mm]."""
+    """Return the height of a point over a wall, less the growth of the wall [mm]."""
     X = observed.pose(wall.part, wall.deviation)
-    place = X.R.T @ (observed.position(point) - X.t)
+    p = X.R.T @ (observed.position(point) - X.t)
     height = face_height(wall.deviation, observed.deviations, wall.foot(point.position))
-    return wall.side * distance(wall.surface, place) - height
+    return wall.side * distance(wall.surface, p) - height
 
 
-def distance(surface: AnalyticSurface, place: ca.SX) -> ca.SX:
-    """Return the signed distance [mm] of a place (3, 1) from a surface: AnalyticSurface.distance as an expression."""
-    offset, axis = place - ca.DM(surface.origin), ca.DM(surface.axis)
+def distance(surface: AnalyticSurface, p: ca.SX) -> ca.SX:
+    """Return the signed distance [mm] of a point p (3, 1) from a surface: AnalyticSurface.distance as an expression."""
+    offset, axis = p - ca.DM(surface.origin), ca.DM(surface.axis)
     along = ca.dot(axis, offset)
     across = offset - along * axis
     if isinstance(surface, Plane):
@@ -112,16 +111,16 @@ def distance(surface: AnalyticSurface, place: ca.SX) -> ca.SX:
 def _round_clearance(clearance: RoundClearance, observed: Observed) -> ca.SX:
     moving, reference = clearance.moving, clearance.reference
     X_RM = _relative(moving, reference, observed)
-    grown = ca.vertcat(*(face_height(face.deviation, observed.deviations) for face in (moving, reference)))
+    growths = ca.vertcat(*(face_height(face.deviation, observed.deviations) for face in (moving, reference)))
     points = clearance.points
-    of_points = round_gaps(points, X_RM.vector(), grown, ca.SX(len(points), 1), ca.SX(ENTRIES, 0))
-    return least(ca.vertsplit(of_points.gaps))
+    gaps = round_gaps(points, X_RM.vector(), growths, ca.SX(len(points), 1), ca.SX(ENTRIES, 0)).gaps
+    return minimum(ca.vertsplit(gaps))
 
 
 def _mesh_clearance(clearance: MeshClearance, observed: Observed) -> ca.SX:
     faces = (clearance.moving, clearance.reference)
-    grown = sum(face_height(face.deviation, observed.deviations) for face in faces)
-    return mesh_clearance(clearance, _relative(*faces, observed)) - grown
+    growth = sum(face_height(face.deviation, observed.deviations) for face in faces)
+    return mesh_clearance(clearance, _relative(*faces, observed)) - growth
 
 
 def _axis_distance(pair: AxisPair, observed: Observed) -> ca.SX:
@@ -140,12 +139,12 @@ def _axis_distance(pair: AxisPair, observed: Observed) -> ca.SX:
     shortest = segment_distance(moving, reference)
     if not pair.is_between_surfaces:
         return shortest
-    grown = sum(axis.radius + face_height(axis.deviation, observed.deviations) for axis in (pair.moving, pair.reference))
-    return shortest - grown
+    radii = sum(axis.radius + face_height(axis.deviation, observed.deviations) for axis in (pair.moving, pair.reference))
+    return shortest - radii
 
 
 def _angle(pair: DirectionPair, observed: Observed) -> ca.SX:
-    """Return the angle [rad] by atan2 of sine and cosine, which keeps its digits where the cosine is 1."""
+    """Return the angle [rad] by atan2 of sine and cosine, which remains accurate where the cosine is 1."""
     faces = (pair.moving, pair.reference)
     u, v = (
         observed.pose(face.part, face.deviation).R @ ca.DM(direction)

@@ -10,9 +10,9 @@ from tolcontact.declaration import Measure, Part, Point
 from tolcontact.declaration.measure import BINARY, MAX_STEPS, UNARY, Tape
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError, designation
+from tolcontact.mechanics.group_equations import face_height, face_pose
 from tolcontact.mechanics.measurements import Observed, value_of
 from tolcontact.mechanics.pose import ENTRIES, Pose
-from tolcontact.mechanics.setting import face_height, face_pose
 
 UNARY_FUNCTIONS: dict[str, Callable[[Any], Any]] = {
     "neg": lambda a: -a, "exp": ca.exp, "log": ca.log, "sqrt": ca.sqrt, "sq": lambda a: a * a, "twice": lambda a: 2 * a,
@@ -31,7 +31,7 @@ _NAMES = {getattr(ca, f"OP_{name.upper()}"): name for name in (*UNARY, *BINARY)}
 
 
 def record(expression: ca.SX, entries: ca.SX, max_steps: int = MAX_STEPS) -> Tape:
-    """Return the steps of a scalar expression of `entries`.
+    """Return the operations of a scalar expression of `entries`.
 
     entries   (12 * part + contributor, 1): the entries of all poses, then deviations
 
@@ -61,7 +61,7 @@ def record(expression: ca.SX, entries: ca.SX, max_steps: int = MAX_STEPS) -> Tap
 
 
 def replay(tape: Tape, poses: Sequence[Pose], deviations: ca.SX) -> ca.SX:
-    """Return the expression that a tape holds, on the given poses and deviations."""
+    """Return the expression of a tape, at the given poses and deviations."""
     entries = ca.vertcat(*(pose.vector() for pose in poses), deviations)
     if entries.numel() != ENTRIES * len(poses) + deviations.numel():
         raise ValueError("a tape needs 12 entries for each pose")
@@ -79,7 +79,7 @@ def replay(tape: Tape, poses: Sequence[Pose], deviations: ca.SX) -> ca.SX:
 
 
 class SymbolicPoses:
-    """The symbolic poses of the parts, by their declarations: the argument of a user's own measure."""
+    """The symbolic poses of the parts, by their declarations: the argument of a user-defined measure."""
 
     def __init__(self, nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> None:
         self._nominal = nominal
@@ -104,7 +104,7 @@ class SymbolicPoses:
         return X.apply(p if X_face is None else X_face.apply(p))
 
     def rotation(self, part: Part) -> ca.SX:
-        """Return the rotation R (3, 3) of a part from its nominal place."""
+        """Return the rotation R (3, 3) of a part from its nominal orientation."""
         return self._pose(part).R
 
     def translation(self, part: Part) -> ca.SX:
@@ -141,13 +141,14 @@ def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list
 def _expression(measure: Measure, nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> ca.SX:
     part_poses = SymbolicPoses(nominal, poses, deviations)
     if isinstance(measure.of, Point):
-        of, to = measure.of, measure.to
+        point, to = measure.of, measure.to
         if to is not None:
-            origin = nominal.position(to) - nominal.position(of) if measure.quantity == "deviation of distance" else np.zeros(3)
-            moved = part_poses.position(to) - part_poses.position(of) - ca.DM(origin)
+            is_deviation = measure.quantity == "deviation of distance"
+            origin = nominal.position(to) - nominal.position(point) if is_deviation else np.zeros(3)
+            moved = part_poses.position(to) - part_poses.position(point) - ca.DM(origin)
         else:
-            origin = nominal.position(of) if measure.quantity == "displacement" else np.zeros(3)
-            moved = part_poses.position(of) - ca.DM(origin)
+            origin = nominal.position(point) if measure.quantity == "displacement" else np.zeros(3)
+            moved = part_poses.position(point) - ca.DM(origin)
         return ca.dot(ca.DM(np.array(measure.along)), moved)
     function: Any = measure.of
     value: Any = replay(measure.of, poses, deviations) if isinstance(measure.of, tuple) else function(part_poses)

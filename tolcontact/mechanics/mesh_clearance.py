@@ -1,10 +1,14 @@
-"""The clearance of two faces by their triangles at any pose: the least distance of corners, facets and edges.
+"""The clearance of two triangulated faces at any pose: the minimum distance of corners, facets and edges.
 
-A corner counts as the nearest facet over or under which it is says: as its height, negative inside the material. Edges that may
-touch first count as the distance of their lines along the common normal, negative where they have passed each other. All other
-distances are of the nearest places of both edges. Elements that are not looked at are farther apart than the horizon, less what
-the moving face has moved relative to the reference one; the clearance is never larger than that.
+The clearance of a corner is its signed height over the nearest facet that it projects onto, negative inside the material. The
+clearance of two edges that may touch first is the distance of their lines along the common normal, negative where the edges
+have passed each other. The clearance of all other edges is their shortest distance. Elements outside the horizon are not
+evaluated: they are further apart than the horizon, less the motion of the moving face relative to the reference face. The
+clearance is never larger than that.
 """
+
+from collections.abc import Sequence
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -12,10 +16,10 @@ import numpy as np
 from tolcontact.discretization.measured_geometry import MeshClearance
 from tolcontact.geometry.nearest_elements import Corners, EdgePairs
 from tolcontact.mechanics.pose import Pose
-from tolcontact.mechanics.segments import MIN_SQUARE, least, segment_distance
 
-NONE = 1e300  # height of a corner that is over no facet
-MARGIN = 1e-9  # of a facet: how far beside it a corner counts
+NO_HEIGHT = 1e300  # height of a corner that projects onto no facet
+MARGIN = 1e-9  # of a facet: a corner counts up to this distance outside it
+MIN_SQUARE = 1e-300  # of a length: keeps quotients finite where a segment has no length
 
 
 def mesh_clearance(clearance: MeshClearance, X_21: Pose) -> ca.SX:
@@ -25,39 +29,39 @@ def mesh_clearance(clearance: MeshClearance, X_21: Pose) -> ca.SX:
     values = [*_heights(elements.corners[0], X_21), *_heights(elements.corners[1], X_12)]
     values += _edge_distances(elements.edges, X_21)
     motion = ca.vertcat(*(ca.norm_2(X_21.apply(ca.DM(corner)) - ca.DM(corner)) for corner in clearance.box))
-    return least([*values, elements.horizon - ca.mmax(motion)])
+    return minimum([*values, elements.horizon - ca.mmax(motion)])
 
 
 def _heights(corners: Corners, X: Pose) -> list[ca.SX]:
-    """Return the height [mm] of each corner at pose X over the nearest facet over which it is, NONE if there is none."""
+    """Return the height [mm] of each corner at pose X over the nearest facet that it projects onto, or NO_HEIGHT."""
     heights = []
-    for number in np.unique(corners.numbers):
-        rows = np.flatnonzero(corners.numbers == number)
-        place, nearest = X.apply(ca.DM(corners.points[rows[0]])), ca.SX(NONE)
+    for corner in np.unique(corners.numbers):
+        rows = np.flatnonzero(corners.numbers == corner)
+        p, nearest = X.apply(ca.DM(corners.points[rows[0]])), ca.SX(NO_HEIGHT)
         for row in rows:
-            height = _height(place, corners.triangles[row], corners.slopes[row])
+            height = _height(p, corners.triangles[row], corners.slopes[row])
             nearest = ca.if_else(ca.fabs(height) < ca.fabs(nearest), height, nearest)
         heights.append(nearest)
     return heights
 
 
-def _height(place: ca.SX, triangle: np.ndarray, slopes: np.ndarray) -> ca.SX:
-    """Return the height of a place (3, 1) over a triangle (3, 3); NONE if the place is not over or under it.
+def _height(p: ca.SX, triangle: np.ndarray, slopes: np.ndarray) -> ca.SX:
+    """Return the height of a point p (3, 1) over a triangle (3, 3); NO_HEIGHT if the point does not project onto it.
 
-    Under facets that lean towards each other the border is halfway between them.
+    Below two facets that meet in a concave edge, their bisecting plane separates the regions of the two.
     """
     along = np.roll(triangle, -1, axis=0) - triangle
     n = np.cross(along[0], along[1])
     n /= np.linalg.norm(n)
     inward = np.cross(n, along)
     inward /= np.linalg.norm(inward, axis=1, keepdims=True)
-    height = ca.dot(ca.DM(n), place) - float(n @ triangle[0])
+    height = ca.dot(ca.DM(n), p) - float(n @ triangle[0])
     depth, margin = ca.fmax(-height, 0), MARGIN * float(np.linalg.norm(along, axis=1).max())
     is_over = ca.SX(1)
     for corner, direction, slope in zip(triangle, inward, slopes, strict=True):
-        beside = ca.dot(ca.DM(direction), place) - float(direction @ corner)
-        is_over = ca.logic_and(is_over, beside + (float(slope) * depth if slope else 0) >= -margin)
-    return ca.if_else(is_over, height, NONE)
+        inset = ca.dot(ca.DM(direction), p) - float(direction @ corner)
+        is_over = ca.logic_and(is_over, inset + (float(slope) * depth if slope else 0) >= -margin)
+    return ca.if_else(is_over, height, NO_HEIGHT)
 
 
 def _edge_distances(pairs: EdgePairs, X: Pose) -> list[ca.SX]:
@@ -65,13 +69,48 @@ def _edge_distances(pairs: EdgePairs, X: Pose) -> list[ca.SX]:
     distances = []
     for left, right, sense in zip(pairs.left, pairs.right, pairs.senses, strict=True):
         p, q = [X.apply(ca.DM(end)) for end in left], [ca.SX(ca.DM(end)) for end in right]
-        apart = segment_distance(p, q)
+        distance = segment_distance(p, q)
         if sense:
             u, v, r = p[1] - p[0], q[1] - q[0], q[0] - p[0]
             n = ca.cross(u, v)
             square = ca.fmax(ca.sumsqr(n), MIN_SQUARE)
             shares = ca.dot(ca.cross(r, v), n) / square, ca.dot(ca.cross(r, u), n) / square
             is_inner = ca.logic_and(*(ca.logic_and(share > 0, share < 1) for share in shares))
-            apart = ca.if_else(is_inner, -float(sense) * ca.dot(n, r) / ca.sqrt(square), apart)
-        distances.append(apart)
+            distance = ca.if_else(is_inner, -float(sense) * ca.dot(n, r) / ca.sqrt(square), distance)
+        distances.append(distance)
     return distances
+
+
+def minimum(values: Any) -> ca.SX:
+    """Return the minimum of several expressions."""
+    return ca.mmin(ca.vertcat(*values))
+
+
+def segment_distance(moving: Sequence[ca.SX], reference: Sequence[ca.SX]) -> ca.SX:
+    """Return the shortest distance [mm] of two segments between ends (3, 1), which may be parallel.
+
+    It is the minimum of five distances: from each end to the other segment, and between the closest points of the two lines if
+    both lie between the ends (Ericson, Real-Time Collision Detection, 5.1.9). Each is the distance of a point on one segment
+    from a point on the other. So none is too short, even where the lines are almost parallel and their closest points
+    uncertain.
+    """
+    p, q, r = moving[1] - moving[0], reference[1] - reference[0], reference[0] - moving[0]
+    pp, qq, pq = ca.dot(p, p), ca.dot(q, q), ca.dot(p, q)
+
+    def squared(s: ca.SX | float, t: ca.SX | float) -> ca.SX:
+        return ca.sumsqr(r + t * q - s * p)
+
+    def on_moving(t: ca.SX | float) -> ca.SX:
+        return clipped(ca.dot(p, r + t * q) / ca.fmax(pp, MIN_SQUARE))
+
+    def on_reference(s: ca.SX | float) -> ca.SX:
+        return clipped(ca.dot(q, s * p - r) / ca.fmax(qq, MIN_SQUARE))
+
+    inner = clipped((ca.dot(p, r) * qq - ca.dot(q, r) * pq) / ca.fmax(pp * qq - pq**2, MIN_SQUARE))
+    squares = [squared(s, on_reference(s)) for s in (0.0, 1.0, inner)] + [squared(on_moving(t), t) for t in (0.0, 1.0)]
+    return ca.sqrt(minimum(squares))
+
+
+def clipped(share: ca.SX) -> ca.SX:
+    """Return a share of a segment, clipped to the range from 0 to 1."""
+    return ca.fmin(ca.fmax(share, 0), 1)

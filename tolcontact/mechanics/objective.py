@@ -1,7 +1,7 @@
 """The objectives that the corrected pose minimizes, and their regularization. Paper (9), (11).
 
 All of them are quadratic in the poses. A linear step about any pose therefore has the same quadratic term as one from the raw
-state. In the exact resolution (repeated steps) the linear term holds the residuals from the raw state.
+state. In the exact resolution (repeated steps) the linear term contains the residuals from the raw state.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,14 +11,14 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.mechanics.displacement import MOMENTS, displacement_energy, moments_about
+from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.groups import Group, Side
 from tolcontact.mechanics.placement import elongation
 from tolcontact.mechanics.pose import Pose, Vector, constant, relative
-from tolcontact.mechanics.setting import Setting
 from tolcontact.method import Method
 
-# Seating: the share of the forces that the quadratic term carries when all points have moved by the group's length. It is small
-# enough for the contacts to carry nearly the whole load, and large enough for the solvers.
+# Seating: the share of the forces that the quadratic term balances when all points have moved by the group's length. It is
+# small enough for the contacts to take nearly the whole load, and large enough for the solvers.
 SEATING_SHARE = 1e-3
 
 
@@ -33,60 +33,61 @@ class Energy(NamedTuple):
     scale: ca.SX
 
 
-def energy(setting: Setting, poses: Sequence[Pose]) -> Energy:
+def energy(system: GroupEquations, poses: Sequence[Pose]) -> Energy:
     """Return the objective at `poses`, which are affine in the increments."""
-    scale = objective_scale(setting.group, setting.method, setting.moments) if setting.scale is None else setting.scale
-    return Energy(_VALUES[setting.method.objective](setting, poses, scale), scale)
+    scale = objective_scale(system.group, system.method, system.moments) if system.scale is None else system.scale
+    return Energy(_VALUES[system.method.objective](system, poses, scale), scale)
 
 
 def objective_scale(group: Group, method: Method, moments: ca.SX) -> ca.SX:
-    """Return the scale of the objective: of points their number, by the moments (10, side) of those that count, at least 1.
+    """Return the scale of the objective.
 
-    Of springs it is the sum of their stiffness [N/mm], of forces that of their sizes [N]; 1 without any.
+    For points, it is the weighted number of points that count, from their moments (10, side), and at least 1. For springs, it
+    is the sum of their stiffness [N/mm]; for forces, the sum of their magnitudes [N]. It is 1 if there are none.
     """
     if method.minimizes.counts_points:
         return ca.fmax(ca.sum2(moments[0, :]), 1)
     if method.minimizes.presses:
         return ca.SX(sum(float(np.linalg.norm(load.vector)) for load in group.loads) or 1.0)
-    return ca.SX(sum(float(k) for hold in group.holds for k in hold.stiffness) or 1.0)
+    return ca.SX(sum(float(k) for locators in group.bilateral for k in locators.stiffness) or 1.0)
 
 
-def proximity(setting: Setting, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
+def proximity(system: GroupEquations, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
     """Return half the mean squared displacement of all contact points [mm^2] between two poses."""
-    energies = (_displaced(setting, points, start, end) for points in _points_of_parts(setting.group))
-    return sum(energies, ca.SX(0)) / setting.group.count
+    energies = (_displaced(system, points, start, end) for points in _points_of_parts(system.group))
+    return sum(energies, ca.SX(0)) / system.group.count
 
 
-def _points(setting: Setting, poses: Sequence[Pose], scale: ca.SX) -> ca.SX:
-    """Return the mean displacement energy of the points that count."""
-    value = setting.firmness * _regularization(setting, poses)
-    for k, side in enumerate(setting.group.sides):
-        value += displacement_energy(setting.moments[:, k], side.centre, setting.raw[side.part], poses[side.part])
+def _points(system: GroupEquations, poses: Sequence[Pose], scale: ca.SX) -> ca.SX:
+    """Return the mean displacement energy of the weighted points."""
+    value = system.regularization_factor * _regularization(system, poses)
+    for k, side in enumerate(system.group.sides):
+        value += displacement_energy(system.moments[:, k], side.centre, system.raw[side.part], poses[side.part])
     return value / scale
 
 
-def _springs(setting: Setting, poses: Sequence[Pose], scale: ca.SX) -> ca.SX:
+def _springs(system: GroupEquations, poses: Sequence[Pose], scale: ca.SX) -> ca.SX:
     """Return the energy 1/2 sum k e^2 [N mm] of the movers' two-sided locators, divided by the sum of the k [N/mm]."""
-    regularization = setting.firmness * _regularization(setting, poses)
+    regularization = system.regularization_factor * _regularization(system, poses)
     value = ca.SX(0)
-    for hold in setting.group.holds:
-        start_elongation, end_elongation = (elongation(setting, hold, poses, linear=True) for poses in (setting.raw, poses))
-        for k, e in zip(hold.stiffness, ca.vertsplit(end_elongation - start_elongation), strict=True):
+    for locators in system.group.bilateral:
+        start_elongation, end_elongation = (elongation(system, locators, poses, linear=True) for poses in (system.raw, poses))
+        for k, e in zip(locators.stiffness, ca.vertsplit(end_elongation - start_elongation), strict=True):
             value += k * e**2 / 2
-    return value / scale + regularization / setting.group.count
+    return value / scale + regularization / system.group.count
 
 
-def _forces(setting: Setting, poses: Sequence[Pose], scale: ca.SX) -> ca.SX:
-    """Return the negative work of the declared forces [N mm], divided by the sum of their sizes [N]."""
+def _forces(system: GroupEquations, poses: Sequence[Pose], scale: ca.SX) -> ca.SX:
+    """Return the negative work of the declared forces [N mm], divided by the sum of their magnitudes [N]."""
     work = ca.SX(0)
-    for load in setting.group.loads:
+    for load in system.group.loads:
         p = constant(load.point)
-        work += ca.dot(constant(load.vector), poses[load.part].apply(p) - setting.raw[load.part].apply(p))
-    quadratic = setting.firmness * SEATING_SHARE * proximity(setting, setting.raw, poses) / setting.group.length
+        work += ca.dot(constant(load.vector), poses[load.part].apply(p) - system.raw[load.part].apply(p))
+    quadratic = system.regularization_factor * SEATING_SHARE * proximity(system, system.raw, poses) / system.group.length
     return quadratic - work / scale
 
 
-_VALUES: dict[str, Callable[[Setting, Sequence[Pose], ca.SX], ca.SX]] = {
+_VALUES: dict[str, Callable[[GroupEquations, Sequence[Pose], ca.SX], ca.SX]] = {
     "active points": _points,
     "all points": _points,
     "locator stiffness": _springs,
@@ -94,22 +95,20 @@ _VALUES: dict[str, Callable[[Setting, Sequence[Pose], ca.SX], ca.SX]] = {
 }
 
 
-def _regularization(setting: Setting, poses: Sequence[Pose]) -> ca.SX:
-    return sum(
-        (setting.method.eta * term for term in _REGULARIZATIONS[setting.method.regularization](setting, poses)), ca.SX(0)
-    )
+def _regularization(system: GroupEquations, poses: Sequence[Pose]) -> ca.SX:
+    return sum((system.method.eta * term for term in _REGULARIZATIONS[system.method.regularization](system, poses)), ca.SX(0))
 
 
-def _point_energies(setting: Setting, poses: Sequence[Pose]) -> list[ca.SX]:
+def _point_energies(system: GroupEquations, poses: Sequence[Pose]) -> list[ca.SX]:
     """Return the displacement energy of all contact points of each side."""
-    return [_displaced(setting, _points_of_side(side), setting.raw, poses) for side in setting.group.sides]
+    return [_displaced(system, _points_of_side(side), system.raw, poses) for side in system.group.sides]
 
 
-def _identity_energies(setting: Setting, poses: Sequence[Pose]) -> list[ca.SX]:
+def _identity_energies(system: GroupEquations, poses: Sequence[Pose]) -> list[ca.SX]:
     """Return the energies of the paper's eta I: translations [mm] and rotations [rad] of the movers."""
     energies = []
-    for part in map(setting.group.position, setting.group.free):
-        dt, D = poses[part].t - setting.raw[part].t, poses[part].R - setting.raw[part].R
+    for part in map(system.group.position, system.group.free):
+        dt, D = poses[part].t - system.raw[part].t, poses[part].R - system.raw[part].R
         energies.append((ca.dot(dt, dt) + ca.sumsqr(D) / 2) / 2)  # |[w]x|^2 = 2 |w|^2
     return energies
 
@@ -126,28 +125,28 @@ class _PartPoints(NamedTuple):
 
 
 def _points_of_parts(group: Group) -> list[_PartPoints]:
-    """Return all contact points, together those of each part, or those of each side where moments are symbols."""
+    """Return all contact points, grouped by part, or by side if moments are symbols."""
     sides = [_points_of_side(side) for side in group.sides]
-    together: dict[int, _PartPoints] = {}
+    points_by_part: dict[int, _PartPoints] = {}
     for points in sides:
         if isinstance(points.centre, ca.SX) or isinstance(points.moments, ca.SX):
             return sides
-        first = together.get(points.part, points._replace(moments=np.zeros(MOMENTS)))
-        moments = first.moments + moments_about(np.asarray(first.centre), points.moments, points.centre)
-        together[points.part] = first._replace(moments=moments)
-    return list(together.values())
+        total = points_by_part.get(points.part, points._replace(moments=np.zeros(MOMENTS)))
+        moments = total.moments + moments_about(np.asarray(total.centre), points.moments, points.centre)
+        points_by_part[points.part] = total._replace(moments=moments)
+    return list(points_by_part.values())
 
 
 def _points_of_side(side: Side) -> _PartPoints:
     return _PartPoints(side.part, side.centre, side.all_moments)
 
 
-def _displaced(setting: Setting, points: _PartPoints, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
-    """Return the displacement energy of points, relative to the free part that theirs is located on, if any."""
-    group, (part, centre, moments) = setting.group, points
+def _displaced(system: GroupEquations, points: _PartPoints, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
+    """Return the displacement energy of points, relative to the free part that their part is located on, if any."""
+    group, (part, centre, moments) = system.group, points
     supporting = group.mobilities[part].movers[:-1]
     if not supporting:
         return displacement_energy(ca.SX(moments), centre, start[part], end[part])
     support = group.position(group.free[supporting[-1]])
-    end_relative = setting.linear(relative(end[part], end[support]))
+    end_relative = system.linear(relative(end[part], end[support]))
     return displacement_energy(ca.SX(moments), centre, relative(start[part], start[support]), end_relative)

@@ -12,10 +12,10 @@ from tolcontact import poses
 
 ENTRIES = poses.ENTRIES
 
-Number = float | ca.SX  # a number of the model, or its symbol in a function that serves many pairs
+Number = float | ca.SX  # a number of the model, or its symbol in a function that several pairs share
 Vector = np.ndarray | ca.SX
 
-# Keeps sqrt differentiable at rest; its square root is far below any angle, and the series below stay exact with it.
+# Keeps sqrt differentiable at theta = 0. Its square root is far below any angle, so the formulas below stay exact.
 _TINY = 1e-300
 
 
@@ -39,7 +39,7 @@ class Pose(NamedTuple):
 
 
 def constant(values: Vector) -> ca.SX | ca.DM:
-    """Return numbers (n,) as a CasADi matrix (n, 1); symbols stay as they are."""
+    """Return numbers (n,) as a CasADi matrix (n, 1); symbols are returned unchanged."""
     return values if isinstance(values, ca.SX) else ca.DM(values)
 
 
@@ -49,7 +49,7 @@ def pose_of(vector: ca.SX) -> Pose:
 
 
 def poses_of(vector: ca.SX) -> list[Pose]:
-    """Return the poses whose entries stand one after the other in `vector`."""
+    """Return the poses whose entries are concatenated in `vector`."""
     return [pose_of(part) for part in ca.vertsplit(vector, ENTRIES)]
 
 
@@ -62,7 +62,7 @@ def rotation(theta: ca.SX) -> ca.SX:
 
 
 def nearest_rotation(R: ca.SX, steps: int = 4) -> ca.SX:
-    """Return the rotation nearest to a matrix R (3, 3) that is nearly one, by Newton's iteration for its polar factor."""
+    """Return the rotation nearest to a nearly orthogonal matrix R (3, 3), by Newton's iteration for its polar factor."""
     for _ in range(steps):
         R = R @ (3 * ca.SX.eye(3) - R.T @ R) / 2
     return R

@@ -1,7 +1,7 @@
-"""Silence for plugins, which print banners and messages that no option turns off for good.
+"""Suppression of plugin output: banners and messages that no option turns off reliably.
 
-CasADi passes their output to Python's streams, in the thread that called it. While any thread is in `quiet`, other streams take
-their place, which pass on only the output of the other threads.
+CasADi passes plugin output to Python's streams, in the calling thread. While any thread is in `quiet`, these streams are
+replaced by streams that pass on only the output of the other threads.
 """
 
 import contextlib
@@ -11,11 +11,11 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Any
 
-CONSTRUCTION_LOCK = threading.RLock()  # CasADi's objects must be made one after the other, in all threads
+CONSTRUCTION_LOCK = threading.RLock()  # only one thread at a time may construct CasADi objects
 
 _LOCK = threading.Lock()
 _THREAD = threading.local()
-_inside = 0  # how many times threads are in `quiet`
+_depth = 0  # number of `quiet` contexts that are open in all threads
 
 
 class _Muffled:
@@ -31,24 +31,24 @@ class _Muffled:
         return getattr(self.stream, name)
 
 
-# The latest ones are kept alive: `print` in another thread holds no reference to the stream that it writes to.
-_kept: deque[_Muffled] = deque(maxlen=16)
+# The latest streams are kept alive: `print` in another thread holds no reference to the stream that it writes to.
+_streams: deque[_Muffled] = deque(maxlen=16)
 
 
 def _muffled(stream: Any) -> _Muffled:
-    for muffled in _kept:
+    for muffled in _streams:
         if muffled.stream is stream:
             return muffled
-    _kept.append(_Muffled(stream))
-    return _kept[-1]
+    _streams.append(_Muffled(stream))
+    return _streams[-1]
 
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
     """Drop the output of plugins in this thread; other threads print as before."""
-    global _inside  # noqa: PLW0603  the streams are global, so is their replacement
+    global _depth  # noqa: PLW0603  the streams are global, so is their replacement
     with _LOCK:
-        _inside += 1
+        _depth += 1
         for name in ("stdout", "stderr"):
             stream = getattr(sys, name)
             if stream is not None and not isinstance(stream, _Muffled):
@@ -59,8 +59,8 @@ def quiet() -> Iterator[None]:
     finally:
         _THREAD.depth -= 1
         with _LOCK:
-            _inside -= 1
-            for name in ("stdout", "stderr") if not _inside else ():
+            _depth -= 1
+            for name in ("stdout", "stderr") if not _depth else ():
                 stream = getattr(sys, name)
-                if isinstance(stream, _Muffled):  # else ours have been replaced meanwhile
+                if isinstance(stream, _Muffled):  # otherwise another replacement has been installed in the meantime
                     setattr(sys, name, stream.stream)

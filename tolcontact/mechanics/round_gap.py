@@ -1,4 +1,4 @@
-"""Gaps of round faces at any pose: a ball's centre, or the ends of a shaft's axis, beside a wall."""
+"""Gaps of round faces at any pose: of the centre of a ball, or the axis ends of a shaft, against a wall."""
 
 import functools
 from collections.abc import Sequence
@@ -18,66 +18,68 @@ TANGENT_TOLERANCE = 0.05  # rad: tangents within this angle count as one
 
 
 class RoundGaps(NamedTuple):
-    """The gaps of round points at X_RM, and their derivatives by z, which moves the parts.
+    """The gaps of round points at X_RM, and their derivatives by the increments z.
 
-    gaps       (point, 1) [mm]; where two tangents nearly agree, both have the gap of the nearer one
-    slopes     (point, z): their derivatives by z
-    bends      (12, 1): the sum of reactions times their derivatives by X_RM
-    bow        (z, z): the sum of reactions times their second derivatives for X_RM linear in z, without `wrap`
-    wrap       (z, z): the sum of reactions times the second derivatives that are due to bodies sliding along hollow walls;
-               positive semidefinite, and to be subtracted from `bow`
-    distances  (point, 1) [mm]: the gap of each point itself
+    gaps              (point, 1) [mm]; where two tangents nearly agree, both have the gap of the nearer one
+    slopes            (point, z): derivatives of the gaps by z
+    bends             (12, 1): sum of reaction times gap derivative by X_RM
+    curvature         (z, z): sum of reaction times second gap derivative, for X_RM linear in z, without `hollow_curvature`
+    hollow_curvature  (z, z): the part of that sum due to bodies sliding along hollow walls; positive semidefinite, and to be
+                      subtracted from `curvature`
+    distances         (point, 1) [mm]: the gap of each point, without regard to other tangents
     """
 
     gaps: ca.SX
     slopes: ca.SX
     bends: ca.SX
-    bow: ca.SX
-    wrap: ca.SX
+    curvature: ca.SX
+    hollow_curvature: ca.SX
     distances: ca.SX
 
 
-def round_gaps(points: RoundPoints, X_RM: ca.SX, heights: ca.SX, reactions: ca.SX, by_z: ca.SX) -> RoundGaps:
+def round_gaps(points: RoundPoints, X_RM: ca.SX, growths: ca.SX, reactions: ca.SX, by_z: ca.SX) -> RoundGaps:
     """Return the gaps of round points.
 
     X_RM       (12, 1)
-    heights    (2, 1) [mm] by which the moving and the reference face have grown
+    growths    (2, 1) [mm]: growth of the moving and the reference face
     reactions  (point, 1)
     by_z       (12, z): the derivatives of X_RM by z
     """
     bodies: list[_Body] = []
     gaps, slopes, distances = [], [], []
     loads, terms_of_points = ca.vertsplit(reactions), []
-    nearest: int | None = None  # the last tangent that turns along a hollow wall
-    known = list(points)
-    for k, point in enumerate(known):
+    nearest: int | None = None  # index of the last tangent that rotates along a hollow wall
+    entries = list(points)
+    for k, point in enumerate(entries):
         body = next((body for body in bodies if body.has(point)), None)
         if body is None:
             bodies.append(body := _Body(point, X_RM, by_z))
-        grown = heights if point.on_moving else heights[[1, 0]]
-        of_point = round_terms(point, body.place, body.station(point), grown)
-        terms_of_points.append((body, of_point))
-        gap, slope = of_point.gap, of_point.slope
+        growths_of_point = growths if point.on_moving else growths[[1, 0]]
+        terms = round_terms(point, body.coordinates, body.station(point), growths_of_point)
+        terms_of_points.append((body, terms))
+        gap, slope = terms.gap, terms.slope
         distances.append(gap)
         if point.is_hollow:
             nearest = k
-        elif nearest is not None and _is_at(point, known[nearest]) and _touches(point, known[nearest]):
-            # Otherwise either could carry, to a solver's accuracy, and the steps would not converge.
+        elif nearest is not None and _is_at(point, entries[nearest]) and _touches(point, entries[nearest]):
+            # Otherwise either could be active, to a solver's accuracy, and the steps would not converge.
             nearer = terms_of_points[nearest][1]
-            gap, slope, passed, kept = body.merged.call([gap, slope, nearer.gap, nearer.slope, body.squares, loads[k]])
-            loads[nearest], loads[k] = loads[nearest] + passed, kept
+            gap, slope, passed_load, kept_load = body.merged.call([
+                gap, slope, nearer.gap, nearer.slope, body.squares, loads[k]
+            ])  # fmt: skip
+            loads[nearest], loads[k] = loads[nearest] + passed_load, kept_load
         gaps.append(gap)
         slopes.append(slope @ body.by_z)
     if reactions.nnz():
-        for (body, of_point), load in zip(terms_of_points, loads, strict=True):
-            body.add(of_point, load)
+        for (body, terms), load in zip(terms_of_points, loads, strict=True):
+            body.add(terms, load)
     freedoms = by_z.size2()
     return RoundGaps(
         gaps=ca.vertcat(*gaps),
         slopes=ca.vertcat(*slopes),
         bends=sum((body.bends() for body in bodies), ca.SX(ENTRIES, 1)),
-        bow=sum((body.bow() for body in bodies), ca.SX(freedoms, freedoms)),
-        wrap=sum((body.wrap for body in bodies), ca.SX(freedoms, freedoms)),
+        curvature=sum((body.curvature() for body in bodies), ca.SX(freedoms, freedoms)),
+        hollow_curvature=sum((body.hollow_curvature for body in bodies), ca.SX(freedoms, freedoms)),
         distances=ca.vertcat(*distances),
     )
 
@@ -85,81 +87,81 @@ def round_gaps(points: RoundPoints, X_RM: ca.SX, heights: ca.SX, reactions: ca.S
 class _Body:
     """A ball or a shaft in the frame of the part that has the wall.
 
-    place          (n, 1): its centre, or a point of its axis and the axis
-    by_X, by_z     (n, 12), (n, z): the derivatives of `place`
-    squares        (n / 3, n / 3): by_X by_X' in blocks, which are these times the identity: no direction in space differs
-    merged         see _merged
-    wrap           (z, z): what closing walls subtract from the second derivative by z of the sum of loads times gaps
+    coordinates       (n, 1): its centre, or a point of its axis and the axis
+    by_X, by_z        (n, 12), (n, z): the derivatives of `coordinates`
+    squares           (n / 3, n / 3): by_X by_X' consists of 3 x 3 blocks, which are these numbers times the identity
+    merged            see _merged
+    hollow_curvature  (z, z): the part of the second derivative by z of the sum of load times gap that closing walls subtract
     """
 
     def __init__(self, point: RoundPoint, X_RM: ca.SX, by_z: ca.SX) -> None:
         self._point, self._X, self._X_by_z = point, X_RM, by_z
-        self._function = _place(bool(point.on_moving), bool(point.axis.any()))
-        self.place, self.by_X, _ = self._placed(ca.SX(self._function.size1_in("weights"), 1))
+        self._function = _coordinates(bool(point.on_moving), bool(point.axis.any()))
+        self.coordinates, self.by_X, _ = self._evaluated(ca.SX(self._function.size1_in("weights"), 1))
         self.by_z = self.by_X @ by_z
         rows = self.by_X[::3, :]
         self.squares, self.merged = rows @ rows.T, _merged(rows.size1())
-        size, freedoms = self.place.numel(), by_z.size2()
-        self._slope, self._bend, self.wrap = ca.SX(1, size), ca.SX(size, size), ca.SX(freedoms, freedoms)
+        size, freedoms = self.coordinates.numel(), by_z.size2()
+        self._slope, self._bend, self.hollow_curvature = ca.SX(1, size), ca.SX(size, size), ca.SX(freedoms, freedoms)
 
-    def _placed(self, weights: ca.SX) -> Sequence[ca.SX]:
-        """Return what the Function of the place returns for weights (n, 1)."""
+    def _evaluated(self, weights: ca.SX) -> Sequence[ca.SX]:
+        """Return the coordinates, their derivatives and weighted second derivative (see _coordinates) for weights (n, 1)."""
         return self._function.call([self._X, ca.SX(ca.DM(self._point.centre)), ca.SX(ca.DM(self._point.axis)), weights])
 
     def has(self, point: RoundPoint) -> bool:
-        """Return whether a point is of this ball, or beside this shaft."""
-        first = self._point
-        if point.on_moving != first.on_moving or (point.axis != first.axis).any():
+        """Return whether a point belongs to this ball or shaft."""
+        origin = self._point
+        if point.on_moving != origin.on_moving or (point.axis != origin.axis).any():
             return False
-        off_axis = point.centre - first.centre - self.station(point) * point.axis
-        size = np.linalg.norm(point.centre) + np.linalg.norm(first.centre)
+        off_axis = point.centre - origin.centre - self.station(point) * point.axis
+        size = np.linalg.norm(point.centre) + np.linalg.norm(origin.centre)
         return bool(np.linalg.norm(off_axis) <= ROUNDING * size)
 
     def station(self, point: RoundPoint) -> float:
-        """Return the place [mm] of a point on the axis of a shaft, from that of its first point."""
+        """Return the coordinate [mm] of a point along the axis of a shaft, from its first point."""
         return float((point.centre - self._point.centre) @ point.axis)
 
-    def add(self, of_point: Terms, load: ca.SX) -> None:
-        """Add the terms of a point that pushes with a load."""
-        self._slope += load * of_point.slope
-        self._bend += load * of_point.bend
-        sliding = of_point.sliding @ self.by_z
-        self.wrap += congruent(load * of_point.closing * ca.SX.eye(sliding.size1()), sliding)
+    def add(self, terms: Terms, load: ca.SX) -> None:
+        """Add the terms of a point under a load."""
+        self._slope += load * terms.slope
+        self._bend += load * terms.bend
+        sliding = terms.sliding @ self.by_z
+        self.hollow_curvature += congruent(load * terms.closing * ca.SX.eye(sliding.size1()), sliding)
 
     def bends(self) -> ca.SX:
-        """Return the derivative (12, 1) by X_RM of the sum of loads times gaps."""
+        """Return the derivative (12, 1) by X_RM of the sum of load times gap."""
         return self.by_X.T @ self._slope.T
 
-    def bow(self) -> ca.SX:
-        """Return its second derivative (z, z), without closing walls."""
-        *_, turning = self._placed(self._slope.T)
-        one_sided = self._X_by_z.T @ ca.triu(turning) @ self._X_by_z  # each entry of X_RM enters linearly
+    def curvature(self) -> ca.SX:
+        """Return the second derivative (z, z) of the sum of load times gap, without closing walls."""
+        *_, coordinate_curvature = self._evaluated(self._slope.T)
+        one_sided = self._X_by_z.T @ ca.triu(coordinate_curvature) @ self._X_by_z  # each entry of X_RM enters linearly
         return one_sided + one_sided.T + congruent(self._bend, self.by_z)
 
 
 @functools.cache
-def _place(on_moving: bool, has_axis: bool) -> ca.Function:
+def _coordinates(on_moving: bool, has_axis: bool) -> ca.Function:
     """Return a Function of X_RM (12), the nominal centre (3) and axis (3) of a ball or shaft, and weights (n).
 
-    Its results are those of _Body: place (n), by_X (n, 12), and turning (12, 12), the second derivative by X_RM of
-    weights'place.
+    Its results are the coordinates (n) and by_X (n, 12) of _Body, and coordinate_curvature (12, 12), the second derivative by
+    X_RM of weights'coordinates.
     """
     X, centre, axis = ca.SX.sym("X_RM", ENTRIES), ca.SX.sym("centre", 3), ca.SX.sym("axis", 3)
     pose = pose_of(X)
     if not on_moving:
         pose = Pose(pose.R.T, -(pose.R.T @ pose.t))
-    place = pose.apply(centre)
+    coordinates = pose.apply(centre)
     if has_axis:
-        place = ca.vertcat(place, pose.R @ axis)
-    weights = ca.SX.sym("weights", place.numel())
-    turning, _ = ca.hessian(ca.dot(weights, place), X)
+        coordinates = ca.vertcat(coordinates, pose.R @ axis)
+    weights = ca.SX.sym("weights", coordinates.numel())
+    coordinate_curvature, _ = ca.hessian(ca.dot(weights, coordinates), X)
     inputs = {"X_RM": X, "centre": centre, "axis": axis, "weights": weights}
-    outputs = {"place": place, "by_X": ca.jacobian(place, X), "turning": turning}
-    return ca.Function("place", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs])
+    outputs = {"coordinates": coordinates, "by_X": ca.jacobian(coordinates, X), "coordinate_curvature": coordinate_curvature}
+    return ca.Function("coordinates", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs])
 
 
 def _is_at(point: RoundPoint, other: RoundPoint) -> bool:
-    """Return whether two points are of one ball, or of one end of a shaft."""
+    """Return whether two points belong to the same ball, or the same end of a shaft."""
     is_same = (point.centre == other.centre).all() and (point.axis == other.axis).all()
     return bool(is_same and point.on_moving == other.on_moving)
 
@@ -169,32 +171,33 @@ def _touches(plane: RoundPoint, hollow: RoundPoint) -> bool:
     wall, n = hollow.wall, plane.wall.axis
     if plane.wall.kind != "plane":
         return False
-    offset = float(n @ (plane.wall.origin - wall.origin)) + wall.radius  # n looks inward
-    lean = 0.0 if wall.kind == "sphere" else float(n @ wall.axis) - np.sin(wall.angle)
-    return abs(offset) < TOLERANCE * plane.radius and abs(lean) < TOLERANCE
+    offset = float(n @ (plane.wall.origin - wall.origin)) + wall.radius  # n points inward
+    tilt = 0.0 if wall.kind == "sphere" else float(n @ wall.axis) - np.sin(wall.angle)
+    return abs(offset) < TOLERANCE * plane.radius and abs(tilt) < TOLERANCE
 
 
 @functools.cache
 def _merged(vectors: int) -> ca.Function:
-    """Return a Function of the gaps and slopes of a fixed tangent and of the nearest one, and of the fixed one's load.
+    """Return a Function of the gaps and slopes of a fixed and the nearest tangent, and the load of the fixed tangent.
 
-    Its results are gap and slope of the fixed tangent, which are those of the nearest one if they have nearly the same
-    direction, the load that it passes on to that one then, and the load that it keeps. The place has a number of `vectors`,
-    centre and axis, of which `squares` (vector, vector) gives the derivatives by X_RM.
+    Its results are the gap and slope of the fixed tangent, the load that it passes to the nearest tangent, and the load that it
+    keeps. If both tangents have nearly the same direction, the fixed one takes gap and slope of the nearest one, and passes its
+    load. The coordinates are those of one or two `vectors`, the centre and the axis. `squares` (vector, vector) are the
+    products of their derivatives by X_RM (see _Body).
     """
     gap, nearest_gap, load = (ca.SX.sym(name) for name in ("gap", "nearest_gap", "load"))
     slope, nearest_slope = (ca.SX.sym(name, 1, 3 * vectors) for name in ("slope", "nearest_slope"))
     squares = ca.SX.sym("squares", vectors, vectors)
 
-    def square(by_place: ca.SX) -> ca.SX:
-        by_vector = ca.reshape(by_place, 3, vectors)
+    def square(by_coordinates: ca.SX) -> ca.SX:
+        by_vector = ca.reshape(by_coordinates, 3, vectors)
         return ca.dot(squares, by_vector.T @ by_vector)
 
-    is_alike = square(slope - nearest_slope) < TANGENT_TOLERANCE**2 * square(slope)
+    is_parallel = square(slope - nearest_slope) < TANGENT_TOLERANCE**2 * square(slope)
     results = [
-        ca.if_else(is_alike, nearest_gap, gap),
-        ca.if_else(is_alike, nearest_slope, slope),
-        ca.if_else(is_alike, load, 0),
-        ca.if_else(is_alike, 0, load),
+        ca.if_else(is_parallel, nearest_gap, gap),
+        ca.if_else(is_parallel, nearest_slope, slope),
+        ca.if_else(is_parallel, load, 0),
+        ca.if_else(is_parallel, 0, load),
     ]
     return ca.Function("merged", [gap, slope, nearest_gap, nearest_slope, squares, load], results)

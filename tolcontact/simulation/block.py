@@ -3,6 +3,7 @@
 import enum
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +15,60 @@ from tolcontact.contact.record import Record, join_groups, untouched_numbers
 from tolcontact.mechanics import ENTRIES
 from tolcontact.readable import Readable
 from tolcontact.simulation.bodies import watched_bodies
-from tolcontact.simulation.sequence import Beginning, hand_over, stages
 from tolcontact.vocabulary import CORRECTED, RAW, Status
+
+
+class Stage(NamedTuple):
+    """A station in the sequence of a program; a program without stations has one stage, which places nothing again.
+
+    position   its position among the stations
+    groups     indices of its contact groups
+    """
+
+    position: int
+    groups: tuple[int, ...]
+
+
+class InitialPoses(NamedTuple):
+    """The poses before contact of the stations is resolved.
+
+    poses     (realization, part, 12)
+    relative  (realization, pair, 12): X_RM of the pairs
+    """
+
+    poses: Float[Array, "realization part 12"]
+    relative: Float[Array, "realization pair 12"]
+
+
+def stages(program: Program) -> list[Stage]:
+    """Return the stages of a program, in their order."""
+    if not program.stations:
+        return [Stage(0, tuple(range(len(program.groups))))]
+    return [Stage(position, station.groups) for position, station in enumerate(program.stations)]
+
+
+def hand_over(
+    program: Program,
+    stage: Stage,
+    rows: np.ndarray,
+    initial: InitialPoses,
+    corrected: Float[Array, "realization part 12"],
+    deviations: Float[Array, "realization contributor"],
+) -> bool:
+    """Place the joints of a station again if contact in earlier stations has changed them, and return whether it did.
+
+    rows        (row,) realizations that contact in earlier stations has changed
+    initial     initial poses; the poses of this station are replaced
+    corrected   corrected poses of earlier stations, and raw poses of this station, which are replaced, too
+    """
+    station = program.stations[stage.position] if program.stations else None
+    if station is None or station.place is None or not rows.size:
+        return False
+    placed = station.place(poses=corrected[rows[:, None], station.sources], deviations=deviations[rows])
+    poses = placed["placed"].reshape(len(rows), len(station.parts), ENTRIES)
+    corrected[rows[:, None], station.parts] = initial.poses[rows[:, None], station.parts] = poses
+    initial.relative[rows[:, None], station.pairs] = placed["relative"].reshape(len(rows), len(station.pairs), ENTRIES)
+    return True
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -25,20 +78,20 @@ class Block(Record, Readable):
     deviations    (n, contributor), in mm or the units of the contributor
     poses         (n, state, part, 12): R row by row, t [mm]
     measured      (n, state, measure)
-    gap_min       (n, state, pair) [mm]: least true gap (5) of all contact points at the archived poses
+    gap_min       (n, state, pair) [mm]: smallest true gap (5) of all contact points at the archived poses
     active        (n, pair): number of active contact points in the raw state
     carrying      (n, pair): number of contact points under load: with more than 1e-4 of the largest reaction
-    reaction      (n, pair): sum of their reactions, in the units of the objective
+    reaction      (n, pair): sum of the reactions of these points, in the units of the objective
     clashes       (n,): number of pairs of parts without declared contact that lie in each other in the corrected state; -1 if
                   they were not tested
-    clash_depth   (n,) [mm]: how deep the parts of the deepest of these pairs do, NaN if that is not measured; clash_part,
-                  clash_other (n,) are their indices among the parts of the assembly, -1 for none. Without such a pair they name
-                  parts with declared contact that make the answer doubtful
-    status        (n,), Status: with stations, that of the worst station
+    clash_depth   (n,) [mm]: penetration of the deepest of these pairs, NaN if it is not measured; clash_part, clash_other (n,)
+                  are the indices of its parts in the assembly, -1 if there is none. Without such a pair they name parts with
+                  declared contact that make the answer doubtful
+    status        (n,), Status: with stations, the status of the worst station
     station_status  (n, station), Status
 
-    With stations, parts and pairs are those of all stations, one after the other, and measures as well.
-    The numbers of the record (kkt_residual, iterations, starts, second_answers, searched) are 0 if contact touches nothing.
+    With stations, the parts, pairs and measures of all stations are concatenated.
+    The diagnostics of the record (kkt_residual, iterations, starts, second_answers, searched) are 0 if there is no contact.
     """
 
     start: int
@@ -101,7 +154,7 @@ class Block(Record, Readable):
 
     @classmethod
     def joined(cls, blocks: Iterable["Block"]) -> "Block":
-        """Return blocks that follow each other as one."""
+        """Return consecutive blocks as one."""
         parts = list(blocks)
         names = [entry.name for entry in fields(cls) if entry.name != "start"]
         return cls(start=parts[0].start, **{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
@@ -113,7 +166,7 @@ def outcomes(block: Block) -> tuple[Float[Array, "n state measure"], Int[Array, 
 
 
 class Outcome(enum.IntEnum):
-    """The outcome of a realization in one group, the worse the higher: the worst of all groups decides its status."""
+    """The outcome of a realization in one group, in ascending order of severity: the worst of all groups decides its status."""
 
     UNTOUCHED = 0
     RESOLVED = 1
@@ -138,14 +191,15 @@ def simulate_block(
     block = Block.untouched(start, deviations, raw, measured, len(program.nominal.pairs), len(program.stations))
     sequence = stages(program)
     outcomes_by_stage = np.zeros((len(block), len(sequence)), dtype=np.int8)
-    begin, is_unknown = Beginning(raw, relative), ~np.isfinite(raw).all(axis=(1, 2))  # gaps that are not numbers touch nothing
+    # NaN gaps count as no contact, so realizations with NaN poses are marked as unsolved below.
+    initial, is_unknown = InitialPoses(raw, relative), ~np.isfinite(raw).all(axis=(1, 2))
     raw_relative = relative.copy() if program.stations else relative
     for stage in sequence:
-        worst = outcomes_by_stage[:, stage.number]
+        worst = outcomes_by_stage[:, stage.position]
         changed = np.flatnonzero(outcomes_by_stage.any(axis=1))
-        is_placed_again = hand_over(program, stage, changed, begin, block.poses[:, CORRECTED], deviations)
-        for resolver in (resolvers[number] for number in stage.groups):
-            resolved = resolver.resolve(begin.poses, begin.relative, deviations)
+        is_placed_again = hand_over(program, stage, changed, initial, block.poses[:, CORRECTED], deviations)
+        for resolver in (resolvers[index] for index in stage.groups):
+            resolved = resolver.resolve(initial.poses, initial.relative, deviations)
             _put(block, resolver, resolved)
             if is_placed_again:
                 _put_raw(block, resolver, changed, raw_relative)
@@ -166,7 +220,7 @@ def simulate_block(
         for station, rows in bodies.withdrawn:
             worst = outcomes_by_stage[:, station]
             worst[rows] = np.where(worst[rows] <= Outcome.RESOLVED, Outcome.DOUBTFUL, worst[rows])
-    is_unknown |= ~np.isfinite(begin.poses).all(axis=(1, 2))
+    is_unknown |= ~np.isfinite(initial.poses).all(axis=(1, 2))
     outcomes_by_stage[is_unknown], block.kkt_residual[is_unknown] = Outcome.UNSOLVED, np.inf
     worst = outcomes_by_stage.max(axis=1)
     touched = worst > Outcome.UNTOUCHED
@@ -187,7 +241,7 @@ def _put(block: Block, resolver: ContactResolver, resolved: Resolved) -> None:
 
 
 def _put_raw(block: Block, resolver: ContactResolver, rows: np.ndarray, relative: Float[Array, "n pair 12"]) -> None:
-    """Write gaps and active points of the raw state of some rows, whose contact began at handed-over poses."""
+    """Write gaps and active points of the raw state for rows whose contact was resolved from handed-over poses."""
     gaps, active = resolver.raw_contact(relative[rows], block.deviations[rows])
     block.gap_min[rows[:, None], RAW, resolver.pairs] = gaps
     block.active[rows[:, None], resolver.pairs] = active
@@ -196,12 +250,12 @@ def _put_raw(block: Block, resolver: ContactResolver, rows: np.ndarray, relative
 def _outcome(resolved: Resolved) -> Int[Array, " n"]:
     """Return the Outcome of each touched realization (n,)."""
     state = resolved.state
-    answered = np.where(state.doubtful, Outcome.DOUBTFUL, np.where(state.in_conflict, Outcome.IN_CONFLICT, Outcome.RESOLVED))
-    return np.where(state.solved, answered, Outcome.UNSOLVED)
+    solved = np.where(state.doubtful, Outcome.DOUBTFUL, np.where(state.in_conflict, Outcome.IN_CONFLICT, Outcome.RESOLVED))
+    return np.where(state.solved, solved, Outcome.UNSOLVED)
 
 
 def _statuses(is_exact: bool) -> np.ndarray:
-    """Return the Status for each Outcome. Only repeated steps can tell that no pose is free of penetration."""
+    """Return the Status for each Outcome. Only repeated steps can show that no pose is free of penetration."""
     conflict = Status.NOT_ASSEMBLABLE if is_exact else Status.NOT_CONVERGED
     return np.array([Status.UNTOUCHED, Status.RESOLVED, conflict, Status.DOUBTFUL, Status.NOT_CONVERGED], dtype=np.int8)
 

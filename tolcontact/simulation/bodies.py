@@ -1,4 +1,4 @@
-"""The watch over all bodies of a block: it withdraws certificates of pairs that lie in each other, and counts other clashes."""
+"""The watch over all bodies of a block: it withdraws certificates of penetrating pairs, and counts other clashes."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -9,8 +9,8 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import Program
 from tolcontact.interference import Clash
 
-MAX_TRIANGLES = 1000  # of two bodies whose depth is measured in every realization; it takes milliseconds if there are more
-MEASURED_STEP = 16  # realizations: that of others is measured where this divides the number of the realization
+MAX_TRIANGLES = 1000  # of two bodies: with more, measuring their depth takes milliseconds
+MEASURED_STEP = 16  # realizations: the depth of bodies with more triangles is measured in every 16th realization
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,8 +19,8 @@ class WatchedBodies:
 
     withdrawn   stations, and the rows (k,) in which bodies with declared contact there lie in each other
     clashes     (n,) number of pairs of parts without declared contact that lie in each other
-    depth       (n,) [mm]: how deep those of the deepest of these pairs do; 0 for none, NaN if it is not measured
-    part, other (n,) their indices among the parts of the assembly; -1 for none
+    depth       (n,) [mm]: penetration of the deepest of these pairs; 0 for none, NaN if it is not measured
+    part, other (n,) indices of the parts of this pair in the assembly; -1 for none
     """
 
     clashes: Int[Array, " n"]
@@ -35,7 +35,7 @@ class WatchedBodies:
         return cls(np.zeros(count, dtype=int), np.zeros(count), np.full(count, -1), np.full(count, -1))
 
     def name(self, rows: Int[Array, " k"], depths: Float[Array, " k"], parts: tuple[int, int]) -> None:
-        """Take two parts, with depths (k,) [mm], for the deepest ones in rows (k,) in which they are."""
+        """Record two parts, with depths (k,) [mm], as the deepest pair in each of the rows (k,) where they are."""
         is_deeper = (self.part[rows] < 0) | (np.nan_to_num(depths) > np.nan_to_num(self.depth[rows]))
         deepest = rows[is_deeper]
         self.depth[deepest], self.part[deepest], self.other[deepest] = depths[is_deeper], *parts
@@ -53,9 +53,9 @@ def watched_bodies(
 ) -> WatchedBodies:
     """Return which bodies lie in each other at poses (n, part, 12) of realizations `start` to `start + n`.
 
-    Pairs of bodies that were `tested` before are left out where answers are certified. A pair of parts counts once, also if it
-    lies in each other in several stations. Pairs that do nominally do not count. Where none counts, bodies with declared
-    contact are named whose answer is doubtful, or will be.
+    Pairs of bodies that were already `tested` are skipped where answers are certified. A pair of parts counts once, even if it
+    penetrates in several stations. Pairs that penetrate nominally do not count. If no pair counts, bodies with declared contact
+    are named where the answer is doubtful, or becomes doubtful because of them.
     """
     watch, nominal, count = program.watch, program.nominal, len(poses)
     stations = [scene.station for scene in nominal.scenes] or [""]
@@ -83,7 +83,7 @@ def watched_bodies(
 
 
 def _parts(program: Program, clash: Clash) -> tuple[int, int]:
-    """Return the indices of two bodies among the parts of the assembly, the smaller one first."""
+    """Return the indices of two bodies among the parts of the assembly, in ascending order."""
     part, other = sorted(program.nominal.number(index) for index in clash.pair)
     return part, other
 
@@ -91,9 +91,9 @@ def _parts(program: Program, clash: Clash) -> tuple[int, int]:
 def _depths(
     program: Program, clash: Clash, poses: Float[Array, "n part 12"], deviations: Float[Array, "n contributor"], start: int
 ) -> Float[Array, " k"]:
-    """Return how deep (k,) [mm] two bodies lie in each other; NaN where that is not measured, since it would take long.
+    """Return the penetration (k,) [mm] of two bodies; NaN in realizations where it is not measured, to save time.
 
-    Whether it is depends on the number of a realization alone, so that it is the same in every block.
+    This choice depends only on the index of a realization in the run, so that results do not depend on the block size.
     """
     triangles = sum(len(program.nominal.parts[body].mesh.faces) for body in clash.pair)
     is_measured = np.full(len(clash.rows), triangles <= MAX_TRIANGLES) | ((start + clash.rows) % MEASURED_STEP == 0)

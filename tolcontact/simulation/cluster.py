@@ -1,8 +1,8 @@
 """Blocks of realizations on the workers of a dask cluster, in order, and the same to the last bit as in one process.
 
-A worker gets a model as discretized numbers, once, and compiles it itself. It simulates shards: some blocks, which take about a
-second. A bounded number of shards is under way, so memory does not grow with the number of realizations. Shards of workers
-that are lost are simulated again by others, as dask has it. Shards that a restarted scheduler does not know are sent again.
+A worker receives the discretized model once, and compiles it. It simulates shards: several blocks that take about a second
+together. A bounded number of shards is in progress, so memory does not grow with the number of realizations. Dask reassigns
+shards of lost workers to other workers. Shards that a restarted scheduler does not know are submitted again.
 """
 
 import logging
@@ -36,10 +36,10 @@ dask = lazy_loader.load("dask", error_on_import=False)
 distributed = lazy_loader.load("distributed", error_on_import=False)
 log = logging.getLogger(__name__)
 
-SHARDS_AHEAD = 4  # under way for each thread of a worker
+SHARDS_AHEAD = 4  # shards in progress for each thread of a worker
 SHARD_SECONDS, MAX_SHARD_ROWS = 1.0, 1 << 15
 WORKER_TIMEOUT = 60.0  # s: for a lost connection, and for the first worker
-LOOPBACK = "127.0.0.1:0"  # any port; by default, pages of a cluster are served on all interfaces
+LOOPBACK = "127.0.0.1:0"  # any port; by default, the dashboard of a cluster is served on all interfaces
 LOOP_TIMEOUT, SCHEDULER_TIMEOUT = 1.0, 5.0  # s: for the end of an event loop, for an answer of the scheduler
 
 T = TypeVar("T")
@@ -48,7 +48,7 @@ MapBlocks = Callable[..., Iterator[Any]]  # `map_blocks`, or the same on workers
 
 @contextmanager
 def client_of(workers: int | None, scheduler: str | None) -> Iterator[Any]:
-    """Open the client of new processes on this machine, or of a running scheduler; None if there is neither."""
+    """Open the client of new processes on this machine, or of a running scheduler; yield None if neither is given."""
     if workers is not None and scheduler is not None:
         raise OptionError("workers are started here, a scheduler has its own; choose one of --workers and --scheduler")
     if workers is not None:
@@ -63,43 +63,43 @@ def client_of(workers: int | None, scheduler: str | None) -> Iterator[Any]:
 
 @contextmanager
 def local_cluster(workers: int) -> Iterator[Any]:
-    """Open the client of new processes on this machine, with one thread each; they end with it, however it ends."""
+    """Open the client of new processes on this machine, with one thread each; they always end with the client."""
     if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
         raise OptionError(f"workers is {workers!r}; expected a whole number, at least 1")
     with needs_dask():
-        started, security = distributed.LocalCluster, distributed.Security.temporary()
-        usual = dask.config.get("distributed.nanny.pre-spawn-environ")
+        local_cluster_type, security = distributed.LocalCluster, distributed.Security.temporary()
+        default_environ = dask.config.get("distributed.nanny.pre-spawn-environ")
     settings = {
-        # Dask makes workers give back every freed array to the system at once, which takes them half as long again.
+        # By default, workers return every freed array to the system at once, which makes them take 50 % longer.
         "distributed.nanny.pre-spawn-environ": {
-            name: value for name, value in usual.items() if name != "MALLOC_TRIM_THRESHOLD_"
+            name: value for name, value in default_environ.items() if name != "MALLOC_TRIM_THRESHOLD_"
         },
-        # It gives up a worker for good that is lost and 15 s later is lost again; here all are begun again, however often.
+        # By default, a worker that is lost again within 15 s is not restarted; here all workers are restarted, however often.
         "distributed.deploy.lost-worker-timeout": "1000 days",
-        "distributed.worker.profile.enabled": False,  # which takes a twentieth of their time
+        "distributed.worker.profile.enabled": False,  # profiling takes 5 % of their time
     }
     with dask.config.set(settings), _event_loop() as loop:
         try:
-            cluster = started(
+            cluster = local_cluster_type(
                 n_workers=workers, threads_per_worker=1, processes=True, memory_limit=0, silence_logs=logging.CRITICAL,
-                # Any user of this machine can reach the scheduler, which runs the code of whoever has the credentials.
+                # Any user of this machine can reach the scheduler, which runs code for everyone who has the credentials.
                 security=security, dashboard_address=LOOPBACK, worker_dashboard_address=LOOPBACK, loop=loop,
             )  # fmt: skip
         except (OSError, RuntimeError) as error:
             raise ClusterError(f"worker processes cannot be started: {error.__cause__ or error}") from error
         with cluster, distributed.Client(cluster) as client:
-            _say_where(client)
+            _log_dashboard(client)
             yield client
 
 
 @contextmanager
 def _event_loop() -> Iterator[Any]:
-    """Yield an event loop for a cluster. Ctrl-C in a terminal goes to its processes, too; there it is blocked.
+    """Yield an event loop for a cluster with SIGINT blocked, since a terminal sends Ctrl-C to all processes of the cluster.
 
-    A thread inherits the signals that are blocked in the thread that starts it, and a process those of its parent's thread.
+    A thread inherits its blocked signals from the thread that starts it, and a process from the parent's thread.
     """
     runner = distributed.utils.LoopRunner()
-    resource_tracker.ensure_running()  # the thread that starts it has SIGINT unblocked
+    resource_tracker.ensure_running()  # start it while SIGINT is not blocked in this thread
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         runner.start()
@@ -108,11 +108,11 @@ def _event_loop() -> Iterator[Any]:
     try:
         yield runner.loop
     finally:
-        with suppress(TimeoutError):  # of a cluster that was stopped while it began; its processes end with this one
+        with suppress(TimeoutError):  # if a cluster was stopped during its start; its processes end with this process
             runner.stop(timeout=LOOP_TIMEOUT)
 
 
-def _say_where(client: Any) -> None:
+def _log_dashboard(client: Any) -> None:
     if find_spec("bokeh"):
         log.warning("dask dashboard: %s", client.dashboard_link)
 
@@ -128,12 +128,13 @@ def running_cluster(address: str) -> Iterator[Any]:
             )
         try:
             distributed.Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False).close()
-            client = distributed.Client(address, timeout=WORKER_TIMEOUT, set_as_default=False)  # waits as long for a lost one
+            # The timeout is also how long this client waits for a lost scheduler.
+            client = distributed.Client(address, timeout=WORKER_TIMEOUT, set_as_default=False)
         except (OSError, ValueError) as error:
             advice = "start one with: dask scheduler; if it asks for certificates, its address begins with tls://"
             raise ClusterError(f'no dask scheduler answers at "{address}": {error}; {advice}') from error
-    with _silent("distributed.client"), client:  # a lost scheduler is told here
-        _say_where(client)
+    with _silent("distributed.client"), client:  # this module reports a lost scheduler
+        _log_dashboard(client)
         yield client
 
 
@@ -150,7 +151,7 @@ def _silent(name: str) -> Iterator[None]:
 
 @contextmanager
 def needs_dask() -> Iterator[None]:
-    """Raise OptionError if dask turns out not to be installed."""
+    """Raise OptionError if dask is not installed."""
     try:
         yield
     except ImportError as error:
@@ -163,17 +164,17 @@ def mapping(client: Any) -> MapBlocks:
 
 
 def threads_of(client: Any) -> int:
-    """Return how many blocks are simulated together: by this process, or by the workers of a client."""
+    """Return the number of blocks that are simulated in parallel, by this process or by the workers of a client."""
     return processors() if client is None else max(1, sum(map(int, client.nthreads().values())))
 
 
 class Workers:
-    """`map_blocks` on the workers of a client. They get a program once, however often it is simulated.
+    """`map_blocks` on the workers of a client. They receive a program once, however often it is simulated.
 
-    Raises ClusterError if there are no workers, if one has other versions than this process, or if none comes through a shard;
-    and any error of a shard.
+    Raises ClusterError if there are no workers, if the versions of a worker differ from this process, or if a shard repeatedly
+    ends its worker; raises any error of a shard.
 
-    timeout   how long [s] a lost connection, and the first worker, are waited for
+    timeout   time limit [s] for a lost connection, and for the first worker
     """
 
     def __init__(self, client: Any, timeout: float = WORKER_TIMEOUT) -> None:
@@ -185,20 +186,20 @@ class Workers:
         self, function: Callable[[Block], T], program: Program, *, samples: int, seed: int, start: int = 0,
         block: int | None = None, draws: Sampler | None = None,
     ) -> Iterator[T]:  # fmt: skip
-        """Yield what `function` makes of each block of `simulate_blocks` where it is simulated; in order."""
+        """Yield the result of `function` for each block of `simulate_blocks`, in order; it is called on the workers."""
         job = Packed.of((draws or program.draws, function), program.nominal)
         shards = _Shards(self._client, self._sent(program), job, seed, samples, block or block_rows(program), self._timeout)
         try:
-            begin = start
-            while begin < samples or shards:
-                while begin < samples and len(shards) < SHARDS_AHEAD * shards.threads:
-                    begin = shards.begin(begin)
+            position = start
+            while position < samples or shards:
+                while position < samples and len(shards) < SHARDS_AHEAD * shards.threads:
+                    position = shards.begin(position)
                 yield from shards.finish()
         finally:
             shards.cancel()
 
     def get_ready(self, function: Callable[[Block], Any], program: Program) -> None:
-        """Make all present workers import and compile what they need; otherwise their first shard takes longer."""
+        """Make all present workers import and compile the program; otherwise their first shard takes longer."""
         model, job = self._sent(program).packed, Packed.of(function, program.nominal)
         self._client.run(prepare_worker, model, job.data)
 
@@ -209,7 +210,7 @@ class Workers:
 
 
 class _Model:
-    """A program that workers compile; what they need for it is a result that they pass on to each other."""
+    """A program that workers compile; its packed model is a dask result, which workers pass on to each other."""
 
     def __init__(self, client: Any, program: Program) -> None:
         self._client, self.program = client, program
@@ -222,7 +223,7 @@ class _Model:
 
 
 def check_workers(client: Any, timeout: float = WORKER_TIMEOUT) -> None:
-    """Raise ClusterError unless a worker comes within `timeout` [s], and all have the versions of this process."""
+    """Raise ClusterError unless a worker connects within `timeout` [s], and all have the versions of this process."""
     try:
         client.wait_for_workers(1, timeout=timeout)
     except TimeoutError as error:
@@ -237,14 +238,14 @@ def check_workers(client: Any, timeout: float = WORKER_TIMEOUT) -> None:
 
 
 def shard_result(client: Any, future: Any, timeout: float = WORKER_TIMEOUT) -> Any:
-    """Return the result of a shard; wait for it as long as there are workers, and `timeout` [s] without any."""
+    """Return the result of a shard; wait for it while there are workers, and up to `timeout` [s] without any."""
     last_contact = time.monotonic()
     while True:
         try:
             return future.result(timeout=SCHEDULER_TIMEOUT)
         except TimeoutError:
             if future.status == "error":
-                return future.result()  # which raises what the shard raised
+                return future.result()  # raises the error of the shard
             if client.nthreads():
                 last_contact = time.monotonic()
             elif time.monotonic() > last_contact + timeout:
@@ -254,57 +255,57 @@ def shard_result(client: Any, future: Any, timeout: float = WORKER_TIMEOUT) -> A
 
 
 class _Shards:
-    """Shards that are under way, in their order."""
+    """Shards in progress, in order."""
 
     def __init__(self, client: Any, model: _Model, job: Packed, seed: int, samples: int, block: int, timeout: float) -> None:
         self._client, self._model, self._job = client, model, job
         self._seed, self._samples, self._block, self._timeout = seed, samples, block, timeout
         self._blocks = 1  # of the next shard
-        self._begun: deque[tuple[int, int, Any]] = deque()
+        self._pending: deque[tuple[int, int, Any]] = deque()
         self._send_job()
 
     def __len__(self) -> int:
-        return len(self._begun)
+        return len(self._pending)
 
     @property
     def threads(self) -> int:
-        """The number of shards that can be simulated together; 1 if the scheduler is lost, which the next shard tells."""
+        """The number of shards that can be simulated in parallel; 1 if the scheduler is lost: the next shard reports this."""
         try:
             return threads_of(self._client)
         except OSError:
             return 1
 
     def begin(self, start: int) -> int:
-        """Submit the shard from the realization `start` on; return where the next one begins."""
+        """Submit the shard that starts at realization `start`; return the start of the next one."""
         stop = min(start + self._blocks * self._block, self._samples)
-        self._begun.append((start, stop, self._submitted(start, stop)))
+        self._pending.append((start, stop, self._submitted(start, stop)))
         return stop
 
     def finish(self) -> list[Any]:
         """Wait for the first shard, and return its results."""
         while True:
-            start, stop, future = self._begun[0]
+            start, stop, future = self._pending[0]
             try:
                 seconds, results = shard_result(self._client, future, self._timeout)
             except distributed.KilledWorker as error:
                 raise ClusterError(
                     f"realizations {start} to {stop - 1} ended the workers that simulated them: {error}"
                 ) from error
-            except (distributed.client.FutureCancelledError, OSError):  # a lost connection is an OSError for any cause
-                if future.status == "error":  # of the shard itself
+            except (distributed.client.FutureCancelledError, OSError):  # any lost connection is an OSError
+                if future.status == "error":  # raised by the shard
                     raise
                 self._begin_again()
             else:
-                self._begun.popleft()
+                self._pending.popleft()
                 limit = MAX_SHARD_ROWS // self._block
                 self._blocks = max(1, min(int(SHARD_SECONDS * len(results) / max(seconds, 1e-3)), limit, 2 * self._blocks))
                 return list(results)
 
     def cancel(self) -> None:
         """Cancel all shards."""
-        if self._begun and self._client.status == "running":
-            self._client.cancel([future for _, _, future in self._begun], force=True)
-        self._begun.clear()
+        if self._pending and self._client.status == "running":
+            self._client.cancel([future for _, _, future in self._pending], force=True)
+        self._pending.clear()
 
     def _send_job(self) -> None:
         self._sent = self._client.submit(bytes, self._job.data, pure=False)
@@ -323,11 +324,11 @@ class _Shards:
         )
 
     def _begin_again(self) -> None:
-        """Wait for a scheduler that has forgotten the shards under way, and send them again."""
+        """Wait for a scheduler that has lost the shards in progress, and submit them again."""
         log.warning("the scheduler was lost; waiting for it")
-        until = time.monotonic() + self._timeout
+        deadline = time.monotonic() + self._timeout
         while not self._has_workers():
-            if time.monotonic() > until:
+            if time.monotonic() > deadline:
                 raise ClusterError(
                     "the scheduler was lost, and did not come back with its workers "
                     f"within {self._timeout:.0f} s; resume the run later"
@@ -335,10 +336,10 @@ class _Shards:
             time.sleep(0.2)
         self._model.send()
         self._send_job()
-        self._begun = deque((start, stop, self._submitted(start, stop)) for start, stop, _ in self._begun)
+        self._pending = deque((start, stop, self._submitted(start, stop)) for start, stop, _ in self._pending)
 
     def _has_workers(self) -> bool:
         """Whether the scheduler answers, and has workers."""
-        with suppress(OSError):  # it may be lost between a look at the client's status and the question
+        with suppress(OSError):  # the connection may be lost between reading the status and the request
             return self._client.status == "running" and bool(self._client.nthreads())
         return False

@@ -1,4 +1,4 @@
-"""Realizations as lazy arrays of dask: a chunk is drawn and simulated when somebody asks for it, wherever that is."""
+"""Realizations as lazy dask arrays: a chunk is drawn and simulated when it is computed, on any worker."""
 
 from collections.abc import Callable
 from importlib import import_module
@@ -19,13 +19,13 @@ CHUNK_BLOCKS = 8
 
 
 def dask_arrays() -> Any:
-    """Return the module of dask arrays. Raises OptionError if it is not installed."""
+    """Return the module dask.array. Raises OptionError if it is not installed."""
     with needs_dask():
         return import_module("dask.array")
 
 
 def chunk_rows(program: Program) -> int:
-    """Return the number of realizations of a chunk: whole blocks, so that results are those of a run."""
+    """Return the number of realizations of a chunk: whole blocks, so that results equal the results of a run."""
     return CHUNK_BLOCKS * block_rows(program)
 
 
@@ -38,14 +38,17 @@ def lazy_draws(program: Program, samples: int, seed: int) -> Any:
 
 
 def lazy_realizations(program: Program, deviations: Any, function: Callable[..., np.ndarray], kind: np.dtype) -> Any:
-    """Return, as a lazy array, what `function` makes of blocks at deviations (realization, contributor): records of a kind."""
+    """Return a lazy array of records of dtype `kind`: the results of `function` for blocks.
+
+    deviations   (realization, contributor)
+    """
     return dask_arrays().map_blocks(
         _simulated, deviations, dtype=kind, drop_axis=1, meta=np.empty(0, kind), model=_sent(program), function=function
     )
 
 
 def _sent(program: Program) -> Any:
-    """Return what workers compile the program from; this process has it compiled already."""
+    """Return the packed model, which workers compile; this process reuses the compiled program."""
     packed = pack_model(program)
     packed_program(packed, lambda: program)
     return dask.delayed(packed, name=f"model-{packed.token}", pure=True)

@@ -1,6 +1,6 @@
-"""Models and jobs as bytes that workers can read, and shards as workers simulate them.
+"""Serialization of models and jobs for workers, and the simulation of shards on workers.
 
-A worker gets a model as discretized numbers, compiles it once, and keeps it for all its shards.
+A worker receives the discretized model, compiles it once, and keeps it for all its shards.
 """
 
 import functools
@@ -34,7 +34,7 @@ MAX_CACHED = 8  # models and jobs that a worker keeps
 
 @dataclass(frozen=True, eq=False)
 class Packed:
-    """An object as bytes, which workers can read without the script of the model; the token is its key in their cache."""
+    """A serialized object, which workers can load without the model script; the token is its key in their cache."""
 
     data: bytes
     token: str
@@ -55,7 +55,7 @@ class Packed:
 
 @contextmanager
 def _scripts_by_value(nominal: Nominal) -> Iterator[None]:
-    """Send users' functions whole: a worker cannot import the script that declares them."""
+    """Serialize user-defined functions by value: a worker cannot import the script that declares them."""
     names = {measure.of.__module__ for measure in nominal.measures if isinstance(measure.of, FunctionType)}
     modules = [sys.modules[name] for name in names if name in sys.modules and not name.startswith("tolcontact")]
     for module in modules:
@@ -69,7 +69,7 @@ def _scripts_by_value(nominal: Nominal) -> Iterator[None]:
 
 @functools.lru_cache(maxsize=MAX_CACHED)
 def pack_model(program: Program) -> Packed:
-    """Return what a program can be compiled from; the last ones are packed once."""
+    """Return the packed model, solver name and method of a program; recent results are cached."""
     return Packed.of((program.nominal, program.plugin.name, program.method), program.nominal)
 
 
@@ -79,7 +79,7 @@ def versions() -> dict[str, str]:
 
 
 def check_version(worker: str, library: str, actual: str, expected: str) -> None:
-    """Raise ClusterError for a worker that has another version of a library than this process."""
+    """Raise ClusterError if the version of a library on a worker differs from this process."""
     if actual != expected:
         raise ClusterError(
             f"worker {worker} has {library} {actual}, and this process {expected}; results would differ: "
@@ -92,7 +92,7 @@ _cache_lock = threading.Lock()
 
 
 def _cached(token: str, make: Callable[[], Any]) -> Any:
-    """Return a model or a job from the cache of this process, made if it is not there."""
+    """Return a model or a job from the cache of this process, or make it."""
     with _cache_lock:
         if token not in _cache:
             _cache[token] = make()
@@ -102,7 +102,7 @@ def _cached(token: str, make: Callable[[], Any]) -> Any:
 
 
 def packed_program(model: Packed, make: Callable[[], Program] | None = None) -> Program:
-    """Return a model compiled, or made otherwise, once in each process.
+    """Return the compiled model, compiled (or made by `make`) once in each process.
 
     Raises ClusterError if this process has other versions than the one that packed the model.
     """
@@ -116,7 +116,7 @@ def packed_program(model: Packed, make: Callable[[], Program] | None = None) -> 
 
 
 def prepare_worker(model: Packed, job: bytes) -> None:
-    """Import and compile, on a worker, what a job needs."""
+    """Import and compile everything that a job needs, on a worker."""
     packed_program(model)
     pickle.loads(job)
 
@@ -124,7 +124,7 @@ def prepare_worker(model: Packed, job: bytes) -> None:
 def simulate_shard(
     model: bytes, job: bytes, tokens: tuple[str, str], versions: dict[str, str], seed: int, start: int, stop: int
 ) -> tuple[float, list[Any]]:
-    """Simulate a shard on a worker; return how long it took [s], and what the function made of its blocks."""
+    """Simulate a shard on a worker; return the time [s], and the results of the function for its blocks."""
     program = packed_program(Packed(model, tokens[0], versions))
     draws, function = _cached(tokens[1], lambda: pickle.loads(job))
     start_time = time.perf_counter()

@@ -1,8 +1,8 @@
 """Blocks of realizations on as many threads as there are processors, in order.
 
-A block does not depend on the one before it, nor on the thread that simulates it: the results of a run are the same for any
-number of threads, to the last bit. The last block of a run is simulated in pieces if it has fewer realizations than a block may
-have: so several threads share a small run. A piece does not depend on the others, either.
+A block does not depend on previous blocks, nor on the thread that simulates it: the results of a run are the same for any
+number of threads, to the last bit. If the last block of a run is not full, it is simulated in pieces, so that several threads
+share a small run. Pieces do not depend on each other, either.
 """
 
 import contextlib
@@ -22,23 +22,23 @@ from tolcontact.simulation.block import Block, simulate_block
 from tolcontact.vocabulary import BLOCK_ROWS
 
 CURVED_ROWS, MIN_ROWS = 512, 16
-PIECE_ROWS = 512  # at most; a thread needs some milliseconds to begin
-MAX_BODIES = 24  # that are coupled; a whole block of more bodies would take longer than some ten seconds
+PIECE_ROWS = 512  # at most; a thread needs several milliseconds to start
+MAX_BODIES = 24  # coupled bodies: a whole block of more bodies would take longer than about ten seconds
 
 T = TypeVar("T")
-Resolvers = list[ContactResolver]  # of the groups of a program, for one block at a time
+Resolvers = list[ContactResolver]  # one for each group of a program; they serve one block at a time
 
 
 @runtime_checkable
 class Sampler(Protocol):
-    """A source of deviations (realization, contributor) of realizations `start` to `stop`, as Draws are."""
+    """A source of deviations (realization, contributor) of realizations `start` to `stop`, such as Draws."""
 
     def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray: ...
 
 
 @runtime_checkable
 class BoundToProgram(Protocol):
-    """A function of blocks that needs their program, too, and gets it where they are simulated."""
+    """A function of blocks that also needs their program, and receives it in the process that simulates them."""
 
     def bound_to(self, program: Program) -> Callable[[Block], Any]:
         """Return the function of a block."""
@@ -57,11 +57,11 @@ def simulate_blocks(
 ) -> Iterator[Block]:
     """Yield realizations `start` to `samples` in blocks (of `block_rows` by default), in order.
 
-    The realization k is the same in any run. Its deviations come from `draws`, by default those of the program. At most two
+    Realization k is the same in any run. Its deviations come from `draws`, by default from the program's draws. At most two
     blocks for each of the `threads` (by default one for each processor) are in memory.
     """
     return map_blocks(
-        lambda done: done, program, samples=samples, seed=seed, start=start, block=block, threads=threads, draws=draws
+        lambda result: result, program, samples=samples, seed=seed, start=start, block=block, threads=threads, draws=draws
     )
 
 
@@ -77,17 +77,17 @@ def map_blocks(
     draws: Sampler | None = None,
     unused: list[Resolvers] | None = None,
 ) -> Iterator[T]:
-    """Yield what `function` makes of each block of `simulate_blocks`, in the thread that simulates it; in order.
+    """Yield the result of `function` for each block of `simulate_blocks`, in order; it is called in the simulating thread.
 
-    A function that needs the program as well has `bound_to` (see BoundToProgram). Resolvers that are `unused` are taken from
-    that list if there are any, and put back at the end.
+    A function that also needs the program has a method `bound_to` (see BoundToProgram). Resolvers are taken from the list
+    `unused` if it has any, and put back at the end.
     """
     if isinstance(function, BoundToProgram):
         function = function.bound_to(program)
     threads, block = threads or processors(), block or block_rows(program)
     starts = range(start, samples, block)
     count = len(starts[:-1]) + sum(len(_pieces(begin, samples, block)) for begin in starts[-1:])
-    idle = _taken([] if unused is None else unused, program, min(2 * threads, count))
+    idle = _available([] if unused is None else unused, program, min(2 * threads, count))
     running: deque[tuple[Future[Any], Resolvers, bool]] = deque()
 
     def simulate(rows: range, resolvers: Resolvers) -> Block:
@@ -95,15 +95,15 @@ def map_blocks(
         return simulate_block(program, deviations, start=rows.start, resolvers=resolvers)
 
     def finish_block(earlier: Sequence[Future[Block]], rows: range, resolvers: Resolvers) -> T:
-        last = simulate(rows, resolvers)  # the pool has begun with all earlier pieces, so none waits for this thread
+        last = simulate(rows, resolvers)  # the pool has started all earlier pieces, so none waits for this thread
         return function(Block.joined([*(piece.result() for piece in earlier), last]) if earlier else last)
 
     def finish_one() -> Iterator[T]:
         future, resolvers, ends_block = running.popleft()
-        done = future.result()
+        result = future.result()
         idle.append(resolvers)
         if ends_block:
-            yield done
+            yield result
 
     pool = ThreadPoolExecutor(threads)
     try:
@@ -115,54 +115,54 @@ def map_blocks(
                     yield from finish_one()
                 resolvers = idle.pop()
                 for resolver in resolvers:
-                    resolver.start_over()  # here, where the threads do not wait for each other to make CasADi's objects
+                    resolver.start_over()  # in this thread, so that threads do not wait to construct CasADi objects
                 task = functools.partial(finish_block, tuple(earlier)) if rows is pieces[-1] else simulate
                 earlier.append(pool.submit(task, rows, resolvers))
                 running.append((earlier[-1], resolvers, rows is pieces[-1]))
         while running:
             yield from finish_one()
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)  # if all went well none is left; a stopped run does not wait
+        pool.shutdown(wait=False, cancel_futures=True)  # after success none is left; an aborted run does not wait
         if unused is not None:
             unused.extend(idle)
 
 
 def _pieces(begin: int, samples: int, block: int) -> list[range]:
-    """Return the realizations of each piece of the block that begins there. A block that is not the last one is a piece."""
+    """Return the realizations of each piece of the block that starts at `begin`. A full block is one piece."""
     rows = range(begin, min(begin + block, samples))
     count = 1 if len(rows) == block else -(-len(rows) // PIECE_ROWS)
-    return [rows[len(rows) * number // count : len(rows) * (number + 1) // count] for number in range(count)]
+    return [rows[len(rows) * piece // count : len(rows) * (piece + 1) // count] for piece in range(count)]
 
 
 class Threads:
-    """`map_blocks` in threads of this process, which may be called in several. Resolvers of a program are made once."""
+    """`map_blocks` in threads of this process; several threads may call it. Resolvers of a program are made once."""
 
     def __init__(self) -> None:
         self._program: Program | None = None
         self._unused: list[Resolvers] = []
 
     def __call__(self, function: Callable[[Block], T], program: Program, **options: Any) -> Iterator[T]:
-        """Yield what `map_blocks` does, for its options."""
+        """Yield the results of `map_blocks`, for its options."""
         if self._program is not program:
             self._program, self._unused = program, []
         return map_blocks(function, program, unused=self._unused, **options)
 
 
-def _taken(unused: list[Resolvers], program: Program, count: int) -> list[Resolvers]:
-    """Return the resolvers of `count` blocks: unused ones, which other threads may take as well, and new ones."""
-    taken: list[Resolvers] = []
+def _available(unused: list[Resolvers], program: Program, count: int) -> list[Resolvers]:
+    """Return the resolvers of `count` blocks: unused ones, which other threads may take at the same time, and new ones."""
+    resolvers: list[Resolvers] = []
     with contextlib.suppress(IndexError):
-        while len(taken) < count:
-            taken.append(unused.pop())
-    originals = [ContactResolver(program, group) for group in program.groups] if len(taken) < count else []
-    return taken + [[resolver.twin() for resolver in originals] for _ in range(count - len(taken))]
+        while len(resolvers) < count:
+            resolvers.append(unused.pop())
+    originals = [ContactResolver(program, group) for group in program.groups] if len(resolvers) < count else []
+    return resolvers + [[resolver.twin() for resolver in originals] for _ in range(count - len(resolvers))]
 
 
 def block_rows(program: Program) -> int:
-    """Return how many realizations are simulated together: a power of two, and fewer if one of them takes long.
+    """Return the number of realizations in a block: a power of two, and smaller if a realization takes long.
 
-    Its time grows with the bodies that contact couples: with their cube by a dense solver. It grows with every projection onto
-    curved faces, too. A block should end within seconds: then it is safe, and visible as progress.
+    The time of a realization grows with the number of coupled bodies, for a dense solver with its cube, and with projections
+    onto curved faces. A block should take seconds at most: then it is stored, and visible as progress.
     """
     bodies = max((len(group.group.free) for group in program.groups), default=0)
     rows = BLOCK_ROWS
@@ -175,5 +175,5 @@ def block_rows(program: Program) -> int:
 
 
 def processors() -> int:
-    """Return how many processors this process may use."""
+    """Return the number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

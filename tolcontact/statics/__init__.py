@@ -1,11 +1,11 @@
 """Balance of forces at the contacts of an assembly, with Coulomb friction.
 
-A contact holds a part by a normal force N >= 0 and a friction force of at most mu N across it. One-sided locators and contact
-pairs that touch are such contacts. Two-sided locators guide: they push and pull, without friction.
+A contact acts on a part by a normal force N >= 0 and a tangential friction force of at most mu N. One-sided locators and
+touching contact pairs are such contacts. Two-sided locators are guides: bilateral constraints without friction.
 """
 
 from tolcontact.statics.critical_friction import Balance, Seat, balances
-from tolcontact.statics.touching import TOUCH_SHARE, Contact, Touching, TouchingPlaces, contacts_at, drawn_contacts
+from tolcontact.statics.touching import TOUCH_SHARE, Contact, Touching, TouchingPoints, contacts_at, drawn_contacts
 
 __all__ = [
     "TOUCH_SHARE",
@@ -13,7 +13,7 @@ __all__ = [
     "Contact",
     "Seat",
     "Touching",
-    "TouchingPlaces",
+    "TouchingPoints",
     "balances",
     "contacts_at",
     "drawn_contacts",

@@ -1,4 +1,4 @@
-"""The least friction at which a part can be held short of a seat: of a locator, or of a face that it touches."""
+"""The critical friction at which a part can stick short of a seat: a locator, or a face that it touches."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -11,19 +11,19 @@ from tolcontact.arrays import Array, Float
 from tolcontact.statics.force_cones import MIN_HELD, ForceCones
 from tolcontact.statics.touching import Contact, Touching, across, wrenches
 
-USUAL_FRICTION = 0.5
+HIGH_FRICTION = 0.5  # coefficient: higher ones are unusual
 MIN_LOAD = 1e-9  # of the sum of all forces: a smaller load is rounding
-MAX_UNBALANCED = 1e-7  # of the sum of all forces: a smaller component of the load that no contact can balance is rounding
+MAX_UNBALANCED = 1e-7  # of the sum of all forces: a smaller load component that no contact can balance is rounding
 MIN_GUIDE = 1e-9  # of the largest singular value of the guides: a smaller one is rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Seat:
-    """A contact, and how its part can be held short of it.
+    """A contact, and the friction at which its part can stick short of it.
 
-    critical   the least coefficient of friction, the same at all other contacts, at which these can balance the forces: 0 if
-               they can without friction, infinite if they cannot with any
-    reserve    the least factor of the stated coefficients at which the other contacts can; NaN if not all are stated
+    critical   the smallest coefficient of friction, equal at all other contacts, at which they can balance the forces: 0 if
+               they can without friction, infinite if they cannot at any friction
+    reserve    the smallest factor of the stated coefficients at which the other contacts can; NaN if not all are stated
     shares     (contact,): share of the sum of all normal forces at the critical coefficient
     """
 
@@ -34,14 +34,14 @@ class Seat:
 
 
 class Balance:
-    """The balance of forces of all parts that contacts connect with each other.
+    """The balance of forces of parts that contacts connect to each other.
 
-    parts, contacts   their numbers
+    parts, contacts   indices of the parts and of the contacts
     """
 
     def __init__(self, touching: Touching, parts: Sequence[int], contacts: Sequence[int]) -> None:
         self.parts, self.contacts, self._touching = list(parts), list(contacts), touching
-        points = np.vstack([touching.contacts[number].points for number in contacts])
+        points = np.vstack([touching.contacts[index].points for index in contacts])
         self._centre, self._length = points.mean(axis=0), float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
         forces, moments = np.split(touching.loads[self.parts], 2, axis=1)
         moments = (moments - np.cross(self._centre, forces)) / self._length
@@ -54,52 +54,52 @@ class Balance:
 
     @property
     def is_held(self) -> bool:
-        """Whether all contacts together hold the parts, without more friction than usual."""
+        """Whether all contacts together can balance the forces, with a friction coefficient of at most HIGH_FRICTION."""
         cones = self._cones(self.contacts, self._equal(self.contacts))
-        return not self._is_loaded(cones) or cones.held(USUAL_FRICTION) > MIN_HELD
+        return not self._is_loaded(cones) or cones.held(HIGH_FRICTION) > MIN_HELD
 
     def seats(self) -> Iterator[Seat]:
         """Yield all contacts as seats."""
-        for number in self.contacts:
-            holders = [holder for holder in self.contacts if holder != number]
-            critical, shares = self._critical(holders, self._equal(holders))
-            yield Seat(self._touching.contacts[number], critical, self._reserve(holders, critical), shares)
+        for index in self.contacts:
+            others = [other for other in self.contacts if other != index]
+            critical, shares = self._critical(others, self._equal(others))
+            yield Seat(self._touching.contacts[index], critical, self._reserve(others, critical), shares)
 
-    def _reserve(self, numbers: Sequence[int], critical: float) -> float:
-        """Return the least factor of the coefficients that contacts (k,) state; NaN if one of them states none."""
-        stated = [self._touching.contacts[number].mu for number in numbers if not self._touching.contacts[number].is_guide]
+    def _reserve(self, indices: Sequence[int], critical: float) -> float:
+        """Return the smallest factor of the stated coefficients of contacts (k,); NaN if one of them has none."""
+        stated = [self._touching.contacts[index].mu for index in indices if not self._touching.contacts[index].is_guide]
         if None in stated:
             return np.nan
         if len(values := {mu for mu in stated if mu}) == 1:
             return critical / float(values.pop())
-        return self._critical(numbers, np.array([self._touching.contacts[number].mu or 0.0 for number in numbers]))[0]
+        return self._critical(indices, np.array([self._touching.contacts[index].mu or 0.0 for index in indices]))[0]
 
-    def _equal(self, numbers: Sequence[int]) -> np.ndarray:
-        """Return 1 for each contact (k,), but 0 where friction is stated to be 0."""
-        return np.array([0.0 if self._touching.contacts[number].mu == 0 else 1.0 for number in numbers])
+    def _equal(self, indices: Sequence[int]) -> np.ndarray:
+        """Return 1 for each contact (k,), but 0 where the stated friction is 0."""
+        return np.array([0.0 if self._touching.contacts[index].mu == 0 else 1.0 for index in indices])
 
-    def _critical(self, numbers: Sequence[int], roughness: np.ndarray) -> tuple[float, np.ndarray]:
+    def _critical(self, indices: Sequence[int], roughness: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the critical factor of the roughness (k,) of contacts, and the shares of all contacts (contact,)."""
         shares = np.zeros(len(self._touching.contacts))
-        cones = self._cones(numbers, roughness)
+        cones = self._cones(indices, roughness)
         if not self._is_loaded(cones):
             return 0.0, shares
-        factor, of_points = cones.critical_factor()
-        np.add.at(shares, self._owners(numbers), of_points / (of_points.sum() or 1.0))
+        factor, point_shares = cones.critical_factor()
+        np.add.at(shares, self._owners(indices), point_shares / (point_shares.sum() or 1.0))
         return factor, shares
 
     @staticmethod
     def _is_loaded(cones: ForceCones) -> bool:
         return bool(np.linalg.norm(cones.load) > MIN_LOAD)
 
-    def _owners(self, numbers: Sequence[int]) -> np.ndarray:
+    def _owners(self, indices: Sequence[int]) -> np.ndarray:
         """Return the contact of each point (point,) that has friction or may lift off."""
         contacts = self._touching.contacts
-        return np.repeat(numbers, [0 if contacts[k].is_guide else len(contacts[k].points) for k in numbers]).astype(int)
+        return np.repeat(indices, [0 if contacts[k].is_guide else len(contacts[k].points) for k in indices]).astype(int)
 
-    def _cones(self, numbers: Sequence[int], roughness: np.ndarray) -> ForceCones:
-        """Return the force cones of contacts with a roughness (k,) in the directions that guides leave open."""
-        contacts = [self._touching.contacts[number] for number in numbers]
+    def _cones(self, indices: Sequence[int], roughness: np.ndarray) -> ForceCones:
+        """Return the force cones of contacts with a roughness (k,) in the directions that guides leave free."""
+        contacts = [self._touching.contacts[index] for index in indices]
         guides = [self._wrenches(contact, contact.normals) for contact in contacts if contact.is_guide]
         lifting = [contact for contact in contacts if not contact.is_guide]
         forces = [(contact.normals, *across(contact.normals)) for contact in lifting]
@@ -110,13 +110,13 @@ class Balance:
         normals, *tangents = (np.hstack([nothing, *column]) for column in columns)
         U, sizes, _ = np.linalg.svd(np.hstack([nothing, *guides]))
         Z = U[:, int((sizes > MIN_GUIDE * sizes.max(initial=0.0)).sum()) :]
-        of_points = np.repeat(roughness, [0 if contact.is_guide else len(contact.points) for contact in contacts])
+        point_roughness = np.repeat(roughness, [0 if contact.is_guide else len(contact.points) for contact in contacts])
         return _spanned(
-            ForceCones(Z.T @ normals, np.array([Z.T @ tangent for tangent in tangents]), Z.T @ self._load, of_points)
+            ForceCones(Z.T @ normals, np.array([Z.T @ tangent for tangent in tangents]), Z.T @ self._load, point_roughness)
         )
 
     def _wrenches(self, contact: Contact, forces: np.ndarray) -> np.ndarray:
-        """Return the wrenches (row, point) that unit forces (point, 3) on the moving part mean for all parts."""
+        """Return the wrenches (row, point) on all parts due to unit forces (point, 3) on the moving part."""
         wrench = wrenches(contact.points - self._centre, forces).T
         wrench[3:] /= self._length
         rows = np.zeros((len(self.parts), 6, len(forces)))
@@ -127,9 +127,9 @@ class Balance:
 
 
 def _spanned(cones: ForceCones) -> ForceCones:
-    """Return force cones in the directions that their forces span, if the load has next to no other component.
+    """Return force cones in the directions that their forces span, if the load component outside them is negligible.
 
-    So rounding of a load about the line through two contacts, which no force there can balance, does not matter.
+    A moment about the line through two contacts cannot be balanced by forces there. If it is rounding, it is neglected.
     """
     U, sizes, _ = np.linalg.svd(np.hstack([cones.normals, *cones.tangents * cones.roughness]), full_matrices=False)
     span = U[:, sizes > MIN_GUIDE * sizes.max(initial=0.0)].T
@@ -139,7 +139,7 @@ def _spanned(cones: ForceCones) -> ForceCones:
 
 
 def balances(touching: Touching) -> Iterator[Balance]:
-    """Yield the balances of all parts that are located."""
+    """Yield the force balance of each set of connected parts that are located."""
     located = np.flatnonzero(touching.is_located)
     ends = np.array([(contact.moving, contact.reference) for contact in touching.contacts]).reshape(-1, 2)
     inner = ends[np.isin(ends, located).all(axis=1)]

@@ -1,16 +1,20 @@
-"""Statistics of contact: pairs that carry, what they carry, and points that touch."""
+"""Statistics of contact: pairs that carry, what they carry, points that touch, and bodies that lie in each other."""
 
 from collections import Counter
+from typing import Any
 
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.labelled import Rows
+from tolcontact.labelled import Results, Rows, Table
 from tolcontact.realizations import pieces
 from tolcontact.statistics import intervals
 from tolcontact.statistics.sample import Sample
+from tolcontact.vocabulary import ArchiveVariable
 
 MAX_COMBINATIONS = 10  # of pairs that carry together
+MAX_PAIRS = 20  # of parts that are named, the most frequent ones
+VARIABLES = [variable.name for variable in (terms.CLASHES, terms.CLASH_DEPTH, terms.CLASH_PART, terms.CLASH_OTHER)]
 
 
 def carried(rows: Rows) -> np.ndarray:
@@ -77,3 +81,92 @@ class TouchingShares:
         estimates = np.array([intervals.proportion_of(int(count), self._realizations) for count in counts])
         estimates = estimates.reshape(-1, len(terms.ESTIMATE))[place]
         return estimates[:, 0], estimates[:, 1:], self._realizations
+
+
+def surface_values(results: Results, limit: float) -> dict[ArchiveVariable, Any]:
+    """Return what the check found, with shares of depths above `limit` [mm]; NaN for archives that lack a variable of it."""
+    pairs = results.sizes[terms.PAIR]
+    surface = results["surface"].to_dataset() if "surface" in results.children else Table({})
+
+    def depths(variable: ArchiveVariable) -> np.ndarray:
+        return surface[variable.name].values if variable.name in surface else np.full((0, pairs), np.nan)
+
+    def checked(variable: ArchiveVariable, value: int) -> np.ndarray:
+        return surface[variable.name].values == value if variable.name in surface else np.zeros(0, dtype=bool)
+
+    count = len(checked(terms.CHECKED_REALIZATION, -1)) - int(checked(terms.CHECKED_REALIZATION, terms.UNFINISHED).sum())
+    at_random = checked(terms.AT_RANDOM, 1)
+    return {
+        terms.DEEPEST_SURFACE: _over(np.nanmax, depths(terms.SURFACE_PENETRATION)),
+        terms.FARTHEST_BESIDE: _over(np.nanmax, depths(terms.BESIDE)),
+        terms.SURFACES_CHECKED: count,
+        terms.DEEPEST_FALSE_CONTACT: [_over(np.nanmax, of_pair) for of_pair in depths(terms.FALSE_CONTACT).T],
+        terms.PENETRATING_SHARE: _share(depths(terms.SURFACE_PENETRATION), at_random, limit),
+        terms.FALSE_CONTACT_SHARE: _share(depths(terms.FALSE_CONTACT), at_random, limit),
+        terms.CONTACTS_CHECKED: _over(np.nansum, depths(terms.CONTACTS)),
+        terms.CONTACTS_WITHOUT_FACE: _over(np.nansum, depths(terms.CONTACTS_ENDED)),
+    }
+
+
+def _over(reduce: Any, values: np.ndarray) -> float:
+    """Return a reduction of the values that are known; NaN if none is."""
+    return float(reduce(values)) if np.isfinite(values).any() else np.nan
+
+
+def _share(depths: np.ndarray, at_random: np.ndarray, limit: float) -> np.ndarray:
+    """Return the share of random realizations with a depth (realization, pair) [mm] above the limit in any pair."""
+    if not at_random.any() or not np.isfinite(depths).any():
+        return np.array(intervals.UNDEFINED)
+    return np.array(intervals.proportion((np.nan_to_num(depths[at_random]) > limit).any(axis=1)))
+
+
+class Clashes:
+    """How often two parts lie in each other, of the rows of an archive.
+
+    watched     number of realizations that were tested
+    clashing    number of these in which parts without declared contact lie in each other
+    counts      by both parts, and whether their contact is declared: number of realizations in which they lie deepest
+    depths      [mm], by the same: their largest depth; missing if none is measured
+    """
+
+    def __init__(self, rows: Rows) -> None:
+        self.watched, self.clashing = 0, 0
+        self.counts = Counter[tuple[int, int, bool]]()
+        self.depths = dict[tuple[int, int, bool], float]()
+        self._parts = [str(name) for name in rows[terms.PART].values]
+        if all(name in rows for name in VARIABLES):
+            for piece in pieces(rows[VARIABLES]):
+                self._add(*(np.asarray(piece[name].values) for name in VARIABLES))
+
+    def _add(self, clashes: np.ndarray, depth: np.ndarray, part: np.ndarray, other: np.ndarray) -> None:
+        self.watched += int((clashes >= 0).sum())
+        self.clashing += int((clashes > 0).sum())
+        is_pair = np.all([(index >= 0) & (index < len(self._parts)) for index in (part, other)], axis=0)
+        pairs = np.column_stack([part, other, clashes == 0])[is_pair].astype(int)
+        labels, places = np.unique(pairs, axis=0, return_inverse=True)
+        for k, (first, second, is_declared) in enumerate(labels.tolist()):
+            pair, depths = (first, second, bool(is_declared)), depth[is_pair][places.ravel() == k]
+            self.counts[pair] += len(depths)
+            if np.isfinite(depths).any():
+                self.depths[pair] = max(self.depths.get(pair, 0.0), float(np.nanmax(depths)))
+
+    @property
+    def pairs(self) -> list[tuple[int, int, bool]]:
+        """The most frequent pairs of parts."""
+        return [pair for pair, _ in self.counts.most_common(MAX_PAIRS)]
+
+    @property
+    def labels(self) -> list[str]:
+        """The names of both parts of each pair."""
+        return [f"{self._parts[first]} / {self._parts[second]}" for first, second, _ in self.pairs]
+
+    def values(self) -> dict[ArchiveVariable, Any]:
+        """Return the share of realizations with clashes, and what is known of each pair of parts."""
+        share = intervals.proportion_of(self.clashing, self.watched) if self.watched else intervals.UNDEFINED
+        return {
+            terms.WATCHED: self.watched,
+            terms.CLASH_SHARE: np.array(share),
+            terms.CLASH_COUNT: np.array([self.counts[pair] for pair in self.pairs], dtype=np.int64),
+            terms.CLASH_LARGEST_DEPTH: np.array([self.depths.get(pair, np.nan) for pair in self.pairs]),
+            terms.CLASH_DECLARED: np.array([is_declared for *_, is_declared in self.pairs], dtype=np.int8),
+        }

@@ -10,8 +10,7 @@ from tolcontact.errors import ArchiveError
 from tolcontact.labelled import Results, Rows, Table
 from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import contact, intervals
-from tolcontact.statistics.checked_surfaces import surface_values
-from tolcontact.statistics.clashes import Clashes
+from tolcontact.statistics.contact import Clashes, surface_values
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.measure_statistics import STATISTICS, MeasuredValues, limits, measure_estimates
 from tolcontact.vocabulary import ArchiveVariable

@@ -1,4 +1,4 @@
-"""An element of a contact group: a share of it whose terms are summed with those of others, and the constants of both."""
+"""An element of a contact group: a share of the group whose terms are summed with the terms of other elements."""
 
 from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -14,17 +14,17 @@ from tolcontact.mechanics.groups import Group
 
 @dataclass(frozen=True, eq=False)
 class Element:
-    """A contact pair, or a part with its forces and its two-sided locators; positions are those in the whole group.
+    """A contact pair, or a part with its forces and its two-sided locators; positions refer to the whole group.
 
     group      the group of this element alone
-    number     among the elements of the whole group: pairs, then parts
+    index      index among the elements of the whole group: pairs, then parts
     parts      positions of the element's parts
-    movers     numbers of the movers whose increments move them
+    movers     indices of the movers whose increments move these parts
     """
 
     nominal: Nominal
     group: Group
-    number: int
+    index: int
     parts: tuple[int, ...]
     movers: tuple[int, ...]
 
@@ -35,14 +35,16 @@ class Element:
 
     @property
     def kind(self) -> Hashable:
-        """What elements share whose functions are the same."""
+        """The key under which elements share functions."""
         sides, loads = (tuple(entry.part for entry in entries) for entries in (self.group.sides, self.group.loads))
-        holds = tuple((hold.part, hold.owners, hold.parent, hold.is_placed) for hold in self.group.holds)
-        return type(self), tuple(mobility.movers for mobility in self.group.mobilities), sides, loads, holds
+        bilateral = tuple(
+            (locators.part, locators.owners, locators.parent, locators.is_placed) for locators in self.group.bilateral
+        )
+        return type(self), tuple(mobility.movers for mobility in self.group.mobilities), sides, loads, bilateral
 
     @cached_property
     def constants(self) -> np.ndarray:
-        """The constants (see `symbolic`), one after the other."""
+        """The concatenated constants (see `symbolic`)."""
         return np.concatenate(list(self._constants()))
 
     def _constants(self) -> Iterator[np.ndarray]:
@@ -50,12 +52,12 @@ class Element:
         yield from (np.asarray(mobility.centre) for mobility in group.mobilities)
         yield from (np.asarray(values) for side in group.sides for values in (side.centre, side.all_moments))
         yield from (np.asarray(values) for load in group.loads for values in (load.point, load.vector))
-        for hold in group.holds:
-            yield from map(np.asarray, (*hold.points, *hold.directions))
-            yield from (np.array([stiffness]) for stiffness in hold.stiffness)
+        for locators in group.bilateral:
+            yield from map(np.asarray, (*locators.points, *locators.directions))
+            yield from (np.array([stiffness]) for stiffness in locators.stiffness)
 
     def symbolic(self, constants: ca.SX, length: ca.SX, count: ca.SX) -> Group:
-        """Return the group with symbols in place of its constants, the length and the number of points of the whole group.
+        """Return the group with symbols in place of its constants, and with length and point count of the whole group.
 
         Constants are centres of the parts; centre and moments of each side; point and vector of each force; points, directions
         and stiffness of two-sided locators.
@@ -63,7 +65,7 @@ class Element:
         offsets = np.cumsum([0, *(values.size for values in self._constants())]).tolist()
         remaining = iter(ca.vertsplit(constants, offsets))
 
-        def of_each(entries: Iterable) -> list[ca.SX]:
+        def symbols_of(entries: Iterable) -> list[ca.SX]:
             return [next(remaining) for _ in entries]
 
         group = self.group
@@ -72,14 +74,14 @@ class Element:
             mobilities=tuple(replace(mobility, centre=next(remaining)) for mobility in group.mobilities),
             sides=tuple(replace(side, centre=next(remaining), all_moments=next(remaining)) for side in group.sides),
             loads=tuple(replace(load, point=next(remaining), vector=next(remaining)) for load in group.loads),
-            holds=tuple(
+            bilateral=tuple(
                 replace(
-                    hold,
-                    points=of_each(hold.points),
-                    directions=of_each(hold.directions),
-                    stiffness=of_each(hold.stiffness),
+                    locators,
+                    points=symbols_of(locators.points),
+                    directions=symbols_of(locators.directions),
+                    stiffness=symbols_of(locators.stiffness),
                 )
-                for hold in group.holds
+                for locators in group.bilateral
             ),
             length=length,
             count=count,
@@ -109,7 +111,7 @@ class Extent:
             pairs=(),
             sides=(),
             loads=(),
-            holds=(),
+            bilateral=(),
         )
 
     def _local(self, mobility: Mobility) -> Mobility:

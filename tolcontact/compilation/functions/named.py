@@ -1,4 +1,4 @@
-"""Functions for many realizations at once: interpreted by CasADi, compiled when that pays, and called by names."""
+"""Functions for many realizations at once: interpreted by CasADi, compiled if that saves time, and called by name."""
 
 import contextlib
 import functools
@@ -12,22 +12,22 @@ import numpy as np
 
 from tolcontact import code_cache
 from tolcontact.arrays import Array, Float, Int, Real
+from tolcontact.compilation.functions.argument_columns import ArgumentColumns, Located
 from tolcontact.compilation.functions.native import NativeFunction, UnknownInstructionError, key_of
-from tolcontact.compilation.functions.places import ArgumentPlaces, Located
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 
 WIDTHS = (256, 16)  # realizations in a call of CasADi
 
 
 class InterpretedFunction:
-    """A Function that CasADi evaluates; inputs and outputs go by position.
+    """A Function that CasADi evaluates; inputs and outputs are given by position.
 
     Threads must not share it, since each evaluation uses its buffers. `fixed_inputs` are inputs, by position, that are the same
     in all realizations.
     """
 
     def __init__(self, function: ca.Function, fixed_inputs: Mapping[int, np.ndarray] | None = None) -> None:
-        # A buffer keeps the memory of the Function that it calls. Inside another Function a solver takes a free one each time.
+        # A buffer keeps the memory of the Function that it calls. In another Function, a solver takes a free memory each time.
         inputs = [ca.MX.sym(f"i{k}", function.sparsity_in(k)) for k in range(function.n_in())]
         caller = ca.Function("caller", inputs, function.call(inputs))
         self._calls = [_Buffers(caller, width, fixed_inputs or {}) for width in (*WIDTHS, 1)]
@@ -47,9 +47,9 @@ class InterpretedFunction:
         count = len(inputs[0])
         results = [np.empty((count, size)) for size in self._sizes_out]
         failed = np.zeros(count, dtype=bool)
-        for call, start, stop in self._turns(count):
+        for call, start, stop in self._batches(count):
             if not self._succeeds(call, slice(start, stop), inputs, results):
-                # A plugin that gives up on one realization ends the whole call (qpOASES does), so each is evaluated alone.
+                # A plugin that fails on one realization may end the whole call (qpOASES does), so each is evaluated alone.
                 for k in range(start, stop):
                     if not self._succeeds(self._calls[-1], slice(k, k + 1), inputs, results):
                         failed[k] = True
@@ -57,10 +57,10 @@ class InterpretedFunction:
                             result[k] = np.nan
         return results, failed
 
-    def _turns(self, count: int) -> Iterator[tuple["_Buffers", int, int]]:
-        """Yield buffers and the range of realizations they evaluate; the narrower of WIDTHS may have idle places at the end.
+    def _batches(self, count: int) -> Iterator[tuple["_Buffers", int, int]]:
+        """Yield buffers and the range of realizations they evaluate; the narrower of WIDTHS may have unused rows at the end.
 
-        The first realization of all is evaluated alone, since other threads wait for it.
+        The very first realization is evaluated alone, since other threads wait for it.
         """
         start = 0
         while start < count:
@@ -77,12 +77,12 @@ class InterpretedFunction:
 
         qpOASES starts from its last problem, and after one failure it always fails.
         """
-        # The first evaluation constructs objects of CasADi: the memory of solvers, which wider calls then take, too.
+        # The first evaluation constructs CasADi objects: the memory of solvers, which wider calls use later.
         with CONSTRUCTION_LOCK if self._is_new else contextlib.nullcontext():
             succeeds = call([array[rows] for array in inputs], [result[rows] for result in results])
         if not succeeds:
             for solver in self._solvers:
-                solver.checkout()  # the spoiled memory, never released: the next evaluation gets another
+                solver.checkout()  # takes the corrupted memory and never releases it: the next evaluation gets another
         self._is_new = not succeeds
         return succeeds
 
@@ -95,7 +95,7 @@ class _Buffers:
         self._evaluate: Callable[[], None] | None = None
 
     def _allocate(self) -> Callable[[], None]:
-        """Allocate the arrays, and return what evaluates the Function on them."""
+        """Allocate the arrays, and return a callable that evaluates the Function on them."""
         width, fixed_inputs = self.width, self._fixed_inputs
         function = self._function.map(width) if width > 1 else self._function
         self._buffer, evaluate = function.buffer()
@@ -112,7 +112,7 @@ class _Buffers:
         return evaluate  # type: ignore[no-any-return]
 
     def __call__(self, inputs: Sequence[np.ndarray], outputs: Sequence[np.ndarray]) -> bool:
-        """Evaluate for up to `width` realizations; idle places repeat the last one. Return whether it succeeded."""
+        """Evaluate for up to `width` realizations; unused rows repeat the last one. Return whether it succeeded."""
         count = len(inputs[0])
         if self._evaluate is None:
             with CONSTRUCTION_LOCK:
@@ -122,21 +122,21 @@ class _Buffers:
             buffer[count:] = array[-1:]
         try:
             self._evaluate()
-        except RuntimeError:  # CasADi's only exception: bounds that are not numbers
+        except RuntimeError:  # CasADi's only exception: bounds that are NaN
             return False
         for buffer, array in zip(self._outputs, outputs, strict=True):
             array[:] = buffer[:count]
         return bool(self._buffer.ret() == 0)
 
 
-# Evaluations, in all processes, after which a Function is compiled. Compiling takes as long as interpreting it once or twice as
-# often, so that all together takes at most some three times as long as if the number of evaluations had been known.
+# Evaluations, in all processes, after which a Function is compiled. Compiling takes as long as interpreting this number of
+# evaluations once or twice. So the total time is at most about three times the time of the best choice in hindsight.
 MIN_COMPILED_CALLS = 10_000
 MAX_INSTRUCTIONS = 300_000  # that are compiled; more are interpreted, since compiling them takes more than a gigabyte
 
 
 class Evaluations:
-    """The number of evaluations of a Function by this process and by those that stored theirs before."""
+    """The number of evaluations of a Function by this process and by earlier processes that stored it."""
 
     def __init__(self, key: str) -> None:
         self._key = f"{key}-evaluations"
@@ -144,16 +144,16 @@ class Evaluations:
         self.number = int(stored) if stored.isdigit() else 0
 
     def store(self) -> None:
-        """Keep the number for later processes."""
+        """Store the number for later processes."""
         code_cache.store(self._key, str(self.number).encode())
 
 
 class AdaptiveFunction:
-    """A Function of scalar expressions that is interpreted, and compiled once it was evaluated often. Threads may share it.
+    """A Function of scalar expressions that is interpreted first, and compiled after many evaluations. Threads may share it.
 
-    Both ways give the same results to the last bit. Evaluations of earlier processes count, too.
+    Both give the same results to the last bit. Evaluations of earlier processes count, too.
 
-    native   the machine code, or None while CasADi interprets
+    native   the machine code, or None while CasADi interprets the Function
     """
 
     def __init__(self, function: ca.Function) -> None:
@@ -176,32 +176,32 @@ class AdaptiveFunction:
         with CONSTRUCTION_LOCK:
             return InterpretedFunction(self._function)
 
-    def evaluate(self, count: int, arrays: Sequence[Located], places: ArgumentPlaces) -> None:
+    def evaluate(self, count: int, arrays: Sequence[Located], arguments: ArgumentColumns) -> None:
         """Evaluate the Function for all elements of `count` realizations; see NativeFunction."""
-        if native := self._compiled(count * places.elements):
-            native.evaluate(count, arrays, places)
+        if native := self._compiled(count * arguments.elements):
+            native.evaluate(count, arrays, arguments)
             return
-        rows, cut = count * places.elements, len(arrays) - len(self.sizes_out)
+        rows, cut = count * arguments.elements, len(arrays) - len(self.sizes_out)
         inputs = [
-            np.broadcast_to(place.array[:, columns], (count, *columns.shape)).reshape(rows, columns.shape[1])
-            for place, columns in zip(arrays[:cut], places.columns, strict=False)
+            np.broadcast_to(located.array[:, columns], (count, *columns.shape)).reshape(rows, columns.shape[1])
+            for located, columns in zip(arrays[:cut], arguments.tables, strict=False)
         ]
         with self._lock:
             results = self._interpreted(inputs)[0]
-        for place, columns, values in zip(arrays[cut:], places.columns[cut:], results, strict=True):
-            place.array[:, columns] = values.reshape(count, *columns.shape)
+        for located, columns, values in zip(arrays[cut:], arguments.tables[cut:], results, strict=True):
+            located.array[:, columns] = values.reshape(count, *columns.shape)
 
     def _compiled(self, count: int) -> NativeFunction | None:
-        """Return the machine code for `count` more evaluations, None while CasADi interprets."""
-        # CasADi interprets what LLVM cannot compile on this machine.
+        """Return the machine code for `count` more evaluations, or None while CasADi interprets the Function."""
+        # CasADi interprets a Function that LLVM cannot compile on this machine.
         with contextlib.suppress(UnknownInstructionError, RuntimeError):
             if self.native is None and self._is_due(count):
                 self.native = NativeFunction(self._function)  # other threads interpret meanwhile
         return self.native
 
     def _is_due(self, count: int) -> bool:
-        """Return whether to compile before `count` evaluations, which is true once. The first call looks for stored code."""
-        with self._lock:  # other threads wait for stored code: to interpret takes longer
+        """Return whether to compile before `count` evaluations, which only one call does. The first call loads stored code."""
+        with self._lock:  # other threads wait for stored code: interpreting takes longer
             if not self._may_be_compiled or self.native is not None:
                 return False
             if self._evaluations is None:
@@ -228,10 +228,10 @@ class NamedFunction:
         """The names of its inputs."""
         return self._names
 
-    def at(self, places: Mapping[str, Int[Array, "element _"]]) -> "IndexedFunction":
-        """Return the function of several elements, whose inputs and results stand in these columns of arrays, by name."""
+    def at(self, columns: Mapping[str, Int[Array, "element _"]]) -> "IndexedFunction":
+        """Return the function for several elements, with inputs and results in these columns of arrays, by name."""
         names = [*self._names, *self._results]
-        return IndexedFunction(self._evaluate, names, ArgumentPlaces([places[name] for name in names]))
+        return IndexedFunction(self._evaluate, names, ArgumentColumns([columns[name] for name in names]))
 
     @classmethod
     def dense(cls, function: ca.Function) -> "NamedFunction":
@@ -250,15 +250,18 @@ class NamedFunction:
 
 
 class IndexedFunction:
-    """A Function that is evaluated for several elements of each realization, on arrays that hold the numbers of all."""
+    """A Function that is evaluated for several elements of each realization, on arrays that all elements share."""
 
-    def __init__(self, function: AdaptiveFunction, names: Sequence[str], places: ArgumentPlaces) -> None:
-        self._function, self._names, self._places = function, names, places
+    def __init__(self, function: AdaptiveFunction, names: Sequence[str], columns: ArgumentColumns) -> None:
+        self._function, self._names, self._columns = function, names, columns
 
     def __call__(self, count: int, arrays: Mapping[str, Located]) -> None:
-        """Read inputs of `count` realizations from arrays by name, of one row if all share it; write results into others."""
-        if self._places.elements:
-            self._function.evaluate(count, [arrays[name] for name in self._names], self._places)
+        """Read inputs of `count` realizations from arrays by name, and write results into others.
+
+        An input array has one row if all realizations share it.
+        """
+        if self._columns.elements:
+            self._function.evaluate(count, [arrays[name] for name in self._names], self._columns)
 
 
 def flat(array: Real[Array, "realization ..."]) -> Float[Array, "realization _"]:

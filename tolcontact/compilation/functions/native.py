@@ -1,14 +1,14 @@
 """Symbolic Functions as machine code: the instructions that CasADi would interpret, compiled by LLVM.
 
-A Function of scalar expressions is a straight line of some thousand additions and multiplications. CasADi interprets it at
-5 ns an instruction; compiled it takes a tenth of that (and 30 us of compiling), with the same operations in the same order, so
-that the results are the same to the last bit.
+A Function of scalar expressions is straight-line code of several thousand additions and multiplications. CasADi interprets it
+at 5 ns per instruction. Compiled code takes a tenth of that, and compiling takes 30 us per instruction. The operations and
+their order are the same, so that the results are the same to the last bit.
 
-LLVM's time for a straight line grows faster than its length. So it is cut into segments, functions of their own, which pass
-numbers on in memory.
+LLVM's time for straight-line code grows faster than its length. So the code is cut into segments, separate functions that pass
+numbers through memory.
 
-A Function may be evaluated for several elements of every realization, each with its own places in arrays that hold the numbers
-of all: the machine code gathers its inputs and scatters its results by itself.
+A Function may be evaluated for several elements of every realization, each with its own columns in shared arrays: the machine
+code gathers its inputs and scatters its results.
 """
 
 import ctypes
@@ -24,7 +24,7 @@ import numpy as np
 from llvmlite import binding, ir
 
 from tolcontact import code_cache
-from tolcontact.compilation.functions.places import ArgumentPlaces, Located
+from tolcontact.compilation.functions.argument_columns import ArgumentColumns, Located
 
 LANES = 4
 SEGMENT = 1000  # instructions
@@ -32,11 +32,11 @@ _INDEX = ir.IntType(64)
 _DOUBLE = ir.DoubleType()
 _LANES = ir.VectorType(_DOUBLE, LANES)
 _POINTERS = _DOUBLE.as_pointer().as_pointer(), _INDEX.as_pointer(), _INDEX.as_pointer().as_pointer()
-VECTOR_ALIGNMENT = 8  # bytes: what is sure of memory on the stack
+VECTOR_ALIGNMENT = 8  # bytes: guaranteed alignment of memory on the stack
 
 
 class UnknownInstructionError(Exception):
-    """A Function has an instruction that is not translated; CasADi can still interpret it."""
+    """A Function has an instruction without a translation; CasADi can still interpret it."""
 
 
 class NativeFunction:
@@ -52,7 +52,7 @@ class NativeFunction:
         self._engine = _loaded(code) if code else _compiled(_module(function), key_of(function))
         address = self._engine.get_function_address("evaluate")
         self._evaluate = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 3)(address)
-        self._whole = ArgumentPlaces.of_one([*self.sizes_in, *self.sizes_out])
+        self._whole = ArgumentColumns.of_one([*self.sizes_in, *self.sizes_out])
 
     @classmethod
     def from_cache(cls, function: ca.Function, key: str | None = None) -> "NativeFunction | None":
@@ -68,25 +68,25 @@ class NativeFunction:
         self.evaluate(count, [Located.of(array) for array in (*inputs, *results)], self._whole)
         return results
 
-    def evaluate(self, count: int, arrays: Sequence[Located], places: ArgumentPlaces) -> None:
-        """Read inputs from the first arrays, and write results into the others, at the `places` of all elements.
+    def evaluate(self, count: int, arrays: Sequence[Located], arguments: ArgumentColumns) -> None:
+        """Read inputs from the first arrays, and write results into the others, in the columns of all elements.
 
-        Inputs of one row are the same for all realizations. Rows may be apart, as those of a slice of columns are. Raises
-        ValueError for arrays of another shape.
+        Inputs of one row are the same for all realizations. Rows may have a stride, as in a slice of columns. Raises ValueError
+        for arrays of another shape.
         """
-        for (_, _, rows, columns, _), width in zip(arrays, places.widths, strict=True):
+        for (_, _, rows, columns, _), width in zip(arrays, arguments.widths, strict=True):
             if columns < width or rows not in (1, count):
                 raise ValueError(f"an array ({rows}, {columns}); expected {count} rows, or one, and at least {width} columns")
         addresses = (ctypes.c_void_p * len(arrays))(*[array.address for array in arrays])
         steps = (ctypes.c_int64 * len(arrays))(*[array.step for array in arrays])
-        self._evaluate(count, places.elements, addresses, steps, places.addresses)
+        self._evaluate(count, arguments.elements, addresses, steps, arguments.addresses)
 
 
 def _module(function: ca.Function) -> ir.Module:
     """Return a module with `void evaluate(count, elements, arrays, steps, tables)`: all instructions, for LANES realizations.
 
-    The arguments stand in `arrays` of rows that are `steps` apart, in the columns that their `tables` (element, entry) say. In
-    the last turn of the loop over realizations the lanes beyond `count` repeat the last one.
+    The arguments are in `arrays` with row strides `steps`, in the columns given by their `tables` (element, entry). In the last
+    iteration over realizations, lanes beyond `count` repeat the last realization.
     """
     module = ir.Module("contact")
     evaluate = ir.Function(module, ir.FunctionType(ir.VoidType(), [_INDEX, _INDEX, *_POINTERS]), "evaluate")
@@ -122,7 +122,7 @@ def _module(function: ca.Function) -> ir.Module:
 
 
 class Instruction(NamedTuple):
-    """An instruction of a Function: work entries that it writes and reads; of inputs and outputs the argument and its entry."""
+    """An instruction of a Function: the work entries that it writes and reads; for inputs and outputs, argument and entry."""
 
     operation: int
     to: list[int]
@@ -130,9 +130,9 @@ class Instruction(NamedTuple):
 
 
 def _segments(function: ca.Function, module: ir.Module) -> list[ir.Function]:
-    """Return functions `void (arrays, steps, tables, memory, element, lanes...)` that together are all instructions.
+    """Return functions `void (arrays, steps, tables, memory, element, lanes...)` that together execute all instructions.
 
-    A segment stores in `memory` the work entries that later segments read.
+    A segment stores the work entries that later segments read in `memory`.
     """
     instructions = [
         Instruction(function.instruction_id(k), function.instruction_output(k), function.instruction_input(k))
@@ -146,14 +146,14 @@ def _segments(function: ca.Function, module: ir.Module) -> list[ir.Function]:
         stored.insert(0, writes & read_later)
         read_later = read_later - writes | reads
     segments, start = [], 0
-    for number, (part, kept) in enumerate(zip(parts, stored, strict=True)):
-        segments.append(_segment(function, module, f"segment{number}", (start, part), kept))
+    for k, (part, outputs) in enumerate(zip(parts, stored, strict=True)):
+        segments.append(_segment(function, module, f"segment{k}", (start, part), outputs))
         start += len(part)
     return segments
 
 
 def _accesses(part: Sequence[Instruction]) -> tuple[set[int], set[int]]:
-    """Return the work entries that instructions read before they write them, and those that they write."""
+    """Return the work entries that instructions read before they write them, and the work entries that they write."""
     reads, writes = set[int](), set[int]()
     for operation, to, operands in part:
         if operation not in (ca.OP_INPUT, ca.OP_CONST):
@@ -164,9 +164,9 @@ def _accesses(part: Sequence[Instruction]) -> tuple[set[int], set[int]]:
 
 
 def _segment(
-    function: ca.Function, module: ir.Module, name: str, part: tuple[int, Sequence[Instruction]], kept: set[int]
+    function: ca.Function, module: ir.Module, name: str, part: tuple[int, Sequence[Instruction]], stored: set[int]
 ) -> ir.Function:
-    """Return the function of the instructions from a number on, which stores the work entries that are `kept`."""
+    """Return the function of the instructions from a start index; it stores the work entries in `stored`."""
     arguments = [*_POINTERS, _LANES.as_pointer(), _INDEX, *[_INDEX] * LANES]
     segment = ir.Function(module, ir.FunctionType(ir.VoidType(), arguments), name)
     segment.linkage = "internal"
@@ -176,14 +176,14 @@ def _segment(
     sizes = [function.nnz_in(i) for i in range(function.n_in())] + [function.nnz_out(i) for i in range(function.n_out())]
     work, addresses = _Work(builder, memory), _Addresses(builder, (arrays, steps, tables), sizes, (element, *lanes))
     _translate(function, builder, part, work, addresses)
-    for index in sorted(kept):
+    for index in sorted(stored):
         builder.store(work[index], builder.gep(memory, [_INDEX(index)]), align=VECTOR_ALIGNMENT)
     builder.ret_void()
     return segment
 
 
 class _Work(dict[int, ir.Value]):
-    """The work entries of a segment; those of earlier segments are loaded from memory when they are first read."""
+    """The work entries of a segment; entries of earlier segments are loaded from memory when they are first read."""
 
     def __init__(self, builder: ir.IRBuilder, memory: ir.Value) -> None:
         super().__init__()
@@ -195,15 +195,15 @@ class _Work(dict[int, ir.Value]):
 
 
 class _Addresses:
-    """The addresses of entries of arguments for each lane; what all entries share is computed when a segment first needs it."""
+    """The addresses of entries of arguments for each lane; rows of an argument are computed when a segment first needs them."""
 
     def __init__(
-        self, builder: ir.IRBuilder, pointers: Sequence[ir.Value], sizes: Sequence[int], place: Sequence[ir.Value]
+        self, builder: ir.IRBuilder, pointers: Sequence[ir.Value], sizes: Sequence[int], indices: Sequence[ir.Value]
     ) -> None:
         self._builder, self._sizes = builder, sizes
         self._arrays, self._steps, self._tables = pointers
-        self._element, *self._lanes = place
-        self._known: dict[int, tuple[ir.Value, list[ir.Value]]] = {}
+        self._element, *self._lanes = indices
+        self._rows: dict[int, tuple[ir.Value, list[ir.Value]]] = {}
 
     def __call__(self, argument: int, entry: int) -> list[ir.Value]:
         table, rows = self._of_argument(argument)
@@ -212,15 +212,15 @@ class _Addresses:
 
     def _of_argument(self, argument: int) -> tuple[ir.Value, list[ir.Value]]:
         """Return the table of the element, and the row of each lane."""
-        if argument not in self._known:
+        if argument not in self._rows:
             builder = self._builder
             array, step, table = (
                 builder.load(builder.gep(pointers, [_INDEX(argument)]))
                 for pointers in (self._arrays, self._steps, self._tables)
             )
             start = builder.gep(table, [builder.mul(self._element, _INDEX(self._sizes[argument]))])
-            self._known[argument] = start, [builder.gep(array, [builder.mul(lane, step)]) for lane in self._lanes]
-        return self._known[argument]
+            self._rows[argument] = start, [builder.gep(array, [builder.mul(lane, step)]) for lane in self._lanes]
+        return self._rows[argument]
 
 
 def _translate(
@@ -230,21 +230,21 @@ def _translate(
     work: _Work,
     addresses: _Addresses,
 ) -> None:
-    """Emit instructions of a Function from a number on."""
+    """Emit the instructions of a Function from a start index."""
     (start, instructions), inputs = part, function.n_in()
-    for number, (operation, to, names) in enumerate(instructions, start):
+    for k, (operation, to, operands) in enumerate(instructions, start):
         if operation == ca.OP_OUTPUT:
             for lane, address in enumerate(addresses(inputs + to[0], to[1])):
-                builder.store(builder.extract_element(work[names[0]], ir.IntType(32)(lane)), address)
+                builder.store(builder.extract_element(work[operands[0]], ir.IntType(32)(lane)), address)
         elif operation == ca.OP_INPUT:
             value = _LANES(ir.Undefined)
-            for lane, address in enumerate(addresses(names[0], names[1])):
+            for lane, address in enumerate(addresses(operands[0], operands[1])):
                 value = builder.insert_element(value, builder.load(address), ir.IntType(32)(lane))
             work[to[0]] = value
         elif operation == ca.OP_CONST:
-            work[to[0]] = _constant(function.instruction_constant(number))
+            work[to[0]] = _constant(function.instruction_constant(k))
         elif operation in OPERATIONS:
-            work[to[0]] = OPERATIONS[operation](builder, *(work[index] for index in names))
+            work[to[0]] = OPERATIONS[operation](builder, *(work[index] for index in operands))
         else:
             raise UnknownInstructionError(f"instruction {operation}")
 
@@ -257,7 +257,7 @@ ZERO, ONE = _constant(0.0), _constant(1.0)
 
 
 def _truth(builder: ir.IRBuilder, value: ir.Value) -> ir.Value:
-    """Return 1.0 or 0.0 for a bit."""
+    """Return 1.0 or 0.0 for a truth value."""
     return builder.select(value, ONE, ZERO)
 
 
@@ -266,7 +266,7 @@ def _holds(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
 
 
 def _extreme(builder: ir.IRBuilder, sign: str, x: ir.Value, y: ir.Value) -> ir.Value:
-    """Return C's fmin ("<=") or fmax (">="): the other number for a NaN, and the first of two equal numbers."""
+    """Return C's fmin ("<=") or fmax (">="): the other operand if one is NaN, and the first of two equal operands."""
     return builder.select(builder.or_(builder.fcmp_ordered(sign, x, y), builder.fcmp_unordered("uno", y, y)), x, y)
 
 
@@ -304,13 +304,13 @@ OPERATIONS: dict[int, Callable[..., ir.Value]] = {
 
 
 def key_of(function: ca.Function, host: bytes | None = None) -> str:
-    """Return the key of a Function's machine code for a host: that of this process by default."""
+    """Return the key of a Function's machine code for a host, by default the host of this process."""
     return hashlib.blake2b(function.serialize().encode() + (host or host_description()), digest_size=20).hexdigest()
 
 
 @functools.cache
 def host_description() -> bytes:
-    """Return a description of the processor, the libraries and the translation, on which machine code depends, too."""
+    """Return a description of the processor, the libraries and this translation, which also determine the machine code."""
     translation = Path(__file__).read_bytes()
     features = binding.get_host_cpu_features().flatten()
     parts = [binding.get_default_triple(), binding.get_host_cpu_name(), features, version("llvmlite"), version("casadi")]
@@ -334,7 +334,7 @@ def _loaded(code: bytes) -> binding.ExecutionEngine:
 def _engine(module: str) -> binding.ExecutionEngine:
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
-    # More optimization would take as long again, for code that is no faster.
+    # More optimization would double the compile time, for code that is no faster.
     target = binding.Target.from_default_triple().create_target_machine(
         cpu=binding.get_host_cpu_name(), features=binding.get_host_cpu_features().flatten(), opt=1
     )

@@ -1,4 +1,4 @@
-"""Compiled changes of the rows that carry: in all joints at once, or one by one (see search_kernel)."""
+"""Compiled changes of the active set: in all joints at once, or one by one (see search_kernel)."""
 
 import numpy as np
 
@@ -30,21 +30,21 @@ from tolcontact.compilation.graph.factor_kernel import (
 from tolcontact.compilation.graph.layout import JOINT, POSITION, ROW, SLACK
 from tolcontact.compiled import inlined_inner
 
-FEASIBLE = 1e-12  # mm: rows of length 1 are violated by more
-RELIEVED = 1e-14  # times the growth of the multiplier that enters: multipliers that shrink by less stay
+FEASIBLE = 1e-12  # mm: a row of length 1 is violated if it misses its bound by more
+RELIEVED = 1e-14  # times the growth of the entering multiplier: smaller decreases of other multipliers do not block a step
 REFINEMENTS = 4
-CLOSED = 100  # times what violates rows: slacks, which open a gap by a thousandth of them, may be more negative
-# Results of a step: solved with the rows that carry; the target entered; something else left before; nothing can be done.
+CLOSED = 100  # times the tolerance of rows: slacks may be more negative, since they change a gap by a thousandth of their value
+# Results of a step: solved with the active set; the target entered; a blocking row or slack left before; no step is possible.
 CHECKED, ENTERED, PARTIAL, STUCK = range(4)
 
 
 @inlined_inner
 def multiply(layout, work):  # type: ignore[no-untyped-def]
-    """Compute the multipliers of the rows that carry, as equations, and the solution; return the largest multiplier."""
+    """Compute the multipliers of the active rows, as equations, and the solution; return the largest multiplier."""
     multipliers = work.positions[MULTIPLIER]
     for j in range(work.joints.shape[0]):
         for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            row = work.carrying[t]
+            row = work.active[t]
             multipliers[t] = work.rows[row, BOUND] + product(layout.blocks, work.slopes, row, work.vectors[GRADIENT])
             if work.joints[j, OPEN]:
                 multipliers[t] += work.rows[row, OPENING] * work.slacks[PRICE, j]
@@ -60,25 +60,25 @@ def move(layout, work):  # type: ignore[no-untyped-def]
             work.vectors[Y, body, c] = -work.vectors[GRADIENT, body, c]
     largest = 0.0
     for j in range(work.joints.shape[0]):
-        pull = -work.slacks[PRICE, j]
+        slack = -work.slacks[PRICE, j]
         for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            row, multiplier = work.carrying[t], work.positions[MULTIPLIER, t]
+            row, multiplier = work.active[t], work.positions[MULTIPLIER, t]
             add_row(layout.blocks, work.slopes, row, multiplier, work.vectors[Y])
-            pull += work.rows[row, OPENING] * multiplier
+            slack += work.rows[row, OPENING] * multiplier
             largest = max(largest, abs(multiplier))
-        work.slacks[VALUE, j] = pull  # of a closed slack: its multiplier, with the other sign
+        work.slacks[VALUE, j] = slack  # for a closed slack, this is its multiplier times -1
     return largest
 
 
 @inlined_inner
 def refine(layout, work):  # type: ignore[no-untyped-def]
-    """Correct the multipliers by what the rows that carry miss their bounds by, while this helps; return what they miss."""
+    """Refine the multipliers by the residuals of the active rows, while this helps; return the largest residual."""
     missed = np.inf
     for _ in range(REFINEMENTS):
         remainder = 0.0
         for j in range(work.joints.shape[0]):
             for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-                work.positions[STEP, t] = -excess(layout, work, work.carrying[t])
+                work.positions[STEP, t] = -excess(layout, work, work.active[t])
                 remainder = max(remainder, abs(work.positions[STEP, t]))
         helps = remainder > FEASIBLE and remainder < missed / 2
         missed = remainder
@@ -94,7 +94,7 @@ def refine(layout, work):  # type: ignore[no-untyped-def]
 
 @inlined_inner
 def excess(layout, work, row):  # type: ignore[no-untyped-def]
-    """Return by how much a row exceeds its bound."""
+    """Return the value of a row less its bound."""
     j = layout.rows[row, JOINT]
     value = product(layout.blocks, work.slopes, row, work.vectors[Y]) - work.rows[row, BOUND]
     if work.joints[j, OPEN]:
@@ -112,7 +112,10 @@ def toggle(layout, work, j):  # type: ignore[no-untyped-def]
 
 @inlined_inner
 def release(layout, work, tolerance):  # type: ignore[no-untyped-def]
-    """Drop the row of each joint that pulls most, and open slacks whose price is too low; return the number of changes."""
+    """Drop the row with the most negative multiplier of each joint, and open slacks whose rows push more than their price.
+
+    Return the number of changes.
+    """
     changes = 0
     for j in range(work.joints.shape[0]):
         if layout.joints[j, SLACK] < 0:
@@ -143,14 +146,14 @@ def close_slacks(layout, work, tolerance):  # type: ignore[no-untyped-def]
 
 @inlined_inner
 def scan(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-def]
-    """Write the most violated row of each joint, or -1, and its excess; return whether there is one."""
+    """Write the most violated row of each joint, or -1, and its excess; return whether any row is violated."""
     violated = False
     for j in range(work.joints.shape[0]):
         depths[j], deepest[j] = -tolerance, -1
         if layout.joints[j, SLACK] < 0:
             continue
         for row in range(layout.joints[j, ROW], layout.joints[j + 1, ROW]):
-            if work.place[row] < 0:
+            if work.position[row] < 0:
                 value = excess(layout, work, row)
                 if value < depths[j]:
                     depths[j], deepest[j], violated = value, row, True
@@ -159,25 +162,25 @@ def scan(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-d
 
 @inlined_inner
 def most_violated(work, tolerance, depths, deepest):  # type: ignore[no-untyped-def]
-    """Return the row that is violated most, or the number of rows and of the joint whose slack is more negative, or -1."""
+    """Return the most violated row, or row count + joint index if the slack of a joint is more negative, or -1 if none is."""
     lowest, target = -tolerance, -1
     for j in range(deepest.size):
         if depths[j] < lowest:
             lowest, target = depths[j], deepest[j]
         if work.joints[j, OPEN] and work.slacks[VALUE, j] < min(lowest, -CLOSED * tolerance):
-            lowest, target = work.slacks[VALUE, j], work.place.size + j
+            lowest, target = work.slacks[VALUE, j], work.position.size + j
     return target
 
 
 @inlined_inner
 def _aim(layout, work, target):  # type: ignore[no-untyped-def]
-    """Compute the direction of y, slacks and multipliers (times -1) as that of the target grows; return the target's change.
+    """Compute the direction of y, slacks and multipliers (times -1) as the target enters; return the target's change.
 
-    The change is zero if the target depends on the rows that carry.
+    The change is zero if the target is linearly dependent on the active rows.
     """
     change, scatter, direction = work.positions[STEP], work.vectors[SCATTER], work.vectors[DIRECTION]
-    is_row = target < work.place.size
-    joint = layout.rows[target, JOINT] if is_row else target - work.place.size
+    is_row = target < work.position.size
+    joint = layout.rows[target, JOINT] if is_row else target - work.position.size
     opening, square = 1.0, 0.0
     if is_row:
         set_row(layout.blocks, work.slopes, target, 1.0, scatter)
@@ -189,30 +192,30 @@ def _aim(layout, work, target):  # type: ignore[no-untyped-def]
     for j in range(work.joints.shape[0]):
         work.slacks[CHANGE, j] = opening if j == joint else 0.0
         for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            change[t] = product(layout.blocks, work.slopes, work.carrying[t], scatter)
+            change[t] = product(layout.blocks, work.slopes, work.active[t], scatter)
             if work.joints[j, OPEN] and j == joint:
-                change[t] += opening * work.rows[work.carrying[t], OPENING]
+                change[t] += opening * work.rows[work.active[t], OPENING]
     solve(layout, work, change)
     for j in range(work.joints.shape[0]):
         for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            add_row(layout.blocks, work.slopes, work.carrying[t], -change[t], direction)
-            work.slacks[CHANGE, j] -= work.rows[work.carrying[t], OPENING] * change[t]
+            add_row(layout.blocks, work.slopes, work.active[t], -change[t], direction)
+            work.slacks[CHANGE, j] -= work.rows[work.active[t], OPENING] * change[t]
     rate = opening * work.slacks[CHANGE, joint] if work.joints[joint, OPEN] else 0.0
     if is_row:
         rate += product(layout.blocks, work.slopes, target, direction)
         set_row(layout.blocks, work.slopes, target, 0.0, scatter)
     else:
-        # If the slack closes, as little remains of its rows as of the slack, times their openings' square.
+        # If the slack closes, its rows have the relative pivot of the slack times the square of their openings.
         largest = 0.0
         for t in range(layout.joints[joint, POSITION], layout.joints[joint, POSITION] + work.joints[joint, COUNT]):
-            largest = max(largest, work.rows[work.carrying[t], OPENING] ** 2)
+            largest = max(largest, work.rows[work.active[t], OPENING] ** 2)
         square = 1.0 / largest if largest > 0.0 else 0.0
     return rate if rate > dependence(work) * square else 0.0
 
 
 @inlined_inner
 def _block(layout, work):  # type: ignore[no-untyped-def]
-    """Return the longest step that leaves multipliers not negative, and the target (see `_aim`) that stops it."""
+    """Return the longest step that keeps multipliers nonnegative, and the row or slack that blocks it (see most_violated)."""
     step, blocking = np.inf, -1
     for j in range(work.joints.shape[0]):
         if layout.joints[j, SLACK] < 0:
@@ -220,10 +223,10 @@ def _block(layout, work):  # type: ignore[no-untyped-def]
         for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
             change = work.positions[STEP, t]
             if change > RELIEVED and work.positions[MULTIPLIER, t] < step * change:
-                step, blocking = max(work.positions[MULTIPLIER, t], 0.0) / change, work.carrying[t]
+                step, blocking = max(work.positions[MULTIPLIER, t], 0.0) / change, work.active[t]
         change = work.slacks[CHANGE, j]
         if not work.joints[j, OPEN] and change > RELIEVED and -work.slacks[VALUE, j] < step * change:
-            step, blocking = max(-work.slacks[VALUE, j], 0.0) / change, work.place.size + j
+            step, blocking = max(-work.slacks[VALUE, j], 0.0) / change, work.position.size + j
     return step, blocking
 
 
@@ -241,7 +244,7 @@ def _advance(layout, work, length):  # type: ignore[no-untyped-def]
 
 @inlined_inner
 def enter_joints(layout, work, deepest):  # type: ignore[no-untyped-def]
-    """Let the most violated row of each joint carry, unless a row of the joint has just left."""
+    """Activate the most violated row of each joint, unless a row of the joint has just left."""
     for j in range(deepest.size):
         if deepest[j] >= 0 and not work.joints[j, CHANGED]:
             append(layout, work, deepest[j])
@@ -249,11 +252,11 @@ def enter_joints(layout, work, deepest):  # type: ignore[no-untyped-def]
 
 @inlined_inner
 def step_towards(layout, work, target, growth):  # type: ignore[no-untyped-def]
-    """Take the longest step towards a row that starts to carry, or a slack that closes; drop what this relieves.
+    """Take the longest step towards activating a row or closing a slack; drop the row or slack that blocks the step.
 
-    Returns ENTERED, PARTIAL or STUCK, and how far the multiplier of the target has grown.
+    Returns ENTERED, PARTIAL or STUCK, and the growth of the target's multiplier.
     """
-    rows = work.place.size
+    rows = work.position.size
     rate = _aim(layout, work, target)
     gap = excess(layout, work, target) if target < rows else work.slacks[VALUE, target - rows]
     step, blocking = _block(layout, work)
@@ -265,12 +268,12 @@ def step_towards(layout, work, target, growth):  # type: ignore[no-untyped-def]
     if whole <= step:
         if target < rows:
             append(layout, work, target)
-            work.positions[MULTIPLIER, work.place[target]] = growth
+            work.positions[MULTIPLIER, work.position[target]] = growth
         else:
             toggle(layout, work, target - rows)
         return ENTERED, growth
     if blocking < rows:
-        remove(layout, work, work.place[blocking])
+        remove(layout, work, work.position[blocking])
     else:
         toggle(layout, work, blocking - rows)
     return PARTIAL, growth

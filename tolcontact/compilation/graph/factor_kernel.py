@@ -1,7 +1,7 @@
-"""Compiled factorization of the Gram matrix of the rows that carry, joint by joint.
+"""Compiled factorization of the Gram matrix of the active rows, joint by joint.
 
-Rows of length 1 have the Gram matrix N N'; the rows of a pair whose slack is open have the products of their openings, too.
-Its Cholesky factor has entries only where the elimination of joints in their order joins them (see layout).
+Rows of length 1 have the Gram matrix N N'. For rows of a pair whose slack is open, the products of their openings are added.
+The Cholesky factor has entries only between joints that the elimination order connects (see layout).
 """
 
 from typing import NamedTuple
@@ -11,7 +11,7 @@ import numpy as np
 from tolcontact.compilation.graph.layout import JOINT, POSITION, PRIOR
 from tolcontact.compiled import inlined_inner
 
-# A row depends on others if they leave less of its square. Open slacks are held by the square of their openings, which is tiny.
+# Relative pivots below which a row is dependent. Pivots of open slacks are squares of openings, which are tiny.
 DEPENDENT, DEPENDENT_IF_OPEN = 1e-11, 1e-14
 
 
@@ -27,24 +27,24 @@ class Work(NamedTuple):
 
     slopes      (row, block, 6)
     rows        (row, 2) openings and bounds
-    place       (row,) positions of the rows that carry, or -1
+    position    (row,) position of each active row, -1 for inactive rows
     vectors     (4, body, 6) the gradient, the solution y, one row among zeros, the direction of y
-    joints      (joint, 4) number of rows of the joint that carry, which have its first positions; number of those whose entries
-                of the factor are valid; whether factorization changed others; whether the slack may differ from zero
+    joints      (joint, 4) number of active rows of the joint, which take its first positions; number of these rows with valid
+                entries of the factor; whether other entries have changed; whether the slack is open
     slacks      (3, joint) price, value and direction; the value of a closed slack is the multiplier of its bound, times -1
-    factor      (position, position) the Cholesky factor, below its diagonal
-    carrying    (position,) rows that carry
-    positions   (3, position) their multipliers, a step of these, the next row of the factor
+    factor      (position, position) the Cholesky factor: lower triangle with diagonal
+    active      (position,) indices of the active rows
+    positions   (3, position) multipliers of the active rows, a step of the multipliers, the next row of the factor
     """
 
     slopes: np.ndarray
     rows: np.ndarray
-    place: np.ndarray
+    position: np.ndarray
     vectors: np.ndarray
     joints: np.ndarray
     slacks: np.ndarray
     factor: np.ndarray
-    carrying: np.ndarray
+    active: np.ndarray
     positions: np.ndarray
 
 
@@ -91,30 +91,30 @@ def set_row(blocks, slopes, row, weight, vectors):  # type: ignore[no-untyped-de
 
 @inlined_inner
 def append(layout, work, row):  # type: ignore[no-untyped-def]
-    """Let a row carry, behind the others of its joint."""
+    """Activate a row, after the other active rows of its joint."""
     j = layout.rows[row, JOINT]
     position = layout.joints[j, POSITION] + work.joints[j, COUNT]
-    work.carrying[position], work.place[row] = row, position
+    work.active[position], work.position[row] = row, position
     work.positions[MULTIPLIER, position] = 0.0
     work.joints[j, COUNT] += 1
 
 
 @inlined_inner
 def remove(layout, work, position):  # type: ignore[no-untyped-def]
-    """Let the row at a position carry no longer."""
-    j = layout.rows[work.carrying[position], JOINT]
-    work.place[work.carrying[position]] = -1
+    """Deactivate the row at a position."""
+    j = layout.rows[work.active[position], JOINT]
+    work.position[work.active[position]] = -1
     work.joints[j, COUNT] -= 1
     for s in range(position, layout.joints[j, POSITION] + work.joints[j, COUNT]):
-        work.carrying[s], work.positions[MULTIPLIER, s] = work.carrying[s + 1], work.positions[MULTIPLIER, s + 1]
-        work.place[work.carrying[s]] = s
+        work.active[s], work.positions[MULTIPLIER, s] = work.active[s + 1], work.positions[MULTIPLIER, s + 1]
+        work.position[work.active[s]] = s
     work.joints[j, FRESH] = min(work.joints[j, FRESH], position - layout.joints[j, POSITION])
     work.joints[j, CHANGED] = 1
 
 
 @inlined_inner
 def _eliminated(layout, work, j, position, value, solution):  # type: ignore[no-untyped-def]
-    """Return a right side's value at a position of joint j, less what the solution (position,) before it contributes."""
+    """Return a right side's value at a position of joint j, less the contributions of the solution (position,) before it."""
     factor = work.factor
     for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
         start = layout.joints[layout.prior[q, 0], POSITION]
@@ -127,25 +127,25 @@ def _eliminated(layout, work, j, position, value, solution):  # type: ignore[no-
 
 @inlined_inner
 def _factor_row(layout, work, j, position, threshold):  # type: ignore[no-untyped-def]
-    """Compute the factor's row at a position of joint j, and return whether the row is independent of those before it."""
-    factor, column, carrying, scatter = work.factor, work.positions[COLUMN], work.carrying, work.vectors[SCATTER]
-    row, start = carrying[position], layout.joints[j, POSITION]
+    """Compute the factor's row at a position of joint j, and return whether the row is independent of the rows before it."""
+    factor, column, active, scatter = work.factor, work.positions[COLUMN], work.active, work.vectors[SCATTER]
+    row, start = active[position], layout.joints[j, POSITION]
     opening = work.rows[row, OPENING] if work.joints[j, OPEN] else 0.0
     set_row(layout.blocks, work.slopes, row, 1.0, scatter)
     square = squared_length(layout.blocks, work.slopes, row) + opening * opening
-    rest = square
+    pivot = square
     for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
         k, adjacent = layout.prior[q, 0], layout.prior[q, 1]
         for t in range(layout.joints[k, POSITION], layout.joints[k, POSITION] + work.joints[k, COUNT]):
-            value = product(layout.blocks, work.slopes, carrying[t], scatter) if adjacent else 0.0
+            value = product(layout.blocks, work.slopes, active[t], scatter) if adjacent else 0.0
             column[t] = _eliminated(layout, work, k, t, value, column) / factor[t, t]
-            rest -= column[t] * column[t]
+            pivot -= column[t] * column[t]
     for t in range(start, position):
-        value = product(layout.blocks, work.slopes, carrying[t], scatter)
+        value = product(layout.blocks, work.slopes, active[t], scatter)
         if work.joints[j, OPEN]:
-            value += opening * work.rows[carrying[t], OPENING]
+            value += opening * work.rows[active[t], OPENING]
         column[t] = _eliminated(layout, work, j, t, value, column) / factor[t, t]
-        rest -= column[t] * column[t]
+        pivot -= column[t] * column[t]
     for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
         k = layout.prior[q, 0]
         for t in range(layout.joints[k, POSITION], layout.joints[k, POSITION] + work.joints[k, COUNT]):
@@ -153,8 +153,8 @@ def _factor_row(layout, work, j, position, threshold):  # type: ignore[no-untype
     for t in range(start, position):
         factor[position, t], column[t] = column[t], 0.0
     set_row(layout.blocks, work.slopes, row, 0.0, scatter)
-    factor[position, position] = np.sqrt(max(rest, 0.0))
-    return rest > threshold * square
+    factor[position, position] = np.sqrt(max(pivot, 0.0))
+    return pivot > threshold * square
 
 
 @inlined_inner
@@ -168,13 +168,13 @@ def any_open(work):  # type: ignore[no-untyped-def]
 
 @inlined_inner
 def dependence(work):  # type: ignore[no-untyped-def]
-    """Return how little of a row's square may remain beside the other rows if it is independent of them."""
+    """Return the relative pivot below which a row counts as linearly dependent."""
     return DEPENDENT_IF_OPEN if any_open(work) else DEPENDENT
 
 
 @inlined_inner
 def factorize(layout, work):  # type: ignore[no-untyped-def]
-    """Complete the factor, and return the number of rows that carry no longer, since they depend on those before them."""
+    """Complete the factor, and return the number of rows that are dropped, since they depend on rows before them."""
     dropped, threshold = 0, dependence(work)
     for j in range(work.joints.shape[0]):
         for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
@@ -196,7 +196,7 @@ def factorize(layout, work):  # type: ignore[no-untyped-def]
 
 @inlined_inner
 def solve(layout, work, values):  # type: ignore[no-untyped-def]
-    """Solve with the Gram matrix of the rows that carry, in place; values (position,)."""
+    """Solve with the Gram matrix of the active rows, in place; values (position,)."""
     factor = work.factor
     for j in range(work.joints.shape[0]):
         for position in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):

@@ -1,4 +1,4 @@
-"""A solver of contact QPs that follows the graph of bodies: few bodies touch each other, so most of the matrices is empty."""
+"""A solver of contact QPs that exploits the graph of bodies: few bodies touch each other, so the matrices are sparse."""
 
 from collections.abc import Mapping
 
@@ -11,20 +11,20 @@ from tolcontact.compilation.graph.layout import POSITION, Layout, Storage, layou
 from tolcontact.compilation.graph.solve_kernel import solve_batch
 from tolcontact.mechanics.correction import FREEDOMS
 
-FEW_BODIES, ROUNDS_OF_FEW, ROUNDS = 2, 4, 40  # rounds in which rows of all joints enter at once
-STEPS_PER_ROW = 4  # in which single rows enter or leave
+FEW_BODIES, ROUNDS_OF_FEW, ROUNDS = 2, 4, 40  # rounds of all joints at once
+STEPS_PER_ROW = 4  # steps of single rows
 
 Arrays = Mapping[str, Float[Array, "_ _"]]
-Layouts = dict[bool, tuple[Layout, Storage]]  # of QPs whose H has blocks on its diagonal only, and of others
+Layouts = dict[bool, tuple[Layout, Storage]]  # by whether H couples bodies
 
 
 class GraphSolver:
     """A solver of QPs with the sparsities of h, g, a and lba. Threads must not share it.
 
-    The last `equations` rows are equations, the last `slacks` variables are not negative, with unit entries in h. Solvers of
-    equal QPs may share their `layouts`, which are made when they are needed.
+    The last `equations` rows are equations. The last `slacks` variables are not negative, with unit entries in h. Solvers of
+    equal QPs may share their `layouts`, which are created on demand.
 
-    remembers   whether it starts each problem from the answer to the previous one: never
+    remembers   whether it starts each problem from the previous answer: never
     """
 
     remembers = False
@@ -43,12 +43,12 @@ class GraphSolver:
     def __call__(
         self, problem: Arrays, reactions: Float[Array, "realization row"], slacks: Float[Array, "realization slack"]
     ) -> tuple[dict[str, Float[Array, "realization _"]], Bool[Array, " realization"]]:
-        """Return x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the solver gave up.
+        """Return x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the solver failed.
 
-        In the first guess rows with `reactions` carry, and `slacks` above zero are open.
+        In the initial active set, rows with `reactions` are active, and `slacks` above zero are open.
         """
         count = len(reactions)
-        assert slacks.shape == (count, self._slacks)  # machine code would read beyond them
+        assert slacks.shape == (count, self._slacks)  # otherwise machine code would read out of bounds
         answer = {name: np.zeros((count, size)) for name, size in self._sizes().items()}
         failed = np.zeros(count, dtype=np.bool_)
         arrays = (problem["h"], problem["a"], self._full("g", problem["g"]), self._full("lba", problem["lba"]))
@@ -59,11 +59,9 @@ class GraphSolver:
             if len(rows) == count:
                 self._search(is_coupled)(arrays, guess, results)
             elif rows.size:
-                own_problem, own_guess, own_results = (
-                    tuple(array[rows] for array in group) for group in (arrays, guess, results)
-                )
-                self._search(is_coupled)(own_problem, own_guess, own_results)
-                for array, values in zip(results, own_results, strict=True):
+                part, part_guess, part_results = (tuple(array[rows] for array in group) for group in (arrays, guess, results))
+                self._search(is_coupled)(part, part_guess, part_results)
+                for array, values in zip(results, part_results, strict=True):
                     array[rows] = values
         return answer, failed
 
@@ -89,7 +87,7 @@ class GraphSolver:
 
 
 class _Search:
-    """The layout of QPs, with buffers for their solution; `coupled` if H has blocks beside its diagonal."""
+    """The layout of QPs, with buffers for their solution; `coupled` if H has off-diagonal blocks."""
 
     def __init__(self, layout: Layout, storage: Storage, *, coupled: bool) -> None:
         self._layout, self._storage, self._coupled = layout, storage, coupled
@@ -100,12 +98,12 @@ class _Search:
         self._work = Work(
             slopes=self._buffer[:cut].reshape(rows, width, FREEDOMS),
             rows=self._buffer[cut:].reshape(rows, 2),
-            place=np.zeros(rows, dtype=np.int64),
+            position=np.zeros(rows, dtype=np.int64),
             vectors=np.zeros((4, bodies, FREEDOMS)),
             joints=np.zeros((joints, 4), dtype=np.int64),
             slacks=np.zeros((3, joints)),
             factor=np.zeros((positions, positions)),
-            carrying=np.zeros(positions, dtype=np.int64),
+            active=np.zeros(positions, dtype=np.int64),
             positions=np.zeros((3, positions)),
         )
         self._blocks = np.zeros((len(storage.columns) if coupled else 0, FREEDOMS, FREEDOMS))

@@ -1,4 +1,4 @@
-"""Compiled block Cholesky factor of H = C C', which takes a QP to one whose H is the identity: its rows become C^-1 a."""
+"""Compiled block Cholesky factor of H = C C', which transforms a QP so that H is the identity: its rows become C^-1 a."""
 
 import numpy as np
 
@@ -46,12 +46,12 @@ def _subtract(block, left, right):  # type: ignore[no-untyped-def]
 
 @inner
 def load_hessian(storage, nonzeros, k, blocks):  # type: ignore[no-untyped-def]
-    """Write the factor of problem k into its blocks; return whether H is positive definite."""
+    """Write the factor of problem k into `blocks`; return whether H is positive definite."""
     blocks[:] = 0.0
     for entry in range(storage.hessian_entries.size):
         if storage.hessian_entries[entry] >= 0:
-            block, place = divmod(storage.hessian_entries[entry], 36)
-            blocks[block, place // 6, place % 6] = nonzeros[k, entry]
+            block, offset = divmod(storage.hessian_entries[entry], 36)
+            blocks[block, offset // 6, offset % 6] = nonzeros[k, entry]
     starts, columns, block_of = storage.starts, storage.columns, storage.block_of
     for body in range(starts.size - 1):
         diagonal = starts[body + 1] - 1
@@ -79,7 +79,7 @@ def _forward(triangle, vector):  # type: ignore[no-untyped-def]
 
 @inner
 def vectors_to_unit(storage, blocks, vectors):  # type: ignore[no-untyped-def]
-    """Replace vectors (body, 6) by C^-1 times them."""
+    """Multiply vectors (body, 6) by C^-1, in place."""
     starts, columns = storage.starts, storage.columns
     for body in range(starts.size - 1):
         diagonal = starts[body + 1] - 1
@@ -92,7 +92,7 @@ def vectors_to_unit(storage, blocks, vectors):  # type: ignore[no-untyped-def]
 
 @inner
 def from_unit(storage, blocks, vectors):  # type: ignore[no-untyped-def]
-    """Replace vectors (body, 6) by C'^-1 times them."""
+    """Multiply vectors (body, 6) by C'^-1, in place."""
     starts, columns = storage.starts, storage.columns
     for body in range(starts.size - 2, -1, -1):
         diagonal = starts[body + 1] - 1
@@ -109,7 +109,7 @@ def from_unit(storage, blocks, vectors):  # type: ignore[no-untyped-def]
 
 @inner
 def rows_to_unit(bodies, storage, blocks, slopes):  # type: ignore[no-untyped-def]
-    """Replace the slopes (row, block, 6) of all rows by C^-1 times them; `bodies` are those of Layout.blocks."""
+    """Multiply the slopes (row, block, 6) of all rows by C^-1, in place; `bodies` is Layout.blocks."""
     starts = storage.starts
     for row in range(slopes.shape[0]):
         for q in range(bodies[row, 0]):

@@ -1,30 +1,30 @@
-"""The layout of a QP on the graph of bodies: which bodies a row touches, and in which order joints are eliminated.
+"""The layout of a QP on the graph of bodies: the bodies that each row touches, and the elimination order of joints.
 
-A joint is the set of rows that share a slack (those of a contact pair), or of equations that touch the same bodies.
+A joint is the set of rows that share a slack (the rows of a contact pair), or a set of equations that touch the same bodies.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from tolcontact.compilation.graph.elimination import elimination, least_degree, least_depth
 from tolcontact.mechanics.correction import FREEDOMS
 
 JOINT, SOURCE = range(2)  # columns of Layout.rows
 ROW, POSITION, PRIOR, SLACK = range(4)  # columns of Layout.joints
+Key = Callable[[int, Sequence[int], Sequence[set[int]]], tuple[int, ...]]
 
 
 class Layout(NamedTuple):
-    """Constant arrays for the search for the rows that carry. Bodies, joints and rows are numbered in the order of elimination.
+    """Constant arrays for the active-set search. Bodies, joints and rows are numbered in elimination order.
 
     blocks   (row, 1 + block) number of bodies that the row touches, and these bodies, in ascending order
-    rows     (row, 2) its joint, and its number in the QP; the rows of a joint come one after the other
-    joints   (joint + 1, 4) the first row of the joint, its first position in the Gram matrix of the rows that carry, its first
-             row of `prior`, and its slack, or -1 for equations
-    prior    (_, 2) earlier joints with which the joint has entries in the factor of the Gram matrix, and whether the two share
-             a body, so that the Gram matrix has entries, too
+    rows     (row, 2) the joint of the row, and its index in the QP; the rows of a joint are consecutive
+    joints   (joint + 1, 4) the first row of the joint, its first position in the Gram matrix of the active rows, its first row
+             of `prior`, and its slack, or -1 for equations
+    prior    (_, 2) earlier joints that share entries of the Gram factor with the joint, and whether the two share a body, so
+             that the Gram matrix has entries, too
     """
 
     blocks: np.ndarray
@@ -34,11 +34,11 @@ class Layout(NamedTuple):
 
 
 class Storage(NamedTuple):
-    """Where the entries of a QP are stored.
+    """The storage of the entries of a QP.
 
-    bodies          (body,) number of each body in the QP
-    entries         (nonzero of a) place of each nonzero in a buffer: slopes (row, block, 6), then openings and bounds (row, 2)
-    hessian_entries (nonzero of h) place of each nonzero in the blocks (block, 6, 6) of H below its diagonal, or -1
+    bodies          (body,) index of each body in the QP
+    entries         (nonzero of a) offset of each nonzero in a buffer: slopes (row, block, 6), then openings and bounds (row, 2)
+    hessian_entries (nonzero of h) offset of each nonzero in the lower triangular blocks (block, 6, 6) of H, or -1
     starts          (body + 1,) first block of each body's row; its last block is on the diagonal
     columns         (block,) body of each block's column
     block_of        (body, body) block of a row and column, or -1
@@ -55,7 +55,7 @@ class Storage(NamedTuple):
 def layout(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int, equations: int, coupled: bool) -> tuple[Layout, Storage]:
     """Return the layout and the storage of QPs with these sparsities.
 
-    If `coupled`, H = C C' has blocks beside its diagonal. Rows become C^-1 a, and touch the bodies that follow theirs as well.
+    If `coupled`, H = C C' has off-diagonal blocks. Rows become C^-1 a, which also touches the bodies that follow in the factor.
     """
     bodies, count = (h.size1() - slacks) // FREEDOMS, a.size1()
     rows, columns = (np.array(indices, dtype=np.int64) for indices in a.get_triplet())
@@ -71,9 +71,9 @@ def layout(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int, equations: int, coupl
         touched = [_with_later(body_order, later, nodes) for nodes in touched]
     joints, equation_joints = _joints(touched, slack_of_row.tolist(), count - equations)
     joint_bodies = [set().union(*(touched[row] for row in members)) for members in joints]
-    near = [{k for k, nodes in enumerate(joint_bodies) if k != j and nodes & joint_bodies[j]} for j in range(len(joints))]
+    adjacent = [{k for k, nodes in enumerate(joint_bodies) if k != j and nodes & joint_bodies[j]} for j in range(len(joints))]
     # Equations come first, so that no equation is dropped because it depends on rows that may leave.
-    order, joined = elimination(near, lambda j, depths, graph: (j >= equation_joints, *least_degree(j, depths, graph)))
+    order, joined = elimination(adjacent, lambda j, depths, graph: (j >= equation_joints, *least_degree(j, depths, graph)))
     prior = [sorted(k for k, nodes in enumerate(joined) if j in nodes) for j in range(len(order))]
     members = [joints[j] for j in order]
     row_order = np.array([row for rows_of_joint in members for row in rows_of_joint], dtype=np.int64)
@@ -83,12 +83,12 @@ def layout(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int, equations: int, coupl
     sizes = [len(joints[j]) if j < equation_joints else min(len(joints[j]), FREEDOMS * len(joint_bodies[j]) + 2) for j in order]
     positions = np.cumsum([0, *sizes])
     slack_of_joint = [*(slack_of_row[rows_of_joint[0]] for rows_of_joint in members), -1]
-    adjacent = [(k, order[k] in near[order[j]]) for j, nodes in enumerate(prior) for k in nodes]
+    prior_joints = [(k, order[k] in adjacent[order[j]]) for j, nodes in enumerate(prior) for k in nodes]
     return Layout(
         blocks=np.array([[len(nodes), *nodes] + [0] * (width - len(nodes)) for nodes in blocks], dtype=np.int64),
         rows=np.stack([np.repeat(np.arange(len(order)), list(map(len, members))), row_order], axis=1),
         joints=np.stack([_starts(members), positions, _starts(prior), slack_of_joint], axis=1),
-        prior=np.array(adjacent, dtype=np.int64).reshape(-1, 2),
+        prior=np.array(prior_joints, dtype=np.int64).reshape(-1, 2),
     ), _storage(h, body_order, later, _entries(rows, columns, np.argsort(row_order), body_rank, blocks, width))
 
 
@@ -97,7 +97,7 @@ def _starts(lists: Sequence[Sequence[int] | set[int]]) -> np.ndarray:
 
 
 def _body_graph(h: ca.Sparsity, bodies: int) -> list[set[int]]:
-    """Return the bodies with which H couples each body."""
+    """Return the bodies that H couples to each body."""
     graph: list[set[int]] = [set() for _ in range(bodies)]
     for row, column in zip(*h.get_triplet(), strict=True):
         i, j = row // FREEDOMS, column // FREEDOMS
@@ -108,7 +108,7 @@ def _body_graph(h: ca.Sparsity, bodies: int) -> list[set[int]]:
 
 
 def _with_later(order: Sequence[int], later: Sequence[Sequence[int]], bodies: set[int]) -> set[int]:
-    """Return the bodies, and those that follow them in the factor of H."""
+    """Return the bodies, and the bodies that follow them in the factor of H."""
     ranks = {order.index(body) for body in bodies}
     for rank in range(len(order)):
         if rank in ranks:
@@ -117,7 +117,7 @@ def _with_later(order: Sequence[int], later: Sequence[Sequence[int]], bodies: se
 
 
 def _joints(touched: Sequence[set[int]], slacks: Sequence[int], inequalities: int) -> tuple[list[list[int]], int]:
-    """Return the rows of each joint, those of equations in front, and their number."""
+    """Return the rows of each joint, joints of equations first, and the number of these."""
     pairs: dict[int, list[int]] = {}
     equations: dict[tuple[int, ...], list[int]] = {}
     for row, (bodies, slack) in enumerate(zip(touched, slacks, strict=True)):
@@ -131,16 +131,16 @@ def _joints(touched: Sequence[set[int]], slacks: Sequence[int], inequalities: in
 def _entries(
     rows: np.ndarray, columns: np.ndarray, row_rank: np.ndarray, body_rank: np.ndarray, blocks: Sequence[list[int]], width: int
 ) -> np.ndarray:
-    """Return the place of each nonzero of a in the buffer of the rows."""
+    """Return the offset of each nonzero of a in the buffer of the rows."""
     openings = len(blocks) * width * FREEDOMS
-    places = np.zeros(len(rows), dtype=np.int64)
+    offsets = np.zeros(len(rows), dtype=np.int64)
     for k, (row, column) in enumerate(zip(row_rank[rows].tolist(), columns.tolist(), strict=True)):
         body, freedom = divmod(column, FREEDOMS)
         if body >= len(body_rank):
-            places[k] = openings + 2 * row
+            offsets[k] = openings + 2 * row
         else:
-            places[k] = (row * width + blocks[row].index(int(body_rank[body]))) * FREEDOMS + freedom
-    return places
+            offsets[k] = (row * width + blocks[row].index(int(body_rank[body]))) * FREEDOMS + freedom
+    return offsets
 
 
 def _storage(h: ca.Sparsity, order: Sequence[int], later: Sequence[Sequence[int]], entries: np.ndarray) -> Storage:
@@ -151,16 +151,48 @@ def _storage(h: ca.Sparsity, order: Sequence[int], later: Sequence[Sequence[int]
     for body, nodes in enumerate(columns):
         block_of[body, nodes] = starts[body] + np.arange(len(nodes))
     rows_of_h, columns_of_h = (np.array(indices, dtype=np.int64) for indices in h.get_triplet())
-    places = np.full(len(rows_of_h), -1, dtype=np.int64)
+    offsets = np.full(len(rows_of_h), -1, dtype=np.int64)
     of_bodies = np.flatnonzero(np.maximum(rows_of_h, columns_of_h) < bodies * FREEDOMS)
     i, j = rows_of_h[of_bodies], columns_of_h[of_bodies]
     blocks = block_of[rank[i // FREEDOMS], rank[j // FREEDOMS]]
-    places[of_bodies] = np.where(blocks < 0, -1, (blocks * FREEDOMS + i % FREEDOMS) * FREEDOMS + j % FREEDOMS)
+    offsets[of_bodies] = np.where(blocks < 0, -1, (blocks * FREEDOMS + i % FREEDOMS) * FREEDOMS + j % FREEDOMS)
     return Storage(
         bodies=np.array(order, dtype=np.int64),
         entries=entries,
-        hessian_entries=places,
+        hessian_entries=offsets,
         starts=starts,
         columns=np.array([k for nodes in columns for k in nodes], dtype=np.int64),
         block_of=block_of,
     )
+
+
+def least_degree(node: int, depths: Sequence[int], neighbours: Sequence[set[int]]) -> tuple[int, ...]:
+    """Return the key of minimum-degree order, whose factors have few entries; a chain is eliminated from both ends."""
+    return len(neighbours[node]), depths[node], node
+
+
+def least_depth(node: int, depths: Sequence[int], neighbours: Sequence[set[int]]) -> tuple[int, ...]:
+    """Return the key of an order with a flat elimination tree: every other node of a chain, and so on recursively."""
+    return depths[node], len(neighbours[node]), node
+
+
+def elimination(graph: Sequence[set[int]], key: Key) -> tuple[list[int], list[list[int]]]:
+    """Return the order of the nodes, and by rank the ranks of later nodes that elimination joins to the node.
+
+    graph   the neighbours of each node
+
+    The remaining node with the smallest key comes next; its neighbours become neighbours of one another.
+    """
+    neighbours = [set(nodes) for nodes in graph]
+    depths, remaining, order, joined = [0] * len(graph), set(range(len(graph))), [], []
+    while remaining:
+        node = min(remaining, key=lambda candidate: key(candidate, depths, neighbours))
+        remaining.remove(node)
+        order.append(node)
+        joined.append(neighbours[node])
+        for neighbour in neighbours[node]:
+            neighbours[neighbour] |= neighbours[node]
+            neighbours[neighbour] -= {node, neighbour}
+            depths[neighbour] = max(depths[neighbour], depths[node] + 1)
+    rank = {node: k for k, node in enumerate(order)}
+    return order, [sorted(rank[node] for node in nodes) for nodes in joined]

@@ -1,8 +1,8 @@
-"""Compiled search for the rows that carry: in all joints at once, and if that goes round, one by one.
+"""Compiled search for the active set: in all joints at once, and if that cycles, one by one.
 
-At once: in every joint the most violated row starts to carry, a row that pulls carries no longer, and slacks open and close.
-One by one: the dual method of Goldfarb and Idnani, which raises the dual objective with every row, so that no set of rows comes
-back; it begins when no multiplier is negative. Equations always carry, with multipliers of any sign.
+At once: in every joint the most violated row enters, a row with a negative multiplier leaves, and slacks open and close.
+One by one: the dual method of Goldfarb and Idnani. Every entering row raises the dual objective, so that no active set recurs.
+It starts when no multiplier is negative. Equations are always active, with multipliers of any sign.
 """
 
 from tolcontact.compilation.graph.active_set_kernel import (
@@ -23,25 +23,25 @@ from tolcontact.compilation.graph.active_set_kernel import (
 from tolcontact.compilation.graph.factor_kernel import any_open, factorize
 from tolcontact.compiled import inlined_inner
 
-JOINTS, RELEASE, ROWS = range(3)  # phases: all joints at once; drop rows that pull; single rows
-ATTEMPTS = 3  # of the search for single rows, each from what the attempt before it ended with
-LOOSER = 10.0  # by which rows may be violated more in every further attempt
-ROUNDS_IN_CONFLICT = 6  # of all joints at once: where a slack is open, they mostly go round
+JOINTS, RELEASE, ROWS = range(3)  # phases: all joints at once; drop rows with negative multipliers; single rows
+ATTEMPTS = 3  # of the search by single rows; each starts from the active set at the end of the previous attempt
+LOOSENING = 10.0  # factor of the tolerance in every further attempt
+ROUNDS_IN_CONFLICT = 6  # of all joints at once: if a slack is open, they usually cycle
 ROUNDING = 1e-15  # of the largest multiplier
-COARSE = 1e-9  # mm: most that counts as rounding
+MAX_ROUNDING = 1e-9  # mm: upper bound of the tolerance
 
 
 @inlined_inner
 def _tolerance(layout, work, refines):  # type: ignore[no-untyped-def]
-    """Solve with the rows that carry as equations, and return the violation [mm] up to which other rows hold."""
+    """Solve with the active rows as equations, and return the violation [mm] up to which other rows count as satisfied."""
     largest = multiply(layout, work)
     missed = refine(layout, work) if refines or any_open(work) else 0.0
-    return min(FEASIBLE + ROUNDING * largest + 2 * missed, COARSE)
+    return min(FEASIBLE + ROUNDING * largest + 2 * missed, MAX_ROUNDING)
 
 
 @inlined_inner
-def _hold_joints(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-def]
-    """Let rows enter and leave in all joints at once; return whether the solution is reached."""
+def _update_joints(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-def]
+    """Update the active set in all joints at once; return whether the solution is reached."""
     changes = release(layout, work, tolerance) + close_slacks(layout, work, tolerance)
     if not scan(layout, work, tolerance, depths, deepest):
         return changes == 0
@@ -50,7 +50,7 @@ def _hold_joints(layout, work, tolerance, depths, deepest):  # type: ignore[no-u
 
 
 @inlined_inner
-def _hold_row(layout, work, tolerance, depths, deepest, state):  # type: ignore[no-untyped-def]
+def _enter_row(layout, work, tolerance, depths, deepest, state):  # type: ignore[no-untyped-def]
     """Take a step towards the most violated row; return whether none is violated. `state` is the result, target and growth."""
     result, target, growth = state
     if result != PARTIAL:
@@ -59,15 +59,15 @@ def _hold_row(layout, work, tolerance, depths, deepest, state):  # type: ignore[
         if target < 0:
             return result == CHECKED, (CHECKED, target, growth)
     result, growth = step_towards(layout, work, target, growth)
-    # What steps add up to is precise, unless open slacks hold rows weakly.
+    # The sum of the steps is accurate, unless open slacks make rows nearly dependent.
     if result == ENTERED and any_open(work):
         result = CHECKED
     return False, (result, target, growth)
 
 
 @inlined_inner
-def find_carrying(layout, work, limits, depths, deepest, counters):  # type: ignore[no-untyped-def]
-    """Find the rows that carry, and return whether they were found.
+def find_active_rows(layout, work, limits, depths, deepest, counters):  # type: ignore[no-untyped-def]
+    """Find the active rows, and return whether the search succeeded.
 
     limits            rounds of all joints at once, steps of single rows in an attempt
     depths, deepest   (joint,) buffers
@@ -82,18 +82,18 @@ def find_carrying(layout, work, limits, depths, deepest, counters):  # type: ign
             tolerance = _tolerance(layout, work, phase == ROWS) * looseness
         if phase == JOINTS:
             counters[0] += 1
-            if _hold_joints(layout, work, tolerance, depths, deepest):
+            if _update_joints(layout, work, tolerance, depths, deepest):
                 return True
             if counters[0] >= limits[0] or (counters[0] >= ROUNDS_IN_CONFLICT and any_open(work)):
                 phase = RELEASE
         elif phase == RELEASE:
             if not release(layout, work, 0.0):
-                phase, steps, looseness = ROWS, 0, LOOSER ** counters[1]
+                phase, steps, looseness = ROWS, 0, LOOSENING ** counters[1]
                 state = CHECKED, deepest.size, 0.0
                 counters[1] += 1
         else:
-            holds, state = _hold_row(layout, work, tolerance, depths, deepest, state)
-            if holds:
+            is_solved, state = _enter_row(layout, work, tolerance, depths, deepest, state)
+            if is_solved:
                 return True
             steps += 1
             if steps == limits[1] or state[0] == STUCK:

@@ -1,4 +1,4 @@
-"""Compiled solution of a batch of QPs on the graph of bodies, each from its data alone."""
+"""Compiled solution of a batch of independent QPs on the graph of bodies."""
 
 from tolcontact.compilation.graph.active_set_kernel import excess, refine
 from tolcontact.compilation.graph.factor_kernel import (
@@ -16,15 +16,15 @@ from tolcontact.compilation.graph.factor_kernel import (
 )
 from tolcontact.compilation.graph.hessian_kernel import from_unit, load_hessian, rows_to_unit, vectors_to_unit
 from tolcontact.compilation.graph.layout import JOINT, POSITION, ROW, SLACK, SOURCE
-from tolcontact.compilation.graph.search_kernel import find_carrying
+from tolcontact.compilation.graph.search_kernel import find_active_rows
 from tolcontact.compiled import inlined_inner, uncounted
 
-MISSED = 1e-7  # mm: an equation that depends on others and is missed by more contradicts them
+MISSED = 1e-7  # mm: a dependent equation with a larger residual contradicts the others
 
 
 @inlined_inner
 def _load(layout, storage, work, problem, k, clears):  # type: ignore[no-untyped-def]
-    """Write the rows, bounds, gradient and prices of problem k into `work`, which is cleared if rows fill more of it."""
+    """Write the rows, bounds, gradient and prices of problem k into `work`; clear its slopes first if `clears`."""
     slopes, gradient, bounds, buffer = problem
     if clears:
         work.slopes[:] = 0.0
@@ -32,7 +32,7 @@ def _load(layout, storage, work, problem, k, clears):  # type: ignore[no-untyped
         buffer[storage.entries[entry]] = slopes[k, entry]
     for row in range(layout.rows.shape[0]):
         work.rows[row, BOUND] = bounds[k, layout.rows[row, SOURCE]]
-        work.place[row] = -1
+        work.position[row] = -1
     bodies = storage.bodies.size
     for body in range(bodies):
         for c in range(6):
@@ -45,7 +45,7 @@ def _load(layout, storage, work, problem, k, clears):  # type: ignore[no-untyped
 
 @inlined_inner
 def _start(layout, work, reactions, slacks, k):  # type: ignore[no-untyped-def]
-    """Open the slacks that were open before, and let equations carry, and rows that did, as far as there are positions."""
+    """Open the guessed slacks, and activate equations and guessed rows, up to the number of positions."""
     for j in range(work.joints.shape[0]):
         slack = layout.joints[j, SLACK]
         work.joints[j, OPEN] = slack >= 0 and slacks[k, slack] > 0
@@ -58,11 +58,11 @@ def _start(layout, work, reactions, slacks, k):  # type: ignore[no-untyped-def]
 
 @inlined_inner
 def _holds_equations(layout, work):  # type: ignore[no-untyped-def]
-    """Return whether equations hold that do not carry, since they depend on others."""
+    """Return whether the inactive equations hold, which depend on others."""
     for j in range(work.joints.shape[0]):
         if layout.joints[j, SLACK] < 0:
             for row in range(layout.joints[j, ROW], layout.joints[j + 1, ROW]):
-                if work.place[row] < 0 and abs(excess(layout, work, row)) > MISSED:
+                if work.position[row] < 0 and abs(excess(layout, work, row)) > MISSED:
                     return False
     return True
 
@@ -81,7 +81,7 @@ def _store(layout, storage, work, k, x, lam_a, lam_x):  # type: ignore[no-untype
             else:
                 lam_x[k, 6 * bodies + layout.joints[j, SLACK]] = work.slacks[VALUE, j]
         for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            lam_a[k, layout.rows[work.carrying[t], SOURCE]] = -work.positions[MULTIPLIER, t]
+            lam_a[k, layout.rows[work.active[t], SOURCE]] = -work.positions[MULTIPLIER, t]
 
 
 @uncounted
@@ -108,7 +108,7 @@ def solve_batch(layout, storage, work, hessian, problem, guess, limits, search, 
             vectors_to_unit(storage, blocks, work.vectors[GRADIENT])
             rows_to_unit(layout.blocks, storage, blocks, work.slopes)
         _start(layout, work, reactions, slacks, k)
-        if not find_carrying(layout, work, limits, depths, deepest, counters[k]):
+        if not find_active_rows(layout, work, limits, depths, deepest, counters[k]):
             failed[k] = True
             continue
         refine(layout, work)

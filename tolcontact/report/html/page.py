@@ -3,23 +3,25 @@
 import base64
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import jinja2
 import markupsafe
+import numpy as np
 import xarray as xr
 
+from tolcontact import vocabulary as terms
 from tolcontact.declaration import Assembly, TitleBlock
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.discretization import Nominal, discretize
 from tolcontact.errors import ArchiveError, ModelError
 from tolcontact.replacing import replacing
+from tolcontact.report.analysis_tables import analysis_report, archived_analysis
 from tolcontact.report.archived_settings import archived_settings
 from tolcontact.report.contributor_shares import ContributorShares, contributor_shares
 from tolcontact.report.figures import grouped, limits_text
-from tolcontact.report.html.analyses import contributions_of, tables_of
 from tolcontact.report.html.charts import bars_of, charts_of, compared_charts, relations_of
 from tolcontact.report.html.scene import gap_rows, scene_of, view_of
 from tolcontact.report.model_tables import model_tables
@@ -58,6 +60,8 @@ WORDS = {
     "states": STATE_WORDS, "rule": VERDICT_RULE, "glossary": GLOSSARY, "estimates_note": ESTIMATES_NOTE,
     "contributors_heading": CONTRIBUTORS, "settings_heading": SIMULATION_SETTINGS,
 }  # fmt: skip
+MAX_BARS = 15  # of a chart
+CASES_NOTE = "Those with contact are the first of the single realizations above."
 
 
 def write_page(results: xr.DataTree, summary: xr.Dataset, path: Path, title_block: TitleBlock | None = None) -> None:
@@ -249,3 +253,43 @@ def _missing(scene: dict[str, Any]) -> list[str]:
         if part["faces"]["shape"][0] < part["triangles"]
     ]
     return remarks
+
+
+def contributions_of(results: xr.DataTree) -> list[dict[str, Any]]:
+    """Return total and first-order shares of each measure's groups, in both states, the largest total share first."""
+    dataset = archived_analysis(results, terms.CONTRIBUTIONS)
+    return [] if dataset is None else [_shares(dataset.sel(measure=measure)) for measure in dataset["measure"].values]
+
+
+def tables_of(results: xr.DataTree) -> Iterator[dict[str, Any]]:
+    """Yield the tables of all other analyses, with titles, columns, rows, and remarks below."""
+    for record in terms.ANALYSES.values():
+        dataset = archived_analysis(results, record)
+        if dataset is None:
+            continue
+        report = analysis_report(record, dataset)
+        notes = [f"{report.count}. {' '.join(report.notes)}", *([CASES_NOTE] if record is terms.WORST_CASE else [])]
+        for table in report.tables:
+            if not table.is_detail:
+                title = f"{report.name}: {table.title}" if table.title else report.name
+                yield {"title": title, "columns": table.columns, "rows": table.rows, "remarks": [*table.remarks, *notes]}
+                notes = []
+
+
+def _shares(dataset: xr.Dataset) -> dict[str, Any]:
+    total = dataset["total"].sel(interval="estimate")
+    order = np.argsort(-np.nan_to_num(total.max("state").values), kind="stable")[:MAX_BARS]
+    states = [
+        {word: [_percents(dataset[word].values[state, k]) for k in order] for word in ("first", "total")}
+        for state in range(len(terms.STATES))
+    ]
+    return {
+        "measure": str(dataset["measure"].values),
+        "groups": [str(dataset["group"].values[k]) for k in order],
+        "states": states,
+        "linear": _percents(dataset["linear"].values[order]),
+    }
+
+
+def _percents(shares: np.ndarray) -> list[float | None]:
+    return [100 * float(share) if np.isfinite(share) else None for share in shares]

@@ -2,25 +2,72 @@
 
 import base64
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
+import fast_simplification
+import igl
 import numpy as np
 import xarray as xr
+from scipy.spatial import cKDTree
 
 from tolcontact import vocabulary as terms
 from tolcontact.declaration import Assembly, Part
 from tolcontact.discretization import Nominal
 from tolcontact.geometry import PartPreview, preview
+from tolcontact.realizations import finished, pieces
 from tolcontact.report.analysis_tables import archived_analysis
 from tolcontact.report.annotations import Marks, fixed_points, marks_of, marks_of_nominal
-from tolcontact.report.html.decimation import coarser, triangle_budgets
 from tolcontact.report.html.feature_list import feature_lists
 from tolcontact.report.html.form_scene import MAX_GAPS, SingleStates
-from tolcontact.report.html.single_realizations import SingleRealization, single_realizations
 from tolcontact.report.html.station_scenes import station_poses, stations_of, stations_of_nominal, worst_poses
 from tolcontact.statistics import touching
 
 Packed = dict[str, Any]
+MAX_TRIANGLES = 60_000  # of all bodies
+MIN_TRIANGLES = 500  # of a body
+MAX_EXCESS = 1.2  # over the number of triangles that the fast method should reach
+EXTREMES = 5  # of each measure, on either side
+MAX_REALIZATIONS = 300
+
+
+class SingleRealization(NamedTuple):
+    """A realization, and the reason to show it."""
+
+    row: int
+    reason: str
+
+
+def single_realizations(results: xr.DataTree) -> list[SingleRealization]:
+    """Return realizations in the order of the page, without duplicates; extremes are those of corrected measures."""
+    done = finished(results)
+    rows = results.to_dataset().isel({terms.REALIZATION: slice(done)})
+    reasons: dict[int, str] = {}
+    for number, measure in enumerate(rows[terms.MEASURE].values):
+        for extreme, extreme_rows in zip(("smallest", "largest"), _extremes(rows, number), strict=True):
+            for row in extreme_rows:
+                reasons.setdefault(int(row), f"{extreme} {measure}")
+    for row in np.random.default_rng(0).permutation(done)[: MAX_REALIZATIONS + len(reasons)]:
+        if len(reasons) >= MAX_REALIZATIONS:
+            break
+        reasons.setdefault(int(row), "at random")
+    return [SingleRealization(row, reason) for row, reason in list(reasons.items())[:MAX_REALIZATIONS]]
+
+
+def _extremes(rows: xr.Dataset, measure: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows with the smallest and with the largest values, the most extreme first."""
+    candidate_rows, candidates = np.zeros(0, dtype=int), np.zeros(0)
+    start = 0
+    for piece in pieces(rows[[terms.MEASURED.name]]):
+        values = piece[terms.MEASURED.name].values[:, -1, measure]
+        candidates = np.concatenate([candidates, values])
+        candidate_rows = np.concatenate([candidate_rows, start + np.arange(len(values))])
+        start += len(values)
+        order = np.argsort(candidates, kind="stable")
+        order = order[np.isfinite(candidates[order])]
+        selection = np.unique(np.concatenate([order[:EXTREMES], order[-EXTREMES:]])) if order.size else order
+        candidates, candidate_rows = candidates[selection], candidate_rows[selection]
+    order = np.argsort(candidates, kind="stable")
+    return candidate_rows[order[:EXTREMES]], candidate_rows[order[::-1][:EXTREMES]]
 
 
 def packed(values: Any, kind: str = "f4") -> Packed:
@@ -193,3 +240,21 @@ def _drawn_part(part: Part, image: PartPreview, faulty: set[str]) -> Scene:
             for face, snippet, groups in zip(image.descriptions, image.snippets, image.groups, strict=True)
         ],
     }
+
+
+def triangle_budgets(counts: Sequence[int]) -> list[int]:
+    """Return the largest number of triangles of each body."""
+    share = min(1.0, MAX_TRIANGLES / max(sum(counts), 1))
+    return [count if share == 1 else min(count, max(MIN_TRIANGLES, int(share * count))) for count in counts]
+
+
+def coarser(vertices: np.ndarray, faces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a surface of about `count` triangles: vertices (vertex, 3), faces (face, 3), and the nearest old vertices."""
+    if len(faces) <= count:
+        return vertices, faces, np.arange(len(vertices))
+    coarse, corners = fast_simplification.simplify(vertices, faces, target_count=count)
+    if len(corners) > MAX_EXCESS * count:  # short edges stop the fast method, not this one
+        coarse, corners, *_ = igl.decimate(
+            np.asarray(vertices, dtype=np.float64, order="C"), np.asarray(faces, dtype=np.int64, order="C"), count
+        )
+    return coarse, corners, cKDTree(vertices).query(coarse)[1]

@@ -1,6 +1,6 @@
-"""Poses of deviating faces: of a face in its part, and of the two faces of a pair relative to each other.
+"""Poses of deviating faces, and the symbols that the equations of a contact group share.
 
-A small rigid deviation enters as the pose of the face. It adds no rows: contact points, their hull and the QP stay the same.
+A small rigid deviation enters as the pose of the face. It adds no rows: contact points, their hull and the QP are unchanged.
 """
 
 from collections.abc import Sequence
@@ -26,13 +26,13 @@ def face_pose(face: FaceDeviation | None, deviations: ca.SX) -> Pose | None:
     return Pose(R, q[:3] + c - R @ c)
 
 
-def face_height(face: FaceDeviation | None, deviations: ca.SX, place: np.ndarray | None = None) -> ca.SX:
-    """Return the growth of a face out of the material [mm]; at a `place` (3,) [mm] of it with the height of its form."""
+def face_height(face: FaceDeviation | None, deviations: ca.SX, point: np.ndarray | None = None) -> ca.SX:
+    """Return the growth of a face out of the material [mm], with its form deviation at a `point` (3,) [mm] if given."""
     height = ca.SX(0)
     if face is not None and face.grows:
         height = ca.dot(ca.DM(face.height), deviations[face.columns.tolist()])
-    if face is not None and face.form is not None and place is not None:
-        height += ca.dot(ca.DM(face.form.heights(place)), deviations[face.form_columns.tolist()])
+    if face is not None and face.form is not None and point is not None:
+        height += ca.dot(ca.DM(face.form.heights(point)), deviations[face.form_columns.tolist()])
     return height
 
 
@@ -43,7 +43,7 @@ def face_poses(pair: ContactPoints, deviations: ca.SX) -> tuple[Pose | None, Pos
 
 
 def face_heights(pair: ContactPoints, deviations: ca.SX) -> ca.SX:
-    """Return the growth (2, 1) [mm] of the moving and the reference face of a pair, this one less the error of coordinates."""
+    """Return the growth (2, 1) [mm] of the moving and the reference face of a pair; the latter less the coordinate error."""
     moving, reference = (face_height(face, deviations) for face in pair.deviating)
     return ca.vertcat(moving, reference - pair.coordinate_error)
 
@@ -61,18 +61,18 @@ def facing_pose(faces: tuple[Pose | None, Pose | None], X_WM: Pose, X_WR: Pose |
 
 
 @dataclass(frozen=True, eq=False)
-class Setting:
-    """A group of coupled parts, and the symbols that its equations share. Poses are one for each part of the group.
+class GroupEquations:
+    """A group of coupled parts, and the symbols that its equations share. Lists of poses have one for each part of the group.
 
-    raw          poses from which displacements count
-    moments      (10, side) of the points of each side that count in the objective
+    raw          raw poses, which displacements are measured from
+    moments      moments (10, side) of the weighted points of each side in the objective
     deviations   (contributor, 1) of the model
-    firmness     factor of the regularization: 1 in the last step
-    z            (6 * mover, 1) [mm]: the increments, about which everything is linearized
+    regularization_factor   factor of the regularization: 1 in the last step
+    z            (6 * mover, 1) [mm]: the increments; everything is linearized at z = 0
     faces        poses of the moving and the reference face of each pair of the group in their parts
-    heights      (2, 1) [mm] by which the moving and the reference face of each pair of the group have grown
-    steps        (locator, 1) [mm] of each of the group's holds, see hold_steps
-    scale        of the objective, if the group is a part of the one whose objective it is; see tolcontact.mechanics.objective
+    heights      growth (2, 1) [mm] of the moving and the reference face of each pair of the group
+    steps        steps (locator, 1) [mm] of the bilateral locators of each mover, see bilateral_steps
+    scale        scale of the whole group's objective, if this is an element of that group; see tolcontact.mechanics.objective
     """
 
     nominal: Nominal
@@ -81,7 +81,7 @@ class Setting:
     raw: Sequence[Pose]
     moments: ca.SX
     deviations: ca.SX
-    firmness: ca.SX
+    regularization_factor: ca.SX
     z: ca.SX
     faces: Sequence[tuple[Pose | None, Pose | None]]
     heights: Sequence[ca.SX]
