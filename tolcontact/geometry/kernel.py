@@ -1,4 +1,4 @@
-"""Compiled gaps of the places at which two bodies can touch: corners on facets, and edges across edges."""
+"""Compiled gaps at the points where two bodies can touch: corners on facets, and edges across edges."""
 
 import math
 from typing import NamedTuple
@@ -21,20 +21,20 @@ from tolcontact.geometry.vector_kernel import (
     turn_back,
 )  # fmt: skip
 
-CORNER_ON_FACET, FACET_ON_CORNER, EDGE_ON_EDGE = 0, 1, 2  # the moving body's part first
-MARGIN = 1e-9  # of the size: places that lie no farther beside an edge still count
-LEANING = 0.2  # sine of the angle by which a normal may lean out of the cone of a corner or an edge
+CORNER_ON_FACET, FACET_ON_CORNER, EDGE_ON_EDGE = 0, 1, 2  # the moving body comes first
+MARGIN = 1e-9  # of the size: largest distance outside an edge at which a contact point counts
+LEANING = 0.2  # sine of the angle by which a normal may tilt out of the cone of a corner or an edge
 MIN_CROSSING = 1e-3  # rad: edges of facing planes that cross at a smaller angle meet at their corners
 PARALLEL = 1e-6  # rad: edges at a smaller angle have no common normal
-MIN_SLANT, MAX_SLANT = 1.02, 1.5  # lengths between which the slope of a gap between rims counts, not the plane's normal
-INSIDE = 1e-9  # mm: places that are no deeper touch
+MIN_SLANT, MAX_SLANT = 1.02, 1.5  # range of lengths in which the slope of a gap between rims counts, not the plane's normal
+INSIDE = 1e-9  # mm: contact points that are no deeper count as touching
 TINY = 1e-300
 ORIGIN = (0.0, 0.0, 0.0)
-NOWHERE = (np.inf, ORIGIN, ORIGIN, ORIGIN)  # gap, place, foot and normal of parts that do not meet
+NOWHERE = (np.inf, ORIGIN, ORIGIN, ORIGIN)  # gap, point, projection and normal of elements that do not meet
 
 
 class Body(NamedTuple):
-    """The parts of a polyhedron at which it can touch another body (see Polyhedron), and the triangles of its whole body."""
+    """The corners, edges and facets of a polyhedron (see Polyhedron), and the triangles of its whole body."""
 
     vertices: np.ndarray
     cones: np.ndarray
@@ -60,7 +60,7 @@ def _leaning(body, corner, n):  # type: ignore[no-untyped-def]
 
 @inlined_uncounted
 def corner_on_facet(A, B, number_A, number_B, plane, spare, reach, X, x):  # type: ignore[no-untyped-def]
-    """Return gap, place, foot and normal of a corner, now at x, of the moving body on a facet of the reference body."""
+    """Return gap, point, projection and normal of a corner, now at x, of the moving body on a facet of the reference body."""
     n = row(B.normals, number_B)
     height = dot(n, minus(x, row_of(B.facets, number_B, 0)))
     if not (-reach[0] <= height <= reach[1]) or (plane < 0 and not is_over(B.facets, B.inward, number_B, x, spare)):
@@ -74,7 +74,7 @@ def corner_on_facet(A, B, number_A, number_B, plane, spare, reach, X, x):  # typ
 
 @inlined_uncounted
 def facet_on_corner(A, B, number_A, number_B, flat, plane, spare, reach, X, y):  # type: ignore[no-untyped-def]
-    """Return gap, place, foot and normal of a facet of the moving body on a corner of the reference body.
+    """Return gap, point, projection and normal of a facet of the moving body on a corner of the reference body.
 
     flat   the facet of the reference body along whose normal facing planes touch
     y      the corner in the frame of the moving body
@@ -100,7 +100,7 @@ def facet_on_corner(A, B, number_A, number_B, flat, plane, spare, reach, X, y): 
 
 @inlined_uncounted
 def _rises(A, B, number_A, number_B, X, n):  # type: ignore[no-untyped-def]
-    """Return how far n and -n lean towards the facets beside two edges, if they point from the reference to the moving body.
+    """Return the tilts of n and of -n towards the facets at two edges, as a normal from the reference to the moving body.
 
     Both are sines of the largest angle.
     """
@@ -114,7 +114,7 @@ def _rises(A, B, number_A, number_B, X, n):  # type: ignore[no-untyped-def]
 
 @inlined_uncounted
 def _inner(x, share, d, n, height, normals, edge):  # type: ignore[no-untyped-def]
-    """Return the place on the edge x + s d that is equally deep below both facets beside another edge.
+    """Return the point on the edge x + s d that is equally deep below both facets at another edge.
 
     It lies inside the other body if x is below that edge by -height along n. Where facets meet sharply, x may lie outside.
     """
@@ -133,7 +133,7 @@ def _is_past(share, edge, spare):  # type: ignore[no-untyped-def]
 
 @inlined_uncounted
 def edge_on_edge(A, B, number_A, number_B, flat, plane, spare, reach, X, x, d):  # type: ignore[no-untyped-def]
-    """Return gap, place, foot and normal of an edge of the moving body across one of the reference body.
+    """Return gap, point, projection and normal of an edge of the moving body across one of the reference body.
 
     The edge, now at x + s d, meets q + u e where s = (q - x) x e . m / c . m and u = (q - x) x d . m / c . m, with c = d x e,
     seen along m: their common normal, or the normal of the reference plane; then the gap's slope is c / c . m.

@@ -1,4 +1,4 @@
-"""Compiled local minima of the gap between two planes with form."""
+"""Compiled local minima of the gap between two planes with form deviation."""
 
 import math
 
@@ -7,14 +7,14 @@ import numpy as np
 from tolcontact.compiled import compiled, inner
 from tolcontact.geometry.height_kernel import coordinates, gap_at, write_map
 
-MAX_STEPS = 10  # of the search of one minimum
-STEP_SHARE = 1e-2  # of the reach: a smaller step is the last one
-SPARE_FALL = 6.0  # times the fall that a step foresees
-BASIN_SHARE = 0.5  # of the reach: a start that is nearer to the end of an earlier search is spared
-NEAR_SHARE = 0.05  # of the reach: minima that are nearer to each other are one
+MAX_STEPS = 10  # per local search
+STEP_SHARE = 1e-2  # of the reach: a smaller step ends the search
+SPARE_FALL = 6.0  # times the predicted decrease of a step
+BASIN_SHARE = 0.5  # of the reach: a start nearer than this to the end of an earlier search is skipped
+NEAR_SHARE = 0.05  # of the reach: minima nearer than this to each other are one
 ON_EDGE = 1e-9  # of the reach
-CELLS = 1 << 26  # along each side of the box around a moving plane, in labels of its places
-FIRST_PLACE = 1 << 60  # label of the first of these places
+CELLS = 1 << 26  # along each side of the box around a moving plane, in the labels of its points
+FIRST_PLACE = 1 << 60  # label of the first of these points
 
 
 @inner
@@ -41,7 +41,7 @@ def _write_edges(moving, reference, along, edges):  # type: ignore[no-untyped-de
 
 @inner
 def _share(edges, u, v, du, dv, slack, skipped):  # type: ignore[no-untyped-def]
-    """Return the share of a step du, dv after which it leaves the faces; 1 if it does not. One edge may be skipped."""
+    """Return the share of a step du, dv at which it leaves the faces; 1 if it does not. One edge may be skipped."""
     share = 1.0
     for e in range(edges.shape[0]):
         rate = du * edges[e, 5] + dv * edges[e, 6]
@@ -60,7 +60,7 @@ def _share(edges, u, v, du, dv, slack, skipped):  # type: ignore[no-untyped-def]
 
 @inner
 def _slide(edges, u, v, du, dv, derivatives, reach, slack):  # type: ignore[no-untyped-def]
-    """Return the longest step du, dv along an edge that blocks a step at u, v towards the least gap there."""
+    """Return the longest step du, dv towards the least gap along an edge that blocks a step at u, v."""
     g_u, g_v, g_uu, g_uv, g_vv = derivatives
     longest, best_u, best_v = 0.0, 0.0, 0.0
     for e in range(edges.shape[0]):
@@ -80,9 +80,9 @@ def _slide(edges, u, v, du, dv, derivatives, reach, slack):  # type: ignore[no-u
 
 @inner
 def _descend(moving, reference, sums_m, sums_r, row, along, edges, u, v, reach, level, weights, scratch, best):  # type: ignore
-    """Write coordinates and value (3,) of the local minimum of the gap over both faces, near u, v over them.
+    """Write the coordinates and the value (3,) of the local minimum of the gap over both faces, from a start at u, v.
 
-    The search ends where the gap will hardly fall below a level [mm].
+    The search ends once the gap is unlikely to fall below a level [mm].
     """
     slack = ON_EDGE * reach
     best[2] = np.inf
@@ -115,7 +115,7 @@ def _descend(moving, reference, sums_m, sums_r, row, along, edges, u, v, reach, 
 
 @inner
 def _is_over(edges, first, end, u, v, slack):  # type: ignore[no-untyped-def]
-    """Return whether coordinates lie within the rim of the edges from `first` to `end`, or beside it by at most a slack."""
+    """Return whether coordinates lie within the rim of the edges from `first` to `end`, or outside it by at most a slack."""
     is_inside = False
     for e in range(first, end):
         x, y = u - edges[e, 0], v - edges[e, 1]
@@ -132,7 +132,7 @@ def _is_over(edges, first, end, u, v, slack):  # type: ignore[no-untyped-def]
 
 @compiled
 def choose_starts(points, gaps, limits, distance, chosen):  # type: ignore[no-untyped-def]
-    """Write the numbers (n, start) of points with the least gaps, a distance [mm] apart from each other; -1 for none.
+    """Write the indices (n, start) of the points with the least gaps, at least a distance [mm] apart; -1 for none.
 
     points   (n, point, 3) [mm], or (1, point, 3) if they are the same in all rows
     gaps     (n, point) [mm]
@@ -163,14 +163,14 @@ def choose_starts(points, gaps, limits, distance, chosen):  # type: ignore[no-un
 
 @compiled
 def find_minima(moving, reference, poses, sums_m, sums_r, grown, points, starts, reach, slack, depth, labels):  # type: ignore
-    """Write the labels (n, place) of the deepest local minima of the gap that are deeper than `depth` [mm]; -1 for none.
+    """Write the labels (n, point) of the deepest local minima of the gap that are deeper than `depth` [mm]; -1 for none.
 
     sums_m, sums_r   HeightSums of both planes
-    grown    (n,) [mm]: the sum by which both faces have grown
+    grown    (n,) [mm]: the sum of the outward offsets of both faces
     points   (n, point, 3) [mm] of the moving plane, or (1, point, 3) if they are the same at all poses
-    starts   (n, start): numbers of the points from which minima are searched; -1 for none
-    reach    [mm] of one step of the search
-    slack    [mm] by which starts may stand beside a rim
+    starts   (n, start): indices of the points from which minima are searched; -1 for none
+    reach    [mm]: longest step of the search
+    slack    [mm]: largest distance of a start outside a rim
     """
     along, weights, scratch, best = np.empty((3, 3)), np.empty((6, 4)), np.empty(5), np.empty(3)
     count = moving.edges.shape[0]
@@ -216,7 +216,7 @@ def find_minima(moving, reference, poses, sums_m, sums_r, grown, points, starts,
 
 @compiled
 def join(labels, former, joined):  # type: ignore[no-untyped-def]
-    """Write labels (n, a), and after them other former ones (n, b), to joined (n, c), then -1; return the most of a row."""
+    """Write labels (n, a), then further former labels (n, b), then -1 to joined (n, c); return the largest count of a row."""
     most = 0
     for k in range(labels.shape[0]):
         count = 0
@@ -234,7 +234,7 @@ def join(labels, former, joined):  # type: ignore[no-untyped-def]
 
 @inner
 def _label(plane, u, v):  # type: ignore[no-untyped-def]
-    """Return the label of a place on a plane: its coordinates in whole cells."""
+    """Return the label of a point on a plane: its coordinates in whole cells."""
     low, high = plane.corners[0], plane.corners[1]
     i = min(max(int((u - low[0]) / (high[0] - low[0]) * CELLS), 0), CELLS - 1)
     j = min(max(int((v - low[1]) / (high[1] - low[1]) * CELLS), 0), CELLS - 1)
@@ -243,9 +243,9 @@ def _label(plane, u, v):  # type: ignore[no-untyped-def]
 
 @compiled
 def write_places(moving, reference, poses, sums_m, sums_r, labels, slack, places, feet, gaps, heights):  # type: ignore
-    """Write places (n, place, 3) of labels, feet (n, place, 3), nominal gaps (n, place), and the sums of both heights [mm].
+    """Write the points (n, point, 3) of labels, their projections, nominal gaps (n, point), and sums of both heights [mm].
 
-    Gaps are infinite where there is no place: of labels -1, and of places that stand beside a face by more than a slack.
+    The gap of a label -1 is infinite, and so is the gap of a point that overhangs a face by more than a slack.
     """
     along, weights, scratch = np.empty((3, 3)), np.empty((6, 4)), np.empty(5)
     low, high, count = moving.corners[0], moving.corners[1], moving.edges.shape[0]

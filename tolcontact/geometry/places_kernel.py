@@ -1,4 +1,4 @@
-"""Compiled search for the places at which two bodies touch, among all candidates, at given relative poses."""
+"""Compiled search for the points at which two bodies touch, among all candidates, at given relative poses."""
 
 import math
 from typing import NamedTuple
@@ -31,19 +31,19 @@ from tolcontact.geometry.vector_kernel import (
     turn,
 )
 
-MAX_SHEAR = 1.8  # by which a corner's place beside a facet changes with its height, where planes face each other
+MAX_SHEAR = 1.8  # lateral shift of a corner's projection per unit height, where planes face each other
 EVERYWHERE = (-np.inf, -np.inf, np.inf, np.inf)
 
 
 class Candidates(NamedTuple):
-    """The places at which two bodies can touch (see Meeting), those of a corner or edge of one body one after the other.
+    """The points at which two bodies can touch (see Meeting), grouped by the corner or edge of one body.
 
-    Those of a corner or edge and one facing plane, or no such plane, are a run; runs begin at `runs` (run + 1,). From `middles`
-    (run,) on they are sorted by the first value of their boxes, which are no wider than `widths` (run,) [mm].
-    `boxes` (candidate, 4) [mm] are least and largest coordinates, in a facing plane, of the facets or the edge that a corner or
-    an edge may touch there, along the vectors in `frames` (facing planes, body, 2, 3). `segments` (segment, 5) are the outlines
-    of facing planes in these coordinates (see is_within); those of a plane of the moving and of the reference body begin at
-    `outlines` (2 planes + 1,); their sorted segments begin at `outline_middles` and are no taller than `tallest` (2 planes,).
+    The candidates of a corner or edge and one facing plane, or no plane, are a run; runs begin at `runs` (run + 1,). From
+    `middles` (run,) on they are sorted by the first value of their boxes, which are no wider than `widths` (run,) [mm].
+    `boxes` (candidate, 4) [mm] are the least and largest coordinates of the facets or the edge that a corner or an edge may
+    touch in a facing plane, along the vectors in `frames` (facing planes, body, 2, 3). `segments` (segment, 5) are the outlines
+    of facing planes in these coordinates (see is_within). The outlines of a plane of the moving and of the reference body begin
+    at `outlines` (2 planes + 1,). Their sorted segments begin at `outline_middles`, and are no taller than `tallest` (2 planes,).
     """
 
     kinds: np.ndarray
@@ -64,7 +64,7 @@ class Candidates(NamedTuple):
 
 @compiled
 def cover(poses, corners, travel, turn, covered):  # type: ignore[no-untyped-def]
-    """Write whether corners (v, 3) travel by at most `travel` [mm], and turn by at most `turn` [rad], at X_RM (n, 12)."""
+    """Write whether corners (v, 3) travel by at most `travel` [mm], and rotate by at most `turn` [rad], at X_RM (n, 12)."""
     largest = 8 * math.sin(turn / 2) ** 2 if turn < math.pi else np.inf  # |R - I|^2
     for k in range(poses.shape[0]):
         X, square = poses[k], 0.0
@@ -80,9 +80,9 @@ def cover(poses, corners, travel, turn, covered):  # type: ignore[no-untyped-def
 
 @uncounted
 def _keep_shallowest(candidates, touching, gaps, least):  # type: ignore[no-untyped-def]
-    """Drop all but the nearest of the facets that a corner is behind: by that one it leaves. Facing planes hold all corners.
+    """Drop all but the nearest facet of a corner that is behind several: it leaves through that one. Facing planes are kept.
 
-    It may be behind several by no more than `least` [mm].
+    A corner may be behind several facets by no more than `least` [mm].
     """
     best, owner_of_best = -1, -1
     for s in touching:
@@ -114,7 +114,7 @@ def _is_over_plane(candidates, plane, body, x, spare):  # type: ignore[no-untype
 
 @inlined_uncounted
 def _place(A, B, candidates, s, spare, reach, X, moved):  # type: ignore[no-untyped-def]
-    """Return gap, place, foot and normal of candidate s, which may lie `spare` [mm] beside edges."""
+    """Return gap, point, projection and normal of candidate s, which may lie `spare` [mm] outside edges."""
     corners, lines, back = moved
     kind, number_A, number_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
     flat = 0 if plane < 0 else candidates.facing[plane, 1]
@@ -133,7 +133,7 @@ def _place(A, B, candidates, s, spare, reach, X, moved):  # type: ignore[no-unty
 
 @inlined_uncounted
 def _write(results, s, gaps, places, feet, normals):  # type: ignore[no-untyped-def]
-    """Write gap, place, foot and normal of candidate s."""
+    """Write gap, point, projection and normal of candidate s."""
     gaps[s] = results[0]
     for vectors, vector in ((places, results[1]), (feet, results[2]), (normals, results[3])):
         vectors[s, 0], vectors[s, 1], vectors[s, 2] = vector
@@ -141,7 +141,7 @@ def _write(results, s, gaps, places, feet, normals):  # type: ignore[no-untyped-
 
 @uncounted
 def _is_near(candidates, s, foot, feet, touching, gaps, distance):  # type: ignore[no-untyped-def]
-    """Return whether a place of facing planes is no farther than `distance` from another one at which they touch."""
+    """Return whether a contact point of facing planes is within `distance` of another one at which they touch."""
     for neighbour in touching:
         if candidates.planes[neighbour] == candidates.planes[s] and gaps[neighbour] < np.inf:
             difference = minus(row(feet, neighbour), foot)
@@ -152,7 +152,7 @@ def _is_near(candidates, s, foot, feet, touching, gaps, distance):  # type: igno
 
 @inlined_uncounted
 def _range(A, candidates, s, moved, spare):  # type: ignore[no-untyped-def]
-    """Return least and largest coordinates of the corner or edge of candidate s in the plane that faces it."""
+    """Return the least and largest coordinates of the corner or edge of candidate s in the plane that faces it."""
     corners, lines, back = moved
     kind, number_A, number_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
     body = 0 if kind == FACET_ON_CORNER else 1
@@ -175,20 +175,21 @@ def _range(A, candidates, s, moved, spare):  # type: ignore[no-untyped-def]
 
 @uncounted
 def _find_at(A, B, candidates, reach, margins, nearness, beside, retained, X, moved, touching, is_held, gaps, all_places):  # type: ignore
-    """Write gap, places and normal of the candidates that touch at one pose X_RM (12,); return how many there are.
+    """Write gap, points and normal of the candidates that touch at one pose X_RM (12,); return how many there are.
 
-    Of facing planes, candidates that are kept count a little beside their edges: there, near a corner of the overlap, the
-    planes themselves err little. Far from it, or where planes no longer overlap, another body may be free.
+    Retained candidates of facing planes count slightly outside their edges: near a corner of the overlap the error of the
+    extended planes is small. Far from it, or where planes no longer overlap, the other body may be free.
 
-    margins       (p + 1,) [mm] by which places may lie beside edges: those that are kept, of each two facing planes; all others
-    nearness      in margins: how far from a place where the planes touch such a place may lie
-    retained      (k,): numbers of the candidates that are kept, or -1
+    margins       (p + 1,) [mm]: largest distance of contact points outside edges: of retained candidates, by facing planes;
+                  of all others
+    nearness      in margins: largest distance of such a contact point from a point where the planes touch
+    retained      (k,): indices of the retained candidates, or -1
     moved         corners (v, 3), and starts and vectors of edges (e, 2, 3), of the moving body in the reference frame, and
                   corners of the reference body in the moving frame
-    touching      (c,): numbers of the candidates that touch
-    is_held       (corner,), false: see _drop_passed
-    gaps          (c,) [mm], infinite before
-    all_places    places, feet, normals (3, c, 3): P^m, P^r, n^r of the paper
+    touching      (c,): indices of the candidates that touch
+    is_held       (corner,), false: see drop_passed
+    gaps          (c,) [mm], initially infinite
+    all_places    points, projections, normals (3, c, 3): P^m, P^r, n^r of the paper
     """
     (places, feet, normals), margin, boxes = all_places, margins[-1], candidates.boxes
     count = 0
@@ -221,7 +222,7 @@ def _find_at(A, B, candidates, reach, margins, nearness, beside, retained, X, mo
 
 @uncounted
 def _choose(touching, gaps, feet, retained, directions, is_chosen, labels):  # type: ignore[no-untyped-def]
-    """Write the labels (p,) of places that may matter: those kept, those of the least gaps, and the outermost; -1 for none."""
+    """Write the labels (p,) of relevant points: retained ones, those with the least gaps, and the outermost; -1 for none."""
     number = 0
     for s in touching:
         is_chosen[s] = gaps[s] == np.inf
@@ -250,7 +251,7 @@ def _choose(touching, gaps, feet, retained, directions, is_chosen, labels):  # t
 
 @uncounted
 def _move(A, B, facing, X, corners, lines, back, sines):  # type: ignore[no-untyped-def]
-    """Write what moves at a pose X_RM (12,): see `moved` in _find_at; and sines of the angles between facing planes."""
+    """Write the moved geometry at a pose X_RM (12,), see `moved` in _find_at, and sines of the angles between facing planes."""
     for j in range(corners.shape[0]):
         corners[j, 0], corners[j, 1], corners[j, 2] = move(X, row(A.vertices, j))
     for j in range(lines.shape[0]):
@@ -266,7 +267,7 @@ def _move(A, B, facing, X, corners, lines, back, sines):  # type: ignore[no-unty
 
 @uncounted
 def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, directions, results, scratch):  # type: ignore
-    """Write what `find` writes, found = (labels, gaps, places, feet, normals)."""
+    """Write the results of `find`: labels, gaps, points, projections and normals."""
     corners, lines, back, margins, touching, is_held, is_chosen, all_gaps, all_places = scratch
     labels, gaps, places, feet, normals = results
     places_at, feet_at, normals_at = all_places
@@ -298,21 +299,22 @@ def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, direc
 
 @compiled
 def find(A, B, candidates, reach, margin, error, poses, retained, directions, labels, gaps, places, feet, normals):  # type: ignore
-    """Write the places at which bodies can touch, at poses X_RM (n, 12): of all candidates those that may matter.
+    """Write the relevant points at which bodies can touch, at poses X_RM (n, 12).
 
-    These are first those in `retained` (n, k), then the ones with the least gaps, then the outermost in each of the
+    First come the candidates in `retained` (n, k), then the candidates with the least gaps, then the outermost in each of the
     `directions` (direction, 3). All are written if there is room for them.
 
     A, B          Body, the moving and the reference one
     candidates    Candidates
-    reach         (3,) [mm]: the largest depth, and the largest gap, that a place may have; from which nominal depth on a body
-                  has come in elsewhere
-    margin        [mm] by which places may lie beside edges
-    error         (4,) [mm] that facing planes may make beside their edges, the margin in which they may make it, how many
-                  margins away from a place where they touch, and the depth up to which a corner counts behind several facets
-    labels        (n, p): numbers of the candidates, -1 where there is none
-    gaps          (n, p) [mm], infinite where there is none
-    places, feet, normals   (n, p, 3), left as they are where there is none
+    reach         (3,) [mm]: the largest depth and the largest gap of a contact point; the nominal depth beyond which a body
+                  must have penetrated elsewhere
+    margin        [mm]: largest distance of contact points outside edges
+    error         (4,): the permitted error [mm] of facing planes outside their edges, the margin [mm] in which it is permitted,
+                  the distance in margins from a point where they touch, and the depth [mm] up to which a corner counts behind
+                  several facets
+    labels        (n, p): indices of the candidates, -1 for none
+    gaps          (n, p) [mm], infinite for none
+    places, feet, normals   (n, p, 3), left unchanged for none
     """
     count = candidates.kinds.size
     scratch = (

@@ -19,7 +19,7 @@ SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
 class Polyhedron:
     """The triangles of a face, and the edges and corners around them, in the nominal assembly frame [mm].
 
-    Vertices inside a plane, and edges between facets of one plane, cannot touch anything first; they are left out.
+    Vertices inside a plane, and edges between facets of one plane, cannot be the first to touch anything, and are left out.
 
     vertices     (v, 3): the corners of the face
     cones        (v + 1,): the first direction of each corner, and the end
@@ -32,8 +32,8 @@ class Polyhedron:
     into         (e, 2, 3): unit vectors across each edge into the two facets of the body that meet there
     edge_normals (e, 2, 3): outward unit normals of these two facets
     convex       (e,): whether the body is convex there
-    facet_planes, vertex_planes, edge_planes   number of the plane of each facet (t,); planes around each vertex (v, plane)
-                 and beside each edge (e, 2), as numbers, -1 where there is none
+    facet_planes, vertex_planes, edge_planes   index of the plane of each facet (t,); indices of the planes around each vertex
+                 (v, plane) and on both sides of each edge (e, 2), -1 for none
     body         (f, 3, 3): all triangles of the body, none if it is not closed
     """
 
@@ -55,9 +55,9 @@ class Polyhedron:
 
 
 def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
-    """Return the polyhedron of a face of a body, both in their nominal places.
+    """Return the polyhedron of a face of a body, both in their nominal poses.
 
-    Planes of the body count as a whole, also where the face was cut out of them: the body does not end there. If its file
+    Planes of the body count as a whole, even where the face was cut out of them: the body does not end there. If its file
     rounds coordinates, it is smaller by their error.
     """
     merged, _, is_closed = merged_surface(body)
@@ -108,7 +108,7 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
 
 
 def _cones(corners: np.ndarray, edges: np.ndarray, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return cones (corner + 1,) and directions (d, 3) of `corners` (corner,), from the numbers of the ends of edges."""
+    """Return cones (corner + 1,) and directions (d, 3) of `corners` (corner,), from the vertex indices of edges."""
     starts, ends = np.concatenate([edges, edges[:, ::-1]]).T
     kept = np.isin(starts, corners)
     starts, ends = starts[kept], ends[kept]
@@ -119,7 +119,7 @@ def _cones(corners: np.ndarray, edges: np.ndarray, vertices: np.ndarray) -> tupl
 
 
 def _planes_around(corners: np.ndarray, faces: np.ndarray, planes: np.ndarray) -> np.ndarray:
-    """Return the planes (corner, plane) of the `faces` (face, 3) around each corner, filled up with -1."""
+    """Return the planes (corner, plane) of the `faces` (face, 3) around each corner, padded with -1."""
     pairs = np.unique(np.stack([faces.ravel(), planes.repeat(3)], axis=1), axis=0)
     place = np.searchsorted(corners, pairs[:, 0])
     is_corner = np.isin(pairs[:, 0], corners)
