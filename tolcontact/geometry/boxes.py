@@ -1,4 +1,4 @@
-"""Boxes around corners, edges and triangles: which of them overlap."""
+"""Overlaps of the boxes around corners, edges and triangles."""
 
 from collections.abc import Iterator
 

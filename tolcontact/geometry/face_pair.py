@@ -1,9 +1,9 @@
 """The penetration depth of the faces of a contact pair, including between contact points.
 
-A plane with form deviation bounds its body over the nominal plane up to the rim, and no further: each of its points is displaced
-along the normal of the plane. Adjacent faces keep their nominal positions, and end where they meet the displaced rim along that
-normal. The penetration of the other body is therefore its depth behind the displaced plane, including at the rim. The form
-deviation of a plane counts along its own normal, never along the normals of other faces.
+A plane with form deviation bounds its body over the nominal plane up to the rim, and no further: each of its points is
+displaced along the normal of the plane. Adjacent faces keep their nominal positions, and end where they meet the displaced rim
+along that normal. The penetration of the other body is therefore its depth behind the displaced plane, including at the rim.
+The form deviation of a plane counts along its own normal, never along the normals of other faces.
 """
 
 from dataclasses import dataclass
@@ -175,7 +175,7 @@ class PairForm(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class FacePair:
-    """The faces of a pair, for checks at any pose. Depths up to `rounding` [mm], the coordinate error of files, do not count."""
+    """The faces of a pair, for checks at any pose. Depths up to `rounding` [mm], the coordinate error of files, are ignored."""
 
     moving: BodyFace
     reference: BodyFace

@@ -1,4 +1,4 @@
-"""A mesh whose vertices are merged where they are one, and apart where different parts of a surface touch."""
+"""A mesh whose coincident vertices are merged, except where different parts of a surface touch."""
 
 from typing import NamedTuple
 
@@ -9,14 +9,14 @@ from scipy.sparse.csgraph import connected_components
 
 from tolcontact.arrays import Array, Int
 
-MERGE_SHARE = 1e-9  # of the size: vertices that are no farther apart are one
-ROUNDED = 1e-9  # of a full turn: triangles at an edge that are no farther apart are in one place
+MERGE_SHARE = 1e-9  # of the size: largest distance between vertices that are merged
+ROUNDED = 1e-9  # of a full turn: largest angle between triangles at an edge that count as coincident
 
 
 class MergedSurface(NamedTuple):
     """The triangles of a body that have an area, with merged vertices.
 
-    sources    (t,): which of the triangles of the body these are
+    sources    (t,): indices of these triangles in the body
     is_closed  whether each triangle of the body continues into others along all its edges
     """
 
@@ -28,8 +28,9 @@ class MergedSurface(NamedTuple):
 def merged_surface(body: trimesh.Trimesh) -> MergedSurface:
     """Return the triangles of a body that have an area, with merged vertices.
 
-    Two blocks that touch along an edge, or in a corner, have an edge of four triangles, or a corner of two fans. They are
-    closed all the same: each triangle continues into the one on the other side of its material, and each fan has a vertex.
+    Two blocks that touch along an edge, or in a corner, have an edge with four triangles, or a corner with two fans. They are
+    closed nevertheless: each triangle continues into the triangle on the other side of its material, and each fan has its own
+    vertex.
     """
     surface = trimesh.Trimesh(body.vertices, body.faces, process=False)
     surface.merge_vertices(digits_vertex=int(np.ceil(-np.log10(MERGE_SHARE * max(surface.scale, 1e-9)))))
@@ -79,7 +80,7 @@ def _across_material(
     arms -= np.outer(arms @ along, along)
     u = arms[np.argmax(np.linalg.norm(arms, axis=1))]
     turns = np.arctan2(arms @ np.cross(along, u), arms @ u) / (2 * np.pi)
-    # Of triangles in one place the one that ends material comes first: flush blocks remain two.
+    # Among coincident triangles the one that ends material comes first, so that flush blocks remain two.
     order = np.lexsort([~is_forward, np.round(turns / ROUNDED) % (1 / ROUNDED)])
     opened, pairs = list[int](), list[tuple[int, int]]()
     for place in [*order, *order]:  # twice around

@@ -1,6 +1,6 @@
-"""The corners, triangles and edges of two meshes that are nearest to each other: between them is their least distance.
+"""The nearest corners, triangles and edges of two meshes, which determine their least distance. Lengths in mm.
 
-Two disjoint polyhedra are nearest to each other at a corner and a facet, or at two convex edges or their ends. Lengths in mm.
+The nearest points of two disjoint polyhedra lie at a corner and a facet, or at two convex edges or their ends.
 """
 
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ from tolcontact.errors import GeometryFault
 from tolcontact.geometry.body_overlap import SolidBody
 from tolcontact.geometry.edges import edges
 
-SPARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the smaller mesh: by how much more others may be apart
-MIN_SPARE = 1e-3  # of this size: what must remain if there are too many elements
-MAX_ELEMENTS = (500, 500, 200)  # pairs of a corner and a triangle of the other mesh, and of edges
+SPARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the smaller mesh's size: distance of the horizon beyond the least distance
+MIN_SPARE = 1e-3  # of this size: smallest permitted spare if there are too many elements
+MAX_ELEMENTS = (500, 500, 200)  # pairs of a corner and a triangle (both ways), and pairs of edges
 MAX_COMPARISONS = 30_000_000  # of triangles with triangles
 CHUNK = 1_000_000
 FLAT = 1e-6  # [rad] between triangles of one plane
@@ -24,10 +24,10 @@ TINY = 1e-300
 
 @dataclass(frozen=True, eq=False)
 class Corners:
-    """Corners (pair, 3) of a mesh, and the triangles (pair, 3, 3) of the other one that are near.
+    """Corners (pair, 3) of a mesh, and nearby triangles (pair, 3, 3) of the other mesh.
 
-    numbers   (pair,) of the corners: the same for all triangles near one corner
-    slopes    (pair, 3) tangent of half the angle by which a triangle turns at its edges towards its outside, 0 at convex edges
+    numbers   (pair,) indices of the corners: equal for all triangles near one corner
+    slopes    (pair, 3) tangent of half the concave dihedral angle at each edge of a triangle, 0 at convex edges
     """
 
     numbers: np.ndarray
@@ -40,7 +40,7 @@ class Corners:
 class EdgePairs:
     """Convex edges (pair, end, 3) of two meshes that are near each other.
 
-    senses   (pair,) 1 or -1, so that sense times the cross product of both edges points from the second mesh to the first one;
+    senses   (pair,) 1 or -1: sense times the cross product of both edges points from the second mesh to the first one;
              0 where this normal does not fit between the triangles at both edges
     """
 
@@ -51,7 +51,7 @@ class EdgePairs:
 
 @dataclass(frozen=True, eq=False)
 class NearestElements:
-    """Elements of two meshes; all others are at least `horizon` [mm] apart. `line` (2, 3) joins the nearest places found.
+    """Elements of two meshes; all others are at least `horizon` [mm] apart. `line` (2, 3) joins the nearest points found.
 
     corners   of the first mesh over triangles of the second one, and the reverse
     """
@@ -65,9 +65,9 @@ class NearestElements:
 class Edged:
     """A mesh with its convex edges and rims.
 
-    ends      (edge, 2) numbers of vertices
-    normals   (edge, 2, 3) of the triangles on both sides, twice the same on a rim
-    slopes    (triangle, 3) as of Corners
+    ends      (edge, 2) vertex indices
+    normals   (edge, 2, 3) of the triangles on both sides, two equal ones on a rim
+    slopes    (triangle, 3) as in Corners
     """
 
     def __init__(self, mesh: trimesh.Trimesh) -> None:
@@ -93,15 +93,15 @@ class Edged:
 
 
 def nearest_elements(mesh: trimesh.Trimesh, other_mesh: trimesh.Trimesh, distance: float) -> NearestElements:
-    """Return the elements of two meshes between which their least distance is, also after small motions.
+    """Return the elements of two meshes that determine their least distance, including after small motions.
 
-    distance   [mm] a bound of the least distance from above
+    distance   [mm] an upper bound of the least distance
 
     Raises GeometryFault if there are too many of them.
     """
     left, right = Edged(mesh), Edged(other_mesh)
     size = min(left.size, right.size)
-    for share in SPARES:  # a wider horizon has many more pairs, and is looked at only while there are few
+    for share in SPARES:  # a wider horizon has many more pairs, and is tried only while there are few
         horizon = distance + share * size
         pairs = _near_triangles(left.triangles, right.triangles, horizon)
         corners = _corner_pairs(left, right, pairs), _corner_pairs(right, left, pairs[:, ::-1])
@@ -156,9 +156,9 @@ def _near_triangles(A: np.ndarray, B: np.ndarray, horizon: float) -> np.ndarray:
 
 
 def _corner_pairs(body: Edged, target: Edged, pairs: np.ndarray) -> np.ndarray:
-    """Return the corners of a body, and the triangles of a target (pair, 2), of pairs of triangles.
+    """Return the corners of a body and the triangles of a target (pair, 2) from pairs of triangles.
 
-    A corner outside of the target has no height over triangles at the back of it.
+    Triangles on the far side of the target are left out for corners outside it.
     """
     rows = np.unique(np.column_stack([body.faces[pairs[:, 0]].ravel(), pairs[:, 1].repeat(3)]), axis=0)
     corners, places = np.unique(rows[:, 0], return_inverse=True)
@@ -178,14 +178,14 @@ def _edge_pairs(left: Edged, right: Edged, pairs: np.ndarray) -> np.ndarray:
 
 
 def _corner_places(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return points (pair, 3), each with the nearest place of its triangle (pair, 3, 3): (pair, 2, 3)."""
+    """Return points (pair, 3), each with the nearest point of its triangle (pair, 3, 3): (pair, 2, 3)."""
     if not len(points):
         return np.zeros((0, 2, 3))
     return np.stack([points, trimesh.triangles.closest_point(triangles, points)], axis=1)
 
 
 def _segment_places(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Return the nearest places (pair, 2, 3) of segments p and q (pair, end, 3) (Ericson, 5.1.9)."""
+    """Return the nearest points (pair, 2, 3) of segments p and q (pair, end, 3) (Ericson, 5.1.9)."""
     u, v, r = p[:, 1] - p[:, 0], q[:, 1] - q[:, 0], p[:, 0] - q[:, 0]
     uu, vv, uv = ((a * b).sum(axis=1) for a, b in ((u, u), (v, v), (u, v)))
     ur, vr = (u * r).sum(axis=1), (v * r).sum(axis=1)
@@ -211,7 +211,7 @@ def _edges(left: Edged, right: Edged, pairs: np.ndarray, places: np.ndarray) -> 
 
 
 def _is_between(n: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Return a mask (pair,) of directions n (pair, 3) across an edge that lie between its normals (pair, 2, 3)."""
+    """Return a mask (pair,) of directions n (pair, 3) at an edge that lie between its normals (pair, 2, 3)."""
     middle = normals.sum(axis=1)
     middle /= np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), TINY)
     cosine = (normals[:, 0] * middle).sum(axis=1)

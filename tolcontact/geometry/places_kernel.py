@@ -43,7 +43,8 @@ class Candidates(NamedTuple):
     `boxes` (candidate, 4) [mm] are the least and largest coordinates of the facets or the edge that a corner or an edge may
     touch in a facing plane, along the vectors in `frames` (facing planes, body, 2, 3). `segments` (segment, 5) are the outlines
     of facing planes in these coordinates (see is_within). The outlines of a plane of the moving and of the reference body begin
-    at `outlines` (2 planes + 1,). Their sorted segments begin at `outline_middles`, and are no taller than `tallest` (2 planes,).
+    at `outlines` (2 planes + 1,). Their sorted segments begin at `outline_middles`, and are no taller than `tallest` (2
+    planes,).
     """
 
     kinds: np.ndarray

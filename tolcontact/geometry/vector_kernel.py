@@ -127,9 +127,9 @@ def is_within(segments, start, middle, end, tallest, x, y, spare):  # type: igno
 
 @uncounted
 def is_inside(triangles, x):  # type: ignore[no-untyped-def]
-    """Return whether x lies in a closed body: its triangles cover at least half of the full solid angle. True without triangles.
+    """Return whether x lies in a closed body: its triangles cover at least half of the full solid angle.
 
-    The solid angle of a triangle follows van Oosterom and Strackee (1983).
+    The result is True if there are no triangles. Solid angles follow van Oosterom and Strackee (1983).
     """
     if triangles.shape[0] == 0:
         return True
