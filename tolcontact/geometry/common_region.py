@@ -66,7 +66,7 @@ def _above(triangles: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _cut(triangles: np.ndarray, heights: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return the apex p of each triangle (the only corner on its side), the cuts of its edges, and its other corners q and r."""
+    """Return the apex p of each triangle (the only corner on its side), the cuts of its edges, and its corners q and r."""
     rows = np.arange(len(triangles))
     (p, q, r), (h_p, h_q, h_r) = (
         [values[rows, (apex + k) % 3] for k in range(3)] for values in (triangles, heights[..., None])

@@ -26,11 +26,11 @@ def curvature_points(face: Surface, target: Surface, *, chord: float, within: fl
     random displacements are used; the seed is fixed.
     """
     points = distinct(_refined(face, target, chord, within).reshape(-1, 3), 1e-9 * face.mesh.scale)
-    feet, normals, is_over = target.project(points)
-    reached = is_over & (np.linalg.norm(points - feet, axis=1) <= within)
-    points, feet, normals = points[reached], feet[reached], normals[reached]
+    projections, normals, is_over = target.project(points)
+    reached = is_over & (np.linalg.norm(points - projections, axis=1) <= within)
+    points, projections, normals = points[reached], projections[reached], normals[reached]
     if len(points) > MAX_POINTS:
-        order = _by_depth(_gap_rows(points, feet, normals), within, chord / CHORD_SHARE)
+        order = _by_depth(_gap_rows(points, projections, normals), within, chord / CHORD_SHARE)
         points = points[order[:MAX_POINTS]]
     return points
 
@@ -80,8 +80,8 @@ def _halved(triangles: np.ndarray, edge: np.ndarray) -> np.ndarray:
 def _gaps_to(target: Surface, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return gaps (triangle, 3) [mm] of points (triangle, 3, 3) to the target, and its normals there (triangle, 3, 3)."""
     points = places.reshape(-1, 3)
-    feet, normals, _ = target.project(points)
-    gaps = ((points - feet) * normals).sum(axis=1)
+    projections, normals, _ = target.project(points)
+    gaps = ((points - projections) * normals).sum(axis=1)
     return gaps.reshape(-1, 3), normals.reshape(-1, 3, 3)
 
 
@@ -92,8 +92,8 @@ def sampling_error(sample: np.ndarray, points: np.ndarray, target: Surface, *, u
     `sample`. `unit` [mm] is the smallest tolerance range.
     """
     both = np.concatenate([sample, points])
-    feet, normals, is_over = target.project(both)
-    rows = _gap_rows(both, feet, normals)
+    projections, normals, is_over = target.project(both)
+    rows = _gap_rows(both, projections, normals)
     in_sample = np.arange(len(both)) < len(sample)
     differences = []
     for moves in _moves(within, unit, seed=1):
@@ -154,12 +154,12 @@ def distinct(points: np.ndarray, tolerance: float) -> np.ndarray:
     return points[np.sort(start)]
 
 
-def _gap_rows(points: np.ndarray, feet: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def _gap_rows(points: np.ndarray, projections: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Return gaps as functions of small displacements (t, r): rows (point, 7) of n, lever, and the initial gap [mm]."""
     centre = points.mean(axis=0)
     length = max(float(np.linalg.norm(points - centre, axis=1).max()), 1e-300)
     lever = np.cross(points - centre, normals) / length
-    return np.column_stack([normals, lever, ((points - feet) * normals).sum(axis=1)])
+    return np.column_stack([normals, lever, ((points - projections) * normals).sum(axis=1)])
 
 
 def _moves(within: float, unit: float, seed: int) -> list[np.ndarray]:

@@ -106,13 +106,13 @@ class BodyFace:
         for surface, is_hollow, _ in self._pieces:
             along, *across = np.linalg.svd(surface.axis[None])[2]
             axes = np.array([*across, along if along @ surface.axis > 0 else -along])
-            places = (axes @ R) @ other.points.T + ((t - surface.origin) @ axes.T)[..., None]
-            level = surface.height_beside_axis(np.hypot(places[:, 0], places[:, 1]), places[:, 2])
+            coordinates = (axes @ R) @ other.points.T + ((t - surface.origin) @ axes.T)[..., None]
+            level = surface.height_beside_axis(np.hypot(coordinates[:, 0], coordinates[:, 1]), coordinates[:, 2])
             is_near |= (-level if is_hollow else level) < outward[:, None]
         row, point = np.nonzero(is_near)
         return row, point
 
-    def feet(self, points: np.ndarray, turns: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def projections(self, points: np.ndarray, turns: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the projections (k, 3) [mm] of points (k, 3) at which this face's form deviation counts, and inward normals.
 
         turns     (k, 3, 3): rotations of the other face
@@ -186,8 +186,8 @@ class FacePair:
         hits = np.zeros(len(X_RM), dtype=bool)
         for every in (THINNED, 1):
             rows = np.flatnonzero(~hits)
-            of_rows = None if form is None else form.take(rows)
-            hits[rows] = self.depth(X_RM[rows], heights[rows], of_rows, every=every) > 0
+            row_form = None if form is None else form.take(rows)
+            hits[rows] = self.depth(X_RM[rows], heights[rows], row_form, every=every) > 0
         return hits
 
     def depth(self, X_RM: np.ndarray, heights: np.ndarray, form: "PairForm | None" = None, *, every: int = 1) -> np.ndarray:
@@ -210,13 +210,15 @@ class FacePair:
                 if row.size:
                     points, outward = side.points[point], heights[rows][row]
                     if form is not None:
-                        of_rows = form.take(rows)
-                        outward = outward + of_rows.at_face(k, row, points)
-                    places = _moved(motion, row, points + outward[:, None] * side.normals[point])
+                        row_form = form.take(rows)
+                        outward = outward + row_form.at_face(k, row, points)
+                    displaced = _moved(motion, row, points + outward[:, None] * side.normals[point])
                     if form is not None:
-                        feet, towards = body.feet(_moved(motion, row, points), pose.rotation(motion)[row], side.normals[point])
-                        places += of_rows.at_face(1 - k, row, feet)[:, None] * towards
-                    body.raise_to_depths(largest[rows], row, places)
+                        projections, towards = body.projections(
+                            _moved(motion, row, points), pose.rotation(motion)[row], side.normals[point]
+                        )
+                        displaced += row_form.at_face(1 - k, row, projections)[:, None] * towards
+                    body.raise_to_depths(largest[rows], row, displaced)
         return np.maximum(largest - self.rounding, 0) if self.rounding else largest
 
 
@@ -235,8 +237,8 @@ def body_face(face: Surface, body: trimesh.Trimesh, contacts: int) -> BodyFace:
     flat = _plane_of(face)
     if flat is not None:
         return BodyFace(face, body, points, np.broadcast_to(flat[0], points.shape))
-    feet, normals, _ = face.project(points)
-    return BodyFace(face, body, feet if face.surfaces else points, normals)
+    projections, normals, _ = face.project(points)
+    return BodyFace(face, body, projections if face.surfaces else points, normals)
 
 
 def _plane_of(face: Surface) -> tuple[np.ndarray, float] | None:

@@ -28,13 +28,13 @@ from tolcontact.geometry.sorted_candidates import sorted_candidates
 from tolcontact.geometry.surface import Surface
 
 FACING = -0.99  # cosine of the angle between the normals of planes that face each other
-SPARE_LEANING = 0.1  # rad: tilt of candidates in addition to the largest tilt of the body
+TILT_MARGIN = 0.1  # rad: tilt of candidates in addition to the largest tilt of the body
 MAX_COMPARISONS = 100_000_000  # of corners with facets, and of edges with edges
 MAX_CANDIDATES = 100_000
 NEARNESS = 2.0  # margins outside edges: largest distance of such a contact point from a point where the planes touch
-FARTHER = 4.0  # factor of travel and rotation for bodies beyond reach
+EXTENSION_FACTOR = 4.0  # factor of travel and rotation for bodies beyond reach
 MAX_TRAVEL = 1e4  # in sizes
-MAX_PLACES = 32  # contact points returned per pose
+MAX_POINTS = 32  # contact points returned per pose
 DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if 0 < np.abs(d).sum() < 3])  # 18
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 ARC = np.linspace(0, 1, 17)  # shares at which the normals between two facets are compared
@@ -84,9 +84,9 @@ class Reach(NamedTuple):
         return self.clearance + self.depth
 
     @property
-    def leaning(self) -> float:
+    def tilt_sine(self) -> float:
         """The sine of the angle by which normals may nominally tilt out of a cone."""
-        return min(kernel.LEANING + self.tilt + SPARE_LEANING, 1.0)
+        return min(kernel.MAX_TILT_SINE + self.tilt + TILT_MARGIN, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ class Meeting:
              facing (plane, 2): a facet of the moving and of the reference plane
     reach    bounds on the displacement of the bodies from their nominal poses
     size     [mm] of the larger face
-    beside   [mm]: largest distance outside its edges at which a contact point counts
+    overhang [mm]: largest distance outside its edges at which a contact point counts
     """
 
     moving: Polyhedron
@@ -106,29 +106,29 @@ class Meeting:
     candidates: places_kernel.Candidates
     reach: Reach
     size: float
-    beside: float = field(default=0.0, kw_only=True)
+    overhang: float = field(default=0.0, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.candidates.kinds)
 
-    def widened(self, beside: float) -> "Meeting":
-        """Return the same candidates, which count up to `beside` [mm] outside their edges."""
-        return replace(self, beside=beside)
+    def widened(self, overhang: float) -> "Meeting":
+        """Return the same candidates, which count up to `overhang` [mm] outside their edges."""
+        return replace(self, overhang=overhang)
 
     @property
     def kinds(self) -> Int[Array, " c"]:
         """The kinds of the candidates, followed by the kinds of the extended meeting's candidates if it has been built."""
-        farther = self.__dict__.get("farther")
-        return self.candidates.kinds if farther is None else np.concatenate([self.candidates.kinds, farther.kinds])
+        extended = self.__dict__.get("extended")
+        return self.candidates.kinds if extended is None else np.concatenate([self.candidates.kinds, extended.kinds])
 
     @cached_property
-    def farther(self) -> "Meeting | None":
+    def extended(self) -> "Meeting | None":
         """The meeting for bodies that are further apart; None if its travel has no bound, or if it has too many candidates."""
         if self.reach.travel > MAX_TRAVEL * self.size:
             return None
-        travel, tilt = FARTHER * self.reach.travel, FARTHER * (self.reach.tilt + SPARE_LEANING)
-        farther = _meeting(self.moving, self.reference, self.reach._replace(travel=travel, tilt=tilt), self.size)
-        return None if farther is None else farther.widened(self.beside)
+        travel, tilt = EXTENSION_FACTOR * self.reach.travel, EXTENSION_FACTOR * (self.reach.tilt + TILT_MARGIN)
+        extended = _meeting(self.moving, self.reference, self.reach._replace(travel=travel, tilt=tilt), self.size)
+        return None if extended is None else extended.widened(self.overhang)
 
     @property
     def turn(self) -> float:
@@ -138,15 +138,15 @@ class Meeting:
     def covers(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
         """Return whether the bodies are near enough to their nominal poses that no candidate is missed (n,)."""
         covered = np.empty(len(X_RM), dtype=bool)
-        turn = self.reach.tilt + SPARE_LEANING if self.reach.leaning < 1 else np.inf
+        turn = self.reach.tilt + TILT_MARGIN if self.reach.tilt_sine < 1 else np.inf
         places_kernel.cover(np.ascontiguousarray(X_RM), self._extremes, self.reach.travel, turn, covered)
         return covered
 
     def reaches(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
         """Return whether no candidate is missed at poses X_RM (n, 12), including the extended meetings (n,)."""
         reached = self.covers(X_RM)
-        if not reached.all() and self.farther is not None:
-            reached[~reached] = self.farther.reaches(X_RM[~reached])
+        if not reached.all() and self.extended is not None:
+            reached[~reached] = self.extended.reaches(X_RM[~reached])
         return reached
 
     @cached_property
@@ -169,37 +169,39 @@ class Meeting:
     ) -> Places:
         """Return the relevant contact points at poses X_RM (n, 12), including the candidates in `retained` (n, k), -1 for none.
 
-        Where bodies are beyond reach, the points belong to the `farther` meeting. Its indices follow the indices of this one.
+        Where bodies are beyond reach, the points belong to the `extended` meeting. Its indices follow the indices of this one.
 
         Facing planes count beyond their edges up to an error of `error` [mm], within the distance of a touching point that
         `nearness` states. Steps need this: otherwise a corner that overhangs an edge becomes active and inactive in turn.
         """
         beyond = np.flatnonzero(~self.covers(X_RM))
-        if beyond.size and self.farther is not None:
+        if beyond.size and self.extended is not None:
             return self._beyond(beyond, X_RM, retained, error, nearness)
         return self._near(X_RM, retained, error, nearness)
 
     def _beyond(self, rows: np.ndarray, X_RM: np.ndarray, retained: np.ndarray | None, error: float, nearness: float) -> Places:
         """Return contact points at poses; at some of them, `rows`, the bodies are beyond reach."""
-        assert self.farther is not None
+        assert self.extended is not None
         count = len(self)
         nearby = self._near(X_RM, retained, error, nearness)
-        far_kept = None if retained is None else np.maximum(retained[rows] - count, -1)
-        farther_places = self.farther.at(X_RM[rows], far_kept, error, nearness)
-        farther_places = farther_places._replace(labels=np.where(farther_places.labels >= 0, farther_places.labels + count, -1))
-        room = max(nearby.gaps.shape[1], farther_places.gaps.shape[1])
+        extended_retained = None if retained is None else np.maximum(retained[rows] - count, -1)
+        extended_places = self.extended.at(X_RM[rows], extended_retained, error, nearness)
+        extended_places = extended_places._replace(
+            labels=np.where(extended_places.labels >= 0, extended_places.labels + count, -1)
+        )
+        width = max(nearby.gaps.shape[1], extended_places.gaps.shape[1])
         padded = []
-        for empty, of_all, of_some in zip((-1, np.inf, 0.0, 0.0, 0.0), nearby, farther_places, strict=True):
-            values = np.full((len(X_RM), room, *of_all.shape[2:]), empty, dtype=of_all.dtype)
-            values[:, : of_all.shape[1]] = of_all
-            values[rows], values[rows, : of_some.shape[1]] = empty, of_some
+        for empty, nearby_values, extended_values in zip((-1, np.inf, 0.0, 0.0, 0.0), nearby, extended_places, strict=True):
+            values = np.full((len(X_RM), width, *nearby_values.shape[2:]), empty, dtype=nearby_values.dtype)
+            values[:, : nearby_values.shape[1]] = nearby_values
+            values[rows], values[rows, : extended_values.shape[1]] = empty, extended_values
             padded.append(values)
         return Places(*padded)
 
     def _near(self, X_RM: np.ndarray, retained: np.ndarray | None, error: float, nearness: float) -> Places:
         """Return contact points at poses within reach."""
-        room = max(min(len(self), MAX_PLACES), 1)
-        shape = (len(X_RM), room)
+        width = max(min(len(self), MAX_POINTS), 1)
+        shape = (len(X_RM), width)
         places = Places(np.empty(shape, dtype=np.int64), np.empty(shape), *(np.zeros((*shape, 3)) for _ in range(3)))
         # Bodies that were beyond reach before may have kept candidates of the extended meeting.
         retained = (
@@ -208,8 +210,8 @@ class Meeting:
         places_kernel.find(
             *self._bodies, self.candidates,
             np.array([self.reach.depth, self.reach.height, _passed(self.reach, self.size)]),
-            kernel.MARGIN * self.size + self.beside,
-            np.array([error, self.reach.depth, nearness, self.beside]),
+            kernel.MARGIN * self.size + self.overhang,
+            np.array([error, self.reach.depth, nearness, self.overhang]),
             np.ascontiguousarray(X_RM), retained, DIRECTIONS, *places,
         )  # fmt: skip
         return places
@@ -235,12 +237,12 @@ def _meeting(A: Polyhedron, B: Polyhedron, reach: Reach, size: float) -> Meeting
     comparisons = len(A.vertices) * len(B.facets) + len(A.facets) * len(B.vertices) + len(A.edges) * len(B.edges)
     if comparisons > MAX_COMPARISONS:
         return None
-    travel, leaning = reach.depth, reach.leaning
+    travel, tilt_sine = reach.depth, reach.tilt_sine
     facing, facets = _facing_planes(A, B, reach, size)
     parts = [
-        _on_facets(A, B, facing, travel, leaning, CORNER_ON_FACET),
-        _on_facets(B, A, facing.T, travel, leaning, FACET_ON_CORNER),
-        _across_edges(A, B, facing, travel, leaning),
+        _on_facets(A, B, facing, travel, tilt_sine, CORNER_ON_FACET),
+        _on_facets(B, A, facing.T, travel, tilt_sine, FACET_ON_CORNER),
+        _across_edges(A, B, facing, travel, tilt_sine),
     ]
     if sum(len(part) for part in parts) > MAX_CANDIDATES:
         return None
@@ -278,7 +280,7 @@ def _plane_count(body: Polyhedron) -> int:
 
 
 def _on_facets(
-    corners: Polyhedron, facets: Polyhedron, facing: np.ndarray, travel: float, leaning: float, kind: int
+    corners: Polyhedron, facets: Polyhedron, facing: np.ndarray, travel: float, tilt_sine: float, kind: int
 ) -> np.ndarray:
     """Return candidates (candidate, 3), first, second and plane, of the corners of one body on the facets of the other.
 
@@ -289,7 +291,7 @@ def _on_facets(
     for block in blocks(len(corners.vertices), len(facets.facets)):
         starts = corners.cones[block.start : block.stop + 1]
         slopes = corners.directions[starts[0] : starts[-1]] @ facets.normals.T
-        fits = np.minimum.reduceat(slopes, starts[:-1] - starts[0], axis=0) >= -leaning
+        fits = np.minimum.reduceat(slopes, starts[:-1] - starts[0], axis=0) >= -tilt_sine
         corner, facet = np.nonzero(fits & overlaps(corners.vertices[block], corners.vertices[block], *boxes))
         corner += block.start
         plane = facing[corners.vertex_planes[corner], facets.facet_planes[facet][:, None]].max(axis=1, initial=-1)
@@ -301,7 +303,7 @@ def _on_facets(
     return np.concatenate(candidates)
 
 
-def _across_edges(A: Polyhedron, B: Polyhedron, facing: np.ndarray, travel: float, leaning: float) -> np.ndarray:
+def _across_edges(A: Polyhedron, B: Polyhedron, facing: np.ndarray, travel: float, tilt_sine: float) -> np.ndarray:
     """Return candidates (candidate, 3), first, second and plane, of edges of the moving body across edges of the reference."""
     candidates = [np.zeros((0, 3), dtype=int)]
     boxes = B.edges.min(axis=1) - travel, B.edges.max(axis=1) + travel
@@ -315,7 +317,7 @@ def _across_edges(A: Polyhedron, B: Polyhedron, facing: np.ndarray, travel: floa
         retained = plane >= 0
         for some in np.array_split(meets, len(meets) // BLOCK_ARCS + 1):
             cosine = -np.einsum("pai,pki->pak", arcs_A[first[some]], arcs_B[second[some]]).min(axis=(1, 2))
-            retained[some] = cosine >= np.cos(min(np.arcsin(leaning) + ARC_SPACING, np.pi))
+            retained[some] = cosine >= np.cos(min(np.arcsin(tilt_sine) + ARC_SPACING, np.pi))
         candidates.append(np.stack([first, second, plane], axis=1)[retained])
     return np.concatenate(candidates)
 

@@ -131,7 +131,7 @@ def _is_over(edges, first, end, u, v, slack):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def choose_starts(points, gaps, limits, distance, chosen):  # type: ignore[no-untyped-def]
+def choose_starts(points, gaps, limits, distance, starts):  # type: ignore[no-untyped-def]
     """Write the indices (n, start) of the points with the least gaps, at least a distance [mm] apart; -1 for none.
 
     points   (n, point, 3) [mm], or (1, point, 3) if they are the same in all rows
@@ -140,25 +140,25 @@ def choose_starts(points, gaps, limits, distance, chosen):  # type: ignore[no-un
     """
     nearby, order = np.empty(gaps.shape[1], dtype=np.int64), np.empty(gaps.shape[1])
     for k in range(gaps.shape[0]):
-        of_row, count, found = points[k % points.shape[0]], 0, 0
+        row_points, count, start_count = points[k % points.shape[0]], 0, 0
         for p in range(gaps.shape[1]):
             if gaps[k, p] < limits[k]:
                 nearby[count], order[count], count = p, gaps[k, p], count + 1
-        while found < chosen.shape[1]:
-            least, start = np.inf, -1
+        while start_count < starts.shape[1]:
+            least_gap, start = np.inf, -1
             for c in range(count):
-                if order[c] < least:
-                    least, start = order[c], nearby[c]
+                if order[c] < least_gap:
+                    least_gap, start = order[c], nearby[c]
             if start < 0:
                 break
-            chosen[k, found], found = start, found + 1
+            starts[k, start_count], start_count = start, start_count + 1
             for c in range(count):
-                away = 0.0
+                square = 0.0
                 for i in range(3):
-                    away += (of_row[nearby[c], i] - of_row[start, i]) ** 2
-                if away <= distance * distance:
+                    square += (row_points[nearby[c], i] - row_points[start, i]) ** 2
+                if square <= distance * distance:
                     order[c] = np.inf
-        chosen[k, found:] = -1
+        starts[k, start_count:] = -1
 
 
 @compiled
@@ -178,7 +178,7 @@ def find_minima(moving, reference, poses, sums_m, sums_r, grown, points, starts,
     ends = np.empty((starts.shape[1], 2))
     for k in range(poses.shape[0]):
         write_map(moving, reference, poses[k], along)
-        are_edges_known, found, searches = False, 0, 0
+        are_edges_known, minimum_count, searches = False, 0, 0
         for s in range(starts.shape[1]):
             if starts[k, s] < 0:
                 break
@@ -200,24 +200,24 @@ def find_minima(moving, reference, poses, sums_m, sums_r, grown, points, starts,
             if not best[2] < -depth:
                 continue
             is_known = False
-            for m in range(found):
+            for m in range(minimum_count):
                 distance = (minima[m, 0] - best[0]) ** 2 + (minima[m, 1] - best[1]) ** 2
                 is_known = is_known or distance < (NEAR_SHARE * reach) ** 2
-            if is_known or (found == labels.shape[1] and best[2] >= minima[found - 1, 2]):
+            if is_known or (minimum_count == labels.shape[1] and best[2] >= minima[minimum_count - 1, 2]):
                 continue
-            m = min(found, labels.shape[1] - 1)
+            m = min(minimum_count, labels.shape[1] - 1)
             while m > 0 and minima[m - 1, 2] > best[2]:
                 minima[m] = minima[m - 1]
                 m -= 1
-            minima[m], found = best, min(found + 1, labels.shape[1])
+            minima[m], minimum_count = best, min(minimum_count + 1, labels.shape[1])
         for m in range(labels.shape[1]):
-            labels[k, m] = _label(moving, minima[m, 0], minima[m, 1]) if m < found else -1
+            labels[k, m] = _label(moving, minima[m, 0], minima[m, 1]) if m < minimum_count else -1
 
 
 @compiled
 def join(labels, former, joined):  # type: ignore[no-untyped-def]
     """Write labels (n, a), then further former labels (n, b), then -1 to joined (n, c); return the largest count of a row."""
-    most = 0
+    largest_count = 0
     for k in range(labels.shape[0]):
         count = 0
         for group in (labels, former):
@@ -228,8 +228,8 @@ def join(labels, former, joined):  # type: ignore[no-untyped-def]
                 if is_new:
                     joined[k, count], count = label, count + 1
         joined[k, count:] = -1
-        most = max(most, count)
-    return most
+        largest_count = max(largest_count, count)
+    return largest_count
 
 
 @inner
@@ -242,7 +242,7 @@ def _label(plane, u, v):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def write_places(moving, reference, poses, sums_m, sums_r, labels, slack, places, feet, gaps, heights):  # type: ignore
+def write_places(moving, reference, poses, sums_m, sums_r, labels, slack, places, projections, gaps, heights):  # type: ignore
     """Write the points (n, point, 3) of labels, their projections, nominal gaps (n, point), and sums of both heights [mm].
 
     The gap of a label -1 is infinite, and so is the gap of a point that overhangs a face by more than a slack.
@@ -267,7 +267,7 @@ def write_places(moving, reference, poses, sums_m, sums_r, labels, slack, places
             y = along[1, 0] * u + along[1, 1] * v + along[1, 2]
             for i in range(3):
                 places[k, p, i] = moving.origin[i] + u * moving.axes[0, i] + v * moving.axes[1, i]
-                feet[k, p, i] = reference.origin[i] + x * reference.axes[0, i] + y * reference.axes[1, i]
+                projections[k, p, i] = reference.origin[i] + x * reference.axes[0, i] + y * reference.axes[1, i]
             if _is_over(edges, count, edges.shape[0], u, v, slack):
                 gap = gap_at(moving, reference, sums_m, sums_r, k, along, u, v, weights, scratch)
                 gaps[k, p] = along[2, 0] * u + along[2, 1] * v + along[2, 2]

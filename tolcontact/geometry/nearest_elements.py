@@ -26,11 +26,11 @@ TINY = 1e-300
 class Corners:
     """Corners (pair, 3) of a mesh, and nearby triangles (pair, 3, 3) of the other mesh.
 
-    numbers   (pair,) indices of the corners: equal for all triangles near one corner
+    indices   (pair,) indices of the corners: equal for all triangles near one corner
     slopes    (pair, 3) tangent of half the concave dihedral angle at each edge of a triangle, 0 at convex edges
     """
 
-    numbers: np.ndarray
+    indices: np.ndarray
     points: np.ndarray
     triangles: np.ndarray
     slopes: np.ndarray
@@ -112,21 +112,21 @@ def nearest_elements(mesh: trimesh.Trimesh, other_mesh: trimesh.Trimesh, distanc
             _segment_places(left.vertices[left.ends[kinds[2][:, 0]]], right.vertices[right.ends[kinds[2][:, 1]]]),
         ]
         lengths = [np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) for ends in places]
-        if any(np.count_nonzero(values < horizon) > most for values, most in zip(lengths, MAX_ELEMENTS, strict=True)):
+        if any(np.count_nonzero(values < horizon) > limit for values, limit in zip(lengths, MAX_ELEMENTS, strict=True)):
             break
-    for values, most in zip(lengths, MAX_ELEMENTS, strict=True):
-        if len(values) > most:
-            horizon = min(horizon, float(np.partition(values, most)[most]))
+    for values, limit in zip(lengths, MAX_ELEMENTS, strict=True):
+        if len(values) > limit:
+            horizon = min(horizon, float(np.partition(values, limit)[limit]))
     if horizon < min(float(values.min(initial=np.inf)) for values in lengths) + MIN_SPARE * size:
         raise GeometryFault(
             f"more than {MAX_ELEMENTS[-1]} corners or edges are within {MIN_SPARE * size:.2g} mm of being nearest; choose "
             "smaller faces, or read the part with a larger chord"
         )
-    near = [values < horizon for values in lengths]
-    left_corners, right_corners, edge_pairs = (kind[mask] for kind, mask in zip(kinds, near, strict=True))
+    is_near = [values < horizon for values in lengths]
+    left_corners, right_corners, edge_pairs = (kind[mask] for kind, mask in zip(kinds, is_near, strict=True))
     return NearestElements(
         (_corners(left, right, left_corners), _corners(right, left, right_corners)),
-        _edges(left, right, edge_pairs, places[2][near[2]]),
+        _edges(left, right, edge_pairs, places[2][is_near[2]]),
         horizon,
         np.concatenate(places)[np.concatenate(lengths).argmin()],
     )
@@ -150,8 +150,8 @@ def _near_triangles(A: np.ndarray, B: np.ndarray, horizon: float) -> np.ndarray:
     pairs = [np.zeros((0, 2), dtype=np.int64)]
     for start in range(0, len(rows[0]), step):
         gaps = np.maximum(other_lower - upper[start : start + step, None], lower[start : start + step, None] - other_upper)
-        near = np.argwhere((np.maximum(gaps, 0) ** 2).sum(axis=2) <= horizon**2)
-        pairs.append(np.column_stack([rows[0][near[:, 0] + start], rows[1][near[:, 1]]]))
+        nearby = np.argwhere((np.maximum(gaps, 0) ** 2).sum(axis=2) <= horizon**2)
+        pairs.append(np.column_stack([rows[0][nearby[:, 0] + start], rows[1][nearby[:, 1]]]))
     return np.concatenate(pairs)
 
 
@@ -172,9 +172,9 @@ def _corner_pairs(body: Edged, target: Edged, pairs: np.ndarray) -> np.ndarray:
 
 def _edge_pairs(left: Edged, right: Edged, pairs: np.ndarray) -> np.ndarray:
     """Return the convex edges (pair, 2) of pairs of triangles."""
-    ours, theirs = left.edge_of[pairs[:, 0]], right.edge_of[pairs[:, 1]]
-    both = np.stack(np.broadcast_arrays(ours[:, :, None], theirs[:, None]), axis=-1).reshape(-1, 2)
-    return np.unique(both[(both >= 0).all(axis=1)], axis=0)
+    left_edges, right_edges = left.edge_of[pairs[:, 0]], right.edge_of[pairs[:, 1]]
+    edge_pairs = np.stack(np.broadcast_arrays(left_edges[:, :, None], right_edges[:, None]), axis=-1).reshape(-1, 2)
+    return np.unique(edge_pairs[(edge_pairs >= 0).all(axis=1)], axis=0)
 
 
 def _corner_places(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -201,12 +201,12 @@ def _corners(body: Edged, target: Edged, pairs: np.ndarray) -> Corners:
 
 
 def _edges(left: Edged, right: Edged, pairs: np.ndarray, places: np.ndarray) -> EdgePairs:
-    ours, theirs = pairs.T
-    p, q = left.vertices[left.ends[ours]], right.vertices[right.ends[theirs]]
+    left_edges, right_edges = pairs.T
+    p, q = left.vertices[left.ends[left_edges]], right.vertices[right.ends[right_edges]]
     n = np.cross(p[:, 1] - p[:, 0], q[:, 1] - q[:, 0])
     side = ((places[:, 0] - places[:, 1]) * n).sum(axis=1)
     outward = np.sign(side)[:, None] * n
-    fits = _is_between(outward, right.normals[theirs]) & _is_between(-outward, left.normals[ours])
+    fits = _is_between(outward, right.normals[right_edges]) & _is_between(-outward, left.normals[left_edges])
     return EdgePairs(p, q, np.where(fits, np.sign(side), 0.0))
 
 

@@ -94,11 +94,11 @@ def rim_points(face: Surface, target: Surface, step: float, within: float) -> np
     start = np.concatenate(places)
     points = start
     for _ in range(DROP_ITERATIONS):
-        _, feet = face.nearest(points)
-        points = start + ((feet - start) @ n)[:, None] * n
-    has_arrived = np.linalg.norm(points - feet, axis=1) < 0.1 * INWARD * target.mesh.scale
+        _, projections = face.nearest(points)
+        points = start + ((projections - start) @ n)[:, None] * n
+    has_arrived = np.linalg.norm(points - projections, axis=1) < 0.1 * INWARD * target.mesh.scale
     is_near = np.linalg.norm(points - start, axis=1) <= within
-    return feet[has_arrived & is_near]
+    return projections[has_arrived & is_near]
 
 
 def points_on_rim(face: Surface, step: float) -> np.ndarray:

@@ -100,10 +100,10 @@ def convex(body: trimesh.Trimesh) -> parting_kernel.Convex | None:
     depths = (heights - places @ normals.T).min(axis=1)
     if depths.max() > CONVEX_SHARE * float(hull.scale):
         return None
-    beside = neighbours[is_sharp]
+    sharp_neighbours = neighbours[is_sharp]
     ends = vertices[np.asarray(hull.face_adjacency_edges)[is_sharp]]
     along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
-    into = np.cross(facet_normals[beside], along[:, None])
-    towards = np.asarray(hull.triangles_center)[beside] - ends[:, :1]
+    into = np.cross(facet_normals[sharp_neighbours], along[:, None])
+    towards = np.asarray(hull.triangles_center)[sharp_neighbours] - ends[:, :1]
     into *= np.where((into * towards).sum(axis=2) < 0, -1.0, 1.0)[..., None]
     return parting_kernel.Convex(*(np.ascontiguousarray(values) for values in (vertices, normals, heights, ends, into)))

@@ -32,12 +32,12 @@ class Convex(NamedTuple):
 @inlined_uncounted
 def _lowest(vertices, n):  # type: ignore[no-untyped-def]
     """Return the vertex that is lowest along n, and its height."""
-    best, least = 0, np.inf
+    best, lowest = 0, np.inf
     for j in range(vertices.shape[0]):
         height = dot(n, row(vertices, j))
-        if height < least:
-            best, least = j, height
-    return best, least
+        if height < lowest:
+            best, lowest = j, height
+    return best, lowest
 
 
 @inlined_uncounted
@@ -67,8 +67,8 @@ def _nearest_shares(w, d, e):  # type: ignore[no-untyped-def]
 
 
 @uncounted
-def _across_edges(B, lines, into, least):  # type: ignore[no-untyped-def]
-    """Return the pair of edges whose common normal gives the largest gap, and that gap; -1 if it does not exceed `least`."""
+def _across_edges(B, lines, into, largest_gap):  # type: ignore[no-untyped-def]
+    """Return the pair of edges whose common normal gives the largest gap, and that gap; -1 if it is not above `largest_gap`."""
     best = -1, -1
     for i in range(lines.shape[0]):
         start, d = row_of(lines, i, 0), row_of(lines, i, 1)
@@ -79,9 +79,9 @@ def _across_edges(B, lines, into, least):  # type: ignore[no-untyped-def]
             c, length = _common_normal(d, e, into, B.into, i, j)
             if length > PARALLEL * length_d * math.sqrt(dot(e, e)):
                 gap = dot(c, minus(start, q)) / length
-                if gap > least:
-                    best, least = (i, j), gap
-    return best, least
+                if gap > largest_gap:
+                    best, largest_gap = (i, j), gap
+    return best, largest_gap
 
 
 @uncounted
@@ -96,7 +96,7 @@ def _place_edges(A, X, lines, into):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def part(A, B, poses, edges, gaps, places, feet, normals):  # type: ignore[no-untyped-def]
+def part(A, B, poses, edges, gaps, points, projections, normals):  # type: ignore[no-untyped-def]
     """Write the separating axes of convex bodies at poses X_BA (n, 12): the axes with the largest gap.
 
     An axis is a normal of a plane of either body, or a common normal of two edges. Bodies that penetrate each other have a
@@ -104,21 +104,21 @@ def part(A, B, poses, edges, gaps, places, feet, normals):  # type: ignore[no-un
 
     edges           (n,): e i + j if the axis is the common normal of edge i of A and edge j of the e edges of B, else -1
     gaps            (n,) [mm]: gap along the axis
-    places, feet    (n, 3) [mm]: points on A and on B, in the frames of these bodies
+    points, projections    (n, 3) [mm]: points on A and on B, in the frames of these bodies
     normals         (n, 3): the axis from B to A, in the frame of B
     """
     lines, into = np.empty(A.edges.shape), np.empty(A.into.shape)
     for k in range(poses.shape[0]):
         X = poses[k]
         _place_edges(A, X, lines, into)
-        gap, place, foot, n = -np.inf, ORIGIN, ORIGIN, ORIGIN
+        gap, point, projection, n = -np.inf, ORIGIN, ORIGIN, ORIGIN
         for f in range(B.normals.shape[0]):
             normal = row(B.normals, f)
             vertex, height = _lowest(A.vertices, turn_back(X, normal))
             height += dot(normal, (X[9], X[10], X[11])) - B.heights[f]
             if height > gap:
                 corner = row(A.vertices, vertex)
-                gap, n, place, foot = height, normal, corner, along(move(X, corner), -height, normal)
+                gap, n, point, projection = height, normal, corner, along(move(X, corner), -height, normal)
         for f in range(A.normals.shape[0]):
             down = row(A.normals, f)
             normal = turn(X, scaled(-1.0, down))
@@ -127,7 +127,7 @@ def part(A, B, poses, edges, gaps, places, feet, normals):  # type: ignore[no-un
             height += dot(normal, (X[9], X[10], X[11])) - A.heights[f]
             if height > gap:
                 corner = row(B.vertices, vertex)
-                gap, n, foot, place = height, normal, corner, move_back(X, along(corner, height, normal))
+                gap, n, projection, point = height, normal, corner, move_back(X, along(corner, height, normal))
         (i, j), gap = _across_edges(B, lines, into, gap)
         edges[k] = i * B.edges.shape[0] + j if i >= 0 else -1
         if i >= 0:
@@ -136,18 +136,18 @@ def part(A, B, poses, edges, gaps, places, feet, normals):  # type: ignore[no-un
             c, length = _common_normal(d, e, into, B.into, i, j)
             n = scaled(1.0 / length, c)
             s, u = _nearest_shares(minus(y, x), d, e)
-            place, foot = move_back(X, along(x, s, d)), along(y, u, e)
+            point, projection = move_back(X, along(x, s, d)), along(y, u, e)
         gaps[k] = gap
         for i in range(3):
-            places[k, i], feet[k, i], normals[k, i] = place[i], foot[i], n[i]
+            points[k, i], projections[k, i], normals[k, i] = point[i], projection[i], n[i]
 
 
 @compiled
-def cross_edges(A, B, poses, edges, axes, gaps, places, feet, normals):  # type: ignore[no-untyped-def]
+def cross_edges(A, B, poses, edges, axes, gaps, points, projections, normals):  # type: ignore[no-untyped-def]
     """Write the gaps of pairs of `edges` (n, k), see `part`, along their common normals nearest to the `axes` (n, 3).
 
     gaps                     (n, k) [mm], infinite for -1 and where edges do not cross as seen along their common normal
-    places, feet, normals    (n, k, 3), as in `part`
+    points, projections, normals    (n, k, 3), as in `part`
     """
     gaps[:] = np.inf
     for k in range(poses.shape[0]):
@@ -165,6 +165,6 @@ def cross_edges(A, B, poses, edges, axes, gaps, places, feet, normals):  # type:
                 continue
             n = scaled((1.0 if dot(c, row(axes, k)) > 0.0 else -1.0) / math.sqrt(square), c)
             gaps[k, m] = -dot(n, w)
-            place, foot = move_back(X, along(x, s / square, d)), along(y, u / square, e)
+            point, projection = move_back(X, along(x, s / square, d)), along(y, u / square, e)
             for f in range(3):
-                places[k, m, f], feet[k, m, f], normals[k, m, f] = place[f], foot[f], n[f]
+                points[k, m, f], projections[k, m, f], normals[k, m, f] = point[f], projection[f], n[f]

@@ -10,12 +10,12 @@ NEARLY_PARALLEL = 1e-3  # sine of the angle between edges, below which their com
 
 
 @inlined_uncounted
-def _nominal_height(A, B, candidates, s, X, n, place, foot):  # type: ignore[no-untyped-def]
+def _nominal_height(A, B, candidates, s, X, n, point, projection):  # type: ignore[no-untyped-def]
     """Return the nominal height of candidate s: the height of its point over its projection along n, or along R'n.
 
     Two edges may have shifted along each other: their height is the distance of their lines.
     """
-    arm = minus(place, foot)
+    arm = minus(point, projection)
     if candidates.kinds[s] == EDGE_ON_EDGE:
         start_A, start_B = row_of(A.edges, candidates.firsts[s], 0), row_of(B.edges, candidates.seconds[s], 0)
         d = minus(row_of(A.edges, candidates.firsts[s], 1), start_A)
@@ -29,19 +29,19 @@ def _nominal_height(A, B, candidates, s, X, n, place, foot):  # type: ignore[no-
 
 
 @uncounted
-def drop_passed(A, B, candidates, passed, X, touching, gaps, all_places, is_held):  # type: ignore[no-untyped-def]
+def drop_passed(A, B, candidates, passed, X, touching, gaps, all_points, is_held):  # type: ignore[no-untyped-def]
     """Drop points that are nominally deeper than `passed` [mm] and have a held corner: the body penetrated at that corner.
 
     The corners of a point are the corner itself, or the ends of both edges. `is_held` (corner,) is false before and after, for
     the corners of the moving body followed by the corners of the reference body.
     """
-    places, feet, normals = all_places
+    points, projections, normals = all_points
     count = A.vertices.shape[0]
     for is_first in (True, False):
         for s in touching:
             is_edge = candidates.kinds[s] == EDGE_ON_EDGE
             owner = candidates.firsts[s] if candidates.kinds[s] == CORNER_ON_FACET else count + candidates.seconds[s]
-            height = _nominal_height(A, B, candidates, s, X, row(normals, s), row(places, s), row(feet, s))
+            height = _nominal_height(A, B, candidates, s, X, row(normals, s), row(points, s), row(projections, s))
             has_passed = height < -passed
             if is_first and not is_edge and not has_passed and gaps[s] <= INSIDE:
                 is_held[owner] = True

@@ -68,8 +68,8 @@ def leave_low(X_RM, P_m, rim, gaps, limits, reference, moving):  # type: ignore[
 
 
 @compiled
-def lowest_over(X_RM, P_m, rim, gaps, groups, reference, moving, numbers):  # type: ignore[no-untyped-def]
-    """Write the index of the point with the least gap over the other face, by group, to numbers (n, group); -1 for none.
+def lowest_over(X_RM, P_m, rim, gaps, groups, reference, moving, indices):  # type: ignore[no-untyped-def]
+    """Write the index of the point with the least gap over the other face, by group, to indices (n, group); -1 for none.
 
     P_m         (point, 3) of the moving face, which must be over the reference region at X_RM (n, 12)
     rim         (n, rim point, 3) of the plane of the moving face, which must be over the moving region
@@ -82,16 +82,16 @@ def lowest_over(X_RM, P_m, rim, gaps, groups, reference, moving, numbers):  # ty
             for j in range(groups[group], groups[group + 1]):
                 if gaps[k, j] < least and stands_over(X_RM[k], P_m, rim[k], j, reference, moving):
                     least, number = gaps[k, j], j
-            numbers[k, group] = number
+            indices[k, group] = number
 
 
 @compiled
-def keep_over(X_RM, P_m, rim, reference, moving, numbers):  # type: ignore[no-untyped-def]
+def keep_over(X_RM, P_m, rim, reference, moving, indices):  # type: ignore[no-untyped-def]
     """Replace indices of points (n, k) that are not over the other face by -1; see lowest_over."""
     for k in range(X_RM.shape[0]):
-        for c in range(numbers.shape[1]):
-            if numbers[k, c] >= 0 and not stands_over(X_RM[k], P_m, rim[k], numbers[k, c], reference, moving):
-                numbers[k, c] = -1
+        for c in range(indices.shape[1]):
+            if indices[k, c] >= 0 and not stands_over(X_RM[k], P_m, rim[k], indices[k, c], reference, moving):
+                indices[k, c] = -1
 
 
 @inner

@@ -20,7 +20,7 @@ MAX_BULGE = 0.05  # of a face's size: between a triangle and the analytic surfac
 FLAT_ANGLE = 1e-6  # rad: faces whose normals rotate by less from end to end are planes
 
 
-class Standing(NamedTuple):
+class Approximation(NamedTuple):
     """The rows (triangles or points) that approximate an analytic surface; `side` is 1, or -1 if the triangles are hollow."""
 
     surface: AnalyticSurface
@@ -59,35 +59,38 @@ class Surface:
     def corner_normals(self) -> np.ndarray:
         """Outward unit normals at the corners of each triangle (face, 3, 3)."""
         normals = np.array(_corner_normals(self.mesh) if self._stated_normals is None else self._stated_normals)
-        for surface, rows, side in self._standings:
+        for surface, rows, side in self._approximations:
             corners = np.asarray(self.mesh.triangles)[rows].reshape(-1, 3)
             normals[rows] = _normals_of(surface, side, corners, normals[rows].reshape(-1, 3)).reshape(-1, 3, 3)
         return normals
 
     @cached_property
-    def _standings(self) -> list[Standing]:
+    def _approximations(self) -> list[Approximation]:
         """The triangles that approximate each analytic surface."""
         centres, facets = np.asarray(self.mesh.triangles_center), np.asarray(self.mesh.face_normals)
-        standings = []
+        approximations = []
         for number, surface in enumerate(self.surfaces):
             rows = np.flatnonzero(self.surface_numbers == number)
             if rows.size:
                 _, slope = surface.distance(centres[rows])
-                standings.append(Standing(surface, rows, 1.0 if (slope * facets[rows]).sum() > 0 else -1.0))
-        return standings
+                approximations.append(Approximation(surface, rows, 1.0 if (slope * facets[rows]).sum() > 0 else -1.0))
+        return approximations
 
     @property
     def pieces(self) -> "list[Piece]":
         """The parts of the face that lie on its analytic surfaces."""
-        return [Piece(surface, side < 0, self.part(rows)) for surface, rows, side in self._standings]
+        return [Piece(surface, side < 0, self.part(rows)) for surface, rows, side in self._approximations]
 
     @cached_property
     def bulge(self) -> float:
         """The largest distance [mm] of triangles, at their centroids and edge midpoints, from their analytic surfaces."""
         corners = np.asarray(self.mesh.triangles)
-        middles = np.concatenate([(corners + np.roll(corners, -1, axis=1)) / 2, corners.mean(axis=1, keepdims=True)], axis=1)
+        midpoints = np.concatenate([(corners + np.roll(corners, -1, axis=1)) / 2, corners.mean(axis=1, keepdims=True)], axis=1)
         return max(
-            (float(np.abs(surface.distance(middles[rows].reshape(-1, 3))[0]).max()) for surface, rows, _ in self._standings),
+            (
+                float(np.abs(surface.distance(midpoints[rows].reshape(-1, 3))[0]).max())
+                for surface, rows, _ in self._approximations
+            ),
             default=0.0,
         )
 
@@ -145,18 +148,18 @@ class Surface:
         barycentric = self._barycentric(triangle, points)
         normals = (barycentric[..., None] * self.corner_normals[triangle]).sum(axis=1)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        for surface, rows, side in self._standing_points(triangle):
+        for surface, rows, side in self._approximating_points(triangle):
             normals[rows] = _normals_of(surface, side, points[rows], normals[rows])
         return normals
 
-    def _standing_points(self, triangle: np.ndarray) -> list[Standing]:
+    def _approximating_points(self, triangle: np.ndarray) -> list[Approximation]:
         """Return, for each analytic surface, the points on `triangle` (point,) that belong to it."""
         if not self.surfaces:
             return []
         numbers = self.surface_numbers[triangle]
         return [
-            standing._replace(rows=np.flatnonzero(numbers == self.surface_numbers[standing.rows[0]]))
-            for standing in self._standings
+            approximation._replace(rows=np.flatnonzero(numbers == self.surface_numbers[approximation.rows[0]]))
+            for approximation in self._approximations
         ]
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "Surface":
@@ -176,28 +179,28 @@ class Surface:
         analytic surface, nearest points and normals refer to that surface. On other curved faces normals are interpolated
         between the corners of a facet, so that they change continuously as a point moves.
         """
-        triangle, feet, is_over = self._feet(points, margin)
-        return feet, self.normals(triangle, feet), is_over
+        triangle, projections, is_over = self._projections(points, margin)
+        return projections, self.normals(triangle, projections), is_over
 
-    def feet(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def projections(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the nearest points and the mask that `project` returns, without the normals."""
-        _, feet, is_over = self._feet(points, 0.0)
-        return feet, is_over
+        _, projections, is_over = self._projections(points, 0.0)
+        return projections, is_over
 
-    def _feet(self, points: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _projections(self, points: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the nearest triangles (point,), and the nearest points and the mask that `project` returns."""
         triangle, nearest = self.nearest(points)
-        sideways, at_rim = self._sideways(points, triangle, nearest)
-        is_over = ~at_rim | (sideways <= max(margin, RIM_TOLERANCE * self.mesh.scale))
-        feet = np.array(nearest)
-        for surface, rows, _ in self._standing_points(triangle):
+        lateral, at_rim = self._lateral_distances(points, triangle, nearest)
+        is_over = ~at_rim | (lateral <= max(margin, RIM_TOLERANCE * self.mesh.scale))
+        projections = np.array(nearest)
+        for surface, rows, _ in self._approximating_points(triangle):
             nearby, direct = surface.project(nearest[rows]), surface.project(points[rows])
             shift = np.linalg.norm(direct - nearest[rows], axis=1)
             height = np.linalg.norm(points[rows] - nearest[rows], axis=1)
             # Points near the axis of a surface, or beyond it, have projections elsewhere.
             is_direct = ~at_rim[rows] & (shift <= MAX_TURN * height + MAX_BULGE * self.mesh.scale)
-            feet[rows] = np.where(is_direct[:, None], direct, nearby)
-        return triangle, feet, is_over
+            projections[rows] = np.where(is_direct[:, None], direct, nearby)
+        return triangle, projections, is_over
 
     def depth(self, points: np.ndarray) -> np.ndarray:
         """Return the depth (point,) [mm] of `points` (point, 3) [mm] behind the surface; 0 in front of it or beyond its rim."""
@@ -205,34 +208,36 @@ class Surface:
         offset = nearest - points
         height = -(offset * np.asarray(self.mesh.face_normals)[triangle]).sum(axis=1)
         distance = np.linalg.norm(offset, axis=1)
-        for surface, rows, side in self._standing_points(triangle):
+        for surface, rows, side in self._approximating_points(triangle):
             height[rows] = side * surface.distance(points[rows])[0]
             distance[rows] = np.abs(height[rows])
         behind = np.flatnonzero(height < 0)
-        sideways, at_rim = self._sideways(points[behind], triangle[behind], nearest[behind])
-        is_over = ~at_rim | (sideways <= RIM_TOLERANCE * self.mesh.scale)
+        lateral, at_rim = self._lateral_distances(points[behind], triangle[behind], nearest[behind])
+        is_over = ~at_rim | (lateral <= RIM_TOLERANCE * self.mesh.scale)
         depth = np.zeros(len(points))
         depth[behind[is_over]] = distance[behind[is_over]]
         return depth
 
     def overhang(self, points: np.ndarray) -> np.ndarray:
         """Return the overhang (point,) [mm] of `points` (point, 3) [mm] beyond the rim; 0 over the surface."""
-        sideways, at_rim = self._sideways(points, *self.nearest(points))
-        return np.where(at_rim, sideways, 0.0)
+        lateral, at_rim = self._lateral_distances(points, *self.nearest(points))
+        return np.where(at_rim, lateral, 0.0)
 
-    def _sideways(self, points: np.ndarray, triangle: np.ndarray, nearest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _lateral_distances(
+        self, points: np.ndarray, triangle: np.ndarray, nearest: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return lateral distances (point,) [mm] from the nearest points, and a mask of the nearest points on the rim."""
         normal = np.array(np.asarray(self.mesh.face_normals)[triangle])
-        for surface, rows, _ in self._standing_points(triangle):
+        for surface, rows, _ in self._approximating_points(triangle):
             normal[rows] = surface.distance(nearest[rows])[1]
         offset = points - nearest
-        sideways = np.linalg.norm(offset - (offset * normal).sum(axis=1, keepdims=True) * normal, axis=1)
+        lateral = np.linalg.norm(offset - (offset * normal).sum(axis=1, keepdims=True) * normal, axis=1)
         coordinates = self._barycentric(triangle, nearest)
         # Edge j of a triangle runs from corner j to corner j+1, so on it the coordinate of corner j+2 is zero. A triangle may
         # also touch the rim with a corner only.
         at_rim = (np.abs(coordinates[:, [2, 0, 1]]) < 1e-9) & self._rim_edges[triangle]
         at_rim |= (coordinates > 1 - 1e-9) & self._rim_corners[triangle]
-        return sideways, at_rim.any(axis=1)
+        return lateral, at_rim.any(axis=1)
 
 
 class Piece(NamedTuple):

@@ -34,8 +34,8 @@ def mesh_clearance(clearance: MeshClearance, X_21: Pose) -> ca.SX:
 def _heights(corners: Corners, X: Pose) -> list[ca.SX]:
     """Return the height [mm] of each corner at pose X over the nearest facet over which it is, NONE if there is none."""
     heights = []
-    for number in np.unique(corners.numbers):
-        rows = np.flatnonzero(corners.numbers == number)
+    for number in np.unique(corners.indices):
+        rows = np.flatnonzero(corners.indices == number)
         place, nearest = X.apply(ca.DM(corners.points[rows[0]])), ca.SX(NONE)
         for row in rows:
             height = _height(place, corners.triangles[row], corners.slopes[row])
