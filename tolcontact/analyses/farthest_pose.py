@@ -102,7 +102,7 @@ def _reactions(model: LinearModel, region: AllowedRegion) -> _Reactions | None:
     lowest = model.gaps + slopes @ middle - np.abs(slopes) @ half
     highest = model.gaps + slopes @ middle + np.abs(slopes) @ half
     deepest = max(float(-lowest.min()), 0.0)
-    # The corrected motion has no more energy than `deepest` d, which opens all gaps; so is the sum of its reactions bounded.
+    # The corrected motion has no more energy than `deepest` d, which opens all gaps; this also bounds the sum of reactions.
     opening = np.sqrt(np.einsum("ij,jk,ik->i", A, np.linalg.inv(hessian), A)) * deepest * energy
     return _Reactions(hessian, np.maximum(highest + opening, 1e-9), np.full(len(A), max(deepest, 1e-9) * energy**2))
 

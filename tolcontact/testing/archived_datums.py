@@ -1,4 +1,4 @@
-"""Planes that touch datum features, computed from an archive alone, by linear programmes, as the simulation does not."""
+"""Tangent datum planes from an archive alone, by linear programmes, independently of the simulation."""
 
 from collections.abc import Iterator
 
@@ -10,11 +10,11 @@ from tolcontact import vocabulary as terms
 from tolcontact.testing.archived_form import ArchivedForm
 
 WITHIN = 1e-9  # mm
-SOLVED = 1e-7  # of the largest height: tolerances of the solver
+SOLVED = 1e-7  # of the largest height: tolerance of the solver
 
 
 class ArchivedTangent:
-    """A plane that touches a datum feature, with a number, from an archive."""
+    """A tangent datum plane from an archive, by its number."""
 
     def __init__(self, tree: xr.DataTree, number: int) -> None:
         contact = {str(name): values.values for name, values in tree.children["contact"].to_dataset().data_vars.items()}
@@ -27,7 +27,7 @@ class ArchivedTangent:
         self._form_columns, self._modes = form[form >= 0], modes[:, form >= 0]
 
     def faults(self, deviations: np.ndarray) -> Iterator[tuple[int, str]]:
-        """Yield realizations whose plane of deviations (realization, contributor) is not the one that touches, and why."""
+        """Yield realizations with a plane, from deviations (realization, contributor), that is not tangent, and the reason."""
         for row, deviation in enumerate(deviations):
             heights = self._heights @ (self._leaning @ deviation) + self._modes @ deviation[self._form_columns]
             least, archived = self._distance(heights, None), self._distance(heights, deviation)
@@ -35,15 +35,15 @@ class ArchivedTangent:
                 yield row, f"is {archived:.9g} mm from its face, and one {least:.9g} mm from it touches it, too"
 
     def _distance(self, heights: np.ndarray, deviation: np.ndarray | None) -> float:
-        """Return the least distance [mm] from heights (place,) of planes that have none of them outside.
+        """Return the least distance [mm] of a plane from heights (point,), none of which may be outside it.
 
-        With a deviation (contributor,), planes have its coordinates as far as these are archived.
+        With a deviation (contributor,), the plane has the archived coordinates in it.
         """
         scale = max(float(np.abs(heights).max()), 1e-300)
         planes, ones = self._heights @ self._free, np.ones((len(heights), 1))
         known = np.zeros(0, dtype=int) if deviation is None else np.flatnonzero(self.columns >= 0)
         values = np.zeros(0) if deviation is None else deviation[self.columns[known]]
-        # A plane with known coordinates may be lower by what rounding leaves.
+        # A plane with known coordinates may be lower by rounding.
         slack = scale * 1e-12 if known.size else 0.0
         solution = scipy.optimize.linprog(
             np.append(np.zeros(planes.shape[1]), 1.0),
@@ -58,6 +58,6 @@ class ArchivedTangent:
 
 
 def tangents(tree: xr.DataTree) -> list[ArchivedTangent]:
-    """Return the planes that touch datum features of an archive."""
+    """Return the tangent datum planes of an archive."""
     sizes = tree.children["contact"].to_dataset().sizes
     return [ArchivedTangent(tree, number) for number in range(sizes.get(terms.TANGENT, 0))]

@@ -1,6 +1,6 @@
-"""The form of a face, computed from an archive alone, in another way than by the simulation.
+"""The form deviation of a face, computed from an archive alone, independently of the simulation.
 
-Sections and lines are not displaced: what displaces them is fitted to many places of each by least squares.
+Sections and lines are not displaced: their displacements are fitted to many points of each by least squares.
 """
 
 from collections.abc import Mapping
@@ -9,12 +9,12 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 
-TURNS = 32  # places around the axis
-STEPS = 16  # places along a line, at the roots of a Legendre polynomial
+TURNS = 32  # points around the axis
+STEPS = 16  # points along a line, at the roots of a Legendre polynomial
 
 
 class ArchivedForm:
-    """The form of a face with a number, from the group `contact` of an archive, variables by name."""
+    """The form deviation of a face by its number, from the group `contact` of an archive, variables by name."""
 
     def __init__(self, contact: Mapping[str, np.ndarray], face: int) -> None:
         def value(variable: terms.ArchiveVariable) -> np.ndarray:
@@ -33,7 +33,7 @@ class ArchivedForm:
         self._angle = value(terms.FORM_SURFACE["angle"])
 
     def heights(self, places: np.ndarray) -> np.ndarray:
-        """Return the heights (..., mode) of modes at places (..., 3) [mm]."""
+        """Return the heights (..., mode) of modes at points (..., 3) [mm]."""
         points = places.reshape(-1, 3)
         heights = {"surface": self._functions, "circles": self._beside_circles, "lines": self._beside_lines}[self._associated](
             points
@@ -60,7 +60,7 @@ class ArchivedForm:
         return (factor * covariance) @ self._weights
 
     def _beside_circles(self, points: np.ndarray) -> np.ndarray:
-        """Return the sums without the place and the diameter of each section, by least squares."""
+        """Return the sums without the position and the diameter of each section, by least squares."""
         arms = points - self._origin
         along = (arms @ self._axis)[:, None] * self._axis
         turns = 2 * np.pi * np.arange(TURNS) / TURNS
@@ -69,7 +69,7 @@ class ArchivedForm:
         return self._beside(points, copies, np.linalg.pinv(terms_)[None], np.array([[1.0, 1.0, 0.0]]))
 
     def _beside_lines(self, points: np.ndarray) -> np.ndarray:
-        """Return the sums without the place and the slope of each line, by least squares over even places."""
+        """Return the sums without the position and the slope of each line, by least squares over even points."""
         (start, end), along = self._ends, (points - self._origin) @ self._axis
         nodes, weights = np.polynomial.legendre.leggauss(STEPS)
         targets = (start + end) / 2 + (end - start) / 2 * nodes
@@ -83,7 +83,7 @@ class ArchivedForm:
         return self._beside(points, copies, (np.linalg.pinv(terms_) * root)[None], own)
 
     def _beside(self, points: np.ndarray, copies: list[np.ndarray], fit: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """Return the sums at points less the fit (1, term, copy) to those at copies of each, by terms `own` (point, term)."""
+        """Return the sums at points minus their fit (1, term, copy) to the sums at copies, by terms `own` (point, term)."""
         values = np.stack([self._functions(places) for places in copies], axis=1)  # (point, copy, mode)
         return self._functions(points) - ((own @ fit[0])[:, None] @ values)[:, 0]
 
