@@ -1,4 +1,4 @@
-"""The group of all commands. The module of a command is imported when the command is resolved: `--help` needs none of them."""
+"""The group of all commands. A command's module is imported when the command is resolved, so `--help` imports none of them."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from typer.core import TyperCommand, TyperGroup
 from tolcontact import cli, interrupts, shape_worker
 from tolcontact.cli.quick_imports import quick_imports
 
-# The module of each command in this folder, and the line that describes the command in the list of commands.
+# The module of each command in this folder, and its line in the list of commands.
 COMMANDS = {
     "contributions": (
         "analyses",
@@ -64,7 +64,7 @@ COMMANDS = {
 
 
 class Commands(TyperGroup):
-    """The commands. One that is stopped ends with a message."""
+    """The commands. A command that is stopped ends with a message."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
@@ -89,7 +89,7 @@ def declared_command(name: str) -> Any:
     """Return a command with its options. The module that declares the command is imported."""
     module, _ = COMMANDS[name]
     with quick_imports():
-        getattr(cli, module)  # its import declares the command
+        getattr(cli, module)  # the import declares the command
     app = cli.app.app
     return next(
         typer.main.get_command_from_info(

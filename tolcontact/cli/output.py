@@ -1,4 +1,4 @@
-"""Output of results on standard output, and names of pages."""
+"""Output of results on standard output, and checks of output files."""
 
 import sys
 from pathlib import Path
@@ -13,7 +13,7 @@ from tolcontact.report.text import summary_text
 from tolcontact.vocabulary import BY_STATUS, UNRESOLVED
 
 FAILED_SHARE = 0.001
-UNBOUNDED = 10_000  # columns outside of a terminal
+UNBOUNDED = 10_000  # columns outside a terminal
 
 
 def console() -> Console:

@@ -41,7 +41,7 @@ def cell_text(cell: Cell) -> str:
 
 
 def model_tables(results: xr.DataTree) -> list[ModelTable]:
-    """Return the tables of the model that have rows. Raises ArchiveError for a declaration that no run wrote."""
+    """Return the tables of the model that have rows. Raises ArchiveError for a damaged declaration."""
     document = json.loads(str(results["model"][terms.DECLARATION.name].values))
     makers: tuple[Callable[[Entry, xr.DataTree], ModelTable], ...] = (_parts, _features, _locators, _pairs, _measurements)
     try:
@@ -112,7 +112,7 @@ def _locators(document: Entry, results: xr.DataTree) -> ModelTable:
 
 
 def _giving(contact: xr.Dataset) -> set[int]:
-    """Return the numbers of the locators that give way."""
+    """Return the indices of the compliant locators."""
     if terms.POINT_STIFFNESS.name not in contact:
         return set()
     gives = np.isfinite(contact[terms.POINT_STIFFNESS.name].values)
