@@ -93,7 +93,7 @@ def allocate(
         "effect": narrowing_effects(trials, program),
     }
     labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
-    limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR, "idle_tried": search.tried}
+    limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR, "idle_tried": search.tested_rows}
     return analysis.dataset(values, labels, samples=samples, fresh=VERIFICATION_FACTOR * samples, by=by, **limits)
 
 
@@ -206,7 +206,7 @@ class Search:
     requirements: Sequence[Requirement]
     prices: Prices
     idle: np.ndarray = field(init=False)  # (group,) whether a group has no known influence on any requirement
-    tried: int = field(init=False, default=0)  # number of realizations in the latest test of that
+    tested_rows: int = field(init=False, default=0)  # number of realizations in the latest test of that
 
     def __post_init__(self) -> None:
         self.idle = self.prices.is_free.copy()
@@ -222,7 +222,7 @@ class Search:
         trial   the trial at `logs`
         """
         before, search = self.idle, IdleSearch(self._changes(logs, trial), (MIN_FACTOR, MAX_FACTOR))
-        self.idle, self.tried = search.idle(before), len(search.rows)
+        self.idle, self.tested_rows = search.idle(before), len(search.rows)
         return bool((before & ~self.idle).any())
 
     def least_cost(self, logs: np.ndarray, trial: Trial, aims: np.ndarray) -> tuple[np.ndarray, Trial]:

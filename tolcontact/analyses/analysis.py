@@ -130,7 +130,7 @@ class Analysis(Question):
         self.check_affordable(total)
         progress = SharedProgress(self.progress, total)
         try:
-            yield [Engine(self.program, self.blocks, progress=progress.of_one(), total=total) for _ in range(count)]
+            yield [Engine(self.program, self.blocks, progress=progress.for_engine(), total=total) for _ in range(count)]
         finally:
             progress.has_ended = True
 

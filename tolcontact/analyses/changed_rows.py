@@ -12,7 +12,7 @@ import numpy as np
 from tolcontact.analyses.scaled_trials import ScaledTrials, Trial
 
 NEGLIGIBLE = 1e-6  # of a measure's spread: smaller changes count as 0
-FEW = 32  # realizations for finding the groups that affect many
+FIRST_ROWS = 32  # realizations for finding the groups that affect many
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ class ChangedRows:
         Groups that change none of the first rows share the search in the remaining ones.
         """
         singles = [np.array([group]) for group in groups]
-        first, others = np.split(rows, [FEW])
+        first, others = np.split(rows, [FIRST_ROWS])
         first_hits = self.of_sets([(single, first) for single in singles], changed_logs)
         is_frequent = np.array([len(hits.rows) > 0 for hits in first_hits], dtype=bool)
         further = dict(self.shared(groups[~is_frequent], changed_logs, others)) if len(others) else {}
@@ -70,16 +70,16 @@ class ChangedRows:
 
     def shared(self, groups: np.ndarray, changed_logs: np.ndarray, rows: np.ndarray) -> list[tuple[int, Hits]]:
         """Return the groups that change any of the rows on their own, with these rows, by bisection of the groups."""
-        sets, found = [(groups, rows)] if len(groups) else [], []
+        sets, hits_of_groups = [(groups, rows)] if len(groups) else [], []
         while sets:
             halves = []
             for (members, _), hits in zip(sets, self.of_sets(sets, changed_logs), strict=True):
                 if len(hits.rows) and len(members) == 1:
-                    found.append((int(members[0]), hits))
+                    hits_of_groups.append((int(members[0]), hits))
                 elif len(hits.rows):
                     halves += [(half, hits.rows) for half in np.array_split(members, 2)]
             sets = halves
-        return found
+        return hits_of_groups
 
 
 def _joined(first: Hits, further: Hits | None) -> Hits:

@@ -112,9 +112,9 @@ def _shapley_effects(engine: Engine, released: ReleasedDraws | None, samples: in
     if released is None:
         return np.empty((len(engine.program.nominal.measures), len(terms.STATES), 0, len(terms.ESTIMATE)))
     measured, _ = engine.simulate_design(released, samples, seed=seed)
-    places = released.places(seed, 0, samples)
+    positions = released.positions(seed, 0, samples)
     return np.array([
-        [shapley_effects(f, places, accuracy) for f in states]
+        [shapley_effects(f, positions, accuracy) for f in states]
         for states, accuracy in zip(measured.transpose(3, 2, 0, 1), engine.program.accuracies, strict=True)
     ])  # fmt: skip
 

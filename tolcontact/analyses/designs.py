@@ -114,14 +114,14 @@ class ReleasedDraws(Design):
         """The number of realizations of each base realization."""
         return 1 + len(self._names)
 
-    def places(self, seed: int, start: int, stop: int) -> np.ndarray:
+    def positions(self, seed: int, start: int, stop: int) -> np.ndarray:
         """Return the positions (base, unit) of the units in the random orders of base realizations."""
         keys = np.stack([uniform(seed, f"order of {name}", start, stop) for name in self._names], axis=1)
         return np.asarray(keys.argsort(axis=1).argsort(axis=1))
 
     def members(self, seed: int, start: int, stop: int) -> np.ndarray:
         """Return deviations (base, member, contributor) of base realizations `start` to `stop`."""
-        places = self.places(seed, start, stop)
+        positions = self.positions(seed, start, stop)
 
         def retained(label: str) -> np.ndarray:
             return uniform(seed, label, start, stop)
@@ -131,15 +131,15 @@ class ReleasedDraws(Design):
 
         members = np.empty((stop - start, self.size, len(self._draws.labels)))
         for count in range(self.size):
-            numbers = self._mixed(retained, redrawn, places, count)
+            numbers = self._mixed(retained, redrawn, positions, count)
             members[:, count] = self._draws.from_numbers(numbers, stop - start)
         return members
 
-    def _mixed(self, retained: Numbers, redrawn: Numbers, places: np.ndarray, count: int) -> Numbers:
+    def _mixed(self, retained: Numbers, redrawn: Numbers, positions: np.ndarray, count: int) -> Numbers:
         """Return numbers in which the first `count` units are retained, and the others redrawn conditional on these."""
         correlated: dict[str, np.ndarray] = {}
         for labels, factor in self._draws.correlated:
-            correlated |= self._conditional(retained, redrawn, places, count, labels, factor)
+            correlated |= self._conditional(retained, redrawn, positions, count, labels, factor)
 
         def numbers(label: str) -> np.ndarray:
             if label in correlated:
@@ -147,12 +147,12 @@ class ReleasedDraws(Design):
             unit = self._unit.get(label, self._unit.get(label.rpartition(" #")[0]))  # " #2": a further attempt
             if unit is None:
                 return redrawn(label)
-            return np.where(places[:, unit] < count, retained(label), redrawn(label))
+            return np.where(positions[:, unit] < count, retained(label), redrawn(label))
 
         return numbers
 
     def _conditional(
-        self, retained: Numbers, redrawn: Numbers, places: np.ndarray, count: int, labels: list[str], factor: np.ndarray
+        self, retained: Numbers, redrawn: Numbers, positions: np.ndarray, count: int, labels: list[str], factor: np.ndarray
     ) -> dict[str, np.ndarray]:
         """Return numbers of correlated contributors by label: the first `count` units retained, the others conditional on them.
 
@@ -162,8 +162,8 @@ class ReleasedDraws(Design):
         the redrawn e after it, has the earlier scores unchanged and the later ones conditional on them.
         """
         scores = [np.stack([ndtri(numbers(label)) for label in labels], axis=1) @ factor.T for numbers in (retained, redrawn)]
-        behind_all = np.full(len(places), self.size)  # the position of a contributor that does not vary
-        place = np.stack([places[:, self._unit[label]] if label in self._unit else behind_all for label in labels], axis=1)
+        after_all = np.full(len(positions), self.size)  # the position of a contributor that does not vary
+        place = np.stack([positions[:, self._unit[label]] if label in self._unit else after_all for label in labels], axis=1)
         order = place.argsort(axis=1, kind="stable")
         L = np.linalg.cholesky((factor @ factor.T)[order[:, :, None], order[:, None, :]])
         e_retained, e_redrawn = (np.linalg.solve(L, np.take_along_axis(z, order, axis=1)[..., None])[..., 0] for z in scores)

@@ -35,7 +35,7 @@ class SharedProgress:
         self._lock = threading.Lock()
         self.has_ended = False
 
-    def of_one(self) -> Progress:
+    def for_engine(self) -> Progress:
         """Return the progress function of a further engine. It raises CancelledError after the end."""
         number = len(self._finished)
         self._finished.append(0)

@@ -82,8 +82,8 @@ class Evaluation:
         if rows:
             measured, status = self._engine.simulate_deviations(deviations[list(rows.values())])
             unresolved = np.isin(status, terms.UNRESOLVED)
-            self._look_at(measured[:, terms.RAW])
-            self._look_at(measured[~unresolved, terms.CORRECTED])
+            self._record_undefined(measured[:, terms.RAW])
+            self._record_undefined(measured[~unresolved, terms.CORRECTED])
             measured[unresolved, terms.CORRECTED] = np.nan
             self._known.update(zip(rows, measured, strict=True))
         return np.array([self._known[key] for key in keys]).reshape(*points.shape[:-1], len(terms.STATES), -1)
@@ -92,10 +92,10 @@ class Evaluation:
         """Return the same with raw measures only, which takes no time; the corrected ones are NaN."""
         program, deviations = self._engine.program, self._deviations(points)
         measured = program.observe(poses=program.place(deviations=deviations)["poses"], deviations=deviations)["measured"]
-        self._look_at(measured)
+        self._record_undefined(measured)
         return np.stack([measured, np.full_like(measured, np.nan)], axis=1).reshape(*points.shape[:-1], len(terms.STATES), -1)
 
-    def _look_at(self, measured: np.ndarray) -> None:
+    def _record_undefined(self, measured: np.ndarray) -> None:
         """Record which measures (n, measure) are not finite numbers."""
         self.is_undefined |= ~np.isfinite(measured).all(axis=0)
 

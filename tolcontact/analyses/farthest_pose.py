@@ -146,7 +146,7 @@ class _Problem:
     def _add_contact(self, model: LinearModel) -> None:
         """Constrain gaps to be non-negative, and bilateral locators to their positions."""
         self._add(np.hstack([self._region.slopes(model.gaps_by_deviations), model.gaps_by_motion]), -model.gaps, np.inf)
-        self._add(np.hstack([np.zeros((len(model.held), len(self._region.lower))), model.held]), 0.0, 0.0)
+        self._add(np.hstack([np.zeros((len(model.bilateral), len(self._region.lower))), model.bilateral]), 0.0, 0.0)
 
     def _add_optimality(self, model: LinearModel, reactions: _Reactions) -> None:
         """Balance the objective's gradient by the reactions; a row is active only if its gap is closed."""

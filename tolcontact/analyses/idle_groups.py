@@ -42,9 +42,9 @@ class IdleSearch:
         idle = candidates.copy()
         for end in reversed(self.ends):
             logs = np.full(len(candidates), np.log(end))
-            few = self.rows[:FIRST_BLOCK]
+            first_rows = self.rows[:FIRST_BLOCK]
             groups = np.flatnonzero(idle)
-            hits = self.changes.of_groups(groups, logs, few)
+            hits = self.changes.of_groups(groups, logs, first_rows)
             idle[[group for group, hit in zip(groups, hits, strict=True) if len(hit.rows)]] = False
             while self._release(idle, logs):  # only a last run over all blocks shows that the remaining groups change nothing
                 pass

@@ -8,7 +8,7 @@ from tolcontact import poses as pose
 from tolcontact.compilation import Program
 from tolcontact.mechanics import Group
 
-MAX_BEND = 0.1  # of the largest slope of a measure: if forward and backward slopes differ by more, there is a kink
+MAX_SLOPE_DIFFERENCE = 0.1  # of the largest slope of a measure: if forward and backward slopes differ by more, there is a kink
 MIN_SLOPE = 1e-6  # of a measure: smaller ones are rounding
 STEP = 1e-4  # mm, and rad times the length of a group: steps of central differences; their second-order error cancels
 
@@ -27,7 +27,7 @@ class LinearModel:
                      has no derivatives
     gaps             (row,) nominally: of the contact points that can be the deepest, of pairs of flat faces
     gaps_by_deviations, gaps_by_motion   (row, contributor), (row, freedom)
-    held             (row, freedom): motions that bilateral locators constrain to 0, if the objective is seating
+    bilateral        (row, freedom): motions that bilateral locators constrain to 0, if the objective is seating
     displacements    (row, freedom): of all contact points, scaled so that the sum of squares is the objective "all points"
     round_pairs      number of pairs of round faces, which have no rows here
     """
@@ -39,7 +39,7 @@ class LinearModel:
     gaps: np.ndarray
     gaps_by_deviations: np.ndarray
     gaps_by_motion: np.ndarray
-    held: np.ndarray
+    bilateral: np.ndarray
     displacements: np.ndarray
     round_pairs: int
 
@@ -59,7 +59,7 @@ def linear_model(program: Program) -> LinearModel:
         )
         kinked = np.array([_kinks(*(ends[0] - measures for ends in sides)) for sides in (varied, moved)])
     return LinearModel(
-        measures, by_deviations[0], by_motion[0], kinked, gaps, by_deviations[1], by_motion[1], _held(program),
+        measures, by_deviations[0], by_motion[0], kinked, gaps, by_deviations[1], by_motion[1], _bilateral_motions(program),
         _displacements(program), sum(gaps is None for gaps in program.gaps),
     )  # fmt: skip
 
@@ -82,7 +82,7 @@ def _kinks(ahead: np.ndarray, behind: np.ndarray) -> np.ndarray:
     At a kink the forward and the backward slope differ by more than a share of the largest slope.
     """
     largest = np.maximum(np.abs(ahead), np.abs(behind)).max(axis=0, initial=STEP * MIN_SLOPE)
-    return np.asarray((np.abs(ahead + behind) > MAX_BEND * largest).any(axis=0))
+    return np.asarray((np.abs(ahead + behind) > MAX_SLOPE_DIFFERENCE * largest).any(axis=0))
 
 
 def leverages(program: Program) -> np.ndarray:
@@ -159,7 +159,7 @@ def _motions(program: Program, sign: int) -> np.ndarray:
     return poses.reshape(len(freedoms), pose.ENTRIES * len(program.nominal.parts))
 
 
-def _held(program: Program) -> np.ndarray:
+def _bilateral_motions(program: Program) -> np.ndarray:
     """Return the displacements (row, freedom) of bilateral locators along their directions, if the objective is seating."""
     if not program.method.minimizes.presses:
         return np.zeros((0, len(_freedoms(program))))

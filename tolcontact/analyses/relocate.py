@@ -25,7 +25,7 @@ from tolcontact.workflow.models import DEFAULT_SOLVER, Choice, Model
 
 GRID_POINTS = {1: 9, 2: 5, 3: 4}  # trial positions along each side, by the number of sides
 MAX_TRIALS = 40  # after the grid, starting at its best position
-PLACE_TOLERANCE = 1e-3  # of the sides: final accuracy of the search
+POSITION_TOLERANCE = 1e-3  # of the sides: final accuracy of the search
 SIX_SIGMA = "6 sigma"
 EXAMPLES = (f"corner height: {SIX_SIGMA}", f"gap: {terms.PPM}")
 
@@ -59,7 +59,7 @@ def relocate(
     analysis.check_affordable(VERIFICATION_FACTOR * samples)
     goal = Goal.parse(least, analysis.program)
     trials = RelocatedTrials(analysis.program.nominal.assembly, analysis, locator, goal.measure)
-    places = TriedPlaces(trials, goal, *_corners(between))
+    places = TrialPositions(trials, goal, *_corners(between))
     places.try_grid()
     if not np.isfinite(places.values).any():
         lower, upper = places.lower.tolist(), places.upper.tolist()
@@ -157,7 +157,7 @@ class RelocatedTrials:
         )
 
 
-class TriedPlaces:
+class TrialPositions:
     """Trial positions in a box, and the value of the goal at each.
 
     lower, upper    (3,) corners of the box [mm]
@@ -185,7 +185,7 @@ class TriedPlaces:
         scipy.optimize.minimize(
             lambda shares: min(self._try(shares), ceiling),
             start, method="COBYQA", bounds=scipy.optimize.Bounds(np.zeros(len(start)), np.ones(len(start))),
-            options={"maxfev": MAX_TRIALS, "initial_tr_radius": 0.5 / self._count, "final_tr_radius": PLACE_TOLERANCE},
+            options={"maxfev": MAX_TRIALS, "initial_tr_radius": 0.5 / self._count, "final_tr_radius": POSITION_TOLERANCE},
         )  # fmt: skip
 
     def _try(self, shares: np.ndarray) -> float:

@@ -17,7 +17,7 @@ from tolcontact.statistics.sobol_indices import sobol_indices
 MIN_GROUPS = 17  # fewer are not screened
 SCREENING_SAMPLES, START = 128, 1 << 38  # base realizations of a screening, and the number of the first one
 MINOR_SHARE = 0.01  # of the variance of any measure in any state: the largest joint share of minor groups
-MIN_CARRYING = 16  # effective base realizations behind the variance of a measure: with fewer, no group is minor
+MIN_EFFECTIVE = 16  # effective base realizations behind the variance of a measure: with fewer, no group is minor
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ def screened(engine: Engine, groups: Mapping[str, np.ndarray], seed: int) -> Scr
     totals, accuracies = [], engine.program.accuracies
     for states, accuracy in zip(measured.transpose(3, 2, 0, 1), accuracies, strict=True):
         totals.append([[index.value for index in sobol_indices(f, accuracy)[1]] for f in states])
-        if any(0 < _carrying(f) < MIN_CARRYING for f in states):
+        if any(0 < _effective_count(f) < MIN_EFFECTIVE for f in states):
             return Screening.none(groups)
     shares = np.nan_to_num(np.array(totals)).reshape(-1, len(groups))
     order = np.argsort(shares.max(axis=0, initial=0.0), kind="stable")
@@ -88,7 +88,7 @@ def screened(engine: Engine, groups: Mapping[str, np.ndarray], seed: int) -> Scr
     return Screening(groups, is_minor, np.array(totals)) if is_minor.sum() > 1 else Screening.none(groups)
 
 
-def _carrying(f: np.ndarray) -> float:
+def _effective_count(f: np.ndarray) -> float:
     """Return the effective number of base realizations behind the variance of f (n, 2 + group); 0 without variance."""
     squares = ((f[:, :2] - f[:, :2].mean()) ** 2).mean(axis=1)
     return float(squares.sum() ** 2 / (squares**2).sum()) if squares.any() else 0.0

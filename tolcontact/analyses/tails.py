@@ -68,14 +68,14 @@ def tails(
         for number, event in enumerate(events.values())
         for side in range(len(event.sides))  # each has its own region, and could hide the region of the other
     ]
-    answers = _answered(analysis, searches, len(events) * samples)
+    results = _run_searches(analysis, searches, len(events) * samples)
     event_tails, statuses, stops = [], [], []
     for number in range(len(events)):
-        sides = [answer for search, answer in zip(searches, answers, strict=True) if search.number == number]
+        sides = [result for search, result in zip(searches, results, strict=True) if search.number == number]
         # If the other limit can be exceeded, a limit that acts as a stop would only add its detection bound, so it is left out.
-        kept = [side.tail for side in sides if not side.is_stop]
+        exceedable_tails = [side.tail for side in sides if not side.is_stop]
         is_undefined = any(side.is_undefined for side in sides)
-        event_tails.append(UNDEFINED_TAIL if is_undefined else either(kept or [side.tail for side in sides]))
+        event_tails.append(UNDEFINED_TAIL if is_undefined else either(exceedable_tails or [side.tail for side in sides]))
         stops.append(any(side.is_stop for side in sides))
         statuses.append(np.sum([side.statuses for side in sides], axis=0))
     values = {
@@ -121,16 +121,16 @@ class _Search(NamedTuple):
     side: int
     samples: int
 
-    def answer(self, engine: Engine, seed: int) -> "_Answer":
+    def run(self, engine: Engine, seed: int) -> "_SearchResult":
         """Return the result of the search."""
         score, rng = self.event.sides[self.side](engine), np.random.default_rng([seed, self.number, self.side])
         dimensions = len(engine.program.draws.varying)
         tail = sufficient_tail(score, dimensions, samples=self.samples, rng=rng, leads=self.event.leads)
         is_stop, is_undefined = (score.is_stop, score.is_undefined) if isinstance(score, _Beyond) else (False, False)
-        return _Answer(tail, is_stop, is_undefined, engine.statuses)
+        return _SearchResult(tail, is_stop, is_undefined, engine.statuses)
 
 
-class _Answer(NamedTuple):
+class _SearchResult(NamedTuple):
     """The result of a search, and the number of realizations by status.
 
     is_stop       values stop at the limit
@@ -143,13 +143,13 @@ class _Answer(NamedTuple):
     statuses: np.ndarray
 
 
-def _answered(analysis: Analysis, searches: Sequence[_Search], total: int) -> list[_Answer]:
+def _run_searches(analysis: Analysis, searches: Sequence[_Search], total: int) -> list[_SearchResult]:
     """Return the results of all searches. They are independent, and run concurrently in threads of this process."""
     longest_first = sorted(range(len(searches)), key=lambda k: -searches[k].samples)
     pool = ThreadPoolExecutor(analysis.threads)
     with analysis.engines(len(searches), total) as engines:
         try:
-            running = {k: pool.submit(searches[k].answer, engines[k], analysis.seed) for k in longest_first}
+            running = {k: pool.submit(searches[k].run, engines[k], analysis.seed) for k in longest_first}
             return [running[k].result() for k in range(len(searches))]
         finally:
             pool.shutdown(wait=False, cancel_futures=True)  # normally none is left; a stopped analysis does not wait

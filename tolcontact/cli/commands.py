@@ -27,7 +27,7 @@ COMMANDS = {
         "analyses",
         "Print the tolerance ranges of least cost for what is required, and the ranges to tighten first.",
     ),
-    "relocate": ("analyses", "Print the place of a locator, within a box, at which a measurement varies least."),
+    "relocate": ("analyses", "Print the position of a locator, within a box, at which a measurement varies least."),
     "seating": (
         "analyses",
         "Print the least friction at which parts can be held short of their locators and seats, and what holds them.",
@@ -71,9 +71,9 @@ class Commands(TyperGroup):
         self.commands = {name: TyperCommand(name, help=purpose) for name, (_, purpose) in COMMANDS.items()}
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        name, command, rest = super().resolve_command(ctx, args)
-        shape_worker.start_early(rest)
-        return name, command and declared_command(str(name)), rest
+        name, command, arguments = super().resolve_command(ctx, args)
+        shape_worker.start_early(arguments)
+        return name, command and declared_command(str(name)), arguments
 
     def invoke(self, ctx: Any) -> Any:
         try:

@@ -225,10 +225,10 @@ def _features(annotation: Annotation, declared: DeclaredFile) -> str:
 def _faces(records: Sequence[int], others: Sequence[int], faces: FacesOfRecords) -> str:
     """Return the faces, or their count if they are unknown; without faces, the count of other items in parentheses."""
     if faces and records:
-        known = [faces[record] for record in records if record in faces][:MAX_FACES]
-        kinds = dict.fromkeys(face.kind for face in known)
-        groups = [f"{kind} {', '.join(str(face) for face in known if face.kind == kind)}".strip() for kind in kinds]
-        more = len(records) - len(known)
+        known_faces = [faces[record] for record in records if record in faces][:MAX_FACES]
+        kinds = dict.fromkeys(face.kind for face in known_faces)
+        groups = [f"{kind} {', '.join(str(face) for face in known_faces if face.kind == kind)}".strip() for kind in kinds]
+        more = len(records) - len(known_faces)
         return ", ".join([*groups, *([f"and {more} more"] if more else [])])
     return str(len(records)) if records or not others else f"({len(others)})"
 

@@ -66,12 +66,14 @@ def shown_progress(
     def show(done: int, total: int) -> None:
         nonlocal last, is_advised
         rate = pace.rate(done)
-        left = (total - done) / rate if rate else 0.0
-        speed = f"{grouped(round(rate))} a second, {duration(left)} left" if rate else ""
+        remaining = (total - done) / rate if rate else 0.0
+        speed = f"{grouped(round(rate))} a second, {duration(remaining)} left" if rate else ""
         if rate and not is_advised:
             is_advised = True
-            if left > long_wait:
-                advice = f"{shown(name)}: about {duration(left)} left; fewer --samples take less time, with wider intervals"
+            if remaining > long_wait:
+                advice = (
+                    f"{shown(name)}: about {duration(remaining)} left; fewer --samples take less time, with wider intervals"
+                )
                 console.print(advice, markup=False, highlight=False, soft_wrap=True)
         bar.update(task, completed=done, total=total, description=shown(name), pace=speed)
         if bar.disable and not quiet and time.monotonic() - last > interval:

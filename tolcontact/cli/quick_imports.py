@@ -32,7 +32,7 @@ def quick_imports() -> Iterator[None]:
     The cyclic garbage collector finds nothing in modules, but takes a fifth of the time of all imports, and again as long at
     the end of the process. So it is off, and ignores the imported objects afterwards.
     """
-    was_collecting, finder, known = gc.isenabled(), _DeferringFinder(), len(sys.modules)
+    was_collecting, finder, module_count = gc.isenabled(), _DeferringFinder(), len(sys.modules)
     gc.disable()
     sys.meta_path.insert(0, finder)
     try:
@@ -40,7 +40,7 @@ def quick_imports() -> Iterator[None]:
     finally:
         sys.meta_path.remove(finder)
         if was_collecting:
-            if len(sys.modules) > known:  # otherwise only garbage of the caller would be frozen
+            if len(sys.modules) > module_count:  # otherwise only garbage of the caller would be frozen
                 gc.freeze()
             gc.enable()
 

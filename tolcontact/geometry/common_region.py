@@ -41,10 +41,10 @@ def _overlapping(corners: np.ndarray, target_corners: np.ndarray) -> tuple[np.nd
     rows, columns, count = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)], 0
     for first in range(0, len(corners), BLOCK_TRIANGLES):
         block = corners[first : first + BLOCK_TRIANGLES]
-        near = np.flatnonzero(((lower <= block.max(axis=(0, 1))) & (upper >= block.min(axis=(0, 1)))).all(axis=1))
-        row, column = np.nonzero(overlaps(block.min(axis=1), block.max(axis=1), lower[near], upper[near]))
+        nearby = np.flatnonzero(((lower <= block.max(axis=(0, 1))) & (upper >= block.min(axis=(0, 1)))).all(axis=1))
+        row, column = np.nonzero(overlaps(block.min(axis=1), block.max(axis=1), lower[nearby], upper[nearby]))
         rows.append(row + first)
-        columns.append(near[column])
+        columns.append(nearby[column])
         count += len(row)
         if count > MAX_PAIRS:
             break

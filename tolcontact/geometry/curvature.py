@@ -91,10 +91,10 @@ def sampling_error(sample: np.ndarray, points: np.ndarray, target: Surface, *, u
     It is the 95 % quantile, over random small displacements, of the depth of the deepest of `points` below the deepest of
     `sample`. `unit` [mm] is the smallest tolerance range.
     """
-    both = np.concatenate([sample, points])
-    projections, normals, is_over = target.project(both)
-    rows = _gap_rows(both, projections, normals)
-    in_sample = np.arange(len(both)) < len(sample)
+    all_points = np.concatenate([sample, points])
+    projections, normals, is_over = target.project(all_points)
+    rows = _gap_rows(all_points, projections, normals)
+    in_sample = np.arange(len(all_points)) < len(sample)
     differences = []
     for moves in _moves(within, unit, seed=1):
         gaps = rows @ moves

@@ -18,7 +18,7 @@ from tolcontact.geometry.analytic_surfaces import Cylinder
 from tolcontact.geometry.face_in_file import FaceInFile
 from tolcontact.geometry.interrupted_surfaces import FaceOnSurface
 
-MAX_LEAN = 1e-4  # [rad] between directions that count as parallel
+MAX_TILT = 1e-4  # [rad] between directions that count as parallel
 MARGIN = 1e-5  # of a part's size: difference of lengths that count as equal
 RESIDUAL_FACTOR = 10  # times the residual of a fitted cylinder: the same
 MAX_HOLE_GAP = 3.0  # [rad] around the axis: the end of a slot has a gap of pi
@@ -45,14 +45,14 @@ class HollowCylinder:
     def equals(self, neighbour: "HollowCylinder", margin: float) -> bool:
         """Return whether another one has the same radius, and an axis parallel to this one."""
         difference = abs(self.surface.radius - neighbour.surface.radius)
-        lean = float(np.linalg.norm(np.cross(self.surface.axis, neighbour.surface.axis)))
-        return difference < margin + RESIDUAL_FACTOR * (self.surface.residual + neighbour.surface.residual) and lean < MAX_LEAN
+        tilt = float(np.linalg.norm(np.cross(self.surface.axis, neighbour.surface.axis)))
+        return difference < margin + RESIDUAL_FACTOR * (self.surface.residual + neighbour.surface.residual) and tilt < MAX_TILT
 
     def is_tangent(self, plane: FaceInFile, margin: float) -> bool:
         """Return whether a plane that faces the axis is tangent to the cylinder."""
         height = float((self.surface.origin - np.array(plane.point)) @ np.array(plane.direction))
         slack = margin + RESIDUAL_FACTOR * self.surface.residual
-        is_parallel = abs(float(self.surface.axis @ np.array(plane.direction))) < MAX_LEAN
+        is_parallel = abs(float(self.surface.axis @ np.array(plane.direction))) < MAX_TILT
         return is_parallel and abs(height - self.surface.radius) < slack
 
 
@@ -114,7 +114,7 @@ class FaceGroups:
 
     def _are_opposed(self, left: Group, right: Group) -> bool:
         normals = [np.array(self._faces[plane[0] - 1].direction) for plane in (left, right)]
-        return bool(np.linalg.norm(normals[0] + normals[1]) < MAX_LEAN)
+        return bool(np.linalg.norm(normals[0] + normals[1]) < MAX_TILT)
 
 
 def _vertices(mesh: trimesh.Trimesh, surfaces: Sequence[FaceOnSurface], numbers: Group) -> np.ndarray:

@@ -59,7 +59,7 @@ class FaceInFile(Readable):
             neighbours = ", ".join(str(number) for number in self.whole if number != self.number)
             entries.append(f"one surface with {neighbours}")
         if self.copies:
-            entries.append(f"stands {self.copies + 1} times in the file")
+            entries.append(f"occurs {self.copies + 1} times in the file")
         return ", ".join([*entries, f"{self.area:.4g} mm2", "at ({:.4g}, {:.4g}, {:.4g})".format(*self.point)])
 
 

@@ -142,7 +142,7 @@ def _by_function(face: Face, mesh: trimesh.Trimesh, selection: Picked) -> np.nda
 
 
 def _by_kind(face: Face, mesh: trimesh.Trimesh, selection: Cylinder | Largest) -> np.ndarray:
-    number_of, _ = number_faces(mesh)
+    face_of, _ = number_faces(mesh)
     faces = describe_faces(mesh)
     if isinstance(selection, Cylinder):
         hits = [candidate for candidate in faces if _is_cylinder(candidate, selection)]
@@ -152,7 +152,7 @@ def _by_kind(face: Face, mesh: trimesh.Trimesh, selection: Cylinder | Largest) -
     if not hits:
         listed = "; ".join(f"{candidate}" for candidate in faces[:MAX_LISTED]) + ("; ..." if len(faces) > MAX_LISTED else "")
         raise GeometryFault(f"face {face}: the part has no such face; its {len(faces)} faces are: {listed}")
-    return np.isin(number_of, [hit.number - 1 for hit in hits])
+    return np.isin(face_of, [hit.number - 1 for hit in hits])
 
 
 def _is_cylinder(face: FaceInFile, selection: Cylinder) -> bool:

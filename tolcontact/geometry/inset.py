@@ -62,10 +62,10 @@ def inset(mesh: trimesh.Trimesh, error: float) -> Float[Array, "vertex 3"]:
     moved = displacements(vertex, joint, np.column_stack([heights[is_joint], joint]), count, MIN_CROSSING)
     motions, free = moved[..., 0], np.eye(3) - moved[..., 1:]  # free: projection onto the directions left free by these planes
     vertex, lone = planes.vertex[~is_joint], N[~is_joint]
-    rest = heights[~is_joint] - (lone * motions[vertex]).sum(axis=1)
+    remainder = heights[~is_joint] - (lone * motions[vertex]).sum(axis=1)
     lone = (lone[:, None] @ free[vertex])[:, 0]
     lone[np.abs(lone) < ROUNDED] = 0
-    motions = motions + displacements(vertex, lone, rest[:, None], count, MIN_CROSSING)[..., 0]
+    motions = motions + displacements(vertex, lone, remainder[:, None], count, MIN_CROSSING)[..., 0]
     return np.asarray(mesh.vertices) + capped(motions, MAX_DISPLACEMENT * error)
 
 

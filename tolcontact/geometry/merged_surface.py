@@ -34,15 +34,15 @@ def merged_surface(body: trimesh.Trimesh) -> MergedSurface:
     """
     surface = trimesh.Trimesh(body.vertices, body.faces, process=False)
     surface.merge_vertices(digits_vertex=int(np.ceil(-np.log10(MERGE_SHARE * max(surface.scale, 1e-9)))))
-    kept = np.flatnonzero((np.diff(np.sort(surface.faces, axis=1), axis=1) > 0).all(axis=1))
-    twins = _twins(np.asarray(surface.vertices), np.asarray(surface.faces)[kept])
+    proper_faces = np.flatnonzero((np.diff(np.sort(surface.faces, axis=1), axis=1) > 0).all(axis=1))
+    twins = _twins(np.asarray(surface.vertices), np.asarray(surface.faces)[proper_faces])
     if twins is not None:
-        surface = _apart(np.asarray(surface.vertices), np.asarray(surface.faces)[kept], twins)
+        surface = _apart(np.asarray(surface.vertices), np.asarray(surface.faces)[proper_faces], twins)
     else:
-        surface.update_faces(kept)
+        surface.update_faces(proper_faces)
     has_area = np.asarray(surface.area_faces) > 0
     surface.update_faces(has_area)
-    return MergedSurface(surface, kept[has_area], twins is not None)
+    return MergedSurface(surface, proper_faces[has_area], twins is not None)
 
 
 def _twins(vertices: np.ndarray, faces: np.ndarray) -> Int[Array, " h"] | None:

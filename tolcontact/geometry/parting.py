@@ -65,10 +65,10 @@ class Parting:
 
     def crossings(self, X_RM: Float[Array, "n 12"], edges: Int[Array, "n k"], axes: Float[Array, "n 3"]) -> Crossings:
         """Return pairs of `edges` (n, k), -1 for none, at poses X_RM (n, 12), with normals in the sense of `axes` (n, 3)."""
-        found = Crossings(np.empty(edges.shape), *np.zeros((3, *edges.shape, 3)))
+        crossings = Crossings(np.empty(edges.shape), *np.zeros((3, *edges.shape, 3)))
         poses, pairs, senses = (np.ascontiguousarray(values) for values in (X_RM, edges, axes))
-        parting_kernel.cross_edges(self.moving, self.reference, poses, pairs, senses, *found)
-        return found
+        parting_kernel.cross_edges(self.moving, self.reference, poses, pairs, senses, *crossings)
+        return crossings
 
 
 def parting(moving: trimesh.Trimesh, reference: trimesh.Trimesh) -> Parting | None:

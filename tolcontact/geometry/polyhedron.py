@@ -74,7 +74,7 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
     is_convex = np.concatenate([merged.face_adjacency_convex, np.ones(len(lone), dtype=bool)])
     planes = trimesh.graph.connected_component_labels(neighbours[~is_sharp], node_count=len(faces))
     is_chosen = np.isin(planes, planes[numbers])
-    chosen = np.flatnonzero(is_chosen)
+    indices = np.flatnonzero(is_chosen)
     is_ours = is_sharp & is_chosen[neighbours].any(axis=1)
     start, end = vertices[ends[:, 0]], vertices[ends[:, 1]]
     along = (end - start) / np.linalg.norm(end - start, axis=1)[:, None]
@@ -82,10 +82,10 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
     towards = np.asarray(merged.triangles_center)[neighbours] - start[:, None]
     into *= np.where((into * towards).sum(axis=2) < 0, -1.0, 1.0)[..., None]
     corners = np.unique(ends[is_ours])
-    corners = corners[np.isin(corners, faces[chosen])]
+    corners = corners[np.isin(corners, faces[indices])]
     cones, directions = _cones(corners, ends[is_sharp], vertices)
     edge_planes = np.where(is_chosen[neighbours], planes[neighbours], -1)
-    triangles = vertices[faces[chosen]]
+    triangles = vertices[faces[indices]]
     sides = np.roll(triangles, -1, axis=1) - triangles
     sides /= np.linalg.norm(sides, axis=2)[..., None]
     return Polyhedron(
@@ -93,15 +93,15 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
         cones=cones,
         directions=directions,
         facets=triangles,
-        normals=facet_normals[chosen],
-        inward=np.cross(facet_normals[chosen][:, None], sides),
+        normals=facet_normals[indices],
+        inward=np.cross(facet_normals[indices][:, None], sides),
         edges=np.stack([start, end], axis=1)[is_ours],
         ends=np.searchsorted(corners, ends[is_ours]),
         into=into[is_ours],
         edge_normals=facet_normals[neighbours][is_ours],
         convex=is_convex[is_ours].astype(np.int64),
-        facet_planes=planes[chosen],
-        vertex_planes=_planes_around(corners, faces[chosen], planes[chosen]),
+        facet_planes=planes[indices],
+        vertex_planes=_planes_around(corners, faces[indices], planes[indices]),
         edge_planes=edge_planes[is_ours],
         body=vertices[faces] if is_closed else np.zeros((0, 3, 3)),
     )
@@ -110,8 +110,8 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
 def _cones(corners: np.ndarray, edges: np.ndarray, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return cones (corner + 1,) and directions (d, 3) of `corners` (corner,), from the vertex indices of edges."""
     starts, ends = np.concatenate([edges, edges[:, ::-1]]).T
-    kept = np.isin(starts, corners)
-    starts, ends = starts[kept], ends[kept]
+    is_corner = np.isin(starts, corners)
+    starts, ends = starts[is_corner], ends[is_corner]
     order = np.argsort(starts, kind="stable")
     directions = vertices[ends[order]] - vertices[starts[order]]
     directions /= np.linalg.norm(directions, axis=1)[:, None]

@@ -34,7 +34,7 @@ def plane_gaps(X_RM, P_m, P_r, n_r, gaps):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def write_promising(X_RM, P_m, rim, gaps, bounds, groups, reference, moving, kept, promising):  # type: ignore[no-untyped-def]
+def write_promising(X_RM, P_m, rim, gaps, bounds, groups, reference, moving, retained, promising):  # type: ignore[no-untyped-def]
     """Write which points may be the lowest of their group over the other face, or are retained; see lowest_over.
 
     bounds      (n, 2) [mm]: error bounds of the gaps of points of the moving face and of the rim; with 0, points are skipped
@@ -44,18 +44,18 @@ def write_promising(X_RM, P_m, rim, gaps, bounds, groups, reference, moving, kep
     for k in range(gaps.shape[0]):
         for group in range(groups.size - 1):
             first, end = groups[group], groups[group + 1]
-            least = np.inf
+            least_gap = np.inf
             for j in range(first, end):
                 highest = gaps[k, j] + bounds[k, 0 if j < count else 1]
-                if highest < least and stands_over(X_RM[k], P_m, rim[k], j, reference, moving):
-                    least = highest
+                if highest < least_gap and stands_over(X_RM[k], P_m, rim[k], j, reference, moving):
+                    least_gap = highest
             for j in range(first, end):
                 bound = bounds[k, 0 if j < count else 1]
-                promising[k, j] = bound > 0 and gaps[k, j] - bound <= least < np.inf
-        for c in range(kept.shape[1]):
-            number = kept[k, c]
-            if number >= 0 and bounds[k, 0 if number < count else 1] > 0:
-                promising[k, number] = True
+                promising[k, j] = bound > 0 and gaps[k, j] - bound <= least_gap < np.inf
+        for c in range(retained.shape[1]):
+            index = retained[k, c]
+            if index >= 0 and bounds[k, 0 if index < count else 1] > 0:
+                promising[k, index] = True
 
 
 @compiled
@@ -78,11 +78,11 @@ def lowest_over(X_RM, P_m, rim, gaps, groups, reference, moving, indices):  # ty
     """
     for k in range(X_RM.shape[0]):
         for group in range(groups.size - 1):
-            least, number = np.inf, -1
+            least_gap, index = np.inf, -1
             for j in range(groups[group], groups[group + 1]):
-                if gaps[k, j] < least and stands_over(X_RM[k], P_m, rim[k], j, reference, moving):
-                    least, number = gaps[k, j], j
-            indices[k, group] = number
+                if gaps[k, j] < least_gap and stands_over(X_RM[k], P_m, rim[k], j, reference, moving):
+                    least_gap, index = gaps[k, j], j
+            indices[k, group] = index
 
 
 @compiled
@@ -95,13 +95,13 @@ def keep_over(X_RM, P_m, rim, reference, moving, indices):  # type: ignore[no-un
 
 
 @inner
-def stands_over(X, P_m, rim, number, reference, moving):  # type: ignore[no-untyped-def]
+def stands_over(X, P_m, rim, index, reference, moving):  # type: ignore[no-untyped-def]
     """Return whether a point is over the other face at a pose X (12,)."""
     count = P_m.shape[0]
-    if number >= count:
-        p = rim[number - count]
+    if index >= count:
+        p = rim[index - count]
         return contains(moving, p[0], p[1], p[2])
-    x, y, z = P_m[number, 0], P_m[number, 1], P_m[number, 2]
+    x, y, z = P_m[index, 0], P_m[index, 1], P_m[index, 2]
     return contains(
         reference,
         X[0] * x + X[1] * y + X[2] * z + X[9],
@@ -117,9 +117,9 @@ def contains(region, x, y, z):  # type: ignore[no-untyped-def]
     u, v = axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z, axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z
     is_inside = False
     for e in range(edges.shape[0]):
-        below, above = edges[e, 0, 1] - v, edges[e, 1, 1] - v
-        if (below > 0) != (above > 0):  # the edge crosses the line through the point along the first axis, on one side
-            crossing = edges[e, 0, 0] + (edges[e, 1, 0] - edges[e, 0, 0]) * below / (below - above)
+        start_height, end_height = edges[e, 0, 1] - v, edges[e, 1, 1] - v
+        if (start_height > 0) != (end_height > 0):  # the edge crosses the line through the point along the first axis
+            crossing = edges[e, 0, 0] + (edges[e, 1, 0] - edges[e, 0, 0]) * start_height / (start_height - end_height)
             is_inside = is_inside != (crossing > u)
     return is_inside or is_near(edges, u, v, region.tolerance)
 

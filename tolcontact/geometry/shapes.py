@@ -43,7 +43,7 @@ def _leave_out_repetitions(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
     _, place = trimesh.grouping.unique_rows(mesh.vertices)
     distinct, _ = distinct_triangles(place[mesh.faces])
     if len(distinct) < len(mesh.faces):
-        log.info("%s: %d triangles that stand twice are left out", geometry, len(mesh.faces) - len(distinct))
+        log.info("%s: %d repeated triangles are left out", geometry, len(mesh.faces) - len(distinct))
         mesh.update_faces(np.sort(distinct))
         mesh.remove_unreferenced_vertices()
 

@@ -33,8 +33,8 @@ def sorted_candidates(A: Polyhedron, B: Polyhedron, table: Int[Array, "c 4"], fa
     kinds, firsts, seconds, planes = table.T
     frames = np.array([[_across(body.normals[k]) for body, k in zip((A, B), facets, strict=True)] for facets in facing])
     frames = frames.reshape(-1, 2, 2, 3)
-    outlines = [_outline(body, k) @ frame.T for facets, of in zip(facing, frames, strict=True)
-                for body, k, frame in zip((A, B), facets, of, strict=True)]  # fmt: skip
+    outlines = [_outline(body, k) @ frame.T for facets, body_frames in zip(facing, frames, strict=True)
+                for body, k, frame in zip((A, B), facets, body_frames, strict=True)]  # fmt: skip
     boxes = np.tile([-np.inf, -np.inf, np.inf, np.inf], (len(table), 1))
     for plane in range(len(facing)):
         for kind, coordinates in (

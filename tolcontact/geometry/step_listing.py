@@ -104,13 +104,13 @@ def faces_of_records(path: str | Path) -> dict[int, RecordedFace]:
 
     Raises OptionError if the file cannot be read.
     """
-    found: dict[int, RecordedFace] = {}
+    recorded_faces: dict[int, RecordedFace] = {}
     for number, body in enumerate(_listed_product(path).bodies, start=1):
         for face_number, face in enumerate(body.faces, start=1):
             for record in face.records:
-                bodies = (*(found[record].bodies if record in found else ()), number)
-                found[record] = RecordedFace(face_number, face.name, bodies)
-    return found
+                bodies = (*(recorded_faces[record].bodies if record in recorded_faces else ()), number)
+                recorded_faces[record] = RecordedFace(face_number, face.name, bodies)
+    return recorded_faces
 
 
 class PartsOfFile(dict[str, Part]):
@@ -139,18 +139,18 @@ def parts_from(
     """
     if not isinstance(model, Assembly):
         raise TypeError(f'model is a {type(model).__name__}; expected an assembly, as in tc.parts_from(model, "file.stp")')
-    wanted = None if names is None else _names("names", names)
+    selected_names = None if names is None else _names("names", names)
     fixed_names = [] if fixed is None or isinstance(fixed, bool) else _names("fixed", fixed)
     try:
         bodies = _bodies(_product(path, chord))  # with the triangles that the parts will have
     except OptionError as error:
         raise ModelError(model.name, [str(error)]) from error
     by_name = {body.name: body for body in bodies}
-    if missing := [name for name in (*(wanted or ()), *fixed_names) if name not in by_name]:
+    if missing := [name for name in (*(selected_names or ()), *fixed_names) if name not in by_name]:
         listed = _first([body.name for body in bodies])
         faults = [f'"{path}" holds no body "{name}"; it holds {listed}{nearest_name(name, by_name)}' for name in missing]
         raise ModelError(model.name, faults)
-    declared = bodies if wanted is None else [by_name[name] for name in wanted]
+    declared = bodies if selected_names is None else [by_name[name] for name in selected_names]
     if undeclared := [name for name in fixed_names if by_name[name] not in declared]:
         raise ModelError(model.name, [f'fixed has the body "{name}", which names has not; add it there' for name in undeclared])
     parts = PartsOfFile()

@@ -306,11 +306,11 @@ def _relocation(dataset: xr.Dataset) -> AnalysisReport:
     columns = [dataset.attrs["locator"], statistic if is_share else f"{statistic} [{dataset['measure_units'].values}]"]
     samples, fresh = (grouped(dataset.attrs[word]) for word in ("samples", "fresh"))
     notes = [
-        f"{samples} realizations for each place tried;",
+        f"{samples} realizations for each trial position;",
         f"{fresh} fresh ones for the figures below, with 95 % intervals.\n",
     ]
     table = AnalysisTable("", columns, rows, _lost(int(dataset["unresolved"].max())))
-    return AnalysisReport("Place of a locator", f"{grouped(dataset.sizes['trial'])} places tried", notes, [table])
+    return AnalysisReport("Position of a locator", f"{grouped(dataset.sizes['trial'])} trial positions", notes, [table])
 
 
 def _seating(dataset: xr.Dataset) -> AnalysisReport:

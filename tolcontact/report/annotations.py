@@ -118,9 +118,9 @@ def _measures(document: Mark, lines: np.ndarray, measure_of_line: np.ndarray) ->
     for number, measure in enumerate(document["measures"]):
         declared = [measure[word] for word in ("of", "to") if "part" in (measure.get(word) or {})]
         positions = [end for end in (_at(document, point) for point in declared) if end is not None]
-        own = lines[measure_of_line == number]
-        if positions or len(own):
-            yield _measure(measure["name"], measure["along"], positions, own)
+        measure_lines = lines[measure_of_line == number]
+        if positions or len(measure_lines):
+            yield _measure(measure["name"], measure["along"], positions, measure_lines)
 
 
 def _measure(name: str, along: Any, positions: list[list[float]], lines: np.ndarray) -> Mark:

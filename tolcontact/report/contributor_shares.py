@@ -86,9 +86,9 @@ def _groups(results: xr.DataTree, sample: xr.Dataset, columns: np.ndarray) -> di
 
     owner_of = dict(zip(labels, owners, strict=True))
     for together in _drawn_together(results):
-        known = [find(owner_of[label]) for label in together if label in owner_of]
-        for owner in known[1:]:
-            leader[find(owner)] = find(known[0])
+        joined = [find(owner_of[label]) for label in together if label in owner_of]
+        for owner in joined[1:]:
+            leader[find(owner)] = find(joined[0])
     members: dict[str, list[int]] = {}
     for position, column in enumerate(columns):
         members.setdefault(find(owners[column]), []).append(position)

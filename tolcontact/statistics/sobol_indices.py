@@ -45,12 +45,12 @@ def sobol_indices(f: np.ndarray, accuracy: float = 0.0) -> tuple[list[Estimate],
     return [ratio(u, v) for u in first_order.T], [ratio(u, v) for u in total.T]
 
 
-def shapley_effects(f: np.ndarray, places: np.ndarray, accuracy: float = 0.0) -> list[Estimate]:
-    """Return each group's Shapley effect, from values f (n, 1 + group) with 0, 1, ... groups of A, at `places` (n, group)."""
+def shapley_effects(f: np.ndarray, positions: np.ndarray, accuracy: float = 0.0) -> list[Estimate]:
+    """Return each group's Shapley effect, from f (n, 1 + group) with 0, 1, ... groups of A, at `positions` (n, group)."""
     remaining = (f[:, -1:] - f) ** 2
     if not np.isfinite(f).all() or not remaining[:, 0].mean() > max(CONSTANT * f.mean() ** 2, accuracy**2):
-        return [UNDEFINED] * places.shape[1]
-    reductions = np.take_along_axis(remaining[:, :-1] - remaining[:, 1:], places, axis=1)
+        return [UNDEFINED] * positions.shape[1]
+    reductions = np.take_along_axis(remaining[:, :-1] - remaining[:, 1:], positions, axis=1)
     return [ratio(u, remaining[:, 0]) for u in reductions.T]
 
 

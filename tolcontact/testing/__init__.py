@@ -28,7 +28,7 @@ from tolcontact.errors import OptionError
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.method import Method
 from tolcontact.testing.archived_datums import tangents
-from tolcontact.testing.referee import ArchivedPair, NotKeptError, Rows
+from tolcontact.testing.referee import ArchivedPair, MissingVariableError, Rows
 from tolcontact.workflow import build
 
 Results = xr.DataTree | str | Path
@@ -236,7 +236,7 @@ def _least_gaps(pair: ArchivedPair, rows: Rows, piece: slice) -> np.ndarray:
     """Return the least gaps (realization, state) [mm] of a piece of the realizations."""
     try:
         return pair.gaps(rows, piece).min(axis=-1)
-    except NotKeptError as error:
+    except MissingVariableError as error:
         raise AssertionError(
             f'gaps cannot be computed again without {error}, which was not kept: tc.run(..., keep="all")'
         ) from error

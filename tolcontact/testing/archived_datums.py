@@ -9,8 +9,8 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.testing.archived_form import ArchivedForm
 
-WITHIN = 1e-9  # mm
-SOLVED = 1e-7  # of the largest height: tolerance of the solver
+TOLERANCE = 1e-9  # mm
+SOLVER_TOLERANCE = 1e-7  # of the largest height: tolerance of the solver
 
 
 class ArchivedTangent:
@@ -30,9 +30,9 @@ class ArchivedTangent:
         """Yield realizations with a plane, from deviations (realization, contributor), that is not tangent, and the reason."""
         for row, deviation in enumerate(deviations):
             heights = self._heights @ (self._leaning @ deviation) + self._modes @ deviation[self._form_columns]
-            least, archived = self._distance(heights, None), self._distance(heights, deviation)
-            if not archived <= least + WITHIN + SOLVED * float(np.abs(heights).max()):
-                yield row, f"is {archived:.9g} mm from its face, and one {least:.9g} mm from it touches it, too"
+            least_distance, archived = self._distance(heights, None), self._distance(heights, deviation)
+            if not archived <= least_distance + TOLERANCE + SOLVER_TOLERANCE * float(np.abs(heights).max()):
+                yield row, f"is {archived:.9g} mm from its face, and one {least_distance:.9g} mm from it touches it, too"
 
     def _distance(self, heights: np.ndarray, deviation: np.ndarray | None) -> float:
         """Return the least distance [mm] of a plane from heights (point,), none of which may be outside it.
@@ -41,15 +41,15 @@ class ArchivedTangent:
         """
         scale = max(float(np.abs(heights).max()), 1e-300)
         planes, ones = self._heights @ self._free, np.ones((len(heights), 1))
-        known = np.zeros(0, dtype=int) if deviation is None else np.flatnonzero(self.columns >= 0)
-        values = np.zeros(0) if deviation is None else deviation[self.columns[known]]
+        known_coordinates = np.zeros(0, dtype=int) if deviation is None else np.flatnonzero(self.columns >= 0)
+        values = np.zeros(0) if deviation is None else deviation[self.columns[known_coordinates]]
         # A plane with known coordinates may be lower by rounding.
-        slack = scale * 1e-12 if known.size else 0.0
+        slack = scale * 1e-12 if known_coordinates.size else 0.0
         solution = scipy.optimize.linprog(
             np.append(np.zeros(planes.shape[1]), 1.0),
             A_ub=np.block([[-planes, 0 * ones], [planes, -ones]]),
             b_ub=np.concatenate([slack - heights, heights]) / scale,
-            A_eq=np.column_stack([self._free[known], np.zeros(len(known))]),
+            A_eq=np.column_stack([self._free[known_coordinates], np.zeros(len(known_coordinates))]),
             b_eq=values / scale,
             bounds=[(None, None)] * planes.shape[1] + [(0, None)],
             method="highs-ds",

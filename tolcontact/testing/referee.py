@@ -25,7 +25,7 @@ GOLDEN = (np.sqrt(5) - 1) / 2
 Rows = Mapping[str, xr.DataArray]  # variables (realization, ...) by name
 
 
-class NotKeptError(LookupError):
+class MissingVariableError(LookupError):
     """An error for an archive without a variable that the computation of gaps needs."""
 
 
@@ -60,23 +60,23 @@ class ArchivedPoint(NamedTuple):
         """
         of_body, of_wall = (of_moving, of_reference) if self.body["on_moving"] else (of_reference, of_moving)
         grown = ArchivedPoint(self.wall, {**self.body, "radius": self.body["radius"] + of_body})
-        return grown._gaps_as_large(R, t) - of_wall
+        return grown._nominal_gaps(R, t) - of_wall
 
-    def _gaps_as_large(self, R: np.ndarray, t: np.ndarray) -> np.ndarray:
+    def _nominal_gaps(self, R: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Return gaps (...) [mm] at these poses, for faces without offset."""
         if not self.body["on_moving"]:
             R = R.swapaxes(-1, -2)
             t = -np.einsum("...ij,...j->...i", R, t)
         centre, axis = R @ self.body["centre"] + t, R @ self.body["axis"]
         if terms.SURFACE_KINDS[self.wall["kind"]] == "plane":
-            return self._beside(-self.wall["axis"], centre, axis)
+            return self._distance_from_plane(-self.wall["axis"], centre, axis)
         if self.body["axis"].any():
-            return self._nearest(lambda e: self.wall["radius"] + self._beside(e, centre, axis), centre.shape[:-1])
+            return self._nearest(lambda e: self.wall["radius"] + self._distance_from_plane(e, centre, axis), centre.shape[:-1])
         offset = centre - self.wall["origin"]
         gap = self._inside(offset) if self.body["is_hollow"] else self._distance(offset)
         return gap - self.body["radius"]
 
-    def _beside(self, e: np.ndarray, centre: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    def _distance_from_plane(self, e: np.ndarray, centre: np.ndarray, axis: np.ndarray) -> np.ndarray:
         """Return the distance from the plane through the wall's point with normal e (..., 3) into the wall."""
         tilt = (e * axis).sum(axis=-1)
         stretch = np.sqrt(1 - tilt**2)
@@ -323,5 +323,5 @@ def _pose(rows: Rows, piece: slice, part: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _needed(rows: Rows, name: str, piece: slice) -> np.ndarray:
     if name not in rows:
-        raise NotKeptError(f'"{name}"')
+        raise MissingVariableError(f'"{name}"')
     return np.asarray(rows[name][piece].values)

@@ -124,6 +124,6 @@ def method_of(assembly: Assembly, method: Choice | None, default: Method | None 
 def check_counts(**counts: int) -> None:
     """Raise OptionError for a count that is not a whole number, or outside `COUNTS`."""
     for option, value in counts.items():
-        least, most = COUNTS[option]
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            raise OptionError(f"{option} is {value!r}; expected a whole number from {least} to {most}")
+        smallest, largest = COUNTS[option]
+        if isinstance(value, bool) or not isinstance(value, int) or not smallest <= value <= largest:
+            raise OptionError(f"{option} is {value!r}; expected a whole number from {smallest} to {largest}")

@@ -124,15 +124,15 @@ def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock |
 def view_page(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> str:
     """Return the view of a model before a run; `nominal` is None for a model with faults other than omissions."""
     omissions = [fault for fault in assembly.omissions() if fault in faults]
-    others = [fault for fault in faults if fault not in omissions]
+    remaining_faults = [fault for fault in faults if fault not in omissions]
     values = {
         "title": assembly.name,
-        "faults": others,
+        "faults": remaining_faults,
         "omissions": omissions,
         "has_features": any(part.toleranced for part in assembly.parts),
         "pairs": gap_rows(nominal),
         "file": _file(assembly, nominal, faults),
-        "stations": (scene := view_of(assembly, nominal, others))["stations"],
+        "stations": (scene := view_of(assembly, nominal, remaining_faults))["stations"],
     }
     return _page("view", values, {"scene": scene, "charts": []})
 

@@ -76,18 +76,18 @@ def worst_poses(results: xr.DataTree, station: str, worst: xr.Dataset | None) ->
         unknown = np.full((count, len(terms.STATES), parts, 3, 3), np.nan)
         return unknown, unknown[..., 0]
     start = sum(sizes[name] for name in names[: names.index(station)])
-    own = slice(start, start + sizes[station])
-    t_held, R_held = (worst[variable.name].values[:, :, own] for variable in terms.STATION_POSES)
+    station_columns = slice(start, start + sizes[station])
+    t_held, R_held = (worst[variable.name].values[:, :, station_columns] for variable in terms.STATION_POSES)
     return _of_all_parts(results, station, R_held, t_held)
 
 
 def _of_all_parts(results: xr.DataTree, station: str, R_held: np.ndarray, t_held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return R and t of all parts, nominal for parts that the station does not hold."""
-    parts, held = (
+    parts, held_parts = (
         results.to_dataset()[terms.PART].values,
         results[terms.station_group(station)].to_dataset()[terms.STATION_PART].values,
     )
-    positions = [parts.tolist().index(part) for part in held]
+    positions = [parts.tolist().index(part) for part in held_parts]
     R = np.tile(np.eye(3), (len(R_held), len(terms.STATES), len(parts), 1, 1))
     t = np.zeros((len(R_held), len(terms.STATES), len(parts), 3))
     R[:, :, positions], t[:, :, positions] = R_held, t_held

@@ -253,7 +253,7 @@ def _between(summary: Rows, count: int) -> Iterator[str]:
         if depth > limit and depth > 2 * float(summary["penetration"].sel(state=CORRECTED)):
             yield f"advice: {_way_out(summary)}"
         if overhang > limit:
-            yield f"touching contact points lie up to {overhang:.3g} mm beside their reference face"
+            yield f"touching contact points lie up to {overhang:.3g} mm outside their reference face"
     contacts, ended = (float(summary[name]) for name in ("contacts", "contacts_ended"))
     if ended > 0:
         yield f"contact beyond the end of a face: {ended:.0f} of {contacts:.0f} touching contact points, where checked"

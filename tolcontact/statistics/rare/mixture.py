@@ -8,7 +8,7 @@ from scipy import cluster, special
 
 from tolcontact.statistics.rare.searches import Score
 
-NUMBERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)  # trial numbers of centres
+CENTRE_COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)  # trial numbers of centres
 MIN_PER_CENTRE = 4
 MAX_FITTED = 1500  # realizations
 MIN_GAIN = 0.01  # of the mean log-likelihood: smallest gain that justifies another centre
@@ -63,7 +63,7 @@ def fitted(groups: Sequence[np.ndarray], rng: np.random.Generator) -> Mixture:
     if len(groups) > 1:
         training, validation = np.concatenate(groups[::2]), np.concatenate(groups[1::2])
         best = -np.inf
-        for candidate in NUMBERS:
+        for candidate in CENTRE_COUNTS:
             if candidate > max(len(training) // MIN_PER_CENTRE, 1):
                 break
             likelihood = float(_clustered(training, candidate, rng).log_ratio(validation).mean())

@@ -24,14 +24,14 @@ from tolcontact.statistics.rare.searches import (
 )
 
 PILOT, MIN_COUNTED = 0.05, 50  # share of all realizations; number of hits among them above which the event is counted
-FIRST_LOOK, MIN_LOOK = 0.25, 3500  # share of realizations, and their number
+FIRST_SHARE, MIN_FIRST = 0.25, 3500  # share of realizations, and their number
 NO_CONCERN = 1e-7  # upper bound that suffices
 SUFFICIENT, MIN_SUFFICIENT = 1.5, 4000  # upper over lower bound that suffices, with this many realizations
 SEARCHABLE, MIN_PILOT, MIN_FEW = 10_000, 500, 3  # with fewer realizations, counting beats searches even with few hits
 SEARCHES = (0.25, 0.3)  # of all realizations: by levels, by inflation
 SCOUTING = 0.04  # of a search, for each trial inflation
 TRIAL, MIN_TRIAL = 0.01, 5  # of a search, at each level, to count its levels; and the minimum for each strand
-MIN_LOOKS = 50  # for each trial inflation
+MIN_TRIALS = 50  # for each trial inflation
 MIN_GROUP = 8  # realizations of a search from which centres are fitted
 AROUND_ZERO = 0.1  # share of the mixture that is drawn without a shift
 REFITS = 2  # to the results of the searches
@@ -56,8 +56,8 @@ def sufficient_tail(score: Score, dimensions: int, *, samples: int, rng: np.rand
     latter needs many realizations, since few may miss regions of the event. Otherwise the result comes from the remaining
     realizations alone.
     """
-    look = int(FIRST_LOOK * samples)
-    if look >= MIN_LOOK:
+    look = int(FIRST_SHARE * samples)
+    if look >= MIN_FIRST:
         tail = tail_probability(score, dimensions, samples=look, rng=rng, leads=leads)
         sufficient = SUFFICIENT * tail.probability.lower if look >= MIN_SUFFICIENT else 0.0
         if tail.disagreement == 1.0 and tail.probability.upper <= max(sufficient, NO_CONCERN):
@@ -85,15 +85,15 @@ def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.ran
     if not groups:
         if all(estimate.upper == 1.0 for estimate in answers):
             return Tail(_counted(score, dimensions, budget_drawn, rng), 1.0)
-        return _agreed(answers)
+        return _combined(answers)
     u, weights = _importance(score, dimensions, groups, budget_drawn, rng)
-    if not _suffices(weights):
-        return _agreed(answers)
+    if not _has_spread_weights(weights):
+        return _combined(answers)
     mean = float(weights.mean())
     reach = math.exp(intervals.student(np.inf) * float(weights.std()) / mean / math.sqrt(len(weights)))
     hits = np.flatnonzero(weights)
     hits = rng.choice(hits, min(2 * REFIT, len(hits)), p=weights[hits] / weights.sum())
-    unseen = _unseen([found for search in searches for found in search.points], u[hits], rng)
+    unseen = _unseen([strand for search in searches for strand in search.points], u[hits], rng)
     estimate = Estimate(mean, mean / reach, min(mean * reach / (1 - unseen), 1.0))
     for alternative in answers:
         if alternative.value > 0 and math.log(alternative.value / mean) > SIGNIFICANT * math.hypot(
@@ -133,7 +133,7 @@ def _searched(score: Score, dimensions: int, budget: int, rng: np.random.Generat
         return by_inflation(walk, inflation, budget - used) if inflates else by_levels(walk)
 
     if inflates:
-        inflation, share = first_inflation(counting, dimensions, max(int(SCOUTING * budget), MIN_LOOKS), rng)
+        inflation, share = first_inflation(counting, dimensions, max(int(SCOUTING * budget), MIN_TRIALS), rng)
     if inflates and dimensions > MAX_WEIGHTED:
         levels = BEFORE_NESTED + nested_levels(inflation, share)
     else:
@@ -193,14 +193,14 @@ def _unseen(strands: Sequence[np.ndarray], hits: np.ndarray, rng: np.random.Gene
     return min((singles + intervals.student(np.inf) * math.sqrt(singles + doubles)) / len(strands), MAX_UNSEEN)
 
 
-def _suffices(weights: np.ndarray) -> bool:
+def _has_spread_weights(weights: np.ndarray) -> bool:
     """Return whether the weights are spread over many realizations, with no dominant one."""
     total = weights.sum()
     is_carried = total > 0 and total**2 / (weights**2).sum() >= MIN_EFFECTIVE
     return bool(is_carried and weights.max() <= MAX_WEIGHT * total)
 
 
-def _agreed(answers: Sequence[Estimate]) -> Tail:
+def _combined(answers: Sequence[Estimate]) -> Tail:
     """Return the mean of the searches' results if they agree, else the larger with an interval that covers both.
 
     A search that misses a region of the event gives too small a value, so the upper bounds of both bound the mean.

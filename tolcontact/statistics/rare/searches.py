@@ -22,14 +22,14 @@ FIRST_STEP, ACCEPTANCE = 0.8, 0.4  # length of steps, and their target acceptanc
 MIN_STEP, MAX_STEP = 0.02, 0.99
 MAX_LEVELS = 60
 INFLATIONS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0)
-COMMON, SEEN = 0.1, 0.01  # shares of realizations in the event: enough to stop inflating; enough if no inflation gives more
+COMMON, MIN_COMMON = 0.1, 0.01  # shares of realizations in the event that end inflation: at once; if none gives more
 UNKNOWN_INFLATION = 3.0  # used where no inflation leads to the event
 MAX_WEIGHTED = 10  # contributors: with more, the weights of inflation spread too far
 MAX_VARIANCE = 1.0  # of weights, relative to the square of their mean
 GOAL, MIN_GOAL = 0.25, 0.05  # share of an inflated event in the previous one: target, and smallest accepted
 NESTED_SEEDS = 1 / 3  # of all realizations: fewer and larger calls of the score than with the share of hits
 FIRST_PACE, MAX_CHANGE, TRIES = 0.05, 3.0, 6  # growth of 1 / s^2 from one inflated event to the next, and its adaptation
-LOOKS_BACK = 0.25  # share of realizations that are checked in the previous event
+CHECKED_SHARE = 0.25  # share of realizations that are checked in the previous event
 BISECTIONS = 30
 NEGLIGIBLE = 1e-9  # probability below which a search ends
 BEFORE_NESTED = 3.0  # realizations per position at a level, before the first nested event
@@ -117,7 +117,7 @@ class Walk:
         u = deviation * self.rng.standard_normal((STRANDS, self.count, self.dimensions))
         return u, self.scores(u)
 
-    def seed_places(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def seed_positions(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the positions of the seeds (strand, seed) of the next level among realizations with weights (strand, n).
 
         A strand without any weight continues from the other strands.
@@ -171,7 +171,7 @@ def nested_levels(inflation: float, share: float) -> float:
     """
     distance = -inflation * special.ndtri(share)
     ratio = math.log(share) - max(float(special.log_ndtr(-distance)), math.log(NEGLIGIBLE))
-    return (2 + LOOKS_BACK) * (1 + max(ratio, 0.0) / -math.log(GOAL))
+    return (2 + CHECKED_SHARE) * (1 + max(ratio, 0.0) / -math.log(GOAL))
 
 
 def first_inflation(score: Score, dimensions: int, count: int, rng: np.random.Generator) -> tuple[float, float]:
@@ -184,8 +184,8 @@ def first_inflation(score: Score, dimensions: int, count: int, rng: np.random.Ge
     common = [(s, share) for s, share in zip(INFLATIONS, shares, strict=True) if share >= COMMON]
     if common:
         return common[0]
-    most = int(np.argmax(shares))
-    return (INFLATIONS[most] if shares[most] > SEEN else UNKNOWN_INFLATION), max(shares[most], 1 / count)
+    best = int(np.argmax(shares))
+    return (INFLATIONS[best] if shares[best] > MIN_COMMON else UNKNOWN_INFLATION), max(shares[best], 1 / count)
 
 
 def _levels(walk: Walk, inflation: float, product: Product) -> list[np.ndarray] | None:
@@ -201,7 +201,7 @@ def _levels(walk: Walk, inflation: float, product: Product) -> list[np.ndarray] 
             return None
         if threshold == 0.0:
             return [points[hits] for points, hits in zip(u, inside, strict=True)]
-        seeds = walk.seed_places(inside)
+        seeds = walk.seed_positions(inside)
         u, g = walk.advance(u[seeds], g[seeds], threshold, inflation)
     return None
 
@@ -236,7 +236,7 @@ def _weighted(walk: Walk, inflation: float) -> SearchResult:
         product.times(weights.mean(axis=1), log_scale=largest)
         if product.is_negligible:
             return SearchResult.nothing(product)
-        seeds = u[walk.seed_places(weights)]
+        seeds = u[walk.seed_positions(weights)]
         u, _ = walk.advance(seeds, np.ones(seeds.shape[:2]), 0.0, t)
         s = t
     return SearchResult(product.estimate, list(u))
@@ -251,16 +251,16 @@ def _nested(walk: Walk, inflation: float, budget: int) -> SearchResult:
     u = _inflated(walk, inflation, product)
     if u is None:
         return SearchResult.nothing(product)
-    z, looks = u / inflation, u[:, :0]  # u (strand, n, d) to be checked for membership in the previous event
+    z, checked_points = u / inflation, u[:, :0]  # u (strand, n, d) to be checked for membership in the previous event
     while s > 1.0:
         for _ in range(TRIES):
             t = max(1 / math.sqrt(1 / s**2 + pace), 1.0)
-            scores = walk.scores(np.concatenate([looks, t * z], axis=1))  # one large call takes less time than two
-            hits_before, hits = np.split(scores > 0, [looks.shape[1]], axis=1)
+            scores = walk.scores(np.concatenate([checked_points, t * z], axis=1))  # one large call takes less time than two
+            hits_before, hits = np.split(scores > 0, [checked_points.shape[1]], axis=1)
             product.over(hits_before)
             if product.is_negligible:
                 return SearchResult.nothing(product)
-            looks = looks[:, :0]
+            checked_points = checked_points[:, :0]
             share = float(hits.mean())
             change = math.log(GOAL) / math.log(min(max(share, 1 / hits.size), 1 - 1 / hits.size))
             pace *= min(max(change, 1 / MAX_CHANGE), MAX_CHANGE)
@@ -270,11 +270,11 @@ def _nested(walk: Walk, inflation: float, budget: int) -> SearchResult:
             return SearchResult.nothing(product)
         product.times(hits.mean(axis=1))
         walk.spread(budget, nested_levels(t, math.exp(product.log)))
-        seeds = z[walk.seed_places(hits)]
+        seeds = z[walk.seed_positions(hits)]
         z, _ = walk.advance(seeds, np.ones(seeds.shape[:2]), 0.0, stretch=t)
-        looks = s * z[:, walk.rng.choice(z.shape[1], max(int(LOOKS_BACK * z.shape[1]), 1), replace=False)]
+        checked_points = s * z[:, walk.rng.choice(z.shape[1], max(int(CHECKED_SHARE * z.shape[1]), 1), replace=False)]
         s = t
-    product.over(walk.scores(looks) > 0)
+    product.over(walk.scores(checked_points) > 0)
     return SearchResult(product.estimate, list(z))
 
 
