@@ -1,4 +1,4 @@
-"""Realizations in which required measures change if tolerance ranges change, by group of tolerances.
+"""Realizations where required measures change if tolerance ranges change, by group of tolerances.
 
 Most groups affect few realizations. The ranges of these groups are changed all at once; only where a realization changes, the
 set of groups is bisected. So most groups cost almost nothing.

@@ -136,7 +136,7 @@ class ReleasedDraws(Design):
         return members
 
     def _mixed(self, retained: Numbers, redrawn: Numbers, positions: np.ndarray, count: int) -> Numbers:
-        """Return numbers in which the first `count` units are retained, and the others redrawn conditional on these."""
+        """Return numbers with the first `count` units retained, and the others redrawn conditional on these."""
         correlated: dict[str, np.ndarray] = {}
         for labels, factor in self._draws.correlated:
             correlated |= self._conditional(retained, redrawn, positions, count, labels, factor)

@@ -60,7 +60,7 @@ class Requirement:
             raise OptionError(f'{samples} realizations are too few for "{self.name}"; expected samples={minimum} or more')
 
     def margin(self, x: np.ndarray) -> float:
-        """Return the margin by which values (n,) meet the requirement, in the measure's units; negative if they do not.
+        """Return the margin of values (n,) above the requirement, in the measure's units; negative if they do not meet it.
 
         For a share the margin is a quantile of the distances within the limits. It changes continuously with the values,
         while a count of values outside jumps.

@@ -32,8 +32,8 @@ def seating(model: Model | Program, *, into: str | Path | None = None) -> xr.Dat
         share     (seat, holder)  the share of each contact in the sum of all normal forces at this coefficient, which shows the
                                   contacts that hold the part; one of several distributions where it is not unique
 
-    Parts are in the poses to which the forces seat them without deviations and without friction, in the exact resolution, for
-    any method of the model. If there is no such pose, parts are in their poses as drawn (attribute `place`). Contacts that
+    Parts are in their poses as seated by the forces without deviations and without friction, in the exact resolution, for any
+    method of the model. If there is no such pose, parts are in their poses as drawn (attribute `place`). Contacts that
     touch there may be active: unilateral locators and contact pairs with friction, bilateral locators without. A contact that
     states mu=0 has no friction. Opposed contacts may press against each other as hard as the balance of forces permits, as in a
     drawer that jams. Whether a part actually stops short depends on how it was put down, which is unknown; the coefficient

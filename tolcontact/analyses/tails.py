@@ -35,7 +35,7 @@ def tails(
     """Return probabilities of rare events (see tolcontact.statistics.rare).
 
         probability  (event, interval)          with its 95 % interval
-        disagreement (event)                    factor by which two searches for the event differ; 1 if they agree
+        disagreement (event)                    ratio of the results of two searches for the event; 1 if they agree
         stop         (event)                    1: many values were at one of the limits, and none beyond; if the other limit
                                                 can be exceeded, this one is left out
         simulated    (event)                    number of realizations, out of about `samples`
@@ -174,7 +174,7 @@ def _events(program: Program) -> dict[str, _Event]:
 
 
 class _Beyond:
-    """The score of one side of a measure's limits: the amount by which values exceed the limit and their accuracy."""
+    """The score of one side of a measure's limits: the excess of values over the limit and their accuracy."""
 
     def __init__(self, engine: Engine, measure: int, limits: Limits) -> None:
         self._engine, self._measure, self._limits = engine, measure, limits

@@ -26,7 +26,7 @@ EXCHANGES = 24  # combinations at which influences are looked for
 MAX_RESTARTS, RESTART_STEP = 3, 0.25  # of continued searches, and their first step
 END_TOLERANCE = 1e-3  # of a measure's spread: searches that end at values closer than this have the same end
 NEGLIGIBLE = 1e-6  # of a measure's spread: smaller changes do not count as influence
-SINGLE = 2  # combinations in which contributors are exchanged one at a time
+SINGLE = 2  # combinations with exchanges of one contributor at a time
 MAX_ROUNDS = 8
 
 

@@ -43,7 +43,7 @@ instead of a mesh that was read from it.
 
 The surface of a face is known exactly where a STEP file states a plane, cylinder, cone, sphere or torus. In other meshes a
 cylinder, cone or sphere is fitted to the vertices of each smooth piece. The fit is accepted if every vertex lies within 1 um
-of it and the piece has at least five facets, each of which turns by at most 30 degrees. Contact points, their projections and
+of it and the piece has at least five facets that turn by at most 30 degrees each. Contact points, their projections and
 normals then lie on the fitted surface instead of the triangles. A prism with many sides is therefore treated as a cylinder;
 `tolcontact check` states how far inside the cylinder its triangles lie. Other curved faces are only as round as their
 triangles.
@@ -56,7 +56,7 @@ extent of a file larger than 0.4 m, and 0.1 rad. `tc.Mesh(file, chord=0.1)` asks
 the file states does not depend on this chord. If there would be more than a million triangles, or triangulation takes too long,
 faces are triangulated 30 times as coarsely and to 0.5 rad, with a warning.
 
-The triangles keep the boundary representation, to which `tc.Brep`, `tc.Cylinder` and `tc.Largest` refer. Where the file states
+The triangles keep the boundary representation, which `tc.Brep`, `tc.Cylinder` and `tc.Largest` use. Where the file states
 a surface, vertices are moved onto it in double precision, as closely as the surfaces that meet at a vertex agree. Vertices of
 a body that are closer than 1e-5 mm at 100 mm, 1e-4 mm at 1 m, are one.
 

@@ -22,7 +22,7 @@ class AnalyticSurface(ABC):
 
     origin     a point of a plane or of the axis (3,) [mm]: the apex of a cone, the centre of a sphere or torus
     axis       normal of a plane, or unit vector along the axis (3,), from the apex into a cone; meaningless for a sphere
-    residual   [mm] largest distance of the vertices to which it was fitted
+    residual   [mm] largest distance of the fitted vertices
     is_fitted  whether it was fitted; otherwise a file states it
     """
 
@@ -64,7 +64,7 @@ class AnalyticSurface(ABC):
         """
 
     def offset(self, point: np.ndarray) -> np.ndarray:
-        """Return the vector (3,) from the origin to a point (3,), without the components in which the origin is arbitrary."""
+        """Return the vector (3,) from the origin to a point (3,), without the arbitrary components of the origin."""
         return point - self.origin
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> Self:

@@ -86,7 +86,7 @@ def _gaps_to(target: Surface, places: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def sampling_error(sample: np.ndarray, points: np.ndarray, target: Surface, *, unit: float, within: float) -> float:
-    """Return the depth [mm] to which `target` can penetrate between the points `sample` (point, 3), judged by `points`.
+    """Return the possible penetration [mm] of `target` between the points `sample` (point, 3), judged by `points`.
 
     It is the 95 % quantile, over random small displacements, of the depth of the deepest of `points` below the deepest of
     `sample`. `unit` [mm] is the smallest tolerance range.

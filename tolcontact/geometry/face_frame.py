@@ -14,7 +14,7 @@ OFF_POWER = 1.1  # keeps the sizes of usual faces off powers of 2, between which
 
 
 class FaceFrame(NamedTuple):
-    """A centre (3,) [mm], unit vectors (3, 3) in columns, and the size [mm] of cells, to which coordinates may be rounded."""
+    """A centre (3,) [mm], unit vectors (3, 3) in columns, and the size [mm] of the cells for rounding coordinates."""
 
     centre: np.ndarray
     axes: np.ndarray

@@ -1,7 +1,7 @@
 """Faces that a drawing treats as one feature: slots, and patterns of equal holes. Part's own frame, lengths in mm.
 
 A slot has two parallel planes that face each other, and two hollow cylinders of one radius as its ends, tangent to both planes.
-The holes of a pattern are cylinders of one radius with parallel axes, each of which spans more than half a turn.
+The holes of a pattern are cylinders of one radius with parallel axes that span more than half a turn each.
 """
 
 import itertools

@@ -27,7 +27,7 @@ DENSITY = 4  # ratio of contact-point spacing to the spacing of these points
 MAX_POINTS = 20_000
 MAX_HALVED = 20  # times the desired number of points: if halving long triangles gives more, points are sampled at random
 POSES_PER_BLOCK = 16
-MORE_POINTS = 8  # factor by which the number of points checked per row grows in each round
+MORE_POINTS = 8  # growth factor per round of the number of points checked in each row
 MIN_MEAN = 0.5  # length of the mean normal: 1 for a plane, 0 for a closed body
 THINNED = 32  # every 32nd point is enough to detect nearly every penetration
 

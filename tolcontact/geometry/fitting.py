@@ -22,7 +22,7 @@ MAX_SIZE = 1e4  # largest radius, in sizes of the fitted vertices; larger radii 
 
 
 def fit_surface(triangles: np.ndarray, tolerance: float) -> AnalyticSurface | None:
-    """Return the surface on which the corners of `triangles` (face, 3, 3) [mm] lie within `tolerance` [mm], if there is one.
+    """Return a surface within `tolerance` [mm] of the corners of `triangles` (face, 3, 3) [mm], if there is one.
 
     Both a sphere and a cone pass through two rings of vertices: the simpler one is used. Triangles in fewer than
     MIN_DIRECTIONS directions are a plane or a fold. Fasteners, features and contact pairs request the same faces, and parts of

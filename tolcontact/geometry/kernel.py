@@ -23,10 +23,10 @@ from tolcontact.geometry.vector_kernel import (
 
 CORNER_ON_FACET, FACET_ON_CORNER, EDGE_ON_EDGE = 0, 1, 2  # the moving body comes first
 MARGIN = 1e-9  # of the size: largest distance outside an edge at which a contact point counts
-MAX_TILT_SINE = 0.2  # sine of the angle by which a normal may tilt out of the cone of a corner or an edge
+MAX_TILT_SINE = 0.2  # largest sine of the tilt of a normal out of the cone of a corner or an edge
 MIN_CROSSING = 1e-3  # rad: edges of facing planes that cross at a smaller angle meet at their corners
 PARALLEL = 1e-6  # rad: edges at a smaller angle have no common normal
-MIN_SLANT, MAX_SLANT = 1.02, 1.5  # range of lengths in which the slope of a gap between rims counts, not the plane's normal
+MIN_SLANT, MAX_SLANT = 1.02, 1.5  # range of lengths where the slope of a gap between rims counts, not the plane's normal
 INSIDE = 1e-9  # mm: contact points that are no deeper count as touching
 TINY = 1e-300
 ORIGIN = (0.0, 0.0, 0.0)
@@ -51,7 +51,7 @@ class Body(NamedTuple):
 
 @inlined_uncounted
 def _tilt_sine(body, corner, n):  # type: ignore[no-untyped-def]
-    """Return the sine of the angle by which edges at a corner rise above the plane across n."""
+    """Return the sine of the largest angle of edges at a corner above the plane across n."""
     tilt_sine = 0.0
     for j in range(body.cones[corner], body.cones[corner + 1]):
         tilt_sine = max(tilt_sine, dot(row(body.directions, j), n))

@@ -85,7 +85,7 @@ class Reach(NamedTuple):
 
     @property
     def tilt_sine(self) -> float:
-        """The sine of the angle by which normals may nominally tilt out of a cone."""
+        """The largest sine of the nominal tilt of normals out of a cone."""
         return min(kernel.MAX_TILT_SINE + self.tilt + TILT_MARGIN, 1.0)
 
 

@@ -92,7 +92,7 @@ def _across_material(
 
 
 def _apart(vertices: np.ndarray, faces: np.ndarray, twins: np.ndarray) -> trimesh.Trimesh:
-    """Return closed faces in which corners are one vertex if a chain of twins connects their triangles."""
+    """Return closed faces whose corners share a vertex if a chain of twins connects their triangles."""
     half_edges = np.arange(len(twins))
     ends = half_edges - half_edges % 3 + (half_edges + 1) % 3
     ones = np.ones(len(twins), dtype=bool)

@@ -168,7 +168,7 @@ def find_minima(moving, reference, poses, sums_m, sums_r, grown, points, starts,
     sums_m, sums_r   HeightSums of both planes
     grown    (n,) [mm]: the sum of the outward offsets of both faces
     points   (n, point, 3) [mm] of the moving plane, or (1, point, 3) if they are the same at all poses
-    starts   (n, start): indices of the points from which minima are searched; -1 for none
+    starts   (n, start): indices of the starting points of searches for minima; -1 for none
     reach    [mm]: longest step of the search
     slack    [mm]: largest distance of a start outside a rim
     """

@@ -316,9 +316,9 @@ def find(A, B, candidates, reach, margin, error, poses, retained, directions, la
     reach         (3,) [mm]: the largest depth and the largest gap of a contact point; the nominal depth beyond which a body
                   must have penetrated elsewhere
     margin        [mm]: largest distance of contact points outside edges
-    error         (4,): the permitted error [mm] of facing planes outside their edges, the margin [mm] in which it is permitted,
-                  the distance in margins from a point where they touch, and the depth [mm] up to which a corner counts behind
-                  several facets
+    error         (4,): the permitted error [mm] of facing planes outside their edges, the margin [mm] where it is permitted,
+                  the distance in margins from a point where they touch, and the largest depth [mm] of a corner that counts
+                  behind several facets
     labels        (n, p): indices of the candidates, -1 for none
     gaps          (n, p) [mm], infinite for none
     points, projections, normals   (n, p, 3), left unchanged for none

@@ -15,7 +15,7 @@ from tolcontact.geometry.subdivision import subdivided
 
 log = logging.getLogger(__name__)
 
-FIELD_DIVISIONS = 12  # number of edges across a part on which its displacement field is shown
+FIELD_DIVISIONS = 12  # number of edges across a part for showing its displacement field
 
 
 def shape(geometry: Geometry, contents: Contents | None = None) -> Shape:

@@ -131,8 +131,8 @@ def _by_size(shares: xr.DataArray) -> np.ndarray:
 
 def _sensitivities(dataset: xr.Dataset) -> AnalysisReport:
     notes = [
-        "Mean derivatives with 95 % intervals: over realizations in which parts stay",
-        "apart, and over those in which they touch, both without kinks and jumps;",
+        "Mean derivatives with 95 % intervals: over realizations without contact, and",
+        "over realizations with contact, both without kinks and jumps;",
         '"all" includes kinks and jumps, and "kinks" is their share.',
         *_lost(_unresolved(dataset)),
     ]

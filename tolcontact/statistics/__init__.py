@@ -64,7 +64,7 @@ all finished realizations, of any status.
 >>> bool(change.sel(interval="upper") < 1)  # contact reduces the spread, at 95 % confidence
 True
 
-For contact, the summary contains the share of realizations in which each pair is under load, the mean and percentiles of its
+For contact, the summary contains the share of realizations with each pair under load, the mean and percentiles of its
 reaction (in the units of the objective: N only for "locator stiffness" and "seating"), and the pairs that are under load at the
 same time. Where faces lie flat on each other, the distribution of the reaction over points is not unique, but the set of
 touching points is. A run counts touching points in its first 2048 realizations; the group `contact` of the archive contains the

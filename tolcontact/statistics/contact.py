@@ -18,7 +18,7 @@ VARIABLES = [variable.name for variable in (terms.CLASHES, terms.CLASH_DEPTH, te
 
 
 def carried(rows: Rows) -> np.ndarray:
-    """Return the share of realizations in which each pair is under load, (pair, interval)."""
+    """Return the share of realizations with each pair under load, (pair, interval)."""
     counts = np.sum([(piece[terms.CARRYING.name].values > 0).sum(axis=0) for piece in pieces(rows)], axis=0)
     total = rows.sizes[terms.REALIZATION]
     return np.array([intervals.proportion_of(int(k), total) for k in counts]).reshape(-1, len(terms.ESTIMATE))
@@ -57,7 +57,7 @@ def _unique_rows(masks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class TouchingShares:
-    """The share of realizations in which each contact point touches, accumulated over realizations.
+    """The share of realizations with contact at each contact point, accumulated over realizations.
 
     is_new   whether realizations were added since the last `values`
     """
@@ -67,7 +67,7 @@ class TouchingShares:
         self.is_new = True
 
     def add(self, counts: np.ndarray, realizations: int) -> None:
-        """Add the counts (point,) of `realizations` further realizations in which each point touches."""
+        """Add the counts (point,) of contacts at each point in `realizations` further realizations."""
         self._counts += counts
         self._realizations += realizations
         self.is_new |= realizations > 0
@@ -124,8 +124,8 @@ class Clashes:
     """The clashes between parts in the rows of an archive.
 
     watched     number of realizations that were tested
-    clashing    number of these in which parts without declared contact penetrate each other
-    counts      number of realizations in which a pair penetrates deepest; by both parts, and whether contact is declared
+    clashing    number of these with penetration between parts without declared contact
+    counts      number of realizations with a pair as the deepest one; by both parts, and whether contact is declared
     depths      [mm], by the same keys: their largest depth; missing if none was measured
     """
 

@@ -189,7 +189,7 @@ def proportion_of(k: float, n: float) -> Estimate:
 
 
 def variance_ratio(sample: np.ndarray | Sample, baseline: np.ndarray | Sample) -> Estimate:
-    """Return the variance of `sample` over that of `baseline`, from the same realizations (paired, on the log scale)."""
+    """Return the ratio of the variances of `sample` and `baseline`, from the same realizations (paired, on the log scale)."""
     sample, baseline = Sample.of(sample), Sample.of(baseline)
     variance_sample, variance_baseline = sample.moments[0], baseline.moments[0]
     if is_constant(sample) or is_constant(baseline):

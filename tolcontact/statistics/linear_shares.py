@@ -29,7 +29,7 @@ class LinearShares(NamedTuple):
 
 
 def required_realizations(contributors: int) -> int:
-    """Return the smallest number of realizations from which shares are estimated."""
+    """Return the smallest number of realizations for an estimate of shares."""
     return max(ROWS_PER_CONTRIBUTOR * (contributors + 1), 10 * BLOCKS)
 
 

@@ -45,7 +45,7 @@ class Sample:
 
     @property
     def widening(self) -> float:
-        """The factor by which the interval of a mean of independent realizations must be widened; below 1 it is narrowed.
+        """The widening factor for the interval of a mean of independent realizations; a factor below 1 narrows it.
 
         The factor is the root of the design effect (Kish, 1965), the variance of the means of replicates over the variance of
         means of independent realizations, with Student's t for the number of replicates. The last replicate may be incomplete;

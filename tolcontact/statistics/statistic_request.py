@@ -1,4 +1,4 @@
-"""The text "measure: statistic value", by which options name a statistic of a corrected measure."""
+"""The text "measure: statistic value" of options that name a statistic of a corrected measure."""
 
 import re
 from collections.abc import Sequence

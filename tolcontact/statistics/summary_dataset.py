@@ -24,11 +24,11 @@ def summarize(results: Results) -> Summary:
     touched         (interval)                           share of realizations that contact touched
     by_status       (status_meaning)                     number of realizations
     not_assemblable (interval)                           share of realizations without a pose free of penetration
-    conflicts       (pair)                               number of these in which the pair is in conflict
+    conflicts       (pair)                               number of these with the pair in conflict
     penetration     (state)                              largest true penetration in a pair that is not compliant [mm]
     watched                                              number of realizations whose bodies were tested for interference
-    clash_share     (interval)                           share of these in which parts without contact penetrate each other
-    clash_count, clash_largest_depth (clash)             number of realizations in which two parts penetrate deepest, depth [mm]
+    clash_share     (interval)                           share of these with penetration between parts without contact
+    clash_count, clash_largest_depth (clash)             number of realizations with two parts as the deepest pair, depth [mm]
     clash_declared  (clash)                              1: their contact is declared, and these realizations are doubtful
     surface_penetration, beside   largest values in the realizations that were checked against the surfaces [mm]: the depth of a
                                   face in the other body, and the distance of touching contact points outside the face
@@ -40,9 +40,9 @@ def summarize(results: Results) -> Summary:
                                   touch a plane beyond the end of its face; NaN where unknown
     false_contact   (pair)                               in the checked realizations: depth of contact points in the raw state
                                                          where the surfaces were apart [mm]; NaN where unknown
-    carried         (pair, interval)                     share of realizations in which a pair is under load
+    carried         (pair, interval)                     share of realizations with a pair under load
     reaction        (pair, of_reaction, interval)        mean and percentiles of its reaction, in the objective's units
-    together        (combination, interval)              share of realizations in which exactly these pairs are under load
+    together        (combination, interval)              share of realizations with exactly these pairs under load
     iterations      (of_iterations)                      median and largest number of linear steps of touched realizations
     field_extreme   (part, state, extreme, interval)     least and largest 6 sigma of the displacement magnitude [mm]
     field_realizations                                   number of realizations in the displacement fields,

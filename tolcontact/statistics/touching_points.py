@@ -1,4 +1,4 @@
-"""The positions of contact points and the shares in which they touch, from an archive."""
+"""The positions of contact points and how often they touch, from an archive."""
 
 import numpy as np
 import xarray as xr
@@ -7,7 +7,7 @@ from tolcontact import vocabulary as terms
 
 
 def touching(results: xr.DataTree) -> xr.Dataset:
-    """Return the archived share of realizations in which each contact point touches in the corrected state, with its interval.
+    """Return how often each contact point touches in the corrected state, as an archived share with its interval.
 
     touching   (point, interval): gaps below 1e-4 mm, in at most the first 2048 realizations (fewer above 10 000 points),
                without realizations that are `searched`

@@ -185,7 +185,7 @@ def _rows(tree: xr.DataTree) -> Rows:
 
 
 def _rows_in_station(tree: xr.DataTree, rows: Rows, pair: int) -> Rows:
-    """Return the variables of realizations with the poses of the station in which a pair may touch."""
+    """Return the variables of realizations with the poses of the station where a pair may touch."""
     if terms.PAIR_STATION.name not in rows:
         return rows
     group = terms.station_group(str(rows[terms.PAIR_STATION.name].values[pair]))

@@ -35,7 +35,7 @@ class ArchivedTangent:
                 yield row, f"is {archived:.9g} mm from its face, and one {least_distance:.9g} mm from it touches it, too"
 
     def _distance(self, heights: np.ndarray, deviation: np.ndarray | None) -> float:
-        """Return the least distance [mm] of a plane from heights (point,), none of which may be outside it.
+        """Return the least distance [mm] of a plane from heights (point,) with no height outside it.
 
         With a deviation (contributor,), the plane has the archived coordinates in it.
         """

@@ -102,7 +102,7 @@ class Results:
         return self._results.isel({terms.REALIZATION: rows})
 
     def touching(self) -> xr.Dataset:
-        """Return the positions of contact points and the shares in which they touch (see tolcontact.statistics.touching)."""
+        """Return the positions of contact points and how often they touch (see tolcontact.statistics.touching)."""
         return touching(self._results)
 
     def __repr__(self) -> str:

@@ -44,7 +44,7 @@ def compare(
     """Simulate the same realizations of a model (see `build`) with each solver and method.
 
     Differences are relative to the first one, in the corrected state. Labels along the dimension `solver` name the solver and
-    the choices in which the methods differ.
+    the choices that differ between the methods.
 
         seconds            (solver)                   wall time of all realizations, from draws to measures [s]
         by_status          (solver, status_meaning)   number of realizations
@@ -131,7 +131,7 @@ def _compared(block: Block) -> tuple[np.ndarray, ...]:
 
 
 def distinctions(method: Method, methods: Sequence[Method]) -> list[str]:
-    """Return the choices of a method in which `methods` differ, in words, except searches implied by the resolution."""
+    """Return the choices of a method that differ among `methods`, in words, except searches implied by the resolution."""
     values = {
         field.name: getattr(method, field.name)
         for field in fields(Method)

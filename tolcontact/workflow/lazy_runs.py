@@ -35,7 +35,7 @@ def simulate(
     Each variable is a dask array. Its chunks are simulated when a computation needs them, and are not stored: by threads of
     this process, or by the workers of the latest client of dask.distributed. `to_netcdf`, `to_zarr` and reductions such as
     `.measured.mean("realization")` stream. Two computations simulate twice.
-    Drawn realizations equal those of `run` to the last bit, however dask schedules them.
+    Drawn realizations equal the realizations of `run` to the last bit, regardless of how dask schedules them.
     Raises ModelError, and OptionError for options or deviations that cannot be used, or if dask is not installed.
     """
     program = program_of(model, solver, method)

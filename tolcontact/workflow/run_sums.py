@@ -24,14 +24,14 @@ MAX_GAPS = 20_000_000  # of all points in all realizations
 
 
 class TouchingCounts(NamedTuple):
-    """The number of realizations in which each contact point touches, `points` (point,), and the number of realizations."""
+    """The counts of contacts at each contact point, `points` (point,), and the number of realizations."""
 
     points: Int[Array, " point"]
     realizations: int
 
 
 def counted_realizations(nominal: Nominal) -> int:
-    """Return the number of realizations, the first ones of a run, in which touching points are counted."""
+    """Return the number of realizations at the start of a run that are used for counting touching points."""
     points = sum(len(pair.P_m) for pair in nominal.pairs)
     return min(MAX_REALIZATIONS, -(-MAX_GAPS // max(points, 1)))
 
@@ -72,7 +72,7 @@ def count_touching(
 def _nearest_counts(
     program: Program, k: int, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"]
 ) -> Int[Array, " point"]:
-    """Return the number of realizations in which a contact of pair k, found at every pose, is nearest to each contact point."""
+    """Return the counts of contacts of pair k, which are found at every pose, by the nearest contact point."""
     pair = program.nominal.pairs[k]
     raised = raised_places(pair, program.meetings[k], X_RM, deviations)
     row, place = np.nonzero(raised.gaps < terms.TOUCHING_GAP)
@@ -89,7 +89,7 @@ class _BlockReduction:
     """Reduction of a block, where it is simulated, to stored rows and sums.
 
     kept      labels of the stored variables
-    counted   number of realizations, starting with the first, in which touching points are counted
+    counted   number of realizations, starting with the first, for counting touching points
     """
 
     kept: tuple[str, ...]

@@ -163,7 +163,7 @@ def pair_columns(summary: Rows) -> list[str]:
 
 
 def pair_rows(summary: Rows) -> list[list[str]]:
-    """Return rows of each pair: the share of realizations in which it is in contact, and its reaction."""
+    """Return rows of each pair: the share of realizations with contact, and its reaction."""
     rows = []
     for pair in summary["pair"].values:
         mean, *_, high = summary["reaction"].sel(pair=pair).values

@@ -32,7 +32,7 @@ SEARCHES = (0.25, 0.3)  # of all realizations: by levels, by inflation
 SCOUTING = 0.04  # of a search, for each trial inflation
 TRIAL, MIN_TRIAL = 0.01, 5  # of a search, at each level, to count its levels; and the minimum for each strand
 MIN_TRIALS = 50  # for each trial inflation
-MIN_GROUP = 8  # realizations of a search from which centres are fitted
+MIN_GROUP = 8  # realizations of a search needed to fit centres
 AROUND_ZERO = 0.1  # share of the mixture that is drawn without a shift
 REFITS = 2  # to the results of the searches
 ROUNDS, ROUND = 2, 0.15  # of importance sampling before the last one, and their shares, for finding missing centres
@@ -43,7 +43,7 @@ SIGNIFICANT = 1.7  # times both half widths: a larger search result shows what i
 
 
 class Tail(NamedTuple):
-    """The probability of an event, and the factor by which the searches for it disagree: 1 if they agree."""
+    """The probability of an event, and the ratio of the searches' results where they disagree: 1 if they agree."""
 
     probability: Estimate
     disagreement: float

@@ -17,7 +17,7 @@ from tolcontact.statistics.intervals import Estimate
 STRANDS = 8
 SHARE = 0.2  # of each event, in the previous one
 MIN_LEVEL = 10  # realizations of a strand at a level
-MIN_SEEDS = 2  # per strand, from which it walks to the next level
+MIN_SEEDS = 2  # per strand: smallest number of starts of walks to the next level
 FIRST_STEP, ACCEPTANCE = 0.8, 0.4  # length of steps, and their target acceptance rate
 MIN_STEP, MAX_STEP = 0.02, 0.99
 MAX_LEVELS = 60
