@@ -10,7 +10,7 @@ from tolcontact.mechanics import Group
 
 MAX_SLOPE_DIFFERENCE = 0.1  # of the largest slope of a measure: if forward and backward slopes differ by more, there is a kink
 MIN_SLOPE = 1e-6  # of a measure: smaller ones are rounding
-STEP = 1e-4  # mm, and rad times the length of a group: steps of central differences; their second-order error cancels
+STEP = 1e-4  # mm, and rad times the length of a group: steps of central differences; second-order terms cancel
 
 
 @dataclass(frozen=True, eq=False)

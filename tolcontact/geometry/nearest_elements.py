@@ -27,7 +27,7 @@ class Corners:
     """Corners (pair, 3) of a mesh, and nearby triangles (pair, 3, 3) of the other mesh.
 
     indices   (pair,) indices of the corners: equal for all triangles near one corner
-    slopes    (pair, 3) tangent of half the concave dihedral angle at each edge of a triangle, 0 at convex edges
+    slopes    (pair, 3) tangent of half the angle between normals at each concave edge of a triangle, 0 at convex edges
     """
 
     indices: np.ndarray

@@ -181,8 +181,8 @@ def _find_at(A, B, candidates, reach, margins, nearness, overhang, retained, X, 
     Retained candidates of facing planes count slightly outside their edges: near a corner of the overlap the error of the
     extended planes is small. Far from it, or where planes no longer overlap, the other body may be free.
 
-    margins       (p + 1,) [mm]: largest distance of contact points outside edges: of retained candidates, by facing planes;
-                  of all others
+    margins       (p + 1,) [mm]: largest distance of contact points outside edges: for retained candidates of each pair of
+                  facing planes, and last for all other candidates
     nearness      in margins: largest distance of such a contact point from a point where the planes touch
     retained      (k,): indices of the retained candidates, or -1
     moved         corners (v, 3), and starts and vectors of edges (e, 2, 3), of the moving body in the reference frame, and
@@ -190,7 +190,7 @@ def _find_at(A, B, candidates, reach, margins, nearness, overhang, retained, X, 
     touching      (c,): indices of the candidates that touch
     is_held       (corner,), false: see drop_passed
     gaps          (c,) [mm], initially infinite
-    all_places    points, projections, normals (3, c, 3): P^m, P^r, n^r of the paper
+    all_points    points, projections, normals (3, c, 3): P^m, P^r, n^r of the paper
     """
     (points, projections, normals), margin, boxes = all_points, margins[-1], candidates.boxes
     count = 0

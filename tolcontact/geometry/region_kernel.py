@@ -38,7 +38,7 @@ def write_promising(X_RM, P_m, rim, gaps, bounds, groups, reference, moving, ret
     """Write which points may be the lowest of their group over the other face, or are retained; see lowest_over.
 
     bounds      (n, 2) [mm]: error bounds of the gaps of points of the moving face and of the rim; with 0, points are skipped
-    kept        (n, k): indices of retained points, -1 for none
+    retained    (n, k): indices of retained points, -1 for none
     """
     count = P_m.shape[0]
     for k in range(gaps.shape[0]):

@@ -13,7 +13,7 @@ contributors realizations are weighted by the ratio of the densities, and resamp
 
 Each search consists of eight strands that share levels or inflations. Their differences determine the accuracy of the product.
 
-The searches have different weaknesses: levels follow the region with the largest score, and inflation prefers distant regions.
+The searches have different weaknesses: levels favour the region with the largest scores, and inflation favours distant regions.
 Realizations within the event walk by u' = sqrt(1 - b^2) u + b v, v standard normal, accepted if u' is in the event (Papaioannou
 and others, 2015). The results of both searches are the centres of a mixture of standard normals, which gives the probability by
 importance sampling. This estimate is unbiased for any centres, but a region that neither search found is missing from it. It is
