@@ -101,7 +101,7 @@ def common_ball(A: SolidBody, B: SolidBody, min_diameter: float) -> tuple[float,
     counts = np.maximum(np.ceil((upper - lower) / (upper - lower).max() * STARTING_CELLS), 1).astype(int)
     size = (upper - lower) / counts
     centres = lower + size * (np.array(np.meshgrid(*map(np.arange, counts))).reshape(3, -1).T + 0.5)
-    deepest, place = min_diameter / 2, None
+    deepest, centre = min_diameter / 2, None
     for _ in range(MAX_LEVELS):
         depths = A.depth(centres)
         reach = float(np.linalg.norm(size)) / 2
@@ -110,11 +110,11 @@ def common_ball(A: SolidBody, B: SolidBody, min_diameter: float) -> tuple[float,
         if not inside.size:
             break
         if depths.max() > deepest:
-            deepest, place = float(depths.max()), centres[inside[depths.argmax()]]
+            deepest, centre = float(depths.max()), centres[inside[depths.argmax()]]
         promising = np.flatnonzero(depths + reach > deepest * (1 + ACCURACY))
         promising = promising[np.argsort(-depths[promising], kind="stable")[: MAX_CELLS // len(HALVES)]]
         if not promising.size:
             break
         centres = (centres[inside[promising], None] + HALVES * size / 2).reshape(-1, 3)
         size = size / 2
-    return None if place is None else (2 * deepest, place)
+    return None if centre is None else (2 * deepest, centre)

@@ -62,9 +62,9 @@ def describe_faces(mesh: trimesh.Trimesh) -> tuple[FaceInFile, ...]:
 def faces_on_surfaces(mesh: trimesh.Trimesh) -> Sequence[FaceOnSurface]:
     """Return the stated or fitted surface and the triangles of each face of a part. Its mesh caches them."""
     if ON_SURFACES not in mesh.metadata:
-        number_of, stated = number_faces(mesh)
-        order = np.argsort(number_of, kind="stable")
-        groups = np.split(order, np.searchsorted(number_of[order], np.arange(1, len(stated))))
+        face_of, stated = number_faces(mesh)
+        order = np.argsort(face_of, kind="stable")
+        groups = np.split(order, np.searchsorted(face_of[order], np.arange(1, len(stated))))
         corners = np.asarray(mesh.triangles)
         surfaces = [
             surface or (fit_surface(corners[triangles], FIT_TOLERANCE) if len(triangles) else None)
@@ -76,17 +76,17 @@ def faces_on_surfaces(mesh: trimesh.Trimesh) -> Sequence[FaceOnSurface]:
 
 def faces_at(mesh: trimesh.Trimesh, point: Vector) -> tuple[list[int], float]:
     """Return the numbers of the faces nearest to a point, several where they meet, and their distance [mm]."""
-    number_of, _ = number_faces(mesh)
-    places = np.tile(point, (len(number_of), 1))
-    distances = np.linalg.norm(trimesh.triangles.closest_point(mesh.triangles, places) - places, axis=1)
-    nearest = np.unique(number_of[distances < distances.min() + POSITION_TOLERANCE * mesh.scale])
+    face_of, _ = number_faces(mesh)
+    copies = np.tile(point, (len(face_of), 1))
+    distances = np.linalg.norm(trimesh.triangles.closest_point(mesh.triangles, copies) - copies, axis=1)
+    nearest = np.unique(face_of[distances < distances.min() + POSITION_TOLERANCE * mesh.scale])
     return [int(number) + 1 for number in nearest], float(distances.min())
 
 
 def _grouped(mesh: trimesh.Trimesh, faces: Sequence[FaceInFile], surfaces: Sequence[FaceOnSurface]) -> list[FaceInFile]:
     """Return the descriptions of B-rep faces with their whole surfaces, slots and patterns."""
-    number_of, _ = number_faces(mesh)
-    neighbours = number_of[np.asarray(mesh.face_adjacency).reshape(-1, 2)]
+    face_of, _ = number_faces(mesh)
+    neighbours = face_of[np.asarray(mesh.face_adjacency).reshape(-1, 2)]
     touching = np.unique(np.sort(neighbours[neighbours[:, 0] != neighbours[:, 1]], axis=1), axis=0)
     wholes = _wholes(mesh, touching, surfaces)
     faces = [replace(face, whole=whole) for face, whole in zip(faces, wholes, strict=True)]

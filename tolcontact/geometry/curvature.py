@@ -58,13 +58,13 @@ def _edge_errors(triangles: np.ndarray, target: Surface, chord: float, within: f
     other edges longer than `max_length` [mm] is their length, since their ends say nothing about the gap between them.
     """
     gap, normal = _gaps_to(target, triangles)
-    middle_gap, middle_normal = _gaps_to(target, (triangles + np.roll(triangles, -1, axis=1)) / 2)
-    sag = (gap + np.roll(gap, -1, axis=1)) / 2 - middle_gap
+    midpoint_gap, midpoint_normal = _gaps_to(target, (triangles + np.roll(triangles, -1, axis=1)) / 2)
+    sag = (gap + np.roll(gap, -1, axis=1)) / 2 - midpoint_gap
     # Where both faces have the same curvature, the chord error only appears once they are displaced.
-    displacement = np.abs(middle_gap) + chord / CHORD_SHARE
-    turned = displacement * (1 - ((normal + np.roll(normal, -1, axis=1)) / 2 * middle_normal).sum(axis=2))
+    displacement = np.abs(midpoint_gap) + chord / CHORD_SHARE
+    turned = displacement * (1 - ((normal + np.roll(normal, -1, axis=1)) / 2 * midpoint_normal).sum(axis=2))
     length = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
-    is_near = middle_gap - length < within
+    is_near = midpoint_gap - length < within
     error = np.where(is_near, np.maximum(sag, turned), 0)
     return np.where(is_near & (length > max_length), np.maximum(error, length), error)
 
@@ -73,13 +73,13 @@ def _halved(triangles: np.ndarray, edge: np.ndarray) -> np.ndarray:
     """Return the halves of `triangles` (triangle, 3, 3), each cut through the midpoint of its edge `edge` (triangle,)."""
     rows = np.arange(len(triangles))
     a, b, c = (triangles[rows, (edge + k) % 3] for k in range(3))
-    middle = (a + b) / 2
-    return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+    midpoint = (a + b) / 2
+    return np.concatenate([np.stack([a, midpoint, c], axis=1), np.stack([midpoint, b, c], axis=1)])
 
 
-def _gaps_to(target: Surface, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _gaps_to(target: Surface, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return gaps (triangle, 3) [mm] of points (triangle, 3, 3) to the target, and its normals there (triangle, 3, 3)."""
-    points = places.reshape(-1, 3)
+    points = positions.reshape(-1, 3)
     projections, normals, _ = target.project(points)
     gaps = ((points - projections) * normals).sum(axis=1)
     return gaps.reshape(-1, 3), normals.reshape(-1, 3, 3)

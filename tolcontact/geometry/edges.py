@@ -42,8 +42,8 @@ def distinct_triangles(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def smooth_pieces(mesh: trimesh.Trimesh, indices: np.ndarray) -> np.ndarray:
     """Return the smooth piece of each triangle in `indices` (face,), from 0: no two neighbours in a piece meet in a crease."""
-    place = np.full(len(mesh.faces), -1)
-    place[indices] = np.arange(len(indices))
-    pairs = place[np.asarray(mesh.face_adjacency)].reshape(-1, 2)
+    position = np.full(len(mesh.faces), -1)
+    position[indices] = np.arange(len(indices))
+    pairs = position[np.asarray(mesh.face_adjacency)].reshape(-1, 2)
     smooth = (pairs >= 0).all(axis=1) & (np.cos(np.asarray(mesh.face_adjacency_angles)) > CREASE)
     return np.asarray(trimesh.graph.connected_component_labels(pairs[smooth], node_count=len(indices)))

@@ -215,8 +215,8 @@ def _by_name(face: Face, names: Sequence[str], name: str) -> np.ndarray:
     return np.flatnonzero(np.array(names) == name)
 
 
-def _by_point(face: Face, mesh: trimesh.Trimesh, place: Vector) -> np.ndarray:
-    numbers, distance = faces_at(mesh, place)
+def _by_point(face: Face, mesh: trimesh.Trimesh, point: Vector) -> np.ndarray:
+    numbers, distance = faces_at(mesh, point)
     if distance > BREP_REACH * mesh.scale:
         raise GeometryFault(
             f"face {face}: the point is {distance:.4g} mm away from the part, which spans {_span(mesh)}; "

@@ -64,11 +64,11 @@ def _vertices(triangles: np.ndarray) -> np.ndarray:
 def nearest_surface(triangles: np.ndarray) -> AnalyticSurface:
     """Return the plane, cylinder, cone or sphere that is nearest to `triangles` (face, 3, 3) [mm]."""
     vertices = _vertices(triangles)
-    places = np.vstack([vertices, triangles.mean(axis=1)])  # two rings of vertices alone also lie on a sphere
+    samples = np.vstack([vertices, triangles.mean(axis=1)])  # two rings of vertices alone also lie on a sphere
     surfaces = [fit(vertices, triangles) for fit in FITS]
     return min(
         (surface for surface in surfaces if surface is not None),
-        key=lambda surface: np.abs(surface.distance(places)[0]).max(),
+        key=lambda surface: np.abs(surface.distance(samples)[0]).max(),
     )
 
 

@@ -58,8 +58,8 @@ def _is_interrupted(body: SolidBody, surface: Cylinder | Cone, parts: Sequence[n
     """Return whether two parts of a surface, the triangles (face,) of each, overlap along its axis without material between."""
     corners = [np.asarray(body.mesh.triangles)[triangles].reshape(-1, 3) for triangles in parts]
     along = [(points - surface.origin) @ surface.axis for points in corners]
-    lower, upper = max(places.min() for places in along), min(places.max() for places in along)
-    if upper - lower < MIN_COMMON_SHARE * min(float(np.ptp(places)) for places in along):
+    lower, upper = max(coordinates.min() for coordinates in along), min(coordinates.max() for coordinates in along)
+    if upper - lower < MIN_COMMON_SHARE * min(float(np.ptp(coordinates)) for coordinates in along):
         return False
     middle = (lower + upper) / 2
     radius = surface.radius if isinstance(surface, Cylinder) else abs(middle) * np.tan(surface.angle)

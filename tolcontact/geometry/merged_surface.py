@@ -54,15 +54,15 @@ def _twins(vertices: np.ndarray, faces: np.ndarray) -> Int[Array, " h"] | None:
     is_forward = start < end
     key = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
     order = np.lexsort([is_forward, key])
-    first = np.flatnonzero(np.append(True, np.diff(key[order]) > 0))
-    counts = np.diff(np.append(first, len(order)))
-    if (np.add.reduceat(np.where(is_forward, 1, -1)[order], first) != 0).any():
+    starts = np.flatnonzero(np.append(True, np.diff(key[order]) > 0))
+    counts = np.diff(np.append(starts, len(order)))
+    if (np.add.reduceat(np.where(is_forward, 1, -1)[order], starts) != 0).any():
         return None
     twins = np.empty(len(order), dtype=np.int64)
-    pairs = order[first[counts == 2][:, None] + np.arange(2)]
+    pairs = order[starts[counts == 2][:, None] + np.arange(2)]
     twins[pairs] = pairs[:, ::-1]
-    for place, count in zip(first[counts > 2], counts[counts > 2], strict=True):
-        edge = order[place : place + count]
+    for start, count in zip(starts[counts > 2], counts[counts > 2], strict=True):
+        edge = order[start : start + count]
         for back, forth in _across_material(vertices, faces, edge, is_forward[edge]):
             twins[back], twins[forth] = forth, back
     return twins
@@ -83,11 +83,11 @@ def _across_material(
     # Among coincident triangles the one that ends material comes first, so that flush blocks remain two.
     order = np.lexsort([~is_forward, np.round(turns / ROUNDED) % (1 / ROUNDED)])
     opened, pairs = list[int](), list[tuple[int, int]]()
-    for place in [*order, *order]:  # twice around
-        if not is_forward[place] and edge[place] not in [back for back, _ in pairs] and place not in opened:
-            opened.append(place)
-        elif is_forward[place] and opened and edge[place] not in [forth for _, forth in pairs]:
-            pairs.append((int(edge[opened.pop()]), int(edge[place])))
+    for half_edge in [*order, *order]:  # twice around
+        if not is_forward[half_edge] and edge[half_edge] not in [back for back, _ in pairs] and half_edge not in opened:
+            opened.append(half_edge)
+        elif is_forward[half_edge] and opened and edge[half_edge] not in [forth for _, forth in pairs]:
+            pairs.append((int(edge[opened.pop()]), int(edge[half_edge])))
     return pairs
 
 

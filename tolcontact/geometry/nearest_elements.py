@@ -106,12 +106,12 @@ def nearest_elements(mesh: trimesh.Trimesh, other_mesh: trimesh.Trimesh, distanc
         pairs = _near_triangles(left.triangles, right.triangles, horizon)
         corners = _corner_pairs(left, right, pairs), _corner_pairs(right, left, pairs[:, ::-1])
         kinds = [*corners, _edge_pairs(left, right, pairs)]
-        places = [
+        nearest_points = [
             _corner_places(left.vertices[kinds[0][:, 0]], right.triangles[kinds[0][:, 1]]),
             _corner_places(right.vertices[kinds[1][:, 0]], left.triangles[kinds[1][:, 1]]),
             _segment_places(left.vertices[left.ends[kinds[2][:, 0]]], right.vertices[right.ends[kinds[2][:, 1]]]),
         ]
-        lengths = [np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) for ends in places]
+        lengths = [np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) for ends in nearest_points]
         if any(np.count_nonzero(values < horizon) > limit for values, limit in zip(lengths, MAX_ELEMENTS, strict=True)):
             break
     for values, limit in zip(lengths, MAX_ELEMENTS, strict=True):
@@ -126,9 +126,9 @@ def nearest_elements(mesh: trimesh.Trimesh, other_mesh: trimesh.Trimesh, distanc
     left_corners, right_corners, edge_pairs = (kind[mask] for kind, mask in zip(kinds, is_near, strict=True))
     return NearestElements(
         (_corners(left, right, left_corners), _corners(right, left, right_corners)),
-        _edges(left, right, edge_pairs, places[2][is_near[2]]),
+        _edges(left, right, edge_pairs, nearest_points[2][is_near[2]]),
         horizon,
-        np.concatenate(places)[np.concatenate(lengths).argmin()],
+        np.concatenate(nearest_points)[np.concatenate(lengths).argmin()],
     )
 
 
@@ -161,13 +161,13 @@ def _corner_pairs(body: Edged, target: Edged, pairs: np.ndarray) -> np.ndarray:
     Triangles on the far side of the target are left out for corners outside it.
     """
     rows = np.unique(np.column_stack([body.faces[pairs[:, 0]].ravel(), pairs[:, 1].repeat(3)]), axis=0)
-    corners, places = np.unique(rows[:, 0], return_inverse=True)
+    corners, corner_rows = np.unique(rows[:, 0], return_inverse=True)
     if not len(corners):
         return rows
     offsets = body.vertices[rows[:, 0]] - target.triangles[rows[:, 1], 0]
     is_behind = (offsets * target.face_normals[rows[:, 1]]).sum(axis=1) < -MARGIN * target.size
     is_inside = target.solid.depth(body.vertices[corners]) > MARGIN * target.size
-    return rows[~is_behind | is_inside[places]]
+    return rows[~is_behind | is_inside[corner_rows]]
 
 
 def _edge_pairs(left: Edged, right: Edged, pairs: np.ndarray) -> np.ndarray:
@@ -200,11 +200,11 @@ def _corners(body: Edged, target: Edged, pairs: np.ndarray) -> Corners:
     return Corners(corner, body.vertices[corner], target.triangles[triangle], target.slopes[triangle])
 
 
-def _edges(left: Edged, right: Edged, pairs: np.ndarray, places: np.ndarray) -> EdgePairs:
+def _edges(left: Edged, right: Edged, pairs: np.ndarray, nearest_points: np.ndarray) -> EdgePairs:
     left_edges, right_edges = pairs.T
     p, q = left.vertices[left.ends[left_edges]], right.vertices[right.ends[right_edges]]
     n = np.cross(p[:, 1] - p[:, 0], q[:, 1] - q[:, 0])
-    side = ((places[:, 0] - places[:, 1]) * n).sum(axis=1)
+    side = ((nearest_points[:, 0] - nearest_points[:, 1]) * n).sum(axis=1)
     outward = np.sign(side)[:, None] * n
     fits = _is_between(outward, right.normals[right_edges]) & _is_between(-outward, left.normals[left_edges])
     return EdgePairs(p, q, np.where(fits, np.sign(side), 0.0))

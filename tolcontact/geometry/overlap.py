@@ -82,7 +82,7 @@ def rim_points(face: Surface, target: Surface, step: float, within: float) -> np
     ends, edge, triangles = edges(faces)
     outer = np.flatnonzero(triangles[edge] == 1)
     n = _mean_normal(target)
-    places = []
+    starts = []
     length = np.linalg.norm(vertices[ends[outer, 1]] - vertices[ends[outer, 0]], axis=1)
     step = max(step, float(length.sum()) / MAX_EDGES)
     for number, size in zip(outer, length, strict=True):
@@ -90,8 +90,8 @@ def rim_points(face: Surface, target: Surface, step: float, within: float) -> np
         inward = np.cross(n, b - a) / max(size, 1e-300)
         inward *= np.sign(inward @ (vertices[faces[number // 3]].mean(axis=0) - a))
         share = np.linspace(0, 1, max(int(np.ceil(size / step)), 1) + 1)[:, None]
-        places.append(a + share * (b - a) + INWARD * target.mesh.scale * inward)
-    start = np.concatenate(places)
+        starts.append(a + share * (b - a) + INWARD * target.mesh.scale * inward)
+    start = np.concatenate(starts)
     points = start
     for _ in range(DROP_ITERATIONS):
         _, projections = face.nearest(points)

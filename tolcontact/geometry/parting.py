@@ -96,8 +96,8 @@ def convex(body: trimesh.Trimesh) -> parting_kernel.Convex | None:
     normals = facet_normals[order[np.unique(np.asarray(planes)[order], return_index=True)[1]]]
     heights = (vertices @ normals.T).max(axis=0)
     triangles = np.asarray(body.triangles)
-    places = np.concatenate([triangles, (triangles + np.roll(triangles, 1, axis=1)) / 2]).reshape(-1, 3)
-    depths = (heights - places @ normals.T).min(axis=1)
+    samples = np.concatenate([triangles, (triangles + np.roll(triangles, 1, axis=1)) / 2]).reshape(-1, 3)
+    depths = (heights - samples @ normals.T).min(axis=1)
     if depths.max() > CONVEX_SHARE * float(hull.scale):
         return None
     sharp_neighbours = neighbours[is_sharp]

@@ -121,10 +121,10 @@ def _cones(corners: np.ndarray, edges: np.ndarray, vertices: np.ndarray) -> tupl
 def _planes_around(corners: np.ndarray, faces: np.ndarray, planes: np.ndarray) -> np.ndarray:
     """Return the planes (corner, plane) of the `faces` (face, 3) around each corner, padded with -1."""
     pairs = np.unique(np.stack([faces.ravel(), planes.repeat(3)], axis=1), axis=0)
-    place = np.searchsorted(corners, pairs[:, 0])
+    corner_index = np.searchsorted(corners, pairs[:, 0])
     is_corner = np.isin(pairs[:, 0], corners)
-    place, plane = place[is_corner], pairs[is_corner, 1]
-    rank = np.arange(len(place)) - np.searchsorted(place, place)
+    corner_index, plane = corner_index[is_corner], pairs[is_corner, 1]
+    rank = np.arange(len(corner_index)) - np.searchsorted(corner_index, corner_index)
     table = np.full((len(corners), rank.max(initial=0) + 1), -1)
-    table[place, rank] = plane
+    table[corner_index, rank] = plane
     return table

@@ -40,8 +40,8 @@ def shape(geometry: Geometry, contents: Contents | None = None) -> Shape:
 
 def _leave_out_repetitions(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
     """Remove repeated triangles of a mesh: a body that its file contains twice is one body."""
-    _, place = trimesh.grouping.unique_rows(mesh.vertices)
-    distinct, _ = distinct_triangles(place[mesh.faces])
+    _, position = trimesh.grouping.unique_rows(mesh.vertices)
+    distinct, _ = distinct_triangles(position[mesh.faces])
     if len(distinct) < len(mesh.faces):
         log.info("%s: %d repeated triangles are left out", geometry, len(mesh.faces) - len(distinct))
         mesh.update_faces(np.sort(distinct))
