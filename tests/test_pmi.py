@@ -323,7 +323,7 @@ def test_the_command_prints_tables_in_80_columns(tmp_path):
     "content, words",
     [
         (step(""), "states no tolerances, dimensions or datums"),
-        (step("", schema="AUTOMOTIVE_DESIGN"), "is no file of AP242 (its schema is AUTOMOTIVE_DESIGN)"),
+        (step("", schema="AUTOMOTIVE_DESIGN"), "is not an AP242 file (its schema is AUTOMOTIVE_DESIGN)"),
         (step("#20=DRAUGHTING_ANNOTATION_OCCURRENCE('',(),#21);"), "its 1 annotations are only drawn"),
         (step("#20=TESSELLATED_SOLID('',(),$);").replace("ADVANCED_FACE", "X"), "its shapes are triangles"),
     ],

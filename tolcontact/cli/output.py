@@ -28,7 +28,7 @@ def check_page(path: Path, *, overwrite: bool = False) -> None:
     if not path.parent.is_dir():
         raise OptionError(f'page "{path}" cannot be written: there is no folder "{path.parent}"; make it first')
     if not overwrite and path.exists() and not report.is_page(path):
-        raise OptionError(f'"{path}" exists, and is no page of tolcontact; choose another name, or replace it with --overwrite')
+        raise OptionError(f'"{path}" exists, and is not a tolcontact page; choose another name, or replace it with --overwrite')
 
 
 def check_spreadsheet(path: Path, *, overwrite: bool = False) -> None:

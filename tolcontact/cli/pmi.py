@@ -100,7 +100,7 @@ def _reason(information: Pmi, name: str) -> str:
     """Return a sentence about a file without annotations, with the reason if it is known."""
     if not information.is_ap242:
         schema = clipped(information.schema, 100) or "not stated"
-        return f'"{name}" is no file of AP242 (its schema is {schema}); tolerances and dimensions are read from AP242 only'
+        return f'"{name}" is not an AP242 file (its schema is {schema}); tolerances and dimensions are read from AP242 only'
     details = ""
     if information.drawings:
         details += f"; its {information.drawings} annotations are only drawn, and drawings are not read"

@@ -30,7 +30,7 @@ def shape(geometry: Geometry, contents: Contents | None = None) -> Shape:
     surface = read(geometry, read_files([geometry]) if contents is None else contents)
     mesh = surface.mesh
     if len(mesh.faces) == 0:
-        raise GeometryFault(f"{geometry} holds no triangles; expected a triangle surface")
+        raise GeometryFault(f"{geometry} has no triangles; expected a triangle surface")
     if not mesh.area > 0:
         raise GeometryFault(f"{geometry} has no area: all its triangles are degenerate")
     _leave_out_repetitions(mesh, geometry)

@@ -46,7 +46,7 @@ def histogram(
     both_states = np.concatenate(list(values.values()))
     name, units = str(column[terms.MEASURE].values), str(column[terms.MEASURE_UNITS.name].values)
     if not np.isfinite(both_states).all():
-        raise OptionError(f'measurement "{name}" has values that are no numbers, so it cannot be drawn')
+        raise OptionError(f'measurement "{name}" has NaN values, so it cannot be drawn')
     if axes is None:
         axes = plt.figure(layout="constrained").add_subplot()
     edges = np.histogram_bin_edges(both_states, bins)

@@ -52,7 +52,7 @@ def write_model(model: Model, path: str | Path) -> None:
 
     Shapes are stated as file names, relative to the folder of `path` if they are in it. Faces that a function selects become
     triangles, and functions of poses become the steps of their expressions.
-    Raises ModelError for a model with faults, and ScriptError for a mesh that is no file.
+    Raises ModelError for a model with faults, and ScriptError for a mesh that is not a file.
     """
     assembly = assembly_of(model)
     program = build(assembly)
