@@ -152,7 +152,9 @@ def parts_from(
         raise ModelError(model.name, faults)
     declared = bodies if selected_names is None else [by_name[name] for name in selected_names]
     if undeclared := [name for name in fixed_names if by_name[name] not in declared]:
-        raise ModelError(model.name, [f'fixed has the body "{name}", which is not in names; add it there' for name in undeclared])
+        raise ModelError(
+            model.name, [f'fixed has the body "{name}", which is not in names; add it there' for name in undeclared]
+        )
     parts = PartsOfFile()
     for body in declared:
         is_fixed = fixed if isinstance(fixed, bool) else body.name in fixed_names or None
