@@ -238,7 +238,7 @@ def test_some_bodies_of_a_file_are_fixed(file):
     assert {part.fixed for part in tc.parts_from(tc.Assembly("a"), file, fixed=[]).values()} == {None}
     with pytest.raises(tc.ModelError, match='holds no body "plate"; it holds'):
         tc.parts_from(tc.Assembly("a"), file, fixed=["plate"])
-    with pytest.raises(tc.ModelError, match='fixed has the body "use 0", which names has not; add it there'):
+    with pytest.raises(tc.ModelError, match='fixed has the body "use 0", which is not in names; add it there'):
         tc.parts_from(tc.Assembly("a"), file, ["use 1"], fixed=["use 0"])
     for wrong in ("use 0", 3, {"use 0": True}, [1]):
         with pytest.raises(TypeError, match="expected a list of the names of bodies, as in fixed="):

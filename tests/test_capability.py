@@ -107,7 +107,7 @@ def test_the_realizations_that_a_positive_bound_of_ppk_needs_are_those_of_the_gu
     p = PERCENTS[0]
     one = np.log(0.025) / np.log(1 - p)
     two = brentq(lambda n: 2 * (1 - p) ** n - (1 - 2 * p) ** n - 0.025, 2000, 5000)
-    stated = f"Fewer than some {round(one, -1):.0f} realizations with one limit, or {round(two, -1):.0f} with two limits"
+    stated = f"Fewer than about {round(one, -1):.0f} realizations with one limit, or {round(two, -1):.0f} with two limits"
     assert stated in GUIDE
     for limits, needed in ((Limits(-np.inf, 4.0), one), (Limits(-4.0, 4.0), two)):
         for factor, is_bounded in ((0.98, False), (1.02, True)):

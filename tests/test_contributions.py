@@ -241,7 +241,7 @@ def test_released_draws_do_not_depend_on_blocks_and_keep_correlations():
     assert np.abs(rows[:, -1] - program.draws(seed=2, start=0, stop=3000)).max() < 1e-9
     for members in (0, 9, 18):
         assert np.corrcoef(rows[:, members, columns].T) == pytest.approx(np.array(MATRIX), abs=0.06)
-    places = released.places(2, 0, 3000)
+    places = released.positions(2, 0, 3000)
     kept = np.isclose(rows[:, 9], rows[:, -1], atol=1e-9)[:, labels.index("upper.A2")]
     assert np.array_equal(kept, places[:, labels.index("upper.A2")] < 9)
 

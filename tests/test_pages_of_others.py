@@ -30,7 +30,7 @@ def test_a_foreign_file_is_replaced_only_if_that_is_asked_for(archive, tmp_path)
     ]  # fmt: skip
     for command in commands:
         done = call(ROOT, *command)
-        assert done.returncode == 2 and "is no page of tolcontact" in done.stderr and "--overwrite" in done.stderr, command
+        assert done.returncode == 2 and "is not a tolcontact page" in done.stderr and "--overwrite" in done.stderr, command
         assert page.read_text() == "<p>dear diary</p>"
     assert call(ROOT, "report", archive, "--out", page, "--overwrite").returncode == 0
     assert "dear diary" not in page.read_text()

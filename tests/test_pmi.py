@@ -323,7 +323,7 @@ def test_the_command_prints_tables_in_80_columns(tmp_path):
     "content, words",
     [
         (step(""), "states no tolerances, dimensions or datums"),
-        (step("", schema="AUTOMOTIVE_DESIGN"), "is no file of AP242 (its schema is AUTOMOTIVE_DESIGN)"),
+        (step("", schema="AUTOMOTIVE_DESIGN"), "is not an AP242 file (its schema is AUTOMOTIVE_DESIGN)"),
         (step("#20=DRAUGHTING_ANNOTATION_OCCURRENCE('',(),#21);"), "its 1 annotations are only drawn"),
         (step("#20=TESSELLATED_SOLID('',(),$);").replace("ADVANCED_FACE", "X"), "its shapes are triangles"),
     ],
@@ -380,7 +380,7 @@ def test_a_face_that_stands_twice_has_one_number_for_both_of_its_records(tmp_pat
     path.write_text(copies[:end] + "".join(f"#{n} = ADVANCED_FACE{body};\n" for n in (90100, 90101)) + copies[end:])
     listing = tc.faces_in(path)  # the kernel mends the solid, and the face that stands thrice is its last one
     (face,) = [face for face in listing if face.copies]
-    assert face.copies == 2 and "stands 3 times in the file" in str(face)
+    assert face.copies == 2 and "occurs 3 times in the file" in str(face)
     assert face.direction == (0, 0, 1) and face.point[2] == 8 and "times" not in str(listing[0])
     found = {record: face.number for record, face in faces_of_records(path).items()}
     assert {found.pop(record) for record in (records[1], 90100, 90101)} == {face.number}

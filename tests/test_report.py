@@ -16,7 +16,7 @@ from tests import cases
 from tests.helpers import call, nightly
 from tests.test_formats import STORED
 from tolcontact.report import grouped, write_page
-from tolcontact.report.html import decimation
+from tolcontact.report.html import scene
 from tolcontact.statistics import intervals
 
 CHROMIUM = shutil.which("chromium")
@@ -268,7 +268,7 @@ def test_bodies_of_many_triangles_are_drawn_with_fewer(tmp_path):
     page = page_of(tmp_path / "ball.nc", tmp_path / "ball.html")
     part = data_of(page)["scene"]["parts"][0]
     count = part["faces"]["shape"][0]
-    assert count <= decimation.MAX_TRIANGLES < part["triangles"] == 81_920 and f"drawn with {grouped(count)} of its" in page
+    assert count <= scene.MAX_TRIANGLES < part["triangles"] == 81_920 and f"drawn with {grouped(count)} of its" in page
     vertices = unpacked(part["vertices"])
     assert np.abs(np.linalg.norm(vertices, axis=1) - 50).max() < 0.5
     field = unpacked(part["sixSigma"])
@@ -279,7 +279,7 @@ def test_bodies_of_many_triangles_are_drawn_with_fewer(tmp_path):
 def test_a_plate_with_finely_divided_holes_is_drawn_with_fewer_triangles():
     """Slivers between far corners and short edges, which the first simplification leaves as they are."""
     ring = trimesh.creation.annulus(20, 2000, 10, sections=8000)
-    vertices, faces, nearest = decimation.coarser(np.asarray(ring.vertices), np.asarray(ring.faces), 3000)
+    vertices, faces, nearest = scene.coarser(np.asarray(ring.vertices), np.asarray(ring.faces), 3000)
     assert len(faces) <= 3000 and nearest.max() < len(ring.vertices)
     off = trimesh.Trimesh(vertices, faces, process=False)
     assert off.area == pytest.approx(ring.area, rel=1e-3) and np.abs(off.bounds - ring.bounds).max() < 0.5

@@ -18,7 +18,7 @@ ROOMS = {
     "clarabel": ("statics/force_cones.py",),
     "matplotlib": ("plot/",),
     "jinja2": ("report/html/",),
-    "fast_simplification": ("report/html/decimation.py",),
+    "fast_simplification": ("report/html/scene.py",),
     "pyvista": ("plot/",),
     "numba": ("compiled.py",),
     "jaxtyping": ("arrays.py",),
@@ -28,7 +28,7 @@ ROOMS = {
     "typer": ("cli/",),
     "msgspec": ("declaration/",),
     "trimesh": ("geometry/", "discretization/", "interference/"),
-    "igl": ("geometry/", "interference/", "report/html/decimation.py"),
+    "igl": ("geometry/", "interference/", "report/html/scene.py"),
     "OCP": ("kernel/",),
 }
 NOT_IN = {

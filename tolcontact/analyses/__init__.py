@@ -12,7 +12,7 @@ also a command, which prints tables, JSON or CSV.
 | `tails` | `tails` | How often is a measure outside its limits (a rare-event estimate in ppm)? |
 | `allocate` | `allocate` | Which tolerance ranges suffice at the lowest cost, and which one should be tightened first? |
 | `relocate` | `relocate` | At which position of a locator does a measure vary least? |
-| `seating` | `seating` | From which coefficient of friction on can a part be held short of a locator or a seat? |
+| `seating` | `seating` | Above which coefficient of friction can a part be held short of a locator or a seat? |
 
 ## Arguments of all analyses
 
@@ -42,9 +42,9 @@ simulated.
 
 ## What matters
 
-`tc.contributions` gives Sobol' indices, which hold with contact, beside the classical linear percentages, which do not. By
-default it simulates some 60 000 realizations: contributors that hardly matter are found first, and estimated together. In
-this example, contact removes the effect of the locators below the block.
+`tc.contributions` gives Sobol' indices, which are valid with contact, and the classical linear percentages, which are not. By
+default it simulates about 60 000 realizations: contributors with little influence are identified first, and estimated as one
+group. In this example, contact removes the effect of the locators below the block.
 
 >>> shares = tc.contributions(assembly, samples=1024, solver="daqp").sel(measure="height")
 >>> bool(shares.total.sel(state="raw", interval="estimate").max() > 0.5)
@@ -69,12 +69,12 @@ Where contact alone does not hold a part, as with a block that can be lifted off
 >>> bool(worst.worst.sel(state="raw", end="largest") > 0.5), float(worst.bound.sel(state="corrected", end="least").round(2))
 (True, -0.0)
 
-`tc.tails` estimates probabilities that are too small to count. Two searches look for the ways into each event, and importance
-sampling about what they found estimates the probability. By default all events share 60 000 realizations, with 10 000 to 40 000
-for each; a quarter suffices where the upper bound of the interval is then at most 1.5 times the lower one. Each limit is
-searched for by itself. Where the two searches disagree, `disagreement` says so, and the interval covers both. What neither
-search finds is missing: a small region far from where others are common, more ways than some thirty, or more than forty
-contributors that matter.
+`tc.tails` estimates probabilities that are too small to count. Two searches look for the regions of each event, and importance
+sampling around their results estimates the probability. By default all events share 60 000 realizations, with 10 000 to 40 000
+for each; a quarter suffices where the upper bound of the interval is then at most 1.5 times the lower one. Each limit has its
+own search. Where the two searches disagree, `disagreement` states it, and the interval covers both. A region that neither
+search finds is missing: a small region far from common ones, or further regions beyond about thirty. The same holds for events
+that depend on more than forty contributors.
 
 >>> far = tc.Assembly("far")
 >>> bar = far.part("bar", tc.Box(50, 25, 10))
@@ -101,10 +101,11 @@ True
 
 ## What seats
 
-`tc.seating` looks at the assembly where its forces seat it, and takes no other arguments than the model and `into`. For each
+`tc.seating` examines the assembly where its forces seat it, and takes no other arguments than the model and `into`. For each
 locator and each contact pair it finds the least coefficient of friction at which the other contacts can hold the part short of
-it. Below, the forces push the part home; above, it may stay where it was let go. A model that states coefficients
-(`tc.Assembly(..., mu=0.15)`) gets their `reserve`, too, and a warning `[friction]` where it is at most 1.
+it. Below this coefficient, the forces push the part home; above it, the part may stay where it was released. For a model that
+states coefficients (`tc.Assembly(..., mu=0.15)`) it also returns their `reserve`, and warns (`[friction]`) where it is at most
+1.
 
 >>> clamped = tc.Assembly("clamped")
 >>> table = clamped.part("table", tc.Box(100, 50, 10), at=(0, 0, -10), fixed=True)

@@ -1,4 +1,4 @@
-"""Tolerance ranges of least cost for what is required of measures, with contact, and the tolerance to tighten first."""
+"""Tolerance ranges of least cost for requirements on measures, with contact, and the tolerance to tighten first."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -26,10 +26,10 @@ from tolcontact.workflow.models import Choice, Model
 
 MIN_FACTOR, MAX_FACTOR = 0.1, 3.0  # times the present range
 MAX_STEPS, USUAL_STEPS = 24, 8  # of one search: at most, and for the forecast
-FIRST_RADIUS, LAST_RADIUS = 0.5, 0.015  # of the region that a step stays in, in logarithms of the factors
+FIRST_RADIUS, LAST_RADIUS = 0.5, 0.015  # of the trust region of a step, in logarithms of the factors
 COMMON_FACTORS = np.geomspace(MIN_FACTOR, MAX_FACTOR, 13)  # of all ranges, where requirements cannot be met
-PENALTY = 10.0  # for missed margins, in the costs that the same margins save to first order
-MIN_GAIN, LAST_GAIN = 1e-4, 1e-3  # of the cost: of a step that is taken, and of one after which others follow
+PENALTY = 10.0  # for missed margins, as a multiple of the cost that these margins save to first order
+MIN_GAIN, LAST_GAIN = 1e-4, 1e-3  # of the cost: smallest gain of an accepted step; smallest gain that leads to another step
 VERIFICATIONS = 4
 Cost = float | Callable[[float], float]
 
@@ -39,33 +39,34 @@ def allocate(
     samples: int = 8192, seed: int = 1, solver: str | None = None, method: Choice | None = None,
     into: str | Path | None = None, client: Any = None, progress: Progress | None = None,
 ) -> xr.Dataset:  # fmt: skip
-    """Return tolerance ranges of least cost with which measures keep what is required, contact resolved.
+    """Return tolerance ranges of least cost that meet requirements on measures, with contact resolved.
 
         range        (group, stage)                      full width of the zones, "before" and "after"; NaN if they differ
         factor       (group)                             range after over range before, the same for all zones of the group
         cost         (group, stage)
-        kept         (requirement, stage, interval)      the share outside of the limits, or the Ppk, in a fresh run of
+        kept         (requirement, stage, interval)      the share outside the limits, or the Ppk, in a fresh run of
                                                          4 samples realizations, with its 95 % interval
-        required     (requirement)                       the share or the Ppk that is required
-        met          (requirement)                       1: kept in the fresh run after; 0: it cannot be met, and `kept` is the
-                                                         best that was reached
+        required     (requirement)                       the required share or Ppk
+        met          (requirement)                       1: met in the fresh run after; 0: it cannot be met, and `kept` is the
+                                                         best value that was reached
         idle         (group)                             1: no influence on any requirement at any range; it keeps its range
         effect       (measure, of_effect, group, interval)  change of 6 sigma, and of the share outside, if a group's zones were
                                                          a tenth narrower: which to tighten first
 
-    `require` is "corner height: ppm 1000" or "corner height: Ppk 1.33", or several such texts. `costs` maps a group that
-    may change to a number c, for the cost c * present range / new range, or to a function of the factor. Groups without costs
-    keep their ranges. If `costs` is left out, all groups may change with c = 1. `by` is as in `contributions`: "contributor",
+    `require` is "corner height: ppm 1000" or "corner height: Ppk 1.33", or a list of such texts. `costs` maps a group that may
+    change to a number c, for the cost c * present range / new range, or to a function of the factor. Groups without costs keep
+    their ranges. If `costs` is left out, all groups may change with c = 1. `by` is as in `contributions`: "contributor",
     "feature" or "part".
 
-    Ranges stay between a tenth and three times the present ones. Groups keep theirs if no required measure changes in any
+    Ranges stay between a tenth and three times the present ones. Groups keep their ranges if no required measure changes in any
     resolved realization with all of them at either end. Each step replaces the margins of the requirements by functions of
-    squared ranges with the same values and slopes, on the same draws; slopes follow from resolved realizations near the limits
-    alone. SLSQP minimizes the cost within a region that shrinks when a step fails (a sequential separable approximation;
-    Svanberg, 1987), also if more realizations then do not assemble than may be outside. If the fresh run misses a requirement,
-    the search continues with a larger margin. Effects follow from samples / 4 realizations, or 4 samples / groups if that is
-    less, but at least 512. `progress` is called with the number of realizations simulated, and about that of all. Arguments
-    that all analyses share, and what they raise, are in tolcontact.analyses. Raises OptionError also if no range varies.
+    squared ranges with the same values and slopes, on the same draws; slopes come only from resolved realizations near the
+    limits. SLSQP minimizes the cost within a trust region (a sequential separable approximation; Svanberg, 1987). The region
+    shrinks when a step fails; a step also fails if more realizations are then not assemblable than may be outside. If the fresh
+    run misses a requirement, the search continues with a larger margin. Effects come from samples / 4 realizations, or
+    4 samples / groups if that is less, but at least 512. `progress` is called with the number of realizations simulated, and
+    the approximate total. Arguments that all analyses share, and their errors, are described in tolcontact.analyses. Also
+    raises OptionError if no range varies.
     """
     check_grouping(by)
     analysis = Analysis(
@@ -92,7 +93,7 @@ def allocate(
         "effect": narrowing_effects(trials, program),
     }
     labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
-    limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR, "idle_tried": search.tried}
+    limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR, "idle_tried": search.tested_rows}
     return analysis.dataset(values, labels, samples=samples, fresh=VERIFICATION_FACTOR * samples, by=by, **limits)
 
 
@@ -111,7 +112,7 @@ class Prices:
 
 
 def _requirements(require: str | Sequence[str], program: Program, samples: int) -> list[Requirement]:
-    """Return what texts require. Raises OptionError if there are none, or for too few samples."""
+    """Return the requirements that texts state. Raises OptionError if there are none, or for too few samples."""
     requirements = [Requirement.parse(text, program) for text in ([require] if isinstance(require, str) else require)]
     if not requirements:
         raise OptionError('require is empty; expected a text such as "corner height: ppm 1000"')
@@ -121,7 +122,7 @@ def _requirements(require: str | Sequence[str], program: Program, samples: int) 
 
 
 def _groups(program: Program, by: str) -> dict[str, np.ndarray]:
-    """Return the columns of the deviations that have ranges, by their owners."""
+    """Return the columns of deviations with ranges, by their owners."""
     groups: dict[str, list[int]] = {}
     contributors = program.draws.contributors
     for column, (owner, contributor) in enumerate(zip(owners(program, by), contributors, strict=True)):
@@ -167,7 +168,7 @@ def _expected(samples: int, groups: int) -> int:
 def _allocated(search: "Search", expected: int) -> tuple[np.ndarray, list[list[Estimate]], np.ndarray]:
     """Return logarithms of the factors (group,), and estimates of the requirements in fresh runs, before and after.
 
-    The last one is whether each requirement is kept after (requirement,).
+    The last result states whether each requirement is met after (requirement,).
     """
     trials, requirements, logs = search.trials, search.requirements, np.zeros(len(search.trials))
     before = _estimates(requirements, trials.trial(np.ones(len(trials)), verification=1))
@@ -199,13 +200,13 @@ def _margins(requirements: Sequence[Requirement], corrected: np.ndarray) -> np.n
 
 @dataclass(eq=False)
 class Search:
-    """The search for the least cost with margins that are large enough, in logarithms of the factors (group,)."""
+    """The search for the least cost with sufficient margins, in logarithms of the factors (group,)."""
 
     trials: ScaledTrials
     requirements: Sequence[Requirement]
     prices: Prices
-    idle: np.ndarray = field(init=False)  # (group,) whether a group has no influence on any requirement, as far as is known
-    tried: int = field(init=False, default=0)  # realizations that showed it last
+    idle: np.ndarray = field(init=False)  # (group,) whether a group has no known influence on any requirement
+    tested_rows: int = field(init=False, default=0)  # number of realizations in the latest test of that
 
     def __post_init__(self) -> None:
         self.idle = self.prices.is_free.copy()
@@ -216,19 +217,19 @@ class Search:
         return self.prices.is_free & ~self.idle
 
     def release(self, logs: np.ndarray, trial: Trial) -> bool:
-        """Free the ranges of idle groups that have an influence at `logs`, of which there is a trial.
+        """Free the ranges of idle groups that have an influence at `logs`; return whether there are any.
 
-        Return whether there are any.
+        trial   the trial at `logs`
         """
         before, search = self.idle, IdleSearch(self._changes(logs, trial), (MIN_FACTOR, MAX_FACTOR))
-        self.idle, self.tried = search.idle(before), len(search.rows)
+        self.idle, self.tested_rows = search.idle(before), len(search.rows)
         return bool((before & ~self.idle).any())
 
     def least_cost(self, logs: np.ndarray, trial: Trial, aims: np.ndarray) -> tuple[np.ndarray, Trial]:
         """Return the logarithms of least cost with margins of at least `aims` (requirement,), and the trial there.
 
-        The search begins at `logs`, of which there is a trial. Groups that turn out to have an influence at the ranges found
-        join it.
+        The search starts at `logs`, with its trial. Groups that turn out to have an influence at the resulting ranges are
+        added.
         """
         logs, trial = self._descend(logs, trial, aims)
         while self.release(logs, trial):
@@ -236,11 +237,11 @@ class Search:
         return logs, trial
 
     def _descend(self, logs: np.ndarray, trial: Trial, aims: np.ndarray) -> tuple[np.ndarray, Trial]:
-        """Return the logarithms of least cost that steps from `logs` on lead to, and the trial there.
+        """Return the logarithms of least cost that are reached by steps from `logs`, and the trial there.
 
-        The merit of a point is its cost plus a penalty for missed margins. A step that improves the merit is taken, and the
-        region of the next one doubles; after any other step the region halves. No step is taken to where more realizations are
-        not resolved than a requirement allows outside, unless there were as many before.
+        The merit of a point is its cost plus a penalty for missed margins. A step that improves the merit is accepted, and the
+        trust region of the next step doubles; after any other step the region halves. A step is rejected if more realizations
+        are then unresolved than a requirement permits outside, unless there were as many before.
         """
         radius = FIRST_RADIUS
         margins, slopes = _margins(self.requirements, trial.corrected) - aims, None
@@ -270,9 +271,9 @@ class Search:
         return logs, trial
 
     def least_missing(self, logs: np.ndarray) -> np.ndarray:
-        """Return the point that misses the requirements least: `logs`, or all ranges that may change times one factor.
+        """Return the point that misses the requirements least: `logs`, or all free ranges times a common factor.
 
-        Margins lead to where a quantile is near its limit, which may be far from where most values are.
+        Margins lead to points where a quantile is near its limit, which may be far from most values.
         """
         common = [np.where(self.is_free, log, 0.0) for log in np.log(COMMON_FACTORS)]
         return min([logs, *common], key=self._missing)
@@ -287,8 +288,8 @@ class Search:
     def _slopes(self, logs: np.ndarray, trial: Trial) -> np.ndarray:
         """Return derivatives (requirement, group) of the margins, by central differences; 0 for groups that do not change.
 
-        A margin follows from the realizations beyond it and near it (Hong, 2009): only these are simulated again if they are
-        resolved, and measures of the others stay.
+        A margin depends on the realizations beyond it and near it (Hong, 2009): only these are simulated again if they are
+        resolved, and the measures of the others do not change.
         """
         corrected, slopes = trial.corrected, np.zeros((len(self.requirements), len(logs)))
         rows = np.unique(np.concatenate([r.decisive(corrected[:, r.measure]) for r in self.requirements]))
@@ -308,7 +309,7 @@ class Search:
     def _step(self, margins: np.ndarray, slopes: np.ndarray, logs: np.ndarray, radius: float) -> np.ndarray:
         """Return the point of least cost with margins approximated by functions of squared ranges.
 
-        If no point within the radius keeps the margins, return the point that misses them least.
+        If no point within the radius has sufficient margins, return the point that misses them least.
         """
 
         def missed(point: np.ndarray) -> float:

@@ -1,8 +1,8 @@
-"""The region that a worst case may come from: all combinations of deviations that the drawings allow, however unlikely.
+"""The region of worst cases: all combinations of deviations that the drawings allow, however unlikely.
 
-The deviation of each contributor lies in its zone: a range about its middle, the limits of a size, or the support of a
-scipy.stats distribution (its middle 99.73 % where it has no end). The components of a feature lie together in the zones of its
-tolerances, with the bonus that its size leaves. Measured parts are one of their rows. Correlations are not regarded.
+The deviation of each contributor lies in its zone: a range around its centre, the limits of a size, or the support of a
+scipy.stats distribution (its central 99.73 % if it is unbounded). The components of a feature lie jointly in the zones of its
+tolerances, with the bonus that its size permits. Measured parts are one of their rows. Correlations are ignored.
 """
 
 import numpy as np
@@ -13,19 +13,19 @@ from tolcontact.variation.component_zones import ComponentZone
 from tolcontact.variation.contributors import TAIL, Contributor
 from tolcontact.variation.draws import Draws
 
-RANDOM_DIRECTIONS = 32  # in which the extreme points of a zone are searched, beside those along its components
-MAX_CUTS = 40  # tangents of a round zone, one after the other
-TOLERANCE = 1e-9  # of a zone's width: points farther outside are outside
+RANDOM_DIRECTIONS = 32  # for the extreme points of a zone, in addition to the directions of its components
+MAX_CUTS = 40  # successive tangents of a round zone
+TOLERANCE = 1e-9  # of a zone's width: points further outside count as outside
 LP_TOLERANCES = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
 COARSE_TOLERANCE, FINE_TOLERANCE = 1e-2, 1e-7  # of a zone's width: distance between tangents and a round zone
 
 
 class AllowedRegion:
-    """The region of a model. A point (contributor,) is a combination of deviations before shared causes drive them.
+    """The region of a model. A point (contributor,) is a combination of deviations before the effects of shared causes.
 
     lower, upper   (contributor,) bounds of points
-    varies         columns that are not one number
-    moves          columns that vary continuously: not those of measured parts
+    varies         columns that are not constant
+    moves          columns that vary continuously, that is, except measured parts
     """
 
     def __init__(self, draws: Draws, *, seed: int) -> None:
@@ -48,21 +48,21 @@ class AllowedRegion:
         for columns in self._joint_columns():
             self._joined.append((columns, self._extremes(columns, rng)))
         self.varies = np.flatnonzero(self.upper > self.lower)
-        self.moves = np.setdiff1d(self.varies, measured)  # between the rows of measured parts there is nothing
+        self.moves = np.setdiff1d(self.varies, measured)  # there are no values between the rows of measured parts
 
     def deviations(self, points: np.ndarray) -> np.ndarray:
-        """Return deviations (n, contributor), as a Program takes them, of points (n, contributor)."""
+        """Return deviations (n, contributor), in the form that a Program takes, of points (n, contributor)."""
         deviations = np.asarray(points @ self._drive)
         self._add_shifts(deviations)
         return deviations
 
     def slopes(self, slopes: np.ndarray) -> np.ndarray:
-        """Return derivatives by points (..., contributor), from derivatives by deviations."""
+        """Return derivatives with respect to points (..., contributor), from derivatives with respect to deviations."""
         return np.asarray(slopes @ self._drive.T)
 
     @property
     def middle(self) -> np.ndarray:
-        """The point (contributor,) in the middle of all ranges and zones."""
+        """The centre (contributor,) of all ranges and zones."""
         middle = (self.lower + self.upper) / 2
         for columns, values in self._populations:
             middle[columns] = values[0]
@@ -70,13 +70,13 @@ class AllowedRegion:
 
     @property
     def independent_columns(self) -> list[np.ndarray]:
-        """Sets of columns that vary independently of each other: of common zones, of measured parts, or single ones."""
+        """Sets of columns that vary independently of each other: zones with common columns, measured parts, or single ones."""
         joined = [columns for columns, _ in self._joined]
         single = np.setdiff1d(self.varies, np.concatenate([np.zeros(0, dtype=int), *joined]))
         return [*joined, *single[:, None]]
 
     def farthest(self, direction: np.ndarray) -> np.ndarray:
-        """Return the farthest points (n, contributor) in directions (n, contributor); in zones, among some extreme points."""
+        """Return the farthest points (n, contributor) in directions (n, contributor); in zones, from sampled extreme points."""
         ends: np.ndarray = np.where(direction > 0, self.upper, np.where(direction < 0, self.lower, self.middle))
         for columns, points in self._joined:
             ends[:, columns] = points[(direction[:, columns] @ points.T).argmax(axis=1)]
@@ -91,7 +91,7 @@ class AllowedRegion:
         return end
 
     def scattered(self, rng: np.random.Generator, count: int) -> np.ndarray:
-        """Return random points (count, contributor): half of them extreme points, half of them between two of these."""
+        """Return random points (count, contributor): half of them extreme points, half of them between two extreme points."""
         ends = self.farthest(rng.standard_normal((2 * count, len(self.lower))))
         share = rng.random((count, 1)) * (np.arange(count) % 2)[:, None]
         points = ends[:count] + share * (ends[count:] - ends[:count])
@@ -111,7 +111,7 @@ class AllowedRegion:
         return np.asarray(np.maximum(shares, 0.0))
 
     def enclosed(self, points: np.ndarray) -> np.ndarray:
-        """Return points (n, contributor) drawn into the region, each zone by itself, towards the middle of the zone."""
+        """Return points (n, contributor) moved into the region, separately for each zone, towards the centre of the zone."""
         points = np.clip(points, self.lower, self.upper)
         middle = self.middle
         for columns in self._joint_columns():
@@ -135,7 +135,7 @@ class AllowedRegion:
         """Return half-spaces (row, contributor), (row,) that contain the region: a @ point <= b.
 
         They are tangents where a point (contributor,) leaves a zone by more than `slack` of its width. Without a point they
-        stand around all zones.
+        enclose all zones.
         """
         rows, ends = [], []
         for zone in self.zones:
@@ -145,7 +145,7 @@ class AllowedRegion:
                     plane[zone.columns] = normal @ row
                     end = zone.width / 2 + plane[zone.columns] @ zone.middle
                     if zone.sizes is not None:
-                        # |row| <= (width + growth (size - limit)) / 2, of the size as it is driven
+                        # |row| <= (width + growth (size - limit)) / 2, with the effects of shared causes in the size
                         plane -= zone.growth / 2 * self._drive[:, zone.sizes[number]]
                         end -= zone.growth / 2 * zone.limit
                     if point is None or plane @ point > end + slack * zone.width:
@@ -176,12 +176,12 @@ class AllowedRegion:
         self.lower[columns], self.upper[columns] = (zone.middle - extent)[~is_bounded], (zone.middle + extent)[~is_bounded]
 
     def _driven_bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return bounds (contributor,), (contributor,) of deviations, with all that shared causes may add to them."""
+        """Return bounds (contributor,), (contributor,) of deviations, including the largest effects of shared causes."""
         ends = np.stack([self.lower, self.upper])[:, :, None] * self._drive
         return ends.min(axis=0).sum(axis=0), ends.max(axis=0).sum(axis=0)
 
     def _joint_columns(self) -> list[np.ndarray]:
-        """Return sets of columns: zones with common columns are one set, with sizes that they grow with and causes of these."""
+        """Return sets of columns: zones with common columns are one set, with the sizes that widen them and their causes."""
         sets: list[set[int]] = []
         for zone in self.zones:
             joined = {int(column) for column in zone.columns}
@@ -223,7 +223,7 @@ class AllowedRegion:
 
 
 def _bounds(contributor: Contributor) -> tuple[float, float]:
-    """Return the bounds of a contributor by itself."""
+    """Return the bounds of a contributor without its zones."""
     if contributor.tolerance is None:
         return 0.0, 0.0  # its zone bounds it
     tolerance: Tolerance = contributor.tolerance
@@ -236,7 +236,7 @@ def _bounds(contributor: Contributor) -> tuple[float, float]:
 
 
 def _normals(row: np.ndarray, position: np.ndarray | None) -> np.ndarray:
-    """Return unit vectors (n, entry) across a zone: all around, or the one towards a position (entry,)."""
+    """Return unit normals (n, entry) of a zone: all around, or only towards a position (entry,)."""
     entries = len(row)
     if entries == 1:
         return np.array([[1.0], [-1.0]])
@@ -250,7 +250,7 @@ def _normals(row: np.ndarray, position: np.ndarray | None) -> np.ndarray:
 
 
 def _first_crossing(start: np.ndarray, along: np.ndarray, half: np.ndarray, half_after: np.ndarray) -> np.ndarray:
-    """Return the least t (n,), at most 1, at which a |start + t along| (n, point, entry) is half + t (half_after - half).
+    """Return the least t (n,), at most 1, at which any |start + t along| (n, point, entry) is half + t (half_after - half).
 
     half, half_after   (n, point)
     """
@@ -260,6 +260,6 @@ def _first_crossing(start: np.ndarray, along: np.ndarray, half: np.ndarray, half
     c = (start**2).sum(axis=2) - half**2
     with np.errstate(divide="ignore", invalid="ignore"):
         root = np.sqrt(np.maximum(b**2 - a * c, 0.0))
-        # The root at which it leaves, in the form that cancels nothing.
+        # The root at which the segment leaves the zone, in the form without cancellation.
         t = np.where(b < 0, np.where(a > 0, (root - b) / a, np.inf), np.where(b + root > 0, -c / (b + root), np.inf))
     return np.asarray(np.clip(t.min(axis=1, initial=1.0), 0.0, 1.0))

@@ -1,4 +1,4 @@
-"""What all analyses have in common: checks before any simulation, the dataset that is returned, and its place in an archive."""
+"""The common base of all analyses: checks before any simulation, the returned dataset, and its storage in an archive."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -18,13 +18,13 @@ from tolcontact.simulation.threads import processors
 from tolcontact.workflow.forecast import check_affordable
 from tolcontact.workflow.models import Choice, Model, check_counts, program_of
 
-SPREAD_SAMPLES = 1 << 14  # realizations that the spreads of contributors are estimated from
+SPREAD_SAMPLES = 1 << 14  # realizations for the spreads of contributors
 
 
 class Question:
-    """A question about one model, and its answer: a dataset with a place in an archive.
+    """A question about one model, and its answer: a dataset that can be stored in an archive.
 
-    Raises ModelError, ArchiveError, OptionError for arguments that cannot be used.
+    Raises ModelError, ArchiveError, OptionError for invalid arguments.
     """
 
     def __init__(
@@ -51,9 +51,9 @@ class Question:
         """Return the dataset of the analysis, and add it to the archive if there is one.
 
         values      array for each variable of the record
-        labels      labels of dimensions that neither the vocabulary nor the model knows
+        labels      labels of dimensions that are neither in the vocabulary nor in the model
         units       units of the only measure, where no dimension lists measures
-        attributes  beside the title and the settings
+        attributes  in addition to the title and the settings
         """
         stated = [*self.record.variables, *(v for v in self.record.of_stations if v.name in values)]
         arrays = {v.name: v.entry(np.array(values[v.name])) for v in stated}
@@ -92,7 +92,7 @@ class Question:
 
 
 class Analysis(Question):
-    """A question that is answered by simulations. Nothing is simulated before all of its options are checked."""
+    """A question that is answered by simulations. All options are checked before anything is simulated."""
 
     def __init__(
         self, record: terms.AnalysisRecord, model: Model | Program, *, samples: int, seed: int, solver: str | None,
@@ -123,20 +123,20 @@ class Analysis(Question):
 
     @contextmanager
     def engines(self, count: int, total: int) -> Iterator[list[Engine]]:
-        """Open engines for different threads, which report progress together, and stop when this ends.
+        """Open engines for different threads, with common progress; they stop when this context ends.
 
         Raises OptionError if `total` realizations would take too much time or memory.
         """
         self.check_affordable(total)
         progress = SharedProgress(self.progress, total)
         try:
-            yield [Engine(self.program, self.blocks, progress=progress.of_one(), total=total) for _ in range(count)]
+            yield [Engine(self.program, self.blocks, progress=progress.for_engine(), total=total) for _ in range(count)]
         finally:
             progress.has_ended = True
 
     @property
     def threads(self) -> int:
-        """The number of threads of this process that may simulate at the same time; one if a client's workers do it."""
+        """The number of threads of this process that may simulate at the same time; one if a client's workers simulate."""
         return processors() if self._client is None else 1
 
     def check_affordable(self, realizations: int) -> None:
@@ -144,7 +144,7 @@ class Analysis(Question):
         check_affordable(self.program, samples=realizations, seed=self.seed, threads=threads_of(self._client))
 
     def sampled_deviations(self) -> np.ndarray:
-        """Return deviations (n, contributor) of enough realizations to estimate spreads."""
+        """Return deviations (n, contributor) of enough realizations for estimates of spreads."""
         return self.program.draws(seed=self.seed, start=0, stop=SPREAD_SAMPLES)
 
     def check_varies(self, varies: object) -> None:

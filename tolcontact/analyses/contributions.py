@@ -1,4 +1,4 @@
-"""Contributors that a measure's variance comes from, with contact and without."""
+"""Contributions to the variance of a measure, with and without contact."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +19,7 @@ from tolcontact.simulation import Block
 from tolcontact.statistics.sobol_indices import missed, shapley_effects, sobol_indices
 from tolcontact.workflow.models import Choice, Model
 
-BUDGET = 60_000  # realizations that base realizations are chosen for by default
+BUDGET = 60_000  # realizations in total that determine the default number of base realizations
 MIN_SAMPLES, MAX_SAMPLES = 512, 4096  # base realizations by default
 
 
@@ -32,25 +32,25 @@ def contributions(
 
         first   (measure, state, group, interval)   share of variance by a group alone, with its 95 % interval
         total   (measure, state, group, interval)   share of variance by a group and its interactions with others
-        minor   (group)                             1: its interval is from 0 to the upper bound of all minor groups together
-        minor_total (measure, state, interval)      share of variance by all minor groups together; 0 if there are none
+        minor   (group)                             1: its interval is from 0 to the joint upper bound of all minor groups
+        minor_total (measure, state, interval)      joint share of variance of all minor groups; 0 if there are none
         shapley (measure, state, unit, interval)    Shapley effects, if contributors are correlated; units are the groups
                                                     that there would be without the correlations
         linear  (measure, group)                    by sensitivities of the raw measure at the nominal assembly: (s sigma)^2,
-                                                    exact for contributors that are drawn by themselves
+                                                    exact for contributors that are drawn alone
         missed  (measure, state, interval)          share of variance that a prediction by these sensitivities misses
         by_status (status_meaning)                  number of realizations
 
-    `by` is "contributor", "feature" or "part". Contributors that are not independent of each other (correlated, drawn together,
-    or one following from another) always form one group. A shared cause is a contributor like others, together with what it
-    adds to those that it drives; these have groups of their own if they also vary by themselves. Contributors that do not vary
-    are left out.
-    With more than 16 groups and 256 samples, a screening of 128 base realizations selects minor groups, which have 1 % of the
-    variance of any measure together, or less; they are estimated as one group (see tolcontact.analyses.screening).
+    `by` is "contributor", "feature" or "part". Contributors that are not independent of each other (correlated, drawn jointly,
+    or one determined by another) always form one group. A shared cause is a contributor like others, including its effects on
+    the contributors that it drives; these have groups of their own if they also vary on their own. Contributors that do not
+    vary are left out.
+    With more than 16 groups and 256 samples, a screening of 128 base realizations selects minor groups, which jointly have at
+    most 1 % of the variance of any measure; they are estimated as one group (see tolcontact.analyses.screening).
     `samples` is the number of base realizations: samples (2 + groups) are simulated, and samples (1 + units) more for Shapley
-    effects, beside the screening. By default it is what 60 000 realizations allow, but at least 512 and at most 4096.
-    `progress` is called with the number of finished realizations, and of all.
-    Arguments that all analyses share, and what they raise, are described in tolcontact.analyses.
+    effects, in addition to the screening. The default follows from 60 000 realizations in total, and is between 512 and 4096.
+    `progress` is called with the number of finished realizations and the total.
+    Arguments that all analyses share, and their errors, are described in tolcontact.analyses.
     """
     check_grouping(by)
     analysis = Analysis(
@@ -86,12 +86,12 @@ def contributions(
 
 
 def _realizations_each(groups: int, released: ReleasedDraws | None) -> int:
-    """Return how many realizations a base realization has for Sobol' indices of groups, and for Shapley effects if any."""
+    """Return the realizations per base realization for Sobol' indices of groups, and for Shapley effects if any."""
     return 2 + groups + (0 if released is None else released.size)
 
 
 def _varying_groups(program: Program, by: str, deviations: np.ndarray, *, correlated: bool) -> dict[str, np.ndarray]:
-    """Return the columns that vary among own deviations (n, contributor), by independent group."""
+    """Return the columns that vary in own deviations (n, contributor), by independent group."""
     varies = np.ptp(deviations, axis=0) > 0
     return independent_groups(program.draws, owners(program, by), varies, correlated=correlated)
 
@@ -108,13 +108,13 @@ def _indices(screening: Screening, measured: np.ndarray, accuracies: np.ndarray)
 
 
 def _shapley_effects(engine: Engine, released: ReleasedDraws | None, samples: int, seed: int) -> np.ndarray:
-    """Return Shapley effects (measure, state, unit, interval); no unit if nothing is correlated."""
+    """Return Shapley effects (measure, state, unit, interval); there are no units if nothing is correlated."""
     if released is None:
         return np.empty((len(engine.program.nominal.measures), len(terms.STATES), 0, len(terms.ESTIMATE)))
     measured, _ = engine.simulate_design(released, samples, seed=seed)
-    places = released.places(seed, 0, samples)
+    positions = released.positions(seed, 0, samples)
     return np.array([
-        [shapley_effects(f, places, accuracy) for f in states]
+        [shapley_effects(f, positions, accuracy) for f in states]
         for states, accuracy in zip(measured.transpose(3, 2, 0, 1), engine.program.accuracies, strict=True)
     ])  # fmt: skip
 
@@ -122,7 +122,7 @@ def _shapley_effects(engine: Engine, released: ReleasedDraws | None, samples: in
 def _linear_shares(program: Program, deviations: np.ndarray, slopes: np.ndarray, groups: Any) -> np.ndarray:
     """Return the share (group,) of each group in the variance of a linear measure with slopes (contributor,).
 
-    The variance of a group is exact if it is one contributor that is drawn by itself, else it is that of own deviations
+    The variance of a group is exact for a single contributor that is drawn alone; otherwise it is estimated from own deviations
     (n, contributor).
     """
     draws = program.draws

@@ -1,11 +1,11 @@
-"""Designs: draws in which each base realization has several realizations, for derivatives, Sobol' indices and Shapley effects.
+"""Designs: draws with several realizations for each base realization, for derivatives, Sobol' indices and Shapley effects.
 
 Sobol' indices: Saltelli et al. (2010). Each base realization has 2 + groups realizations: A, B, and A with the columns of each
 group from B.
 
 Shapley effects: Song, Nelson, Staum (2016); Goda (2021). Each base realization has 1 + units realizations. The last one is A.
-Realization m has the first m units of A, in an order that is random for each base realization; the other units are redrawn,
-conditional on these m. The first one is B, independent of A.
+Realization m has the first m units of A, in a random order for each base realization; the other units are redrawn conditional
+on these m. The first one is B, independent of A.
 """
 
 from abc import ABC, abstractmethod
@@ -17,11 +17,11 @@ from scipy.special import ndtr, ndtri
 from tolcontact.variation.draws import MIN_UNIFORM, Draws
 from tolcontact.variation.plans import Numbers, uniform
 
-REDRAWN_START = 1 << 40  # number of the realization that B begins at; no run is that long
+REDRAWN_START = 1 << 40  # number of the first realization of B; no run is that long
 
 
 class Design(ABC):
-    """Deviations as Draws give them: realization k size + m is member m of base realization k."""
+    """Deviations in the form of Draws: realization k size + m is member m of base realization k."""
 
     @property
     @abstractmethod
@@ -40,9 +40,9 @@ class Design(ABC):
 
 
 class SteppedDraws(Design):
-    """Each realization itself, then with each of `columns` stepped up by `steps` (column,) in its units, then stepped down.
+    """Each realization, followed by steps up, then down, of each of `columns` by `steps` (column,) in its units.
 
-    A shared cause takes along what it drives.
+    A step of a shared cause also steps the contributors that it drives.
     """
 
     def __init__(self, draws: Draws, columns: np.ndarray, steps: np.ndarray) -> None:
@@ -64,7 +64,7 @@ class SteppedDraws(Design):
             for driven in np.flatnonzero(self._drive[column]):
                 members[:, k, driven] += step * self._drive[column, driven]
                 members[:, count + k, driven] -= step * self._drive[column, driven]
-            if self._drive[column].any():  # a datum follows the tilts that a cause drives
+            if self._drive[column].any():  # a datum depends on the tilts that a cause drives
                 self._draws.add_shifts(members[:, k])
                 self._draws.add_shifts(members[:, count + k])
         return members
@@ -95,9 +95,9 @@ class MixedDraws(Design):
 
 
 class ReleasedDraws(Design):
-    """Member m has m units of A, the others are redrawn.
+    """Member m has m units of A; the others are redrawn.
 
-    units  columns of deviations by name; those of different units are independent, or correlated by declaration
+    units  columns of deviations by name; different units are independent, or correlated by declaration
     """
 
     def __init__(self, draws: Draws, units: Mapping[str, np.ndarray]) -> None:
@@ -114,14 +114,14 @@ class ReleasedDraws(Design):
         """The number of realizations of each base realization."""
         return 1 + len(self._names)
 
-    def places(self, seed: int, start: int, stop: int) -> np.ndarray:
-        """Return the places (base, unit) of the units in the random orders of base realizations."""
+    def positions(self, seed: int, start: int, stop: int) -> np.ndarray:
+        """Return the positions (base, unit) of the units in the random orders of base realizations."""
         keys = np.stack([uniform(seed, f"order of {name}", start, stop) for name in self._names], axis=1)
         return np.asarray(keys.argsort(axis=1).argsort(axis=1))
 
     def members(self, seed: int, start: int, stop: int) -> np.ndarray:
         """Return deviations (base, member, contributor) of base realizations `start` to `stop`."""
-        places = self.places(seed, start, stop)
+        positions = self.positions(seed, start, stop)
 
         def retained(label: str) -> np.ndarray:
             return uniform(seed, label, start, stop)
@@ -131,15 +131,15 @@ class ReleasedDraws(Design):
 
         members = np.empty((stop - start, self.size, len(self._draws.labels)))
         for count in range(self.size):
-            numbers = self._mixed(retained, redrawn, places, count)
+            numbers = self._mixed(retained, redrawn, positions, count)
             members[:, count] = self._draws.from_numbers(numbers, stop - start)
         return members
 
-    def _mixed(self, retained: Numbers, redrawn: Numbers, places: np.ndarray, count: int) -> Numbers:
-        """Return numbers in which the first `count` units are retained, and the others redrawn conditional on these."""
+    def _mixed(self, retained: Numbers, redrawn: Numbers, positions: np.ndarray, count: int) -> Numbers:
+        """Return numbers with the first `count` units retained, and the others redrawn conditional on these."""
         correlated: dict[str, np.ndarray] = {}
         for labels, factor in self._draws.correlated:
-            correlated |= self._conditional(retained, redrawn, places, count, labels, factor)
+            correlated |= self._conditional(retained, redrawn, positions, count, labels, factor)
 
         def numbers(label: str) -> np.ndarray:
             if label in correlated:
@@ -147,23 +147,23 @@ class ReleasedDraws(Design):
             unit = self._unit.get(label, self._unit.get(label.rpartition(" #")[0]))  # " #2": a further attempt
             if unit is None:
                 return redrawn(label)
-            return np.where(places[:, unit] < count, retained(label), redrawn(label))
+            return np.where(positions[:, unit] < count, retained(label), redrawn(label))
 
         return numbers
 
     def _conditional(
-        self, retained: Numbers, redrawn: Numbers, places: np.ndarray, count: int, labels: list[str], factor: np.ndarray
+        self, retained: Numbers, redrawn: Numbers, positions: np.ndarray, count: int, labels: list[str], factor: np.ndarray
     ) -> dict[str, np.ndarray]:
         """Return numbers of correlated contributors by label: the first `count` units retained, the others conditional on them.
 
-        Normal scores z of the contributors have the covariance `factor` factor^T. In the order of the units' places z = L e,
-        with L the Cholesky factor of the covariance in this order, and e independent standard normal numbers. An entry of e
-        is what its score has beside that which earlier contributors determine. So z made of the retained e up to `count`, and
-        of the redrawn e behind, has the earlier scores unchanged and the later ones conditional on them.
+        Normal scores z of the contributors have the covariance `factor` factor^T. In the order of the units' positions z = L e,
+        with L the Cholesky factor of the covariance in this order, and e independent standard normal numbers. An entry of e is
+        the part of its score that earlier contributors do not determine. So z composed of the retained e up to `count`, and of
+        the redrawn e after it, has the earlier scores unchanged and the later ones conditional on them.
         """
         scores = [np.stack([ndtri(numbers(label)) for label in labels], axis=1) @ factor.T for numbers in (retained, redrawn)]
-        behind_all = np.full(len(places), self.size)  # the place of a contributor that does not vary
-        place = np.stack([places[:, self._unit[label]] if label in self._unit else behind_all for label in labels], axis=1)
+        after_all = np.full(len(positions), self.size)  # the position of a contributor that does not vary
+        place = np.stack([positions[:, self._unit[label]] if label in self._unit else after_all for label in labels], axis=1)
         order = place.argsort(axis=1, kind="stable")
         L = np.linalg.cholesky((factor @ factor.T)[order[:, :, None], order[:, None, :]])
         e_retained, e_redrawn = (np.linalg.solve(L, np.take_along_axis(z, order, axis=1)[..., None])[..., 0] for z in scores)

@@ -1,4 +1,4 @@
-"""The engine of all analyses: it simulates realizations in blocks, gathers what is observed and counts statuses."""
+"""The engine of all analyses: it simulates realizations in blocks, collects observations and counts statuses."""
 
 import threading
 from collections.abc import Callable
@@ -15,18 +15,18 @@ from tolcontact.simulation.cluster import MapBlocks
 from tolcontact.simulation.threads import Sampler
 from tolcontact.variation import GivenDraws
 
-MAX_ROWS_OF_BODIES = 8192  # realizations of a block, times the bodies that contact couples: a block ends within some seconds
-MIN_BLOCKS = 8  # of few realizations, so that these occupy all processors
-VERIFICATION_FACTOR = 4  # realizations of a fresh run, times samples
+MAX_ROWS_OF_BODIES = 8192  # realizations of a block, times the bodies that contact couples: a block ends within seconds
+MIN_BLOCKS = 8  # for few realizations, so that they occupy all processors
+VERIFICATION_FACTOR = 4  # realizations of a fresh run, in multiples of samples
 
-Progress = Callable[[int, int], None]  # is called with the number of finished steps, and of all
-Observer = Callable[[Block], tuple[Any, ...]]  # gives arrays of a block; the last one is the statuses (n,)
+Progress = Callable[[int, int], None]  # called with the number of finished steps, and the total
+Observer = Callable[[Block], tuple[Any, ...]]  # returns arrays of a block; the last one is the statuses (n,)
 
 
 class SharedProgress:
-    """The progress of several engines in different threads, reported as that of one.
+    """The common progress of several engines in different threads.
 
-    has_ended   whether engines that still simulate shall stop
+    has_ended   whether engines that are still simulating must stop
     """
 
     def __init__(self, progress: Progress | None, total: int) -> None:
@@ -35,8 +35,8 @@ class SharedProgress:
         self._lock = threading.Lock()
         self.has_ended = False
 
-    def of_one(self) -> Progress:
-        """Return what another engine reports to. It raises CancelledError after the end."""
+    def for_engine(self) -> Progress:
+        """Return the progress function of a further engine. It raises CancelledError after the end."""
         number = len(self._finished)
         self._finished.append(0)
 
@@ -78,7 +78,7 @@ class Engine:
     def simulate(
         self, samples: int, *, seed: int = 0, start: int = 0, draws: Sampler | None = None, observe: Observer = outcomes
     ) -> tuple[np.ndarray, ...]:
-        """Simulate `samples` realizations from number `start` on, and return what `observe` gives of all blocks, joined.
+        """Simulate `samples` realizations, starting with number `start`, and return the joined results of `observe`.
 
         By default these are measures (n, state, measure) and statuses (n,). `draws` replaces the draws of the program.
         """
@@ -101,7 +101,7 @@ class Engine:
     def simulate_design(
         self, design: Design, samples: int, *, seed: int, start: int = 0, observe: Observer = outcomes
     ) -> tuple[np.ndarray, ...]:
-        """Return what `observe` gives of `samples` base realizations of a design, as arrays (base, realization, ...).
+        """Return the results of `observe` for `samples` base realizations of a design, as arrays (base, realization, ...).
 
         The first base realization has the number `start`.
         """

@@ -1,8 +1,8 @@
-"""Searches for extreme values of measures, side by side: the candidates of all searches are simulated together.
+"""Parallel searches for extreme values of measures: the candidates of all searches are simulated in one batch.
 
 A search is a generating set search (Kolda, Lewis, Torczon, 2003). It tries points a step away along each contributor and in
 random directions, and then points on the way to the far end of the region along its slopes. It moves to the best of them if
-that gains enough; otherwise its step shrinks. It ends when its step is small. Searches that meet share what was simulated.
+the gain is sufficient; otherwise its step shrinks. It ends when its step is small. Searches that meet share simulated points.
 """
 
 import math
@@ -16,15 +16,15 @@ from tolcontact.analyses.allowed_space import AllowedRegion
 from tolcontact.analyses.engine import Engine
 from tolcontact.analyses.ridge import ridge_end
 
-RANDOM_DIRECTIONS = 4  # that a search tries at each step
-END_SHARES = 0.5 ** np.arange(9)  # of the way to a far end that are tried
-WAY_SHARES = np.arange(1, 9) / 8  # of the way to a better end, where a measure has to grow
+RANDOM_DIRECTIONS = 4  # tried by a search at each step
+END_SHARES = 0.5 ** np.arange(9)  # of the way to a far end, for trial points
+WAY_SHARES = np.arange(1, 9) / 8  # of the way to a better end, at which a measure must increase
 SHRINKAGE = 0.25  # of a step
 ROUNDING, STEP_GAIN = 1e-10, 0.01  # of a measure's spread: the least gain is ROUNDING + STEP_GAIN step^2
-NEARBY_POINTS, NEARBY_STEP = 4, 0.1  # points about a search that did not gain, and steps there, in shares of its own step
+NEARBY_POINTS, NEARBY_STEP = 4, 0.1  # points around a search without a gain, and steps there, in shares of its own step
 MAX_STEPS = 200
-MAX_POLISHES, POLISHING_STEP, POLISHED = 3, 0.25, 0.2  # of the best searches; their first step, the finest one over that before
-POLISHING_SHARE = 0.15  # of the combinations tried before: after as many more, polishing ends
+MAX_POLISHES, POLISHING_STEP, POLISHED = 3, 0.25, 0.2  # of the best searches; their first step; ratio of finest steps
+POLISHING_SHARE = 0.15  # of the combinations tried so far: polishing ends after as many more
 MIN_POLISH = 1e-3  # of a measure's spread: a smaller gain is no reason to continue
 MAX_FINISHES = 4
 DIFFERENCE_STEP = 1e-4  # of the ranges, for slopes at an end
@@ -44,7 +44,7 @@ class Effort:
 
     @classmethod
     def of(cls, samples: int) -> "Effort":
-        """Return the effort that goes with a number of random combinations: 4 and 8 searches for 1024."""
+        """Return the effort for a number of random combinations: 4 and 8 searches for 1024."""
         return cls(best=max(samples // 256, 1), random=max(samples // 128, 2))
 
     @property
@@ -54,14 +54,14 @@ class Effort:
 
     @property
     def levels(self) -> int:
-        """The number of steps of different length, from 1 to the finest one."""
+        """The number of step lengths, from 1 to the finest one."""
         return math.ceil(math.log(self.finest_step) / math.log(SHRINKAGE))
 
 
 class Evaluation:
     """Measures at points of the region (see AllowedRegion). No point is simulated twice.
 
-    is_undefined  (measure,): whether a measure was not a finite number somewhere, raw or certified
+    is_undefined  (measure,): whether a measure was not a finite number at any point, raw or certified
     """
 
     def __init__(self, engine: Engine, region: AllowedRegion) -> None:
@@ -75,28 +75,28 @@ class Evaluation:
         return len(self._known)
 
     def corrected(self, points: np.ndarray) -> np.ndarray:
-        """Return measures (..., state, measure) at points (..., contributor); NaN, corrected, where they are not certified."""
+        """Return measures (..., state, measure) at points (..., contributor); corrected ones are NaN if not certified."""
         deviations = self._deviations(points) + 0.0  # no negative zeros
         keys = [row.tobytes() for row in deviations]
         rows = {key: row for row, key in enumerate(keys) if key not in self._known}
         if rows:
             measured, status = self._engine.simulate_deviations(deviations[list(rows.values())])
             unresolved = np.isin(status, terms.UNRESOLVED)
-            self._look_at(measured[:, terms.RAW])
-            self._look_at(measured[~unresolved, terms.CORRECTED])
+            self._record_undefined(measured[:, terms.RAW])
+            self._record_undefined(measured[~unresolved, terms.CORRECTED])
             measured[unresolved, terms.CORRECTED] = np.nan
             self._known.update(zip(rows, measured, strict=True))
         return np.array([self._known[key] for key in keys]).reshape(*points.shape[:-1], len(terms.STATES), -1)
 
     def raw(self, points: np.ndarray) -> np.ndarray:
-        """Return the same with raw measures alone, which takes no time; the corrected ones are NaN."""
+        """Return the same with raw measures only, which takes no time; the corrected ones are NaN."""
         program, deviations = self._engine.program, self._deviations(points)
         measured = program.observe(poses=program.place(deviations=deviations)["poses"], deviations=deviations)["measured"]
-        self._look_at(measured)
+        self._record_undefined(measured)
         return np.stack([measured, np.full_like(measured, np.nan)], axis=1).reshape(*points.shape[:-1], len(terms.STATES), -1)
 
-    def _look_at(self, measured: np.ndarray) -> None:
-        """Remember which measures (n, measure) are not finite numbers."""
+    def _record_undefined(self, measured: np.ndarray) -> None:
+        """Record which measures (n, measure) are not finite numbers."""
         self.is_undefined |= ~np.isfinite(measured).all(axis=0)
 
     def _deviations(self, points: np.ndarray) -> np.ndarray:
@@ -124,7 +124,7 @@ class Searches:
     def begin(cls, starts: np.ndarray, measured: np.ndarray, effort: Effort, rng: np.random.Generator) -> "Searches":
         """Return searches for each measure, state and sense, from points `starts` (n, contributor).
 
-        They begin at the best points by `measured` (n, state, measure), and at random ones of the others.
+        They start at the best points according to `measured` (n, state, measure), and at random ones among the others.
         """
         searches, ones = [], np.ones(effort.best + effort.random, dtype=int)
         for measure in range(measured.shape[2]):
@@ -139,15 +139,15 @@ class Searches:
         return cls(*(np.concatenate([getattr(search, field.name) for search in searches]) for field in fields(cls)))
 
     def take(self, rows: np.ndarray) -> "Searches":
-        """Return copies of some searches."""
+        """Return copies of the searches in `rows`."""
         return Searches(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     def best_of(self, count: int) -> "Searches":
-        """Return copies of the best of each `count` searches in a row."""
+        """Return copies of the best of each `count` consecutive searches."""
         return self.take(self.value.reshape(-1, count).argmax(axis=1) + np.arange(0, len(self.value), count))
 
     def put(self, rows: np.ndarray, searches: "Searches") -> None:
-        """Replace the points, values and steps of some searches."""
+        """Replace the points, values and steps of the searches in `rows`."""
         self.point[rows], self.value[rows], self.step[rows] = searches.point, searches.value, searches.step
 
     def values_at(self, candidates: np.ndarray, evaluation: Evaluation) -> np.ndarray:
@@ -161,9 +161,9 @@ class Searches:
         return values
 
     def move(self, candidates: np.ndarray, values: np.ndarray, min_gain: np.ndarray) -> np.ndarray:
-        """Move each search to the best of its candidates (n, candidate, contributor) if it gains more than `min_gain` (n,).
+        """Move each search to the best of its candidates (n, candidate, contributor) if the gain exceeds `min_gain` (n,).
 
-        Return which searches moved, (n,).
+        Return whether each search moved, (n,).
         """
         rows, best = np.arange(len(values)), values.argmax(axis=1)
         gains = values[rows, best] > self.value + min_gain
@@ -175,7 +175,7 @@ class Searcher:
     """Moves searches in a region.
 
     spread     (measure,) difference between the largest and the least value of random points
-    is_active  (measure, contributor): contributors that a measure with contact is searched along; others stay
+    is_active  (measure, contributor): contributors along which a measure with contact is searched; others do not change
     """
 
     def __init__(
@@ -189,11 +189,11 @@ class Searcher:
         self._compass = np.diag(self._ranges)[region.moves]
 
     def search(self, searches: Searches, advanced: Callable[[float], None]) -> None:
-        """Move until all steps are small. `advanced` is called with the share of this that is done."""
+        """Move until all steps are small. `advanced` is called with the finished share of the search."""
         self._search(searches, self._finest_step, advanced)
 
     def polish(self, searches: Searches) -> None:
-        """Continue the searches with contact, along kinks, too, until they gain no more, or have cost too much."""
+        """Continue the searches with contact, including along kinks, until they gain no more, or have cost too much."""
         limit = (1 + POLISHING_SHARE) * self._evaluation.count
         for _ in range(MAX_POLISHES):
             values = searches.value.copy()
@@ -207,7 +207,7 @@ class Searcher:
     def _search(
         self, searches: Searches, finest_step: float, advanced: Callable[[float], None], limit: float | None = None
     ) -> None:
-        """Move until all steps are small; with a `limit` of combinations along kinks, too, until as many were tried."""
+        """Move until all steps are small; with a `limit`, also along kinks, until that many combinations were tried."""
         for _ in range(MAX_STEPS):
             rows = np.flatnonzero(searches.step > finest_step)
             if not rows.size or (limit is not None and self._evaluation.count > limit):
@@ -224,7 +224,7 @@ class Searcher:
             advanced(float(steps.mean() / math.log(finest_step)))
 
     def meet(self, searches: Searches, count: int) -> None:
-        """Move the searches with contact to the best of each `count` in a row, where the measure grows all the way there."""
+        """Move searches with contact to the best of `count` consecutive ones if the measure grows all the way there."""
         best = np.repeat(searches.best_of(count).point, count, axis=0)
         rows = np.flatnonzero((searches.state == terms.CORRECTED) & (searches.point != best).any(axis=1))
         if rows.size:
@@ -238,7 +238,7 @@ class Searcher:
             searches.put(rows, behind)
 
     def finish(self, searches: Searches, limit: float) -> None:
-        """Move along the slopes to the very end of round zones; once, if more combinations than the `limit` were tried."""
+        """Move along the slopes to the exact end of round zones; only once if more combinations than `limit` were tried."""
         searches.step[:] = 0.0
         for _ in range(MAX_FINISHES):
             steps = np.full(len(searches.value), DIFFERENCE_STEP)
@@ -251,7 +251,7 @@ class Searcher:
                 return
 
     def _min_gain(self, searches: Searches) -> np.ndarray:
-        """Return the least gain (n,) of a step: a forcing function, which grows with the step so that searches do not creep."""
+        """Return the least gain (n,) of a step: a forcing function, which grows with the step to prevent slow progress."""
         return np.asarray(self._spread[searches.measure] * (ROUNDING + STEP_GAIN * searches.step**2))
 
     def _random_steps(self) -> np.ndarray:
@@ -262,10 +262,10 @@ class Searcher:
     def _neighbours(
         self, searches: Searches, step: np.ndarray, directions: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the points a step (n,) away, as far as the region reaches, their values, and the slopes between them.
+        """Return the points a step (n,) away, limited to the region, their values, and the slopes between them.
 
-        Points (n, candidate, contributor) are those along each contributor, and along `directions` (direction, contributor),
-        in both senses. Slopes are (n, contributor), by the differences along contributors.
+        Points (n, candidate, contributor) lie along each contributor, and along `directions` (direction, contributor), in both
+        senses. Slopes (n, contributor) come from the differences along contributors.
         """
         steps = step[:, None, None] * np.vstack([self._compass, -self._compass, directions, -directions])
         steps *= self._searched(searches)[:, None]
@@ -282,15 +282,15 @@ class Searcher:
         return candidates, values, slopes
 
     def _searched(self, searches: Searches) -> np.ndarray:
-        """Return whether each search goes along each contributor, (n, contributor)."""
+        """Return whether each search uses each contributor, (n, contributor)."""
         return np.asarray(self._is_active[searches.measure] | (searches.state == terms.RAW)[:, None])
 
     def _move_along_ridges(self, searches: Searches, gains: np.ndarray) -> np.ndarray:
-        """Move the searches with contact that did not gain along the kinks that they may have met. Return which moved, (n,).
+        """Move the searches with contact that did not gain along possible kinks. Return whether each moved, (n,).
 
-        At a kink, a measure is the least of several linear functions, and may grow along none of the contributors alone. These
-        functions follow from slopes at a few points nearby; a linear program maximizes the least of them within a step
-        (compare gradient sampling; Burke, Lewis, Overton, 2005).
+        At a kink, a measure is the minimum of several linear functions, and may not increase along any single contributor.
+        These functions come from slopes at a few nearby points; a linear program maximizes their minimum within a step (compare
+        gradient sampling; Burke, Lewis, Overton, 2005).
         """
         rows = np.flatnonzero(~gains & (searches.state == terms.CORRECTED))
         moves = np.zeros(len(gains), dtype=bool)
@@ -311,7 +311,7 @@ class Searcher:
         return moves
 
     def _scattered_about(self, searches: Searches) -> Searches:
-        """Return searches at points within a step of each search: the point itself, and random ones."""
+        """Return searches at points within a step of each search: its own point, and random ones."""
         points = searches.take(np.repeat(np.arange(len(searches.value)), NEARBY_POINTS))
         shares = self._rng.uniform(-1, 1, points.point.shape) * self._searched(points)
         shares[::NEARBY_POINTS] = 0.0
@@ -321,7 +321,7 @@ class Searcher:
         return points
 
     def _one_sided_slopes(self, searches: Searches) -> np.ndarray:
-        """Return slopes (n, contributor) by short steps towards the middle of the region; 0 along what is not searched."""
+        """Return slopes (n, contributor) by short steps towards the centre of the region; 0 for unused contributors."""
         n, width = searches.point.shape
         towards = np.where(searches.point > self._region.middle, -1.0, 1.0) * self._ranges * self._searched(searches)
         steps = (NEARBY_STEP * searches.step[:, None] * towards)[:, None] * np.eye(width)[self._region.moves]
@@ -338,9 +338,9 @@ class Searcher:
         return slopes
 
     def _move_towards(self, searches: Searches, ends: np.ndarray) -> np.ndarray:
-        """Move a share of the way to far ends (n, contributor), if that gains enough. Return which searches moved, (n,).
+        """Move a share of the way to far ends (n, contributor), if the gain suffices. Return whether each search moved, (n,).
 
-        Measured parts are always those at the far end: between their rows there is nothing.
+        Measured parts are always taken from the far end, since there are no values between their rows.
         """
         candidates = searches.point[:, None] + END_SHARES[:, None] * (ends - searches.point)[:, None]
         fixed = np.setdiff1d(self._region.varies, self._region.moves)

@@ -1,17 +1,18 @@
-"""Bounds of measures over all that drawings allow, in the linear model: no pose free of penetration lies beyond.
+"""Bounds of measures over everything that drawings allow, in the linear model: no pose free of penetration lies beyond.
 
-With any objective, gaps are open at the corrected pose, and two-sided locators hold where forces press. So the largest value
-of a measure over all deviations and all these poses is a linear program. Its zones are cut out by tangents (Kelley, 1960), and
-each round bounds the measure from outside. This is the worst case with float of fasteners. Where only the objective holds a
-part, for instance a part that contact may lift without limit, the bound is infinite.
+With any objective, gaps are non-negative at the corrected pose, and bilateral locators keep their positions where forces press.
+So the largest value of a measure over all deviations and all these poses is a linear program. Its zones are approximated by
+tangents (Kelley, 1960), and each round gives an outer bound of the measure. This is the worst case with float of fasteners.
+Where only the objective holds a part, for instance a part that contact may lift without limit, the bound is infinite.
 
-The objective "all points" has the same quadratic term everywhere. There the optimality conditions join the program, with a
-binary number for each row that may carry or be open; HiGHS bounds that, too, when its time is up.
+The objective "all points" has the same quadratic term everywhere. Here the optimality conditions are added to the program, with
+a binary variable for each row that may be active or open; HiGHS also gives a bound for this program when its time is up.
 
 A measure with a kink at the nominal assembly (a minimum, a clearance, an angle that is nominally 0) has no linear model, and
 no bound.
 
-To first order in deviations and motions. Pairs of round faces and springy supports have no rows, which only widens the bounds.
+The bounds are of first order in deviations and motions. Pairs of round faces and springy supports have no rows, which only
+widens the bounds.
 """
 
 import contextlib
@@ -33,17 +34,17 @@ from tolcontact.compilation import Program
 
 MAX_ROUNDS = 30
 SLACK = 1e-7  # of a zone's width
-MAX_BINARY, MAX_SECONDS = 64, 30.0  # rows that may carry or be open; time for one bound
-MAX_CONDITION = 1e8  # of the objective's quadratic term: contact points with a larger one do not hold all freedoms
+MAX_BINARY, MAX_SECONDS = 64, 30.0  # rows that may be active or open; time for one bound
+MAX_CONDITION = 1e8  # of the objective's quadratic term: above this, contact points do not constrain all freedoms
 _LOCK = threading.Lock()
-_inside = 0  # how many times threads are in `muted_c_stdout`
-_stream: int | None = None  # the address of the stream that was replaced
+_inside = 0  # number of threads inside `muted_c_stdout`
+_stream: int | None = None  # the address of the replaced stream
 
 
 def farthest_poses(program: Program, region: AllowedRegion, model: LinearModel) -> np.ndarray:
-    """Return bounds (measure, state, end); those of the raw state are without contact."""
+    """Return bounds (measure, state, end); bounds of the raw state are without contact."""
     bounds = np.empty((len(model.measures), len(terms.STATES), len(terms.ENDS)))
-    # With stations, reactions of a later one do not act on the motions of an earlier one.
+    # With stations, reactions in a later one do not act on the motions in an earlier one.
     has_optimum = program.method.objective == "all points" and not program.stations
     reactions = _reactions(model, region) if has_optimum else None
     for measure in range(len(model.measures)):
@@ -60,7 +61,7 @@ def farthest_poses(program: Program, region: AllowedRegion, model: LinearModel) 
 
 @dataclass(frozen=True, eq=False)
 class _Reactions:
-    """What the optimality conditions of the objective "all points" need.
+    """The data of the optimality conditions of the objective "all points".
 
     hessian           (freedom, freedom) of the objective
     largest_gap       (row,) bound of each gap at a corrected pose [mm]
@@ -75,12 +76,13 @@ class _Reactions:
 def _reactions(model: LinearModel, region: AllowedRegion) -> _Reactions | None:
     """Return bounds of gaps and reactions.
 
-    There are none if there are too many rows, if contact points do not hold all freedoms, or if no motion opens all gaps.
+    The result is None if there are too many rows, if contact points do not constrain all freedoms, or if no motion opens all
+    gaps.
     """
     A, hessian = model.gaps_by_motion, 2 * model.displacements.T @ model.displacements
     if not 0 < len(A) <= MAX_BINARY or model.round_pairs or np.linalg.cond(hessian) >= MAX_CONDITION:
         return None
-    # A motion d that opens all gaps by 1, with the least sum of |d|: one of nearly the least energy is as good.
+    # A motion d that opens all gaps by 1, with the least sum of |d|: nearly the least energy suffices.
     freedoms, eye = A.shape[1], np.eye(A.shape[1])
     lift = scipy.optimize.milp(
         np.r_[np.zeros(freedoms), np.ones(freedoms)],
@@ -100,7 +102,7 @@ def _reactions(model: LinearModel, region: AllowedRegion) -> _Reactions | None:
     lowest = model.gaps + slopes @ middle - np.abs(slopes) @ half
     highest = model.gaps + slopes @ middle + np.abs(slopes) @ half
     deepest = max(float(-lowest.min()), 0.0)
-    # The corrected motion has no more energy than `deepest` d, which opens all gaps; its reactions sum to as much.
+    # The corrected motion has no more energy than `deepest` d, which opens all gaps; this also bounds the sum of reactions.
     opening = np.sqrt(np.einsum("ij,jk,ik->i", A, np.linalg.inv(hessian), A)) * deepest * energy
     return _Reactions(hessian, np.maximum(highest + opening, 1e-9), np.full(len(A), max(deepest, 1e-9) * energy**2))
 
@@ -108,7 +110,7 @@ def _reactions(model: LinearModel, region: AllowedRegion) -> _Reactions | None:
 class _Problem:
     """The largest sense * (measure - nominal) over points x of the region and motions y.
 
-    With `reactions`, also over reactions r, and over binaries b of rows that carry (1) or are open (0).
+    With `reactions`, also over reactions r, and over binaries b of rows that are active (1) or open (0).
     """
 
     def __init__(
@@ -142,12 +144,12 @@ class _Problem:
             self._add_optimality(model, reactions)
 
     def _add_contact(self, model: LinearModel) -> None:
-        """Keep gaps open, and two-sided locators where they are."""
+        """Constrain gaps to be non-negative, and bilateral locators to their positions."""
         self._add(np.hstack([self._region.slopes(model.gaps_by_deviations), model.gaps_by_motion]), -model.gaps, np.inf)
-        self._add(np.hstack([np.zeros((len(model.held), len(self._region.lower))), model.held]), 0.0, 0.0)
+        self._add(np.hstack([np.zeros((len(model.bilateral), len(self._region.lower))), model.bilateral]), 0.0, 0.0)
 
     def _add_optimality(self, model: LinearModel, reactions: _Reactions) -> None:
-        """Balance the objective's gradient by the reactions; a row carries only if its gap is closed."""
+        """Balance the objective's gradient by the reactions; a row is active only if its gap is closed."""
         gaps = np.hstack([self._region.slopes(model.gaps_by_deviations), model.gaps_by_motion])
         count, freedoms = model.gaps_by_motion.shape
         eye, zeros = np.eye(count), np.zeros((count, count))
@@ -194,10 +196,10 @@ def _null_stream() -> int | None:
 
 @contextlib.contextmanager
 def muted_c_stdout() -> Iterator[None]:
-    """Drop what C code prints to its stream `stdout`, such as HiGHS in integer programs; without glibc, drop nothing.
+    """Suppress the output of C code to its stream `stdout`, such as HiGHS in integer programs; without glibc, do nothing.
 
     With glibc this stream is a variable. It leads to the null device while any thread is in this context. The file descriptor
-    stays as it is, so that Python's own output, of this thread and of all others, is not touched.
+    does not change, so that Python's own output, from any thread, is not affected.
     """
     global _inside, _stream  # noqa: PLW0603  the stream is global, so is its replacement
     if platform.libc_ver()[0] != "glibc":

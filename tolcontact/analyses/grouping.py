@@ -18,7 +18,7 @@ def check_grouping(by: str) -> None:
 
 
 def owners(program: Program, by: str) -> list[str]:
-    """Return the owner of each column of the deviations: its contributor, feature or part; the modes of a form are one."""
+    """Return the owner of each column of deviations: its contributor, feature or part; the modes of a form have one owner."""
     nominal, labels = program.nominal, list(program.nominal.contributors)
     if by == "contributor":
         contributors = zip(labels, program.draws.contributors, strict=True)
@@ -34,9 +34,9 @@ def owners(program: Program, by: str) -> list[str]:
 def independent_groups(
     draws: Draws, owners: Sequence[str], varies: np.ndarray, *, correlated: bool = True
 ) -> dict[str, np.ndarray]:
-    """Return columns that vary by owner, with owners joined whose columns are drawn together, so that groups are independent.
+    """Return columns that vary, by independent groups: owners are joined if any of their columns are drawn jointly.
 
-    Without `correlated`, groups that are correlated by declaration stay apart.
+    Without `correlated`, groups that are correlated by declaration remain separate.
     """
     leader = list(range(len(owners)))
 

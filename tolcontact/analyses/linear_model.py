@@ -1,4 +1,4 @@
-"""A model to first order at the nominal assembly, in numbers: for bounds, and for the sensitivities of designers."""
+"""The first-order model at the nominal assembly, as matrices: for bounds, and for nominal sensitivities."""
 
 from dataclasses import dataclass
 
@@ -8,16 +8,17 @@ from tolcontact import poses as pose
 from tolcontact.compilation import Program
 from tolcontact.mechanics import Group
 
-MAX_BEND = 0.1  # of the largest slope of a measure: if slopes ahead and behind differ by more, there is a kink
+MAX_SLOPE_DIFFERENCE = 0.1  # of the largest slope of a measure: if forward and backward slopes differ by more, there is a kink
 MIN_SLOPE = 1e-6  # of a measure: smaller ones are rounding
-STEP = 1e-4  # mm, and rad times the length of a group: steps of central differences; what is odd in them cancels
+STEP = 1e-4  # mm, and rad times the length of a group: steps of central differences; second-order terms cancel
 
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """Measures and gaps for deviations d (contributor,), and a motion y of the free parts from where d places them.
+    """Measures and gaps for deviations d (contributor,), and a motion y of the free parts from their poses at d.
 
-    A motion is (dt, L w) of each free part: a shift of its middle [mm], and a turn times the length L of its group [mm].
+    A motion is (dt, L w) of each free part: a translation of its centre [mm], and a rotation times the length L of its group
+    [mm].
 
     measures         (measure,) nominally
     by_deviations    (measure, contributor)
@@ -26,9 +27,9 @@ class LinearModel:
                      has no derivatives
     gaps             (row,) nominally: of the contact points that can be the deepest, of pairs of flat faces
     gaps_by_deviations, gaps_by_motion   (row, contributor), (row, freedom)
-    held             (row, freedom): motions that two-sided locators hold at 0, if the objective is seating
+    bilateral        (row, freedom): motions that bilateral locators constrain to 0, if the objective is seating
     displacements    (row, freedom): of all contact points, scaled so that the sum of squares is the objective "all points"
-    round_pairs      how many pairs of round faces have no rows here
+    round_pairs      number of pairs of round faces, which have no rows here
     """
 
     measures: np.ndarray
@@ -38,7 +39,7 @@ class LinearModel:
     gaps: np.ndarray
     gaps_by_deviations: np.ndarray
     gaps_by_motion: np.ndarray
-    held: np.ndarray
+    bilateral: np.ndarray
     displacements: np.ndarray
     round_pairs: int
 
@@ -52,21 +53,22 @@ def linear_model(program: Program) -> LinearModel:
         _observed(program, poses, np.zeros((len(poses), count))) for poses in (_motions(program, 1), _motions(program, -1))
     ]
     (measures,), (gaps,) = _observed(program, _at_rest(program, 1), np.zeros((1, count)))
-    with np.errstate(invalid="ignore"):  # of measures that are infinite
+    with np.errstate(invalid="ignore"):  # for measures that are infinite
         by_deviations, by_motion = (
             [(ahead - behind).T / (2 * STEP) for ahead, behind in zip(*sides, strict=True)] for sides in (varied, moved)
         )
         kinked = np.array([_kinks(*(ends[0] - measures for ends in sides)) for sides in (varied, moved)])
     return LinearModel(
-        measures, by_deviations[0], by_motion[0], kinked, gaps, by_deviations[1], by_motion[1], _held(program),
+        measures, by_deviations[0], by_motion[0], kinked, gaps, by_deviations[1], by_motion[1], _bilateral_motions(program),
         _displacements(program), sum(gaps is None for gaps in program.gaps),
     )  # fmt: skip
 
 
 def total_derivatives(program: Program) -> np.ndarray:
-    """Return derivatives (measure, contributor) of the raw measures at the nominal assembly; of causes with what they drive.
+    """Return derivatives (measure, contributor) of the raw measures at the nominal assembly.
 
-    They are NaN for a measure with a kink there.
+    The derivative with respect to a shared cause includes the contributors that it drives. Derivatives are NaN for a measure
+    with a kink at the nominal assembly.
     """
     model = linear_model(program)
     by_deviations = np.where(model.kinked[0][:, None], np.nan, model.by_deviations)
@@ -75,19 +77,19 @@ def total_derivatives(program: Program) -> np.ndarray:
 
 
 def _kinks(ahead: np.ndarray, behind: np.ndarray) -> np.ndarray:
-    """Return whether each measure has a kink (measure,), from its changes (n, measure) by steps ahead and behind.
+    """Return whether each measure has a kink (measure,), from its changes (n, measure) by forward and backward steps.
 
-    At a kink the slopes ahead and behind differ by more than a part of the largest slope.
+    At a kink the forward and the backward slope differ by more than a share of the largest slope.
     """
     largest = np.maximum(np.abs(ahead), np.abs(behind)).max(axis=0, initial=STEP * MIN_SLOPE)
-    return np.asarray((np.abs(ahead + behind) > MAX_BEND * largest).any(axis=0))
+    return np.asarray((np.abs(ahead + behind) > MAX_SLOPE_DIFFERENCE * largest).any(axis=0))
 
 
 def leverages(program: Program) -> np.ndarray:
     """Return the leverage (contributor,) of each locator; NaN for other contributors.
 
-    The leverage is the largest displacement of any vertex of the part, or of its joint, for 1 mm, nominally. It is 1 for three
-    locators on a plane that span all of the part, and larger the closer together they stand.
+    The leverage is the largest nominal displacement of any vertex of the part, or of its joint, for 1 mm. It is 1 for three
+    locators on a plane that span the whole part, and increases as they move closer together.
     """
     nominal = program.nominal
     leverages = np.full(len(nominal.contributors), np.nan)
@@ -115,7 +117,7 @@ def _observed(program: Program, poses: np.ndarray, deviations: np.ndarray) -> tu
     relative = values["relative"].reshape(len(poses), len(program.nominal.pairs), pose.ENTRIES)
     rows = []
     for pair, gaps in enumerate(program.gaps):
-        if gaps is not None and not program.nominal.pairs[pair].is_springy:  # springs let points inside
+        if gaps is not None and not program.nominal.pairs[pair].is_springy:  # springs permit penetration
             by_pose, by_deviations = np.split(gaps.coordinates[:, gaps.corners], [gaps.basis.shape[1]])
             entries = np.column_stack([relative[:, pair], np.ones(len(poses))])
             rows.append(entries @ gaps.basis @ by_pose + deviations[:, gaps.columns] @ by_deviations)
@@ -127,7 +129,7 @@ def _at_rest(program: Program, count: int) -> np.ndarray:
 
 
 def _freedoms(program: Program) -> list[tuple[Group, int, int]]:
-    """Return all freedoms: group, position of the mover among its free parts, and axis (0 to 2 shifts, 3 to 5 turns)."""
+    """Return all freedoms: group, position of the mover among its free parts, axis (0 to 2 translations, 3 to 5 rotations)."""
     groups = [compiled.group for compiled in program.groups]
     return [(group, mover, axis) for group in groups for mover in range(len(group.free)) for axis in range(6)]
 
@@ -151,14 +153,14 @@ def _motions(program: Program, sign: int) -> np.ndarray:
                 poses[row, part] += sign * STEP * np.concatenate([turn.ravel(), origin])
     deviations = np.zeros((len(freedoms), len(program.nominal.contributors)))
     for station in program.stations:
-        if station.place is not None:  # a motion in an earlier station moves what it hands on
+        if station.place is not None:  # a motion in an earlier station moves the parts that it hands on
             placed = station.place(poses=poses[:, station.sources], deviations=deviations)["placed"]
             poses[:, station.parts] += placed.reshape(len(freedoms), -1, pose.ENTRIES) - pose.AT_REST
     return poses.reshape(len(freedoms), pose.ENTRIES * len(program.nominal.parts))
 
 
-def _held(program: Program) -> np.ndarray:
-    """Return the displacements (row, freedom) of two-sided locators along their directions, if the objective is seating."""
+def _bilateral_motions(program: Program) -> np.ndarray:
+    """Return the displacements (row, freedom) of bilateral locators along their directions, if the objective is seating."""
     if not program.method.minimizes.presses:
         return np.zeros((0, len(_freedoms(program))))
     rows = []
@@ -167,7 +169,7 @@ def _held(program: Program) -> np.ndarray:
             nominal = program.nominal.parts[part]
             exact = nominal.locators.exact
             for p, n in zip(nominal.locators.points[exact], nominal.locators.directions[exact], strict=True):
-                rows.append([  # a motion of a part that carries this one carries its locators, too
+                rows.append([  # a motion of a part that supports this one also moves its locators
                     n @ _moves(group, mover, axis, p[None])[0] if group is compiled.group and mover == number else 0.0
                     for group, mover, axis in _freedoms(program)
                 ])  # fmt: skip

@@ -1,4 +1,4 @@
-"""Effects of tolerances on measures: what changes if the zones of a group were a little narrower."""
+"""Effects of tolerances on measures: the changes if the zones of a group were slightly narrower."""
 
 import numpy as np
 
@@ -9,13 +9,13 @@ from tolcontact.analyses.scaled_trials import STEP, ScaledTrials
 from tolcontact.compilation import Program
 from tolcontact.statistics.intervals import mean
 
-BATCHES = 32  # of realizations, for intervals of effects
-# Realizations for the effect of a group: at least; at most samples / 4, and 4 samples / groups.
+BATCHES = 32  # of realizations, for the intervals of effects
+# Realizations for the effect of a group: at least this number; at most samples / 4, and 4 samples / groups.
 MIN_EFFECT_SAMPLES, EFFECT_SHARE = 512, 4
 
 
 def effect_samples(samples: int, groups: int) -> int:
-    """Return how many of `samples` realizations the effect of each group is estimated from."""
+    """Return the number of realizations, out of `samples`, for the effect of each group."""
     count = min(samples // EFFECT_SHARE, EFFECT_SHARE * samples // max(groups, 1))
     return min(max(count, MIN_EFFECT_SAMPLES), samples)
 
@@ -23,7 +23,7 @@ def effect_samples(samples: int, groups: int) -> int:
 def narrowing_effects(trials: ScaledTrials, program: Program) -> np.ndarray:
     """Return changes (measure, of_effect, group, interval) if a group's zones were a tenth narrower.
 
-    Intervals are those of means over batches of the same draws. A group that changes none of the first batches has no effect.
+    Intervals come from means over batches of the same draws. A group that changes none of the first batches has no effect.
     """
     limits = [program.limits(number) for number in range(len(program.nominal.measures))]
     ones = np.ones(len(trials))

@@ -1,4 +1,4 @@
-"""The place of a locator, within a box, at which a measure varies least, with contact."""
+"""The position of a locator, within a box, that minimizes the variation of a measure, with contact."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,9 +23,9 @@ from tolcontact.statistics.sample import Sample
 from tolcontact.statistics.statistic_request import StatisticRequest
 from tolcontact.workflow.models import DEFAULT_SOLVER, Choice, Model
 
-GRID_POINTS = {1: 9, 2: 5, 3: 4}  # places tried along each side, by the number of sides
-MAX_TRIALS = 40  # after the grid, from its best place on
-PLACE_TOLERANCE = 1e-3  # of the sides: the search ends there
+GRID_POINTS = {1: 9, 2: 5, 3: 4}  # trial positions along each side, by the number of sides
+MAX_TRIALS = 40  # after the grid, starting at its best position
+POSITION_TOLERANCE = 1e-3  # of the sides: final accuracy of the search
 SIX_SIGMA = "6 sigma"
 EXAMPLES = (f"corner height: {SIX_SIGMA}", f"gap: {terms.PPM}")
 
@@ -35,21 +35,21 @@ def relocate(
     solver: str = DEFAULT_SOLVER, method: Choice | None = None, into: str | Path | None = None, client: Any = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:  # fmt: skip
-    """Return the best place of a locator, "part.locator", in the box `between` two corners, in its part's own frame [mm].
+    """Return the best position of a locator, "part.locator", in the box `between` two corners, in its part's own frame [mm].
 
-        point        (stage, axis)      its place "before" and "after" [mm]
+        point        (stage, axis)      its position "before" and "after" [mm]
         reached      (stage, interval)  the statistic `least` in a fresh run of 4 samples realizations, with its 95 % interval
-        change       (interval)         6 sigma after / before, or the share outside after minus before, of the same draws
-        unresolved   (stage)            number of realizations of the fresh run that were not resolved
-        tried        (trial, axis)      all places that were tried [mm], and
+        change       (interval)         6 sigma after / before, or the share outside after minus before, for the same draws
+        unresolved   (stage)            number of unresolved realizations in the fresh run
+        tried        (trial, axis)      all trial positions [mm]
         tried_value  (trial)            the statistic there; infinite where the model cannot be built
 
-    `least` is "corner height: 6 sigma", or "corner height: ppm" (the share outside of its limits). A coordinate that is the
-    same in both corners stays. The locator keeps its direction, so choose corners on the surface that it stands against. All
-    places are tried with the same draws: first a grid, then those of scipy's COBYQA from the best place of the grid on. The
-    statistic may have several minima, or be flat: look at `tried_value`. Each trial compiles a model. `progress` is called
-    with the number of trials, and their largest number.
-    Arguments that all analyses share, and what they raise, are described in tolcontact.analyses. Raises OptionError also for a
+    `least` is "corner height: 6 sigma", or "corner height: ppm" (the share outside its limits). A coordinate that is the same
+    in both corners does not change. The locator keeps its direction, so choose corners on the surface that it contacts. All
+    trials use the same draws: first a grid, then scipy's COBYQA starting at the best point of the grid. The statistic may have
+    several minima, or be flat: see `tried_value`. Each trial compiles a model. `progress` is called with the number of trials,
+    and their largest number.
+    Arguments that all analyses share, and their errors, are described in tolcontact.analyses. Also raises OptionError for a
     locator, a box or a measure that does not exist.
     """
     analysis = Analysis(
@@ -59,7 +59,7 @@ def relocate(
     analysis.check_affordable(VERIFICATION_FACTOR * samples)
     goal = Goal.parse(least, analysis.program)
     trials = RelocatedTrials(analysis.program.nominal.assembly, analysis, locator, goal.measure)
-    places = TriedPlaces(trials, goal, *_corners(between))
+    places = TrialPositions(trials, goal, *_corners(between))
     places.try_grid()
     if not np.isfinite(places.values).any():
         lower, upper = places.lower.tolist(), places.upper.tolist()
@@ -81,9 +81,9 @@ def relocate(
 
 @dataclass(frozen=True)
 class Goal:
-    """The statistic that is to be least: 6 sigma of a corrected measure, or the share outside of its limits.
+    """The statistic to minimize: 6 sigma of a corrected measure, or the share outside its limits.
 
-    measure  number of the measure
+    measure  index of the measure
     units    of the statistic
     """
 
@@ -117,7 +117,7 @@ class Goal:
 
 
 class RelocatedTrials:
-    """Simulations of one measure of the assembly with a locator at other places, on the same draws."""
+    """Simulations of one measure of the assembly with a locator at other positions, on the same draws."""
 
     def __init__(self, assembly: Assembly, analysis: Analysis, locator: str, measure: int) -> None:
         self._assembly, self.analysis, self._measure = assembly, analysis, measure
@@ -130,13 +130,13 @@ class RelocatedTrials:
 
     @property
     def point(self) -> np.ndarray:
-        """The declared place of the locator, (3,) [mm]."""
+        """The declared position of the locator, (3,) [mm]."""
         return np.array(self._scheme[self._number].point)
 
     def measured(self, point: np.ndarray, *, fresh: bool = False) -> tuple[np.ndarray, int]:
-        """Return the corrected measure (n,) with the locator at a point (3,) [mm], and how many realizations were not resolved.
+        """Return the corrected measure (n,) with the locator at a point (3,) [mm], and the number of unresolved realizations.
 
-        A `fresh` run has draws of its own, and more of them.
+        A `fresh` run has other draws, and more of them.
         """
         analysis, scheme = self.analysis, list(self._scheme)
         scheme[self._number] = at_point(scheme[self._number], point)
@@ -157,8 +157,8 @@ class RelocatedTrials:
         )
 
 
-class TriedPlaces:
-    """Places in a box that are tried, and the value of the goal at each.
+class TrialPositions:
+    """Trial positions in a box, and the value of the goal at each.
 
     lower, upper    (3,) corners of the box [mm]
     points, values  of all trials
@@ -173,19 +173,19 @@ class TriedPlaces:
         self.values: list[float] = []
 
     def try_grid(self) -> None:
-        """Try a grid of places."""
+        """Try a grid of positions."""
         axes = [np.linspace(0, 1, self._count)] * len(self._sides)
         for shares in np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(self._sides)):
             self._try(shares)
 
     def search(self) -> None:
-        """Try further places from the best one on."""
+        """Try further positions, starting at the best one."""
         start = self._shares[int(np.nanargmin(self.values))]
-        ceiling = 1e3 * max(value for value in self.values if np.isfinite(value))  # COBYQA takes no infinity
+        ceiling = 1e3 * max(value for value in self.values if np.isfinite(value))  # COBYQA does not accept infinity
         scipy.optimize.minimize(
             lambda shares: min(self._try(shares), ceiling),
             start, method="COBYQA", bounds=scipy.optimize.Bounds(np.zeros(len(start)), np.ones(len(start))),
-            options={"maxfev": MAX_TRIALS, "initial_tr_radius": 0.5 / self._count, "final_tr_radius": PLACE_TOLERANCE},
+            options={"maxfev": MAX_TRIALS, "initial_tr_radius": 0.5 / self._count, "final_tr_radius": POSITION_TOLERANCE},
         )  # fmt: skip
 
     def _try(self, shares: np.ndarray) -> float:
@@ -207,7 +207,7 @@ class TriedPlaces:
 
 
 def declared_locators(nominal: Nominal, part: NominalPart) -> tuple[Locator, ...]:
-    """Return the locators of a part in its own frame, or of a joint in those of its parts, as a script would declare them."""
+    """Return the locators of a part in its own frame, or of a joint in the frames of its parts, as in a script."""
     if not isinstance(part.scheme, ThreeTwoOne):
         return part.scheme or ()
     locators, scheme = part.locators, list[Locator]()

@@ -1,4 +1,4 @@
-"""Requirements on a measure: a share outside of its limits, or a capability."""
+"""Requirements on a measure: a share outside its limits, or a capability."""
 
 import math
 from dataclasses import dataclass
@@ -16,18 +16,18 @@ from tolcontact.vocabulary import PPK, PPM
 
 TAIL, HEAD = 0.00135, 0.99865
 ROUNDING = 1e-9
-MIN_DECISIVE, DECISIVE = 64, 4  # values that decide a margin: at least, and times those beyond it
-MIN_HITS = 10  # realizations outside of limits that a share is estimated from
+MIN_DECISIVE, DECISIVE = 64, 4  # values that determine a margin: at least, and in multiples of the values beyond it
+MIN_HITS = 10  # realizations outside the limits needed to estimate a share
 EXAMPLES = ("corner height: ppm 1000", "gap: Ppk 1.33")
 
 
 @dataclass(frozen=True)
 class Requirement:
-    """At most a share of a corrected measure outside of its limits, or at least a Ppk.
+    """A largest share of a corrected measure outside its limits, or a smallest Ppk.
 
-    name      as the user states it
-    measure   number of the measure
-    is_share  whether `value` is a share (of 1), else it is a Ppk
+    name      the text of the user
+    measure   index of the measure
+    is_share  whether `value` is a share (of 1); otherwise it is a Ppk
     """
 
     name: str
@@ -50,7 +50,7 @@ class Requirement:
 
     @property
     def share(self) -> float:
-        """The share of values that it allows beyond the limits; of a Ppk, that beyond its percentiles."""
+        """The permitted share of values beyond the limits; for a Ppk, the share beyond its percentiles."""
         return self.value if self.is_share else TAIL
 
     def check(self, samples: int) -> None:
@@ -60,7 +60,7 @@ class Requirement:
             raise OptionError(f'{samples} realizations are too few for "{self.name}"; expected samples={minimum} or more')
 
     def margin(self, x: np.ndarray) -> float:
-        """Return the margin by which values (n,) keep the requirement, in the measure's units; below 0 if they do not.
+        """Return the margin of values (n,) above the requirement, in the measure's units; negative if they do not meet it.
 
         For a share the margin is a quantile of the distances within the limits. It changes continuously with the values,
         while a count of values outside jumps.
@@ -75,16 +75,16 @@ class Requirement:
         return float(min(sides))
 
     def decisive(self, x: np.ndarray) -> np.ndarray:
-        """Return the numbers of the values (n,) that the margin follows from: those beyond it, and as many again near it.
+        """Return the indices of the values (n,) that determine the margin: values beyond it, and values near it.
 
-        The median of a Ppk is regarded as if it stayed.
+        The median of a Ppk is treated as constant.
         """
         count = max(math.ceil(DECISIVE * self.share * len(x)), MIN_DECISIVE)
         orders = [np.argsort(-self.limits.excess(x))] if self.is_share else [np.argsort(x), np.argsort(-x)]
         return np.concatenate([order[:count] for order in orders])
 
     def shortfall(self, x: np.ndarray) -> float:
-        """Return by how much of the required value values (n,) miss it; 0 if they keep it."""
+        """Return the shortfall of values (n,) as a share of the required value; 0 if they meet the requirement."""
         reached = self.estimate(x).value
         missing = reached - self.value if self.is_share else self.value - reached
         return max(missing / self.value, 0.0) if np.isfinite(missing) else np.inf

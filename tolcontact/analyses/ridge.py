@@ -1,4 +1,4 @@
-"""A step along the kinks of a measure: the least of several linear functions is maximized by a linear program."""
+"""A step along the kinks of a measure: a linear program maximizes the minimum of several linear functions."""
 
 import numpy as np
 import scipy
@@ -14,12 +14,12 @@ def ridge_end(
     values: np.ndarray,
     slopes: np.ndarray,
 ) -> np.ndarray:
-    """Return the point (contributor,) of the region near `center` (contributor,) at which the least linear function is largest.
+    """Return the point (contributor,) of the region near `center` (contributor,) that maximizes the least linear function.
 
-    half_widths  (contributor,): the point is no farther from the center
+    half_widths  (contributor,): largest distance of the point from the center
     points, values, slopes  (n, contributor), (n,), (n, contributor): function k is values_k + slopes_k (x - points_k)
 
-    The center itself is returned if there is no such point, or no value.
+    The center is returned if there is no such point, or no value.
     """
     rows, columns = np.flatnonzero(np.isfinite(values)), np.flatnonzero(half_widths > 0)
     if not rows.size or not columns.size:

@@ -1,4 +1,4 @@
-"""Simulations of a model whose tolerance ranges are scaled."""
+"""Simulations of a model with scaled tolerance ranges."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,14 +11,14 @@ from tolcontact.analyses.engine import VERIFICATION_FACTOR, Engine
 from tolcontact.variation import Draws
 
 STEP = 0.1  # of ranges, for differences
-FIRST_TRIALS = 64  # realizations, which show whether most are unresolved
-MAX_ROWS = 1 << 16  # realizations that are simulated at once, for several factors
+FIRST_TRIALS = 64  # realizations that show whether most are unresolved
+MAX_ROWS = 1 << 16  # realizations per simulation, over several factors
 
 
 class Trial(NamedTuple):
-    """Corrected measures (n, measure) of realizations, and which of these are resolved (n,).
+    """Corrected measures (n, measure) of realizations, and whether each is resolved (n,).
 
-    Poses of other realizations are arbitrary, and so are their measures.
+    Poses of unresolved realizations are arbitrary, and so are their measures.
     """
 
     corrected: np.ndarray
@@ -41,16 +41,16 @@ class ScaledTrials:
     def trial(self, factors: np.ndarray, *, verification: int = 0) -> Trial:
         """Return the trial with the groups' ranges times factors (group,).
 
-        A `verification` with a number above 0 has draws of its own, and more of them.
+        A `verification` above 0 is the number of a run with other draws, and more of them.
         """
         count = VERIFICATION_FACTOR * self.samples if verification else self.samples
         measured, status = self.engine.simulate(count, start=verification << 32, seed=self.seed, draws=self._draws(factors))
         return Trial(np.ascontiguousarray(measured[:, terms.CORRECTED]), ~np.isin(status, terms.UNRESOLVED))
 
     def trial_within(self, factors: np.ndarray, most_unresolved: int) -> Trial | None:
-        """Return the trial with the groups' ranges times factors (group,), None once more realizations are not resolved.
+        """Return the trial with the groups' ranges times factors (group,), or None if too many realizations are unresolved.
 
-        These take a hundred times as long as others.
+        It stops once there are more than `most_unresolved`, since these take a hundred times as long as others.
         """
         draws, parts, unresolved, start = self._draws(factors), [], 0, 0
         while start < self.samples:
@@ -64,7 +64,7 @@ class ScaledTrials:
         return Trial(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
     def corrected_rows(self, factors: Sequence[np.ndarray], rows: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Return corrected measures (row, measure) of some realizations, for each of several factors (group,).
+        """Return corrected measures (row, measure) of selected realizations, for each of several factors (group,).
 
         rows  numbers (row,) of the realizations for each of the factors
         """
@@ -77,17 +77,17 @@ class ScaledTrials:
         return corrected
 
     def _corrected(self, deviations: np.ndarray) -> np.ndarray:
-        """Return corrected measures (n, measure) of deviations (n, contributor); there may be none."""
+        """Return corrected measures (n, measure) of deviations (n, contributor); n may be 0."""
         if not len(deviations):
             return np.empty((0, len(self.engine.program.nominal.measures)))
         return self.engine.simulate_deviations(deviations)[0][:, terms.CORRECTED]
 
     def _deviations(self, factors: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Return the deviations (row, contributor) of some realizations, by their numbers (row,)."""
+        """Return the deviations (row, contributor) of the realizations with numbers `rows` (row,)."""
         return self._draws(factors).from_numbers(lambda label: self._numbers(label)[rows], len(rows))
 
     def _numbers(self, label: str) -> np.ndarray:
-        """Return the numbers (n,) between 0 and 1 that a label's deviations depend on, in all realizations."""
+        """Return the random numbers (n,) between 0 and 1 for the deviations of a label, in all realizations."""
         if label not in self._known:
             self._known[label] = self.engine.program.draws.numbers(seed=self.seed, start=0, stop=self.samples)(label)
         return self._known[label]

@@ -17,7 +17,7 @@ from tolcontact.variation import GivenDraws
 from tolcontact.workflow.models import Model
 
 SEATED, DRAWN = "where the forces seat them", "as drawn, since the forces find no pose without friction"
-STEP = 1e-6  # mm, of differences of the gaps of round faces
+STEP = 1e-6  # mm, for finite differences of the gaps of round faces
 
 
 def seating(model: Model | Program, *, into: str | Path | None = None) -> xr.Dataset:
@@ -25,20 +25,20 @@ def seating(model: Model | Program, *, into: str | Path | None = None) -> xr.Dat
 
         critical  (seat)          the least coefficient of friction, the same at all other contacts, at which these can hold the
                                   part short of the seat. Below it, the forces push the part onto the seat. It is 0 if the other
-                                  contacts hold the part without friction, as where no force presses it against the seat, and
-                                  infinite if no friction holds the part short of the seat
+                                  contacts hold the part without friction, for example if no force presses it against the seat,
+                                  and infinite if no friction holds the part short of the seat
         reserve   (seat)          the least factor of the stated coefficients (`mu`) at which the other contacts can hold it: up
                                   to 1 the part may stop short. Not a number unless all of these state one
-        share     (seat, holder)  the share that each contact then has in the sum of all normal forces: what holds the part; one
-                                  distribution of several where it is not unique
+        share     (seat, holder)  the share of each contact in the sum of all normal forces at this coefficient, which shows the
+                                  contacts that hold the part; one of several distributions where it is not unique
 
-    Parts stand where the forces seat them without deviations and without friction, in the exact resolution, for any method
-    of the model. If they find no such pose, parts stand as drawn (attribute `place`). What touches there may carry: one-sided
-    locators and contact pairs with friction, two-sided locators without. A contact that states mu=0 has no friction. Opposed
-    contacts may press against each other as hard as the balance of forces allows, as in a drawer that jams. Whether a part does
-    stop short depends on how it was put down, which nobody knows; the coefficient states whether it can. It is exact to 1e-6;
-    where contacts can also press against each other without holding the forces, to 1e-3 (see tolcontact.statics).
-    Arguments that all analyses share, and what they raise, are described in tolcontact.analyses.
+    Parts are in their poses as seated by the forces without deviations and without friction, in the exact resolution, for any
+    method of the model. If there is no such pose, parts are in their poses as drawn (attribute `place`). Contacts that
+    touch there may be active: unilateral locators and contact pairs with friction, bilateral locators without. A contact that
+    states mu=0 has no friction. Opposed contacts may press against each other as hard as the balance of forces permits, as in a
+    drawer that jams. Whether a part actually stops short depends on how it was put down, which is unknown; the coefficient
+    states whether it can. It is exact to 1e-6, or to 1e-3 where contacts can also press against each other without holding the
+    forces (see tolcontact.statics). Arguments that all analyses share, and their errors, are described in tolcontact.analyses.
     """
     question = Question(terms.SEATING, model, solver=None, method=None, into=into)
     if not question.program.nominal.assembly.forces:
@@ -64,7 +64,7 @@ def seating(model: Model | Program, *, into: str | Path | None = None) -> xr.Dat
 
 
 def _pressed(question: Question, touching: Touching) -> list[Balance]:
-    """Return the balances of parts that forces press. Raises OptionError if nothing holds their parts, even with friction."""
+    """Return the balances of parts that forces press. Raises OptionError if nothing can hold them, even with friction."""
     pressed = [balance for balance in balances(touching) if balance.is_pressed]
     for balance in pressed:
         if not balance.is_held:
@@ -78,7 +78,7 @@ def _pressed(question: Question, touching: Touching) -> list[Balance]:
 
 
 def seated_contacts(program: Program) -> Touching | None:
-    """Return the contacts at the pose of exact seating; None if the forces find no such pose."""
+    """Return the contacts at the pose of exact seating; None if there is no such pose."""
     seated = compile_program(program.nominal, program.plugin.name, Method(resolution="exact", objective="seating"))
     deviations = np.zeros((1, len(program.nominal.contributors)))
     (block,) = simulate_blocks(seated, samples=1, seed=0, draws=GivenDraws(deviations), block=1)
@@ -95,12 +95,12 @@ def seated_contacts(program: Program) -> Touching | None:
 
 
 def _in_assembly(places: TouchingPoints, X_WR: np.ndarray) -> TouchingPoints:
-    """Return places of the frame of a reference part at X_WR (12,) in that of the assembly."""
+    """Return contact points in the frame of a reference part at X_WR (12,), transformed to the frame of the assembly."""
     return TouchingPoints(pose.apply(X_WR, places.points), places.normals @ pose.rotation(X_WR).T)
 
 
 def _touching(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray) -> TouchingPoints:
-    """Return the places at which pair k touches at X_RM (1, 12), in the frame of its reference part."""
+    """Return the points at which pair k touches at X_RM (1, 12), in the frame of its reference part."""
     pair = program.nominal.pairs[k]
     assert pair.moving_face is not None and pair.reference_face is not None
     nearness = TOUCH_SHARE * max(pair.moving_face.mesh.scale, pair.reference_face.mesh.scale)
@@ -115,7 +115,7 @@ def _touching(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray
 
 
 def _touching_round(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray, nearness: float) -> TouchingPoints:
-    """Return the places at which balls and shafts touch walls; normals are the derivatives of the gaps by the translation."""
+    """Return the points at which balls and shafts touch walls; normals are the derivatives of gaps by translation."""
     pair = program.nominal.pairs[k]
     assert pair.round is not None
     shifts = STEP * np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])

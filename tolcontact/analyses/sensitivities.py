@@ -1,4 +1,4 @@
-"""Derivatives of each measure by each contributor, through contact."""
+"""Derivatives of each measure with respect to each contributor, with contact."""
 
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.workflow.models import Choice, Model
 
 STEP = 0.01  # of a contributor's standard deviation
-MAX_DIFFERENCE = 0.1  # of a derivative: if its two sides differ by more, there is a kink
+MAX_DIFFERENCE = 0.1  # of a derivative: if its one-sided values differ by more, there is a kink
 NEGLIGIBLE = 0.1  # of the largest derivative of a measure: smaller ones may differ by a tenth of that
 
 
@@ -28,7 +28,7 @@ def sensitivities(
 ) -> xr.Dataset:  # fmt: skip
     """Return derivatives of each measure by each contributor that varies, from differences in each realization.
 
-        nominal      (measure, contributor)                    of the raw measure at the nominal assembly, as designers read it;
+        nominal      (measure, contributor)                    of the raw measure at the nominal assembly, as in a stack-up;
                                                                NaN where the measure has a kink there
         leverage     (contributor)                             of a locator: the largest displacement of any point of its part,
                                                                for 1 mm; not a number for others
@@ -39,12 +39,13 @@ def sensitivities(
                                                                by contact, and those touched
         step         (contributor)                             a hundredth of its standard deviation, up and down
 
-    Each contributor is stepped alone, even if it is drawn together with others; a shared cause with what it drives. Where the
-    same points carry before and after the step, and both sides of the step agree within a tenth (or a hundredth of the largest
-    derivative), the central difference is the derivative to second order. Elsewhere it is a mean of both sides and of a jump
-    between them. The linearized resolution may cause jumps, and so may points that join the objective "active points".
-    (2 contributors + 1) samples are simulated. `progress` is called with the number of finished realizations, and of all.
-    Arguments that all analyses share, and what they raise, are described in tolcontact.analyses.
+    Each contributor is stepped alone, even if it is drawn jointly with others; a shared cause is stepped with the contributors
+    that it drives. Where the active set is the same before and after the step, and both sides of the step agree within a tenth
+    (or a hundredth of the largest derivative), the central difference is the derivative to second order. Elsewhere it is a mean
+    of both sides and of a jump between them. The linearized resolution may cause jumps, and so may points that enter the
+    objective "active points". (2 contributors + 1) samples are simulated. `progress` is called with the number of finished
+    realizations and the total.
+    Arguments that all analyses share, and their errors, are described in tolcontact.analyses.
     """
     analysis = Analysis(
         terms.SENSITIVITIES, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
@@ -90,8 +91,9 @@ def _observed(block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _has_kink(ahead: np.ndarray, behind: np.ndarray, nominal: np.ndarray, rounding: np.ndarray) -> np.ndarray:
     """Return whether any measure has a kink or jump within the step, (n, contributor).
 
-    Differences `ahead` and `behind` are (n, contributor, state, measure), nominal derivatives (measure, contributor), and what
-    rounding of the solver makes of differences is (contributor, measure). A contributor with next to no effect has no kink.
+    Forward and backward differences `ahead` and `behind` are (n, contributor, state, measure), nominal derivatives (measure,
+    contributor). `rounding` (contributor, measure) is the effect of the solver's rounding on differences. A contributor with
+    almost no effect has no kink.
     """
     size = np.maximum(np.abs(ahead), np.abs(behind))
     typical = np.median(size.max(axis=2), axis=0).T  # (measure, contributor); a jump does not enlarge a median
@@ -100,7 +102,7 @@ def _has_kink(ahead: np.ndarray, behind: np.ndarray, nominal: np.ndarray, roundi
 
 
 def _means(slopes: np.ndarray) -> np.ndarray:
-    """Return means (measure, contributor, interval) of the derivatives (n, contributor, measure) that are numbers."""
+    """Return means (measure, contributor, interval) of the derivatives (n, contributor, measure) that are not NaN."""
 
     def mean(column: np.ndarray) -> Estimate:
         finite = column[np.isfinite(column)]

@@ -1,4 +1,4 @@
-"""Probabilities that a measure is outside its limits, or that parts cannot be assembled, where this is rare."""
+"""Probabilities of rare events: a measure outside its limits, or parts that cannot be assembled."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -23,7 +23,7 @@ from tolcontact.workflow.models import Choice, Model
 
 MIN_SAMPLES = 4000  # for an event
 BUDGET, DEFAULT_RANGE = 60_000, (10_000, 40_000)  # realizations for all events, and for one
-MIN_AT_STOP = 50  # values at a limit that nothing exceeds
+MIN_AT_STOP = 50  # values at a limit that is never exceeded
 UNDEFINED_TAIL = Tail(UNDEFINED, 1.0)
 
 
@@ -35,23 +35,22 @@ def tails(
     """Return probabilities of rare events (see tolcontact.statistics.rare).
 
         probability  (event, interval)          with its 95 % interval
-        disagreement (event)                    factor by which two searches for the event differ; 1 if they agree
-        stop         (event)                    1: many values were at one of the limits, and none beyond; beside another limit
-                                                it is left out
-        simulated    (event)                    number of realizations, of about `samples`
+        disagreement (event)                    ratio of the results of two searches for the event; 1 if they agree
+        stop         (event)                    1: many values were at one of the limits, and none beyond; if the other limit
+                                                can be exceeded, this one is left out
+        simulated    (event)                    number of realizations, out of about `samples`
         by_status    (event, status_meaning)    number of realizations, most of them unlikely ones
 
-    An event is that a corrected measure is beyond its limits by more than its accuracy, or, in an exact resolution, that parts
-    cannot be assembled. The score of the former is the measure itself, and each limit is searched for by itself; the latter is
-    searched for by inflation of all deviations alone. By default all events share 60 000 realizations, with 10 000 to 40 000
-    for each. A quarter of the samples suffices where the upper bound of the interval is at most 1.5 times the lower one,
-    or at most 1e-7; otherwise the other three quarters answer. A probability of 0 with an upper bound stands for an event whose
-    search ended below 1e-9. Where two searches disagree, the interval covers what both say, and more
-    realizations are needed. A measure that is not a number in some realization has the probability NaN, as `run` says of it.
-    Probabilities include realizations that are not resolved, with their last poses. `progress` is called with the number of
-    realizations simulated, and with the approximate number of all.
-    Arguments that all analyses share, and what they raise, are described in tolcontact.analyses. Raises OptionError also for a
-    model that has no rare event.
+    In an event a corrected measure is beyond its limits by more than its accuracy, or, in an exact resolution, parts cannot be
+    assembled. The score of the former is the measure, and each limit has its own search; the latter only has a search by
+    inflation of all deviations. By default all events share 60 000 realizations, with 10 000 to 40 000 for each. A quarter of
+    the samples suffices where the upper bound of the interval is at most 1.5 times the lower one, or at most 1e-7; otherwise
+    the result comes from the other three quarters. A probability of 0 with an upper bound means that the search ended below
+    1e-9. Where two searches disagree, the interval covers both results, and more realizations are needed. A measure that is not
+    a number in any realization has the probability NaN, as in `run`. Probabilities include unresolved realizations, with their
+    last poses. `progress` is called with the number of realizations simulated, and the approximate total. Arguments that all
+    analyses share, and their errors, are described in tolcontact.analyses. Also raises OptionError for a model that has no rare
+    event.
     """
     if isinstance(samples, int) and samples < MIN_SAMPLES:
         raise OptionError(f"samples is {samples!r}; expected at least {MIN_SAMPLES} realizations for an event")
@@ -67,16 +66,16 @@ def tails(
     searches = [
         _Search(event, number, side, samples // len(event.sides))
         for number, event in enumerate(events.values())
-        for side in range(len(event.sides))  # each has its own way, and may hide that of the other
+        for side in range(len(event.sides))  # each has its own region, and could hide the region of the other
     ]
-    answers = _answered(analysis, searches, len(events) * samples)
+    results = _run_searches(analysis, searches, len(events) * samples)
     event_tails, statuses, stops = [], [], []
     for number in range(len(events)):
-        sides = [answer for search, answer in zip(searches, answers, strict=True) if search.number == number]
-        # Beside another side, one at which values stop would only add how seldom a run of this size can see it.
-        kept = [side.tail for side in sides if not side.is_stop]
+        sides = [result for search, result in zip(searches, results, strict=True) if search.number == number]
+        # If the other limit can be exceeded, a limit that acts as a stop would only add its detection bound, so it is left out.
+        exceedable_tails = [side.tail for side in sides if not side.is_stop]
         is_undefined = any(side.is_undefined for side in sides)
-        event_tails.append(UNDEFINED_TAIL if is_undefined else either(kept or [side.tail for side in sides]))
+        event_tails.append(UNDEFINED_TAIL if is_undefined else either(exceedable_tails or [side.tail for side in sides]))
         stops.append(any(side.is_stop for side in sides))
         statuses.append(np.sum([side.statuses for side in sides], axis=0))
     values = {
@@ -108,34 +107,34 @@ def simulated_scores(engine: Engine, u: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 class _Event(NamedTuple):
-    """An event: scores of its sides, which exclude each other, and whether these say how near it is."""
+    """An event: the scores of its mutually exclusive sides, and whether these state how near it is."""
 
     sides: list[Callable[[Engine], Score]]
     leads: bool
 
 
 class _Search(NamedTuple):
-    """The search for one side of event `number`, with about `samples` realizations."""
+    """The search for one side of the event with index `number`, with about `samples` realizations."""
 
     event: _Event
     number: int
     side: int
     samples: int
 
-    def answer(self, engine: Engine, seed: int) -> "_Answer":
-        """Return what was found."""
+    def run(self, engine: Engine, seed: int) -> "_SearchResult":
+        """Return the result of the search."""
         score, rng = self.event.sides[self.side](engine), np.random.default_rng([seed, self.number, self.side])
         dimensions = len(engine.program.draws.varying)
         tail = sufficient_tail(score, dimensions, samples=self.samples, rng=rng, leads=self.event.leads)
         is_stop, is_undefined = (score.is_stop, score.is_undefined) if isinstance(score, _Beyond) else (False, False)
-        return _Answer(tail, is_stop, is_undefined, engine.statuses)
+        return _SearchResult(tail, is_stop, is_undefined, engine.statuses)
 
 
-class _Answer(NamedTuple):
-    """The answer of a search, and the number of realizations by their status.
+class _SearchResult(NamedTuple):
+    """The result of a search, and the number of realizations by status.
 
     is_stop       values stop at the limit
-    is_undefined  the measure is not a number in realizations that are not negligible
+    is_undefined  the measure is not a number in realizations of non-negligible probability
     """
 
     tail: Tail
@@ -144,16 +143,16 @@ class _Answer(NamedTuple):
     statuses: np.ndarray
 
 
-def _answered(analysis: Analysis, searches: Sequence[_Search], total: int) -> list[_Answer]:
-    """Return the answers of all searches, which do not depend on each other: at the same time, in threads of this process."""
+def _run_searches(analysis: Analysis, searches: Sequence[_Search], total: int) -> list[_SearchResult]:
+    """Return the results of all searches. They are independent, and run concurrently in threads of this process."""
     longest_first = sorted(range(len(searches)), key=lambda k: -searches[k].samples)
     pool = ThreadPoolExecutor(analysis.threads)
     with analysis.engines(len(searches), total) as engines:
         try:
-            running = {k: pool.submit(searches[k].answer, engines[k], analysis.seed) for k in longest_first}
+            running = {k: pool.submit(searches[k].run, engines[k], analysis.seed) for k in longest_first}
             return [running[k].result() for k in range(len(searches))]
         finally:
-            pool.shutdown(wait=False, cancel_futures=True)  # if all went well none is left; a stopped analysis does not wait
+            pool.shutdown(wait=False, cancel_futures=True)  # normally none is left; a stopped analysis does not wait
 
 
 def _events(program: Program) -> dict[str, _Event]:
@@ -175,7 +174,7 @@ def _events(program: Program) -> dict[str, _Event]:
 
 
 class _Beyond:
-    """The score of one side of a measure's limits: by how much values are beyond the limit and their accuracy."""
+    """The score of one side of a measure's limits: the excess of values over the limit and their accuracy."""
 
     def __init__(self, engine: Engine, measure: int, limits: Limits) -> None:
         self._engine, self._measure, self._limits = engine, measure, limits
@@ -184,7 +183,7 @@ class _Beyond:
 
     def __call__(self, u: np.ndarray) -> np.ndarray:
         measured, _ = simulated_scores(self._engine, u)
-        is_likely = gammaincc(u.shape[1] / 2, (u**2).sum(axis=1) / 2) > NEGLIGIBLE  # else inflation alone leads there
+        is_likely = gammaincc(u.shape[1] / 2, (u**2).sum(axis=1) / 2) > NEGLIGIBLE  # otherwise only inflation leads there
         self.is_undefined |= bool(np.isnan(measured[is_likely, terms.CORRECTED, self._measure]).any())
         excess = np.nan_to_num(self._limits.excess(measured[:, terms.CORRECTED, self._measure]), nan=-np.inf, posinf=np.inf)
         self._beyond += int((excess > 0).sum())
@@ -193,12 +192,12 @@ class _Beyond:
 
     @property
     def is_stop(self) -> bool:
-        """Whether many values were at the limit, also inflated ones, and none beyond."""
+        """Whether many values, including inflated ones, were at the limit, and none beyond."""
         return self._beyond == 0 and self._at_limit >= MIN_AT_STOP
 
 
 def not_assemblable(engine: Engine) -> Score:
-    """Return the score of parts that cannot be assembled: 1 if it is so, else -1."""
+    """Return the score of the event that parts cannot be assembled: 1 inside, -1 outside."""
 
     def score(u: np.ndarray) -> np.ndarray:
         _, status = simulated_scores(engine, u)

@@ -1,4 +1,4 @@
-"""The least and the largest value that each measure can have, with the combination of deviations that gives it."""
+"""The least and the largest possible value of each measure, with the combination of deviations that causes it."""
 
 from pathlib import Path
 from typing import Any
@@ -20,22 +20,22 @@ from tolcontact.variation import GivenDraws
 from tolcontact.variation.contributors import FORM
 from tolcontact.workflow.models import Choice, Model
 
-PER_LEVEL, PER_CONTRIBUTOR = 20.0, 6.0  # combinations that a search needs at each length of its steps
+PER_LEVEL, PER_CONTRIBUTOR = 20.0, 6.0  # combinations that a search needs at each step length
 PER_POLISH, PER_POLISHED_CONTRIBUTOR = 110.0, 22.0  # combinations that polishing an end needs
-EXCHANGES = 24  # combinations that influences are looked for at
-MAX_RESTARTS, RESTART_STEP = 3, 0.25  # of searches that continue, and the step that they begin with
+EXCHANGES = 24  # combinations at which influences are looked for
+MAX_RESTARTS, RESTART_STEP = 3, 0.25  # of continued searches, and their first step
 END_TOLERANCE = 1e-3  # of a measure's spread: searches that end at values closer than this have the same end
-NEGLIGIBLE = 1e-6  # of a measure's spread: smaller changes are no influence
-SINGLE = 2  # combinations in which contributors are exchanged one at a time
+NEGLIGIBLE = 1e-6  # of a measure's spread: smaller changes do not count as influence
+SINGLE = 2  # combinations with exchanges of one contributor at a time
 MAX_ROUNDS = 8
 
 
 class Influences:
-    """The contributors of a region that have an influence on each measure with contact, as far as is known.
+    """The contributors of a region with a known influence on each measure with contact.
 
-    They are found by exchanging deviations between combinations. Contributors that vary together, such as the components of a
-    feature in a zone, are exchanged together, so that the combinations that result lie in the region, too. A contributor
-    without influence anywhere is found by exchanging all of them at once.
+    They are found by exchanging deviations between combinations. Contributors that vary jointly, such as the components of a
+    feature in a zone, are exchanged jointly, so that the resulting combinations also lie in the region. Contributors without
+    influence anywhere are identified by exchanging all of them at once.
 
     spread     (measure,) difference between the largest and the least value of random points
     is_active  (measure, contributor)
@@ -49,7 +49,7 @@ class Influences:
     def explore(self, points: np.ndarray, partners: np.ndarray) -> np.ndarray:
         """Find influences at points (n, contributor), by exchange with partners (n, contributor).
 
-        Return whether there is one that was not known, (measure,).
+        Return whether a new influence was found, (measure,).
         """
         before = self.is_active.copy()
         for _ in range(MAX_ROUNDS):
@@ -66,13 +66,13 @@ class Influences:
         return np.asarray((self.is_active != before).any(axis=1))
 
     def _hidden(self, points: np.ndarray, partners: np.ndarray) -> np.ndarray:
-        """Return whether all contributors without known influence, exchanged together, change a measure, (n, measure)."""
+        """Return whether a joint exchange of all contributors without known influence changes a measure, (n, measure)."""
         mixed = np.where(self.is_active[:, None], points, partners)
         changes = self._changes(self._corrected(points)[None], self._corrected(mixed))
         return np.asarray(changes[np.arange(len(mixed)), :, np.arange(len(mixed))].T)
 
     def _explore_one_at_a_time(self, points: np.ndarray, partners: np.ndarray) -> None:
-        """Mark the contributors as active whose exchange changes a measure in any of the points (n, contributor)."""
+        """Mark contributors as active if their exchange changes a measure at any of the points (n, contributor)."""
         mixed = np.repeat(points[:, None], len(self._units), axis=1)
         for unit, columns in enumerate(self._units):
             mixed[:, unit, columns] = partners[:, columns]
@@ -84,7 +84,7 @@ class Influences:
         return self._evaluation.corrected(points)[..., terms.CORRECTED, :]
 
     def _changes(self, values: np.ndarray, exchanged: np.ndarray) -> np.ndarray:
-        """Return whether measures (..., measure) differ; also if one of them is certified and the other is not."""
+        """Return whether measures (..., measure) differ, including where only one of them is certified."""
         with np.errstate(invalid="ignore"):
             return np.asarray((np.abs(values - exchanged) > self._tolerances) | (np.isnan(values) != np.isnan(exchanged)))
 
@@ -93,10 +93,10 @@ def worst_case(
     model: Model | Program, *, samples: int = 512, seed: int = 1, solver: str | None = None, method: Choice | None = None,
     into: str | Path | None = None, client: Any = None, progress: Progress | None = None,
 ) -> xr.Dataset:  # fmt: skip
-    """Return the worst-case minimum and maximum of each measure over all that the tolerances allow.
+    """Return the worst-case minimum and maximum of each measure over everything that the tolerances allow.
 
         worst       (measure, state, end)               found by searches on the engine, nonlinear and with contact
-        deviations  (measure, state, end, contributor)  the combination that gives it
+        deviations  (measure, state, end, contributor)  the combination that causes it
         bound       (measure, state, end)               linear estimate. Raw: the sum of all tolerances times their nominal
                                                         sensitivities. Corrected: in the linear model no pose free of
                                                         penetration lies beyond (see tolcontact.analyses.farthest_pose);
@@ -104,27 +104,25 @@ def worst_case(
                                                         the part
         random      (measure, state, end)               the worst of `samples` random combinations
         agreeing    (measure, state, end)               number of searches that met: they ended at the value of the best one, or
-                                                        the measure grows from their end all the straight way to its end
-        ends        (measure, state, end)               number of different values that searches from random combinations
-                                                        ended at
+                                                        the measure grows along the straight line from their end to its end
+        ends        (measure, state, end)               number of distinct end values of searches from random combinations
         unseen      (measure, state, end)               expected share of starts that lead to an end which no search found
-        by_status   (status_meaning)                    number of realizations, of all that were simulated
-        measured, rotation, translation, gap_min, kkt_residual, status  (case, ...)  corrected worst cases in the form in which
-                                                        archives hold realizations; a case is "least" or "largest" of a measure
-        station_rotation, station_translation  (case, state, station_part, ...)  their poses in all stations, one after another
+        by_status   (status_meaning)                    number of realizations, out of all that were simulated
+        measured, rotation, translation, gap_min, kkt_residual, status  (case, ...)  corrected worst cases in the form of
+                                                        archived realizations; a case is "least" or "largest" of a measure
+        station_rotation, station_translation  (case, state, station_part, ...)  their poses in all stations, in sequence
 
-    tolcontact.analyses.allowed_space describes the region that combinations lie in. With contact a measure is neither smooth
-    nor concave, and the linearized resolution jumps: the searches may miss a worse combination, and `agreeing` says how many
-    of them met. Each measure is searched along the contributors that have an influence on it; the others change nothing when
-    they are exchanged all at once, in 24 random combinations and at each end (see tolcontact.analyses.worst_case).
-    `samples` / 256 searches begin at the best of all combinations tried: random ones, the far ends along nominal sensitivities,
-    and those along the slopes of a regression; `samples` / 128 begin at any of them (see tolcontact.analyses.extreme_search).
-    The best one continues in other random directions until it gains no more. `unseen` is the estimate w (w + 1) / (n (n - 1))
-    for w different ends of n searches from any of them (Boender, Rinnooy Kan, 1987). The linear estimate is exact to first
-    order in the deviations: large tilts may exceed it.
-    Only certified realizations count. `progress` is called with the number of realizations simulated, and with the
-    approximate number of all.
-    Arguments that all analyses share, and what they raise, are described in tolcontact.analyses.
+    tolcontact.analyses.allowed_space describes the region of the combinations. With contact a measure is neither smooth nor
+    concave, and the linearized resolution jumps: the searches may miss a worse combination, and `agreeing` states how many of
+    them met. Each measure is searched along the contributors that have an influence on it; the others change nothing when they
+    are exchanged all at once, in 24 random combinations and at each end (see tolcontact.analyses.worst_case).
+    `samples` / 256 searches start at the best of all trial combinations: random ones, the far ends along nominal sensitivities,
+    and the far ends along the slopes of a regression; `samples` / 128 start at any of them (see
+    tolcontact.analyses.extreme_search). The best one continues in other random directions until it gains no more. `unseen` is
+    the estimate w (w + 1) / (n (n - 1)) for w distinct ends of n searches from random combinations (Boender, Rinnooy Kan,
+    1987). The linear estimate is exact to first order in the deviations: large tilts may exceed it. Only certified realizations
+    count. `progress` is called with the number of realizations simulated, and the approximate total. Arguments that all
+    analyses share, and their errors, are described in tolcontact.analyses.
     """
     analysis = Analysis(
         terms.WORST_CASE, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
@@ -134,7 +132,7 @@ def worst_case(
 
 
 def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
-    """Return the dataset of `worst_case`, by searches of some effort."""
+    """Return the dataset of `worst_case`, by searches with a given effort."""
     program, engine = analysis.program, analysis.engine(analysis.samples)
     if any(contributor.source == FORM for contributor in program.draws.contributors):
         raise OptionError(
@@ -182,7 +180,7 @@ def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
 
 
 def _check_defined(program: Program, is_undefined: np.ndarray) -> None:
-    """Raise OptionError if measures (measure,) are not finite numbers somewhere in the region, or near the nominal assembly."""
+    """Raise OptionError if a measure (measure,) is not finite at any point of the region, or near the nominal assembly."""
     names = [f'"{program.nominal.measures[number].name}"' for number in np.flatnonzero(is_undefined)]
     if names:
         raise OptionError(
@@ -197,8 +195,8 @@ def _searched(
 ) -> Searches:
     """Search, and return the best search for each extreme value.
 
-    Where contributors without known influence turn out to have one at an end, by exchange with partners (n, contributor), the
-    searches of that measure continue along them, too.
+    If an exchange with partners (n, contributor) at an end shows an influence of further contributors, the searches of that
+    measure also continue along these.
     """
     for _ in range(MAX_RESTARTS):
         searcher.search(searches, forecast.advanced)
@@ -220,7 +218,7 @@ def _expected(active: np.ndarray, effort: Effort) -> int:
 
 
 class Forecast:
-    """The number of combinations that the searches will need, as the engine reports it."""
+    """The forecast number of combinations of the searches, reported by the engine."""
 
     def __init__(self, engine: Engine, influences: Influences, effort: Effort) -> None:
         self._engine, self._before = engine, engine.simulated
@@ -230,7 +228,7 @@ class Forecast:
         self.advanced(0.0)
 
     def advanced(self, share: float) -> None:
-        """Revise the total when a share of the searches is done."""
+        """Revise the total when a share of the searches is finished."""
         searched = self._engine.simulated - self._before
         expected = (1 - share) * self._expected + searched
         self._engine.total = self._engine.simulated + round((1 - share) * expected) + self._polishing
@@ -241,8 +239,8 @@ def _starts(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return points (n, contributor), and their measures (n, state, measure).
 
-    The points are the middle, `samples` random ones, and the far ends along nominal slopes and along those of a regression of
-    the corrected measures.
+    The points are the centre, `samples` random ones, and the far ends along nominal slopes and along the slopes of a regression
+    of the corrected measures.
     """
     nominal_ends = _far_ends(region, region.slopes(linear.by_deviations))
     points = np.vstack([region.middle, nominal_ends, region.scattered(rng, samples)])
@@ -264,10 +262,10 @@ def _far_ends(region: AllowedRegion, slopes: np.ndarray) -> np.ndarray:
 
 
 def _as_realizations(program: Program, deviations: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the variables that archives have of realizations, for deviations (n, contributor)."""
+    """Return the variables of archived realizations, for deviations (n, contributor)."""
     (block,) = simulate_blocks(program, samples=len(deviations), seed=0, draws=GivenDraws(deviations), block=len(deviations))
     last_poses, of_stations = block.poses[:, :, program.nominal.last_indices], dict[str, np.ndarray]()
-    if program.stations:  # whose parts follow each other station by station
+    if program.stations:  # parts are listed station by station
         of_stations[terms.STATION_ROTATION.name] = poses.rotation(block.poses)
         of_stations[terms.STATION_TRANSLATION.name] = poses.translation(block.poses)
     return of_stations | {
@@ -278,5 +276,5 @@ def _as_realizations(program: Program, deviations: np.ndarray) -> dict[str, np.n
 
 
 def _count_ends(values: np.ndarray, tolerance: float) -> int:
-    """Return how many values (n,) differ by more than a tolerance from the next smaller one."""
+    """Return the number of values (n,) that exceed the next smaller one by more than a tolerance."""
     return 1 + int((np.diff(np.sort(values)) > tolerance).sum())

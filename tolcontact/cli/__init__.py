@@ -26,7 +26,7 @@
     tolcontact --version
 
 `tolcontact COMMAND --help` lists the options, with examples; `tolcontact --install-completion` enables completion in the
-shell. A script with `tc.main(assembly)` under its main guard takes the options of `run`. Results go to stdout; progress,
+shell. A script with `tc.main(assembly)` under its main guard accepts the options of `run`. Results go to stdout; progress,
 warnings and errors go to stderr: progress is a bar with rate and remaining time in a terminal, a line every ten seconds
 elsewhere, and nothing with `--quiet`. Tables use the width of the terminal, and are never cut in files and pipes. `compare`
 prints JSON with `--json`, and writes netCDF with `--out`.
@@ -52,7 +52,7 @@ prints JSON with `--json`, and writes netCDF with `--out`.
 | 0 | done |
 | 1 | done, but more than 0.1 % of the realizations are not resolved, or what `--until` or `--require` states is not met |
 | 2 | invalid input: one message, nothing written |
-| 130, 143 | stopped by Ctrl-C or SIGTERM, one of which is enough; finished realizations are in the archive |
+| 130, 143 | stopped by a single Ctrl-C or SIGTERM; finished realizations are in the archive |
 
 >>> from typer.testing import CliRunner
 >>> from tolcontact.cli.app import app

@@ -1,4 +1,4 @@
-"""The commands of all analyses, from one table: options that they share are declared once."""
+"""The commands of all analyses, from one table: shared options are declared once."""
 
 import functools
 import inspect
@@ -43,12 +43,12 @@ Frame = Callable[[xr.Dataset], Any]
 
 @dataclass(frozen=True)
 class AnalysisCommand:
-    """A command that asks one analysis of a model.
+    """A command for one analysis of a model.
 
-    samples    what the number of samples is, for the help text; empty for an analysis that simulates nothing
-    frame      makes the data frame that --csv prints
-    options    options of its own by parameter: their typer annotations, and defaults (REQUIRED: none)
-    arguments  makes arguments of the analysis from these options, where they differ
+    samples    the meaning of the number of samples, for the help text; empty for an analysis without simulations
+    frame      function that makes the data frame for --csv
+    options    specific options by parameter: their typer annotations, and defaults (REQUIRED: none)
+    arguments  function that makes the arguments of the analysis from these options, where they differ
     """
 
     name: str
@@ -130,7 +130,7 @@ def _settings_of_run(archive: Path, context: typer.Context) -> dict[str, Any]:
 
 
 def _intervals(name: str) -> Frame:
-    """Return a maker of frames with the estimates of a variable, their intervals, and the units of labels as columns."""
+    """Return a function for frames with the estimates of a variable, their intervals, and the units of labels as columns."""
 
     def frame(dataset: xr.Dataset) -> Any:
         values = dataset[name].to_dataset("interval").to_dataframe()
@@ -140,7 +140,7 @@ def _intervals(name: str) -> Frame:
 
 
 def _columns(names: list[str], dim: str) -> Frame:
-    """Return a maker of frames of variables, with a column for each label of a dimension."""
+    """Return a function for frames of variables, with a column for each label of a dimension."""
 
     def frame(dataset: xr.Dataset) -> Any:
         values = dataset[names].to_dataframe().unstack(dim)

@@ -1,4 +1,4 @@
-"""The application: options that commands share, and its exit codes."""
+"""The application: shared options of commands, and exit codes."""
 
 import inspect
 import io
@@ -32,7 +32,7 @@ app = typer.Typer(
 
 
 def flag(name: str, purpose: str, **settings: Any) -> Any:
-    """Return an option without a value; an empty `metavar` keeps a type out of its help."""
+    """Return an option without a value; an empty `metavar` hides the type in its help."""
     return typer.Option(name, metavar="", help=purpose, **settings)
 
 
@@ -50,7 +50,7 @@ def _options(
 
 
 def or_(names: Iterable[str]) -> str:
-    """Return names as a help text lists them."""
+    """Return names as a list for a help text."""
     return ", ".join(f'"{name}"' if " " in name else name for name in names)
 
 
@@ -97,12 +97,12 @@ def only_one(**options: bool) -> None:
 
 
 def examples(*commands: str) -> str:
-    """Return the end of a help text, with one command per line."""
+    """Return the examples at the end of a help text, with one command per line."""
     return "Examples:\n\n" + "\n\n".join(f"tolcontact {command}" for command in commands)
 
 
 def method_choices(**options: str | None) -> dict[str, str]:
-    """Return the choices of a method that options replace."""
+    """Return the method choices that options set."""
     return {name: value for name, value in options.items() if value is not None}
 
 
@@ -113,7 +113,7 @@ def main(assembly: "Callable[[], Assembly]") -> None:
 
 
 def command_line(arguments: list[str] | None = None) -> None:
-    """Run `app` as the console script; an error is one message with exit code 2."""
+    """Run `app` as the console script; an error prints one message and gives exit code 2."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # for terminals with few characters
@@ -139,11 +139,11 @@ def show_warnings(records: Iterable[warnings.WarningMessage]) -> None:
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    """Print a warning, wrapped to the width of a terminal, else on one line."""
+    """Print a warning, wrapped to the width of a terminal, or on one line elsewhere."""
     if sys.stderr is None:
         return
     text = f"warning: {shown(str(message))}"
     if sys.stderr.isatty():
         columns = max(shutil.get_terminal_size().columns, MIN_COLUMNS)
         text = textwrap.fill(text, columns, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
-    print(text, file=sys.stderr)  # a bar that is shown takes the place of this stream, and moves down
+    print(text, file=sys.stderr)  # a visible progress bar replaces this stream, and moves down

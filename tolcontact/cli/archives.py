@@ -32,7 +32,7 @@ def summary(
     if as_csv:
         values = statistics.dataset_of(table)["statistic_value"].to_dataset("interval").to_dataframe()
         names = values.index.get_level_values(STATISTIC)
-        values["units"] = [units_of(*each) for each in zip(names, values[MEASURE_UNITS.name], strict=True)]
+        values["units"] = [units_of(*labels) for labels in zip(names, values[MEASURE_UNITS.name], strict=True)]
         typer.echo(values[[*ESTIMATE, "units"]].to_csv(lineterminator="\n"), nl=False)
     elif as_json:
         print_data(statistics.dataset_of(table))
@@ -45,7 +45,7 @@ def summary(
 @app.command(epilog=examples("report run.nc", "report run.nc --out page.html", "report run.nc --xlsx tables.xlsx"))
 def report(
     archive: Archive,
-    out: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Page to write. Default: beside the archive.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Page to write. Default: next to the archive.")] = None,
     xlsx: Annotated[
         Path | None,
         typer.Option(metavar="FILE.xlsx", help="Spreadsheet of the tables; the page is then written only with --out."),

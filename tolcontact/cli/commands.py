@@ -1,4 +1,4 @@
-"""The group of all commands. The module of a command is imported when the command is resolved: `--help` needs none of them."""
+"""The group of all commands. A command's module is imported when the command is resolved, so `--help` imports none of them."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from typer.core import TyperCommand, TyperGroup
 from tolcontact import cli, interrupts, shape_worker
 from tolcontact.cli.quick_imports import quick_imports
 
-# The module of each command in this folder, and the line that describes the command in the list of commands.
+# The module of each command in this folder, and its line in the list of commands.
 COMMANDS = {
     "contributions": (
         "analyses",
@@ -27,7 +27,7 @@ COMMANDS = {
         "analyses",
         "Print the tolerance ranges of least cost for what is required, and the ranges to tighten first.",
     ),
-    "relocate": ("analyses", "Print the place of a locator, within a box, at which a measurement varies least."),
+    "relocate": ("analyses", "Print the position of a locator, within a box, at which a measurement varies least."),
     "seating": (
         "analyses",
         "Print the least friction at which parts can be held short of their locators and seats, and what holds them.",
@@ -64,16 +64,16 @@ COMMANDS = {
 
 
 class Commands(TyperGroup):
-    """The commands. One that is stopped ends with a message."""
+    """The commands. A command that is stopped ends with a message."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         self.commands = {name: TyperCommand(name, help=purpose) for name, (_, purpose) in COMMANDS.items()}
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        name, command, rest = super().resolve_command(ctx, args)
-        shape_worker.start_early(rest)
-        return name, command and declared_command(str(name)), rest
+        name, command, arguments = super().resolve_command(ctx, args)
+        shape_worker.start_early(arguments)
+        return name, command and declared_command(str(name)), arguments
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -89,7 +89,7 @@ def declared_command(name: str) -> Any:
     """Return a command with its options. The module that declares the command is imported."""
     module, _ = COMMANDS[name]
     with quick_imports():
-        getattr(cli, module)  # its import declares the command
+        getattr(cli, module)  # the import declares the command
     app = cli.app.app
     return next(
         typer.main.get_command_from_info(

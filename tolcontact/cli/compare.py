@@ -91,7 +91,7 @@ def compare(
                     load_model(inputs[0]), _listed(solvers), samples=samples, seed=seed, methods=methods, client=client
                 )
         if path is not None:
-            # Texts as characters: HDF5's texts of free length crash some versions of the netCDF library.
+            # Texts as characters: HDF5's variable-length strings crash some versions of the netCDF library.
             texts = {name: {"dtype": "S1"} for name in comparison.variables if comparison[name].dtype.kind == "U"}
             with replacing_archive(path) as part:
                 comparison.to_netcdf(part, engine="netcdf4", encoding=texts)

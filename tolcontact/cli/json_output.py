@@ -25,5 +25,5 @@ def _as_json(values: np.ndarray) -> np.ndarray:
 
 
 def _plain(value: object) -> object:
-    """Return a number of NumPy as JSON has it."""
+    """Return a NumPy number as a JSON value."""
     return value.item() if isinstance(value, np.generic) else str(value)

@@ -1,4 +1,4 @@
-"""Output of results on standard output, and names of pages."""
+"""Output of results on standard output, and checks of output files."""
 
 import sys
 from pathlib import Path
@@ -13,7 +13,7 @@ from tolcontact.report.text import summary_text
 from tolcontact.vocabulary import BY_STATUS, UNRESOLVED
 
 FAILED_SHARE = 0.001
-UNBOUNDED = 10_000  # columns outside of a terminal
+UNBOUNDED = 10_000  # columns outside a terminal
 
 
 def console() -> Console:
@@ -28,7 +28,7 @@ def check_page(path: Path, *, overwrite: bool = False) -> None:
     if not path.parent.is_dir():
         raise OptionError(f'page "{path}" cannot be written: there is no folder "{path.parent}"; make it first')
     if not overwrite and path.exists() and not report.is_page(path):
-        raise OptionError(f'"{path}" exists, and is no page of tolcontact; choose another name, or replace it with --overwrite')
+        raise OptionError(f'"{path}" exists, and is not a tolcontact page; choose another name, or replace it with --overwrite')
 
 
 def check_spreadsheet(path: Path, *, overwrite: bool = False) -> None:

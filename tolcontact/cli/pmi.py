@@ -28,7 +28,7 @@ from tolcontact.pmi.script import script
 from tolcontact.pmi.second_reading import SecondReading, second_reading
 from tolcontact.report.text.table import FILE_WIDTH
 
-MAX_ROWS = 2000  # of a table, which takes a second; a drawing has a hundred
+MAX_ROWS = 2000  # of a table, which takes a second; a drawing has about a hundred
 _CSV = (
     "type", "number", "record", "kind", "name", "value", "lower", "upper", "unit", "zone", "details", "datums", "refines",
     "face_records", "other_records", "end_face_records", "end_other_records", "faces", "end_faces", "features", "reason",
@@ -36,7 +36,7 @@ _CSV = (
 _TOLERANCES = ("", "kind", "value", "zone, modifiers", "datums", "faces", "declared as")
 _DIMENSIONS = ("", "dimension", "nominal", "limits", "details", "faces", "declared as")
 _DATUMS = ("", "faces", "targets", "declared as")
-MIN_WIDTHS = {"dimension": 9, "declared as": 12, "faces": 11}  # of columns, so that no word of theirs is cut
+MIN_WIDTHS = {"dimension": 9, "declared as": 12, "faces": 11}  # of columns, so that no word in them is cut
 MAX_FACES = 12  # in a cell
 MAX_FEATURES = 6  # in a cell
 
@@ -73,7 +73,7 @@ def pmi(file: StepFile, as_json: AsJson = False, as_csv: AsCsv = False, as_scrip
 
 
 def _declared(file: Path, information: Pmi) -> DeclaredFile:
-    """Return how features declare what a file states; nothing, with a warning, if its shapes cannot be read."""
+    """Return how features declare the annotations of a file; nothing, with a warning, if its shapes cannot be read."""
     if information.is_empty:
         return DeclaredFile(information, (), (), {})
     try:
@@ -87,7 +87,7 @@ def _declared(file: Path, information: Pmi) -> DeclaredFile:
 
 
 def _entries(declared: DeclaredFile, reading: SecondReading | None) -> dict[str, Any]:
-    """Return everything for JSON: what the file states, its faces, what became of it, and the kernel's reading."""
+    """Return the content for JSON: the annotations of the file, its faces, the declarations, and the kernel's reading."""
     faces = {record: asdict(face) for record, face in declared.faces.items()}
     declarations = {
         entry.annotation.record: {"features": entry.features, "reason": entry.reason} for entry in declared.annotations
@@ -97,10 +97,10 @@ def _entries(declared: DeclaredFile, reading: SecondReading | None) -> dict[str,
 
 
 def _reason(information: Pmi, name: str) -> str:
-    """Return a sentence on a file that states nothing, with the reason if it is known."""
+    """Return a sentence about a file without annotations, with the reason if it is known."""
     if not information.is_ap242:
         schema = clipped(information.schema, 100) or "not stated"
-        return f'"{name}" is no file of AP242 (its schema is {schema}); tolerances and dimensions are read from AP242 only'
+        return f'"{name}" is not an AP242 file (its schema is {schema}); tolerances and dimensions are read from AP242 only'
     details = ""
     if information.drawings:
         details += f"; its {information.drawings} annotations are only drawn, and drawings are not read"
@@ -147,7 +147,7 @@ def _sections(declared: DeclaredFile) -> Iterator[RenderableType]:
 
 
 def _undeclared_lines(declared: DeclaredFile) -> Iterator[RenderableType]:
-    """Yield what is not declared, or only in part, with the reasons."""
+    """Yield the annotations that are not declared, or only partly, with the reasons."""
     numbers: dict[tuple[str, str], list[str]] = defaultdict(list)
     for kind, noun in ((Tolerance, "tolerance"), (Dimension, "dimension"), (Datum, "datum")):
         for entry in declared.annotations:
@@ -165,7 +165,7 @@ def _number(annotation: Annotation) -> str:
 
 
 def _reading_lines(reading: SecondReading) -> Iterator[RenderableType]:
-    """Yield the sentences on the kernel's reading, and the differences."""
+    """Yield the sentences about the kernel's reading, and the differences."""
     yield Text("\nsecond reading, by the CAD kernel", style="bold")
     yield Text(str(reading))
     yield from map(Text, map(str, reading.differences[:MAX_ROWS]))
@@ -174,7 +174,7 @@ def _reading_lines(reading: SecondReading) -> Iterator[RenderableType]:
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
-    """Return a table whose cells are wrapped, and never cut."""
+    """Return a table with wrapped cells that are never cut."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
     for column in columns:
         is_figure = column in ("value", "nominal")
@@ -223,12 +223,12 @@ def _features(annotation: Annotation, declared: DeclaredFile) -> str:
 
 
 def _faces(records: Sequence[int], others: Sequence[int], faces: FacesOfRecords) -> str:
-    """Return the faces if they are known, else how many there are; if there are none, how many other items, in parentheses."""
+    """Return the faces, or their count if they are unknown; without faces, the count of other items in parentheses."""
     if faces and records:
-        known = [faces[record] for record in records if record in faces][:MAX_FACES]
-        kinds = dict.fromkeys(face.kind for face in known)
-        groups = [f"{kind} {', '.join(str(face) for face in known if face.kind == kind)}".strip() for kind in kinds]
-        more = len(records) - len(known)
+        known_faces = [faces[record] for record in records if record in faces][:MAX_FACES]
+        kinds = dict.fromkeys(face.kind for face in known_faces)
+        groups = [f"{kind} {', '.join(str(face) for face in known_faces if face.kind == kind)}".strip() for kind in kinds]
+        more = len(records) - len(known_faces)
         return ", ".join([*groups, *([f"and {more} more"] if more else [])])
     return str(len(records)) if records or not others else f"({len(others)})"
 

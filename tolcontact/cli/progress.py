@@ -1,4 +1,4 @@
-"""Progress on standard error, what a command waits for, and the message of a run that a user stops."""
+"""Progress on standard error, the current activity of a command, and the message of a run that a user stops."""
 
 import contextlib
 import logging
@@ -18,23 +18,23 @@ from tolcontact.report.figures import grouped
 from tolcontact.workflow.forecast import duration
 
 LINE_INTERVAL = 10.0  # s
-LONG_WAIT = 300.0  # s that are left when advice is given
+LONG_WAIT = 300.0  # s remaining, above which advice is given
 WAIT = 2.0  # s before a terminal shows what a command is waiting for
 
-WINDOW, MIN_REPORTS = 60.0, 4  # s of the latest reports that the rate follows from, and how many a forecast needs
+WINDOW, MIN_REPORTS = 60.0, 4  # s of the latest reports that determine the rate; number of reports needed for a forecast
 
 
 class Pace:
-    """The rate of finished realizations of late, and the time that the others will take.
+    """The recent rate of finished realizations, and the remaining time.
 
-    What took no time (realizations of a resumed run) or long ago (compiling) does not count.
+    Realizations that took no time (of a resumed run) and early delays (compilation) do not count.
     """
 
     def __init__(self) -> None:
         self._reports: deque[tuple[float, int]] = deque()  # [s], realizations
 
     def rate(self, done: int) -> float:
-        """Return how many realizations are finished in a second; 0 before there are enough reports."""
+        """Return the finished realizations per second; 0 before there are enough reports."""
         now = time.monotonic()
         self._reports.append((now, done))
         while now - self._reports[0][0] > WINDOW and len(self._reports) > MIN_REPORTS:
@@ -49,8 +49,8 @@ def shown_progress(
 ) -> Iterator[Callable[[int, int], None]]:
     """Yield a function of the finished and the total number of realizations that shows progress; also show announcements.
 
-    Progress is a bar on a terminal, and elsewhere a line after each `interval` [s]. With more than `long_wait` [s] left at the
-    first forecast, a line states what takes less time. With `quiet` nothing is shown.
+    Progress is a bar on a terminal, and elsewhere a line after each `interval` [s]. If more than `long_wait` [s] remain at the
+    first forecast, a line states how to save time. With `quiet` nothing is shown.
     """
     console = Console(stderr=True)
     columns = (
@@ -66,12 +66,14 @@ def shown_progress(
     def show(done: int, total: int) -> None:
         nonlocal last, is_advised
         rate = pace.rate(done)
-        left = (total - done) / rate if rate else 0.0
-        speed = f"{grouped(round(rate))} a second, {duration(left)} left" if rate else ""
+        remaining = (total - done) / rate if rate else 0.0
+        speed = f"{grouped(round(rate))} a second, {duration(remaining)} left" if rate else ""
         if rate and not is_advised:
             is_advised = True
-            if left > long_wait:
-                advice = f"{shown(name)}: about {duration(left)} left; fewer --samples take less time, with wider intervals"
+            if remaining > long_wait:
+                advice = (
+                    f"{shown(name)}: about {duration(remaining)} left; fewer --samples take less time, with wider intervals"
+                )
                 console.print(advice, markup=False, highlight=False, soft_wrap=True)
         bar.update(task, completed=done, total=total, description=shown(name), pace=speed)
         if bar.disable and not quiet and time.monotonic() - last > interval:
@@ -84,7 +86,7 @@ def shown_progress(
 
 @contextlib.contextmanager
 def waiting(text: str) -> Iterator[None]:
-    """Show on a terminal what a command is waiting for, and for how long, once that takes more than WAIT."""
+    """Show on a terminal what a command is waiting for, and for how long, once it takes longer than WAIT."""
     console = Console(stderr=True)
     if not console.is_terminal:
         yield
@@ -128,7 +130,7 @@ def _log_shown(console: Console, show: Callable[[str], None], *, quiet: bool) ->
 
 @contextlib.contextmanager
 def stopped(out: Path | None, done: list[int]) -> Iterator[None]:
-    """End a run that is stopped with how far it is; `done` is the finished and the total number of realizations."""
+    """End a stopped run with a message about its progress; `done` is the finished and the total number of realizations."""
     try:
         yield
     except KeyboardInterrupt:

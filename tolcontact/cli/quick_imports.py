@@ -1,4 +1,4 @@
-"""Imports of commands, which take longer than a small run: without the collector, and without what few commands need."""
+"""Fast imports of commands, which would take longer than a small run: without garbage collection and rarely used modules."""
 
 import contextlib
 import gc
@@ -9,13 +9,13 @@ from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
-# Modules that libraries import, and whose attributes hardly a command needs: each is loaded when one of them is asked for.
+# Modules that libraries import, but that commands rarely need: each is loaded on the first access to one of its attributes.
 DEFERRED = frozenset(
     {
         "PIL.Image",  # by trimesh, for textures
-        "numpy.f2py",  # by SciPy, which lists what NumPy has
+        "numpy.f2py",  # by SciPy, which lists the content of NumPy
         "trimesh.bounds",  # which imports scipy.optimize
-        "trimesh.nsphere",  # which imports scipy.optimize, too
+        "trimesh.nsphere",  # which also imports scipy.optimize
         "trimesh.path.raster",  # which imports PIL
         "trimesh.path.simplify",  # which imports trimesh.nsphere
         "trimesh.smoothing",  # which imports scipy.sparse.linalg
@@ -29,10 +29,10 @@ DEFERRED = frozenset(
 def quick_imports() -> Iterator[None]:
     """Import modules quickly.
 
-    The collector of cycles finds nothing in modules, but takes a fifth of the time of all imports, and again as long at the end
-    of the process. So it is off, and leaves what was imported alone afterwards.
+    The cyclic garbage collector finds nothing in modules, but takes a fifth of the time of all imports, and again as long at
+    the end of the process. So it is off, and ignores the imported objects afterwards.
     """
-    was_collecting, finder, known = gc.isenabled(), _DeferringFinder(), len(sys.modules)
+    was_collecting, finder, module_count = gc.isenabled(), _DeferringFinder(), len(sys.modules)
     gc.disable()
     sys.meta_path.insert(0, finder)
     try:
@@ -40,16 +40,16 @@ def quick_imports() -> Iterator[None]:
     finally:
         sys.meta_path.remove(finder)
         if was_collecting:
-            if len(sys.modules) > known:  # else only garbage of the caller would be kept
+            if len(sys.modules) > module_count:  # otherwise only garbage of the caller would be frozen
                 gc.freeze()
             gc.enable()
 
 
 class _DeferringFinder(MetaPathFinder):
-    """The finder of modules that are loaded when an attribute of them is first asked for."""
+    """The finder of modules that are loaded on the first access to an attribute."""
 
     def find_spec(self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None) -> ModuleSpec | None:
-        """Return the specification that the other finders give, with a loader that defers."""
+        """Return the specification of the other finders, with a deferring loader."""
         if fullname not in DEFERRED:
             return None
         finders = (finder for finder in sys.meta_path if finder is not self)

@@ -103,7 +103,7 @@ def run(
     method = method_choices(resolution=resolution, objective=objective)
     titles = title_entries(title, part_number, author, revision, date, company)
     note_kept_title(out if resume else None, titles)
-    # Stopping first gives the cursor back.
+    # A stop first restores the cursor.
     with (
         stopped(out, done := [0, samples]),
         shown_progress(model.stem, samples, quiet=quiet) as show,
@@ -126,7 +126,7 @@ def run(
 
 
 def _check_files(out: Path | None, report: Path | None, *, overwrite: bool, resume: bool) -> None:
-    """Raise OptionError for options of files that are not written, and for a page that must not be."""
+    """Raise OptionError for options without their file, and for a page that must not be written."""
     if out is None and (resume or (overwrite and report is None)):
         raise OptionError("--overwrite and --resume need an archive; name one: --out FILE.nc")
     if report is not None:
@@ -134,7 +134,7 @@ def _check_files(out: Path | None, report: Path | None, *, overwrite: bool, resu
 
 
 def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Table, str]:
-    """Return the summary of the archive at a path, and what it lacks that `until` states; write its page."""
+    """Return the summary of the archive at a path, and its shortfall from `until`; write its page."""
     with archive.open_tables_unchecked(path) as results:
         archive.check_rows(results)
         summary = statistics.summary_table(results)
@@ -146,11 +146,11 @@ def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Tabl
 
 
 def _print_results(summary: Table, out: Path | None, shortfall: str, *, quiet: bool) -> None:
-    """Print the summary of results. Raises typer.Exit with code 1 if they lack something."""
+    """Print the summary of results. Raises typer.Exit with code 1 if there is a shortfall."""
     print_summary(summary)
     if out is not None:
         typer.echo(f"\narchive: {shown(str(out))}")
     if shortfall:
-        if quiet:  # else the log has said it
+        if quiet:  # otherwise the log has already stated it
             typer.echo(shortfall, err=True)
         raise typer.Exit(1)

@@ -25,7 +25,7 @@ def title_entries(*options: str | None) -> dict[str, str | None]:
 
 
 def note_kept_title(archive: Path | None, entries: Mapping[str, str | None]) -> None:
-    """Say that an archive that a run resumes keeps its title block, if the options have another one."""
+    """Print a note that a resumed archive keeps its title block, if the options state another one."""
     if archive is not None and archive.exists() and any(entries.values()):
         name = shown(str(archive))
         typer.echo(
@@ -36,7 +36,7 @@ def note_kept_title(archive: Path | None, entries: Mapping[str, str | None]) -> 
 
 
 def titled_model(path: Path, entries: Mapping[str, str | None]) -> Assembly:
-    """Return the assembly that a file declares, with entries of its title block replaced as far as they are not None."""
+    """Return the assembly that a file declares, with its title block updated by the `entries` that are not None."""
     assembly = load_model(path)
     if any(entry is not None for entry in entries.values()):
         assembly.title_block = (assembly.title_block or TitleBlock()).overridden(entries)

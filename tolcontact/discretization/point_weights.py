@@ -40,7 +40,7 @@ def point_weights(P_m: Float[Array, "point 3"], distance: float, moving: Surface
     # The middles of the edges of triangles integrate quadratic functions exactly.
     places = (elements.corners + np.roll(elements.corners, 1, axis=1)).reshape(-1, 3) / 2
     if moving.surfaces:
-        places, _ = moving.feet(places)
+        places, _ = moving.projections(places)
     shares = np.repeat(elements.areas / 3, 3)
     centre = shares @ places / shares.sum()
     size = np.sqrt(shares @ ((places - centre) ** 2).sum(axis=1) / shares.sum())
@@ -115,7 +115,7 @@ def _elements(
         vertices, faces, _ = face_frame(moving.mesh).subdivided(vertices, faces, EDGE * size)
         corners = vertices[faces]
         middles = corners.mean(axis=1)
-        feet, is_over = reference.feet(middles)
+        feet, is_over = reference.projections(middles)
         corners = corners[(is_over | (region is not None)) & (np.linalg.norm(middles - feet, axis=1) <= distance + size)]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
     if not areas.sum() > 0:

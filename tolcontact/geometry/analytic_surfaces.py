@@ -1,4 +1,4 @@
-"""Surfaces known exactly: planes, cylinders, cones, spheres and tori, in double precision. Lengths in mm.
+"""Analytic surfaces: planes, cylinders, cones, spheres and tori, in double precision. Lengths in mm.
 
 Each kind is a class, which `ANALYTIC_SURFACES` lists by the kind's name.
 """
@@ -13,16 +13,16 @@ import numpy as np
 
 from tolcontact.vocabulary import SURFACE_KINDS
 
-PROJECTIONS = 2  # one is exact but for rounding
+PROJECTIONS = 2  # one is exact except for rounding
 
 
 @dataclass(frozen=True, eq=False)
 class AnalyticSurface(ABC):
-    """A surface without ends. A size that its kind does not have is 0.
+    """An unbounded surface. A size that its kind does not have is 0.
 
     origin     a point of a plane or of the axis (3,) [mm]: the apex of a cone, the centre of a sphere or torus
-    axis       normal of a plane, or unit vector along the axis (3,): from the apex into a cone; of a sphere without meaning
-    residual   [mm] largest distance of the vertices to which it was fitted
+    axis       normal of a plane, or unit vector along the axis (3,), from the apex into a cone; meaningless for a sphere
+    residual   [mm] largest distance of the fitted vertices
     is_fitted  whether it was fitted; otherwise a file states it
     """
 
@@ -39,7 +39,7 @@ class AnalyticSurface(ABC):
 
     @classmethod
     def of(cls, numbers: Mapping[str, Any]) -> Self:
-        """Return the surface with an origin, an axis and sizes by name; sizes that its kind does not have are ignored."""
+        """Return the surface from its origin, axis and sizes by name; sizes that its kind does not have are ignored."""
         return cls(**{name: numbers[name] for name in ("origin", "axis", *cls.sizes)})
 
     @abstractmethod
@@ -47,13 +47,13 @@ class AnalyticSurface(ABC):
         """Return the signed distance [mm] of a point from the surface, positive in front of a plane or outside.
 
         radial  distance [mm] from the centre of a sphere, the axis of a cylinder or cone, or the circle inside a torus
-        along   height [mm] over a plane, or place along the axis of a cone, from its apex
+        along   height [mm] over a plane, or coordinate along the axis of a cone, from its apex
 
-        Numbers, NumPy arrays and CasADi expressions are accepted alike.
+        Numbers, NumPy arrays and CasADi expressions are all accepted.
         """
 
     def height_beside_axis(self, radial: np.ndarray, along: np.ndarray) -> np.ndarray:
-        """Return `distance` [mm] at distances from the axis, through the origin, and places along it [mm]."""
+        """Return `distance` [mm] at radial distances from the axis and at coordinates along it, from the origin [mm]."""
         return np.asarray(self.height(radial, along))
 
     @abstractmethod
@@ -64,11 +64,11 @@ class AnalyticSurface(ABC):
         """
 
     def offset(self, point: np.ndarray) -> np.ndarray:
-        """Return the vector (3,) from the origin to a point (3,), without its part along which the origin is arbitrary."""
+        """Return the vector (3,) from the origin to a point (3,), without the arbitrary components of the origin."""
         return point - self.origin
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> Self:
-        """Return the surface turned by R (3, 3), then moved by t (3,) [mm]."""
+        """Return the surface rotated by R (3, 3), then translated by t (3,) [mm]."""
         return replace(self, origin=R @ self.origin + t, axis=R @ self.axis)
 
     def project(self, points: np.ndarray) -> np.ndarray:
@@ -79,14 +79,14 @@ class AnalyticSurface(ABC):
         return points
 
     def _around_axis(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return distances (point,) from the axis, unit vectors (point, 3) away from it, and places (point,) along it."""
+        """Return distances (point,) from the axis, unit vectors (point, 3) away from it, and coordinates (point,) along it."""
         offset = points - self.origin
         along = offset @ self.axis
         return *_length_and_direction(offset - along[:, None] * self.axis), along
 
 
 class RoundSurface(AnalyticSurface):
-    """A surface whose hollow side has tangent planes around it: a cylinder, cone or sphere."""
+    """A surface with tangent planes all around its hollow side: a cylinder, cone or sphere."""
 
     def tangent(self, direction: np.ndarray) -> "Plane":
         """Return the tangent plane in a direction (3,) from the axis or centre; its normal points inward."""
@@ -94,7 +94,7 @@ class RoundSurface(AnalyticSurface):
 
     @abstractmethod
     def touched(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """Return the place (3,) nearest to a point (3,) among those in a direction (3,) from the axis or centre."""
+        """Return the surface point (3,) nearest to a point (3,) in a direction (3,) from the axis or centre."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,13 +112,13 @@ class Plane(AnalyticSurface):
         return (points - self.origin) @ self.axis, np.broadcast_to(self.axis, points.shape)
 
     def offset(self, point: np.ndarray) -> np.ndarray:
-        """Return the part of the offset that is along the normal."""
+        """Return the component of the offset along the normal."""
         return float((point - self.origin) @ self.axis) * self.axis
 
 
 @dataclass(frozen=True, eq=False)
 class Cylinder(RoundSurface):
-    """A cylinder with a `radius` [mm] around its axis."""
+    """A cylinder with a `radius` [mm]."""
 
     kind, sizes = "cylinder", ("radius",)
     radius: float
@@ -133,11 +133,11 @@ class Cylinder(RoundSurface):
         return self.height(radial, along), outward
 
     def offset(self, point: np.ndarray) -> np.ndarray:
-        """Return the part of the offset that is across the axis."""
+        """Return the component of the offset perpendicular to the axis."""
         return _across(point - self.origin, self.axis)
 
     def touched(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """Return the nearest place of the line in a direction from the axis."""
+        """Return the nearest point of the generator in a direction from the axis."""
         return self.origin + ((point - self.origin) @ self.axis) * self.axis + self.radius * direction
 
 
@@ -157,14 +157,14 @@ class Cone(RoundSurface):
         return self.height(radial, np.abs(along))
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return signed distances (point,) [mm] from the nearest of both nappes, and their gradients (point, 3)."""
+        """Return signed distances (point,) [mm] from the nearer nappe, and their gradients (point, 3)."""
         radial, outward, along = self._around_axis(points)
         side = np.where(along < 0, -1.0, 1.0)  # the nappes meet in one line through the apex
         slope = np.cos(self.angle) * outward - (side * np.sin(self.angle))[:, None] * self.axis
         return self.height(radial, side * along), slope
 
     def offset(self, point: np.ndarray) -> np.ndarray:
-        """Return the part of the offset that is across the axis: files place cones anywhere along it."""
+        """Return the component of the offset perpendicular to the axis: files place cones anywhere along it."""
         return _across(point - self.origin, self.axis)
 
     def tangent(self, direction: np.ndarray) -> Plane:
@@ -172,7 +172,7 @@ class Cone(RoundSurface):
         return Plane(self.origin, math.sin(self.angle) * self.axis - math.cos(self.angle) * direction)
 
     def touched(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """Return the nearest place of the line in a direction from the axis."""
+        """Return the nearest point of the generator in a direction from the axis."""
         line = math.cos(self.angle) * self.axis + math.sin(self.angle) * direction
         return self.origin + ((point - self.origin) @ line) * line
 
@@ -198,13 +198,13 @@ class Sphere(RoundSurface):
         return self.height(radial, 0.0), outward
 
     def touched(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """Return the place in a direction from the centre."""
+        """Return the surface point in a direction from the centre."""
         return self.origin + self.radius * direction
 
 
 @dataclass(frozen=True, eq=False)
 class Torus(AnalyticSurface):
-    """A torus: a tube with the radius `minor` [mm] along a circle with a `radius` [mm] around the axis."""
+    """A torus: a tube with the radius `minor` [mm] along a circle of `radius` [mm] around the axis."""
 
     kind, sizes = "torus", ("radius", "minor")
     radius: float
@@ -215,9 +215,9 @@ class Torus(AnalyticSurface):
         return radial - self.minor
 
     def from_circle(self, radial: Any, outward: Any, along: Any, axis: Any) -> Any:
-        """Return the vector from the circle to a point, given by its place `along` the axis and distance `radial` from it.
+        """Return the vector from the circle to a point, given by its coordinate `along` the axis and distance `radial` from it.
 
-        `outward` is the unit vector from the axis to the point. Arrays and CasADi expressions are accepted alike.
+        `outward` is the unit vector from the axis to the point. Arrays and CasADi expressions are both accepted.
         """
         return (radial - self.radius) * outward + along * axis
 
@@ -239,9 +239,9 @@ _NUMBERS = ("origin", "axis", "radius", "minor", "angle")
 
 
 def surface_arrays(surfaces: Sequence[AnalyticSurface | None]) -> dict[str, np.ndarray]:
-    """Return surfaces as arrays (surface, ...) by name, as archives hold them.
+    """Return surfaces as arrays (surface, ...) by name, as stored in archives.
 
-    `kind` is the place in SURFACE_KINDS; it is -1 for None.
+    `kind` is the index in SURFACE_KINDS, or -1 for None.
     """
     filled = [surface or Plane(np.zeros(3), np.zeros(3)) for surface in surfaces]
     kinds = np.array([-1 if surface is None else SURFACE_KINDS.index(surface.kind) for surface in surfaces])

@@ -1,7 +1,7 @@
-"""The overlap of two bodies: the largest ball that lies in both, by bisection of the box that both share.
+"""The overlap of two bodies: the largest ball inside both, by bisection of their common box.
 
-The depth of a point in a body changes by no more than the point moves. So a cell whose centre is at depth f, and whose corners
-are r away, holds no point deeper than f + r, and is left out if that is too little.
+The depth of a point in a body changes by no more than the displacement of the point. A cell with a centre at depth f and
+corners at distance r therefore contains no point deeper than f + r, and is dropped if that is too small.
 """
 
 from dataclasses import dataclass
@@ -17,16 +17,16 @@ from tolcontact.geometry.triangle_tree import triangle_tree
 
 STARTING_CELLS = 6  # along the longest side of the box
 MAX_LEVELS = 6
-MAX_CELLS = 200  # of a level: those that may be deepest
+MAX_CELLS = 200  # per level: the cells with the largest possible depth
 ACCURACY = 0.1  # of the depth
 ON_EDGE = 1e-9  # a barycentric coordinate
-SMOOTH = 0.6  # rad: triangles at a smaller angle stand for one curved face
+SMOOTH = 0.6  # rad: triangles at a smaller angle approximate one curved face
 HALVES = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3)).reshape(3, -1).T
 
 
 @dataclass(frozen=True, eq=False)
 class SolidBody:
-    """A closed body in its nominal place."""
+    """A closed body in its nominal pose."""
 
     mesh: trimesh.Trimesh
 
@@ -54,7 +54,7 @@ class SolidBody:
 
     @cached_property
     def facet_height(self) -> float:
-        """The largest height [mm] of the round faces over the triangles that stand for them, from the angles of these."""
+        """The largest height [mm] of the round faces over the triangles that approximate them, from the triangles' angles."""
         angles = np.asarray(self.mesh.face_adjacency_angles)
         smooth = np.flatnonzero((angles < SMOOTH) & (angles > 0))
         if not smooth.size:
@@ -73,9 +73,9 @@ class SolidBody:
         return np.roll(sums.reshape(-1, 3, 3), -1, axis=1)  # edge j runs from corner j to corner j + 1
 
     def depth(self, points: Float[Array, "p 3"]) -> Float[Array, " p"]:
-        """Return the distances (point,) [mm] of `points` (point, 3) [mm] from the surface, negative outside of the body.
+        """Return the distances (point,) [mm] of `points` (point, 3) [mm] from the surface, negative outside the body.
 
-        The sign is that of the pseudonormal (Baerentzen and Aanaes, 2005) at the nearest place: of a face, an edge or a vertex.
+        The sign comes from the pseudonormal (Baerentzen and Aanaes, 2005) of the nearest face, edge or vertex.
         """
         points = np.ascontiguousarray(points)
         squares, triangle, nearest = self._tree.squared_distance(self._vertices, self._faces, points)
@@ -91,7 +91,7 @@ class SolidBody:
 
 
 def common_ball(A: SolidBody, B: SolidBody, min_diameter: float) -> tuple[float, Float[Array, " 3"]] | None:
-    """Return the diameter [mm] and the centre (3,) [mm] of about the largest ball in both bodies.
+    """Return the diameter [mm] and the centre (3,) [mm] of approximately the largest ball in both bodies.
 
     None if the search finds no ball larger than `min_diameter` [mm].
     """
@@ -101,7 +101,7 @@ def common_ball(A: SolidBody, B: SolidBody, min_diameter: float) -> tuple[float,
     counts = np.maximum(np.ceil((upper - lower) / (upper - lower).max() * STARTING_CELLS), 1).astype(int)
     size = (upper - lower) / counts
     centres = lower + size * (np.array(np.meshgrid(*map(np.arange, counts))).reshape(3, -1).T + 0.5)
-    deepest, place = min_diameter / 2, None
+    deepest, centre = min_diameter / 2, None
     for _ in range(MAX_LEVELS):
         depths = A.depth(centres)
         reach = float(np.linalg.norm(size)) / 2
@@ -110,11 +110,11 @@ def common_ball(A: SolidBody, B: SolidBody, min_diameter: float) -> tuple[float,
         if not inside.size:
             break
         if depths.max() > deepest:
-            deepest, place = float(depths.max()), centres[inside[depths.argmax()]]
+            deepest, centre = float(depths.max()), centres[inside[depths.argmax()]]
         promising = np.flatnonzero(depths + reach > deepest * (1 + ACCURACY))
         promising = promising[np.argsort(-depths[promising], kind="stable")[: MAX_CELLS // len(HALVES)]]
         if not promising.size:
             break
         centres = (centres[inside[promising], None] + HALVES * size / 2).reshape(-1, 3)
         size = size / 2
-    return None if place is None else (2 * deepest, place)
+    return None if centre is None else (2 * deepest, centre)

@@ -1,4 +1,4 @@
-"""Boxes around corners, edges and triangles: which of them overlap."""
+"""Overlaps of the boxes around corners, edges and triangles."""
 
 from collections.abc import Iterator
 
@@ -20,7 +20,7 @@ def overlaps(
 
 
 def blocks(count: int, width: int) -> Iterator[slice]:
-    """Yield blocks of the rows of a table (count, width), none of which has many entries."""
+    """Yield blocks of the rows of a table (count, width), each with a limited number of entries."""
     rows = max(BLOCK_PAIRS // max(width, 1), 1)
     for start in range(0, count if width else 0, rows):
         yield slice(start, min(start + rows, count))

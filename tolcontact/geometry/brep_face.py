@@ -17,8 +17,8 @@ from tolcontact.geometry.files.stated_face import FaceMeasure, StatedFace
 from tolcontact.geometry.fitting import fit_surface
 from tolcontact.geometry.interrupted_surfaces import FaceOnSurface, interruptions
 
-FIT_TOLERANCE = 1e-3  # [mm] largest distance of the vertices of a face from the surface on which it is
-RESIDUAL_FACTOR = 10  # times the residuals of two faces: distance at which they still are parts of one surface
+FIT_TOLERANCE = 1e-3  # [mm] largest distance of the vertices of a face from its surface
+RESIDUAL_FACTOR = 10  # times the residuals of two faces: largest distance between parts of one surface
 POSITION_TOLERANCE = 1e-9  # of a part's size: distance between faces of one surface
 PIECES = "pieces"
 DESCRIPTIONS = "descriptions"
@@ -27,9 +27,9 @@ UNKNOWN = StatedFace(0, "", (), 0, None)  # a face of a mesh, or from an archive
 
 
 def number_faces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, Sequence[AnalyticSurface | None]]:
-    """Return the number of each triangle's face (face,), from 0, and the surface that a STEP file states for each face.
+    """Return the index of each triangle's face (face,), and the surface that a STEP file states for each face.
 
-    The faces of other meshes are their smooth pieces, without stated surfaces; the mesh keeps them.
+    The faces of other meshes are their smooth pieces, without stated surfaces; the mesh caches them.
     """
     if BREP in mesh.face_attributes:
         return np.asarray(mesh.face_attributes[BREP]).ravel(), mesh.metadata[SURFACES]
@@ -40,7 +40,7 @@ def number_faces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, Sequence[AnalyticSu
 
 
 def describe_faces(mesh: trimesh.Trimesh) -> tuple[FaceInFile, ...]:
-    """Return the faces of a part. Its mesh keeps them, since fitting surfaces takes time."""
+    """Return the faces of a part. Its mesh caches them, since fitting surfaces takes time."""
     if DESCRIPTIONS not in mesh.metadata:
         on_surfaces = faces_on_surfaces(mesh)
         stated_faces = mesh.metadata.get(STATED_FACES) or [UNKNOWN] * len(on_surfaces)
@@ -60,11 +60,11 @@ def describe_faces(mesh: trimesh.Trimesh) -> tuple[FaceInFile, ...]:
 
 
 def faces_on_surfaces(mesh: trimesh.Trimesh) -> Sequence[FaceOnSurface]:
-    """Return for each face of a part its surface, stated or fitted, and its triangles. Its mesh keeps them."""
+    """Return the stated or fitted surface and the triangles of each face of a part. Its mesh caches them."""
     if ON_SURFACES not in mesh.metadata:
-        number_of, stated = number_faces(mesh)
-        order = np.argsort(number_of, kind="stable")
-        groups = np.split(order, np.searchsorted(number_of[order], np.arange(1, len(stated))))
+        face_of, stated = number_faces(mesh)
+        order = np.argsort(face_of, kind="stable")
+        groups = np.split(order, np.searchsorted(face_of[order], np.arange(1, len(stated))))
         corners = np.asarray(mesh.triangles)
         surfaces = [
             surface or (fit_surface(corners[triangles], FIT_TOLERANCE) if len(triangles) else None)
@@ -75,18 +75,18 @@ def faces_on_surfaces(mesh: trimesh.Trimesh) -> Sequence[FaceOnSurface]:
 
 
 def faces_at(mesh: trimesh.Trimesh, point: Vector) -> tuple[list[int], float]:
-    """Return the numbers of the faces that are nearest to a point, several where they meet, and their distance [mm]."""
-    number_of, _ = number_faces(mesh)
-    places = np.tile(point, (len(number_of), 1))
-    distances = np.linalg.norm(trimesh.triangles.closest_point(mesh.triangles, places) - places, axis=1)
-    nearest = np.unique(number_of[distances < distances.min() + POSITION_TOLERANCE * mesh.scale])
+    """Return the numbers of the faces nearest to a point, several where they meet, and their distance [mm]."""
+    face_of, _ = number_faces(mesh)
+    copies = np.tile(point, (len(face_of), 1))
+    distances = np.linalg.norm(trimesh.triangles.closest_point(mesh.triangles, copies) - copies, axis=1)
+    nearest = np.unique(face_of[distances < distances.min() + POSITION_TOLERANCE * mesh.scale])
     return [int(number) + 1 for number in nearest], float(distances.min())
 
 
 def _grouped(mesh: trimesh.Trimesh, faces: Sequence[FaceInFile], surfaces: Sequence[FaceOnSurface]) -> list[FaceInFile]:
     """Return the descriptions of B-rep faces with their whole surfaces, slots and patterns."""
-    number_of, _ = number_faces(mesh)
-    neighbours = number_of[np.asarray(mesh.face_adjacency).reshape(-1, 2)]
+    face_of, _ = number_faces(mesh)
+    neighbours = face_of[np.asarray(mesh.face_adjacency).reshape(-1, 2)]
     touching = np.unique(np.sort(neighbours[neighbours[:, 0] != neighbours[:, 1]], axis=1), axis=0)
     wholes = _wholes(mesh, touching, surfaces)
     faces = [replace(face, whole=whole) for face, whole in zip(faces, wholes, strict=True)]
@@ -97,9 +97,9 @@ def _grouped(mesh: trimesh.Trimesh, faces: Sequence[FaceInFile], surfaces: Seque
 
 
 def _wholes(mesh: trimesh.Trimesh, touching: np.ndarray, faces: Sequence[FaceOnSurface]) -> Iterator[tuple[int, ...]]:
-    """Yield for each B-rep face the numbers of the faces that make up its surface with it; none if it is alone.
+    """Yield for each B-rep face the numbers of the faces that form one surface with it; none if it is alone.
 
-    They are among the pairs of `touching` (pair, 2) faces, or a cylinder or cone is interrupted between them.
+    Such faces touch, as listed in `touching` (pair, 2), or belong to an interrupted cylinder or cone.
     """
     links = [pair for pair in touching if are_one_surface(mesh, *(faces[number] for number in pair))]
     label = _components(links, len(faces))
@@ -111,7 +111,7 @@ def _wholes(mesh: trimesh.Trimesh, touching: np.ndarray, faces: Sequence[FaceOnS
 
 
 def _components(links: Sequence[Sequence[int]], count: int) -> np.ndarray:
-    """Return the number of the component (node,) of `count` nodes that links of two join."""
+    """Return the connected component (node,) of each of `count` nodes that pairs in `links` join."""
     return np.asarray(
         trimesh.graph.connected_component_labels(np.array(links, dtype=np.int64).reshape(-1, 2), node_count=count)
     )
@@ -132,13 +132,13 @@ def are_one_surface(mesh: trimesh.Trimesh, face: FaceOnSurface, neighbour: FaceO
 
 
 def _is_outside(mesh: trimesh.Trimesh, surface: AnalyticSurface, triangles: np.ndarray) -> bool:
-    """Return whether the outside of some triangles (face,) is the outside of the surface."""
+    """Return whether triangles (face,) have their outside on the outside of the surface."""
     _, slope = surface.distance(np.asarray(mesh.triangles_center)[triangles])
     return bool((slope * np.asarray(mesh.face_normals)[triangles]).sum() > 0)
 
 
 def _measure(mesh: trimesh.Trimesh, triangles: np.ndarray, surface: AnalyticSurface | None) -> FaceMeasure:
-    """Return the measure of a face from its `triangles` (face,): its point lies amid the largest one, on its surface."""
+    """Return the measure of a face from its `triangles` (face,): its point is the largest one's centre, on its surface."""
     if not len(triangles):
         return FaceMeasure(
             0.0, np.zeros(3) if surface is None else surface.project(np.zeros((1, 3)))[0], np.array([0.0, 0.0, 1.0])
@@ -166,13 +166,13 @@ def _description(number: int, surface: AnalyticSurface | None, measure: FaceMeas
 
 
 def _centre(surface: AnalyticSurface, point: np.ndarray) -> np.ndarray:
-    """Return the centre (3,) of a sphere or torus, or the point of the axis of a cylinder or cone beside a point (3,)."""
+    """Return the centre (3,) of a sphere or torus, or the projection of a point (3,) on the axis of a cylinder or cone."""
     if isinstance(surface, Sphere | Torus):
         return surface.origin
     return surface.origin + float((point - surface.origin) @ surface.axis) * surface.axis  # type: ignore[no-any-return]
 
 
 def plain_vector(numbers: np.ndarray) -> Vector:
-    """Return three numbers as a script would write them."""
+    """Return three numbers in the form used in scripts."""
     x, y, z = (float(number) + 0.0 for number in numbers)
     return x, y, z

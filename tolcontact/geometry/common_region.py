@@ -1,4 +1,4 @@
-"""The region of a flat face over another flat face, in triangles: those of the face, cut along the edges of the other's."""
+"""The region of a flat face over another flat face: its triangles, cut along the edges of the other face's triangles."""
 
 import numpy as np
 import trimesh
@@ -8,14 +8,14 @@ from tolcontact.geometry.surface import Surface
 
 MAX_PAIRS = 1_000_000  # of triangles that may overlap
 BLOCK_TRIANGLES = 64
-TIE = 1e-10  # of the face's size: a corner that is no farther from an edge lies on it
+TIE = 1e-10  # of the face's size: largest distance from an edge of a corner that counts as on it
 MIN_AREA = 1e-14  # of the face's area: smaller triangles are rounding
 
 
 def common_region(face: Surface, target: Surface) -> np.ndarray | None:
-    """Return triangles (triangle, 3, 3) [mm] that cover what of a flat face lies over a flat target, along the target's normal.
+    """Return triangles (triangle, 3, 3) [mm] that cover the region of a flat face over a flat target.
 
-    None if too many triangles overlap to cut them all.
+    Over means along the normal of the target. The result is None if too many triangles overlap to cut them all.
     """
     corners, target_corners = np.asarray(face.mesh.triangles), np.asarray(target.mesh.triangles)
     n = target.corner_normals.reshape(-1, 3).mean(axis=0)
@@ -36,15 +36,15 @@ def common_region(face: Surface, target: Surface) -> np.ndarray | None:
 
 
 def _overlapping(corners: np.ndarray, target_corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the numbers of the pairs of triangles (triangle, 3, 3) whose boxes overlap; it stops beyond MAX_PAIRS of them."""
+    """Return the indices of the pairs of triangles (triangle, 3, 3) with overlapping boxes; stops beyond MAX_PAIRS of them."""
     lower, upper = target_corners.min(axis=1), target_corners.max(axis=1)
     rows, columns, count = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)], 0
     for first in range(0, len(corners), BLOCK_TRIANGLES):
         block = corners[first : first + BLOCK_TRIANGLES]
-        near = np.flatnonzero(((lower <= block.max(axis=(0, 1))) & (upper >= block.min(axis=(0, 1)))).all(axis=1))
-        row, column = np.nonzero(overlaps(block.min(axis=1), block.max(axis=1), lower[near], upper[near]))
+        nearby = np.flatnonzero(((lower <= block.max(axis=(0, 1))) & (upper >= block.min(axis=(0, 1)))).all(axis=1))
+        row, column = np.nonzero(overlaps(block.min(axis=1), block.max(axis=1), lower[nearby], upper[nearby]))
         rows.append(row + first)
-        columns.append(near[column])
+        columns.append(nearby[column])
         count += len(row)
         if count > MAX_PAIRS:
             break
@@ -52,9 +52,9 @@ def _overlapping(corners: np.ndarray, target_corners: np.ndarray) -> tuple[np.nd
 
 
 def _above(triangles: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the pieces (piece, 3, 3) of triangles (triangle, 3, 3) where heights at their corners are positive.
+    """Return the pieces (piece, 3, 3) of triangles (triangle, 3, 3) where the height, linear between corners, is positive.
 
-    The second array is the number (piece,) of the triangle to which each belongs.
+    The second array is the index (piece,) of each piece's triangle.
     """
     is_above = heights >= 0
     count = is_above.sum(axis=1)
@@ -66,7 +66,7 @@ def _above(triangles: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _cut(triangles: np.ndarray, heights: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return the apex p of each triangle, which alone is on its side, the cuts of its edges, and the other corners q and r."""
+    """Return the apex p of each triangle (the only corner on its side), the cuts of its edges, and its corners q and r."""
     rows = np.arange(len(triangles))
     (p, q, r), (h_p, h_q, h_r) = (
         [values[rows, (apex + k) % 3] for k in range(3)] for values in (triangles, heights[..., None])

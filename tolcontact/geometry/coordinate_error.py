@@ -1,4 +1,4 @@
-"""Error of the points of a mesh that is due to how its file stores coordinates."""
+"""Error of the points of a mesh from the rounding of coordinates in its file."""
 
 import numpy as np
 import trimesh
@@ -12,11 +12,11 @@ def coordinate_spacing(mesh: trimesh.Trimesh) -> np.ndarray:
 
 
 def coordinate_error(mesh: trimesh.Trimesh) -> float:
-    """Return how far [mm] a point of a mesh may lie from where it was before its file rounded coordinates.
+    """Return the largest displacement [mm] of a point of a mesh caused by the rounding of coordinates in its file.
 
-    A vertex is off by e, with |e_i| at most half the spacing along axis i, thus by half the length of the spacings at most. A
-    point of a triangle is a mean of its corners with shares from 0 to 1, and so is its error: planes are off by no more within
-    their triangles than vertices are. Two bodies that touch as drawn therefore lie in each other, as stored, no deeper than
-    the sum of their two errors, in any direction.
+    The error of a vertex is e, with |e_i| at most half the spacing along axis i, so |e| is at most half the length of the
+    spacing vector. A point of a triangle is a convex combination of its corners, and so is its error: within their triangles,
+    planes have no larger errors than vertices. Two bodies that touch as drawn therefore penetrate each other, as stored, by no
+    more than the sum of their errors, in any direction.
     """
     return float(np.linalg.norm(coordinate_spacing(mesh))) / 2

@@ -1,42 +1,42 @@
-"""Contact points that follow curvature, and the error of a set of points that represents two faces.
+"""Contact points that follow curvature, and the error of representing two faces by a set of points.
 
-Between two contact points of a curved face the other part can sink in, by the height of the arc over their chord. Along a
-straight generator it cannot, however long the chord. So triangles of the moving face are halved across the edge whose middle
-lies deepest below the line between its ends, seen from the reference face, until no middle lies too deep.
+Between two contact points of a curved face the other part can penetrate by the height of the arc over their chord. Along a
+straight generator it cannot, however long the chord. So triangles of the moving face are halved across the edge whose midpoint
+is deepest below the line between its ends, as seen from the reference face, until no midpoint is too deep.
 """
 
 import numpy as np
 
 from tolcontact.geometry.surface import Surface
 
-CHORD_SHARE = 5e-4  # of the smallest tolerance range: depth to which the faces may sink in between points
+CHORD_SHARE = 5e-4  # of the smallest tolerance range: permitted penetration between points
 MAX_HALVINGS = 40
-MAX_POINTS = 5000  # that curvature may add
+MAX_POINTS = 5000  # added because of curvature
 MAX_TRIANGLES = 30_000  # at which halving stops
-FIRST_PIECES = 4  # of the smaller face, across which the first triangles reach
-MOVES = 1500  # random displacements by which sets of points are compared
+FIRST_PIECES = 4  # number of initial triangles across the smaller face
+MOVES = 1500  # random displacements for comparing sets of points
 MOVES_PER_BLOCK = 500
 SMALLEST_MOVE = 0.1  # of the smallest tolerance range
 
 
 def curvature_points(face: Surface, target: Surface, *, chord: float, within: float) -> np.ndarray:
-    """Return points (point, 3) [mm] of a face, so dense that `target` cannot sink between them by more than `chord` [mm].
+    """Return points (point, 3) [mm] of a face, so dense that `target` cannot penetrate between them by more than `chord` [mm].
 
-    Only points within `within` [mm] of the target are returned, at most MAX_POINTS. If there are more, the
-    deepest after random displacements are taken; the seed is fixed.
+    Only points within `within` [mm] of the target are returned, at most MAX_POINTS. If there are more, the deepest points after
+    random displacements are used; the seed is fixed.
     """
     points = distinct(_refined(face, target, chord, within).reshape(-1, 3), 1e-9 * face.mesh.scale)
-    feet, normals, is_over = target.project(points)
-    reached = is_over & (np.linalg.norm(points - feet, axis=1) <= within)
-    points, feet, normals = points[reached], feet[reached], normals[reached]
+    projections, normals, is_over = target.project(points)
+    reached = is_over & (np.linalg.norm(points - projections, axis=1) <= within)
+    points, projections, normals = points[reached], projections[reached], normals[reached]
     if len(points) > MAX_POINTS:
-        order = _by_depth(_gap_rows(points, feet, normals), within, chord / CHORD_SHARE)
+        order = _by_depth(_gap_rows(points, projections, normals), within, chord / CHORD_SHARE)
         points = points[order[:MAX_POINTS]]
     return points
 
 
 def _refined(face: Surface, target: Surface, chord: float, within: float) -> np.ndarray:
-    """Return the triangles (triangle, 3, 3) of a face, halved until no edge is wrong by more than `chord` [mm]."""
+    """Return the triangles (triangle, 3, 3) of a face, halved until the error of every edge is at most `chord` [mm]."""
     triangles = np.asarray(face.mesh.triangles)
     max_length = np.inf if is_flat(target) else target.mesh.scale / FIRST_PIECES
     finished = [np.zeros((0, 3, 3))]
@@ -52,49 +52,49 @@ def _refined(face: Surface, target: Surface, chord: float, within: float) -> np.
 
 
 def _edge_errors(triangles: np.ndarray, target: Surface, chord: float, within: float, max_length: float) -> np.ndarray:
-    """Return the error (triangle, edge) [mm] of taking the gap to the target along an edge as linear.
+    """Return the error (triangle, edge) [mm] of treating the gap to the target along an edge as linear.
 
-    Edge j runs from corner j to corner j + 1. Edges farther than `within` [mm] from the target have no error; others that are
-    longer than `max_length` [mm] are wrong by their length, since their ends see nothing of what is between them.
+    Edge j runs from corner j to corner j + 1. Edges further than `within` [mm] from the target have no error. The error of
+    other edges longer than `max_length` [mm] is their length, since their ends say nothing about the gap between them.
     """
     gap, normal = _gaps_to(target, triangles)
-    middle_gap, middle_normal = _gaps_to(target, (triangles + np.roll(triangles, -1, axis=1)) / 2)
-    sag = (gap + np.roll(gap, -1, axis=1)) / 2 - middle_gap
-    # Where both faces curve alike, the chord's error shows only once they are displaced.
-    displacement = np.abs(middle_gap) + chord / CHORD_SHARE
-    turned = displacement * (1 - ((normal + np.roll(normal, -1, axis=1)) / 2 * middle_normal).sum(axis=2))
+    midpoint_gap, midpoint_normal = _gaps_to(target, (triangles + np.roll(triangles, -1, axis=1)) / 2)
+    sag = (gap + np.roll(gap, -1, axis=1)) / 2 - midpoint_gap
+    # Where both faces have the same curvature, the chord error only appears once they are displaced.
+    displacement = np.abs(midpoint_gap) + chord / CHORD_SHARE
+    turned = displacement * (1 - ((normal + np.roll(normal, -1, axis=1)) / 2 * midpoint_normal).sum(axis=2))
     length = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
-    is_near = middle_gap - length < within
+    is_near = midpoint_gap - length < within
     error = np.where(is_near, np.maximum(sag, turned), 0)
     return np.where(is_near & (length > max_length), np.maximum(error, length), error)
 
 
 def _halved(triangles: np.ndarray, edge: np.ndarray) -> np.ndarray:
-    """Return the halves of `triangles` (triangle, 3, 3), each cut through the middle of its edge `edge` (triangle,)."""
+    """Return the halves of `triangles` (triangle, 3, 3), each cut through the midpoint of its edge `edge` (triangle,)."""
     rows = np.arange(len(triangles))
     a, b, c = (triangles[rows, (edge + k) % 3] for k in range(3))
-    middle = (a + b) / 2
-    return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+    midpoint = (a + b) / 2
+    return np.concatenate([np.stack([a, midpoint, c], axis=1), np.stack([midpoint, b, c], axis=1)])
 
 
-def _gaps_to(target: Surface, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return gaps (triangle, 3) [mm] of places (triangle, 3, 3) to the target, and its normals there (triangle, 3, 3)."""
-    points = places.reshape(-1, 3)
-    feet, normals, _ = target.project(points)
-    gaps = ((points - feet) * normals).sum(axis=1)
+def _gaps_to(target: Surface, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return gaps (triangle, 3) [mm] of points (triangle, 3, 3) to the target, and its normals there (triangle, 3, 3)."""
+    points = positions.reshape(-1, 3)
+    projections, normals, _ = target.project(points)
+    gaps = ((points - projections) * normals).sum(axis=1)
     return gaps.reshape(-1, 3), normals.reshape(-1, 3, 3)
 
 
 def sampling_error(sample: np.ndarray, points: np.ndarray, target: Surface, *, unit: float, within: float) -> float:
-    """Return the depth [mm] to which `target` can sink in between the points `sample` (point, 3), as `points` see it.
+    """Return the possible penetration [mm] of `target` between the points `sample` (point, 3), judged by `points`.
 
-    It is the depth of the deepest of `points` below the deepest of `sample` after random small displacements, which one of
-    twenty exceeds. `unit` [mm] is the smallest tolerance range.
+    It is the 95 % quantile, over random small displacements, of the depth of the deepest of `points` below the deepest of
+    `sample`. `unit` [mm] is the smallest tolerance range.
     """
-    both = np.concatenate([sample, points])
-    feet, normals, is_over = target.project(both)
-    rows = _gap_rows(both, feet, normals)
-    in_sample = np.arange(len(both)) < len(sample)
+    all_points = np.concatenate([sample, points])
+    projections, normals, is_over = target.project(all_points)
+    rows = _gap_rows(all_points, projections, normals)
+    in_sample = np.arange(len(all_points)) < len(sample)
     differences = []
     for moves in _moves(within, unit, seed=1):
         gaps = rows @ moves
@@ -108,8 +108,8 @@ def sampling_error(sample: np.ndarray, points: np.ndarray, target: Surface, *, u
 def facet_error(moving: Surface, reference: Surface, within: float) -> float:
     """Return the distance [mm] of the flat triangles of two faces from the round surfaces that they approximate.
 
-    Only triangles within `within` [mm] of the other face count. The height of an arc over a chord whose ends turn by an angle
-    is the chord's length times the angle / 8. Triangles that stand for an analytic surface are off by its residual.
+    Only triangles within `within` [mm] of the other face count. The height of an arc over its chord is the length of the chord
+    times the arc angle / 8. The error of triangles that approximate an analytic surface is its residual.
     """
     total = 0.0
     for face, opposite in ((moving, reference), (reference, moving)):
@@ -140,26 +140,26 @@ def is_flat(surface: Surface) -> bool:
     normals = surface.corner_normals.reshape(-1, 3)
     n = normals.mean(axis=0)
     size = np.linalg.norm(n)
-    if size == 0:  # as much of it looks one way as the opposite way
+    if size == 0:  # opposite normals cancel
         return False
     heights = np.asarray(surface.mesh.vertices) @ (n / size)
     return bool(np.ptp(heights) < 1e-6 * surface.mesh.scale and (normals @ n).min() > 0)
 
 
 def distinct(points: np.ndarray, tolerance: float) -> np.ndarray:
-    """Return the points (point, 3) without those that repeat an earlier one within `tolerance` [mm], in their order."""
-    # Counted from one of them: far from the origin their numbers would be too large.
+    """Return the points (point, 3) without repetitions of earlier points within `tolerance` [mm], in their order."""
+    # Cells are counted from one of the points: far from the origin their indices would be too large.
     cells = np.round((points - points[:1]) / tolerance).astype(np.int64)
     _, start = np.unique(cells, axis=0, return_index=True)
     return points[np.sort(start)]
 
 
-def _gap_rows(points: np.ndarray, feet: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Return gaps as functions of small displacements (t, r): rows (point, 7) of n, lever, and the gap at rest [mm]."""
+def _gap_rows(points: np.ndarray, projections: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return gaps as functions of small displacements (t, r): rows (point, 7) of n, lever, and the initial gap [mm]."""
     centre = points.mean(axis=0)
     length = max(float(np.linalg.norm(points - centre, axis=1).max()), 1e-300)
     lever = np.cross(points - centre, normals) / length
-    return np.column_stack([normals, lever, ((points - feet) * normals).sum(axis=1)])
+    return np.column_stack([normals, lever, ((points - projections) * normals).sum(axis=1)])
 
 
 def _moves(within: float, unit: float, seed: int) -> list[np.ndarray]:
@@ -176,7 +176,7 @@ def _moves(within: float, unit: float, seed: int) -> list[np.ndarray]:
 
 
 def _by_depth(rows: np.ndarray, within: float, unit: float) -> np.ndarray:
-    """Return the numbers of the points that are the deepest after some displacement, most often first."""
+    """Return the indices of the points that are the deepest after some displacement, most frequent first."""
     times = np.zeros(len(rows), dtype=int)
     for seed in (2, 3):
         for moves in _moves(within, unit, seed):

@@ -9,8 +9,8 @@ CREASE = np.cos(np.radians(30.0))  # facets that meet at a wider angle are two f
 def edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the three edges of each of `faces` (face, 3), one face after the other.
 
-    These are their ends (3 face, 2) in the sense of their triangle, the number of each edge (3 face,), and the number of
-    triangles of each edge (edge,): one on the rim, two inside.
+    The result is their ends (3 face, 2) in the sense of their triangle, the index of each edge (3 face,), and the number of
+    triangles at each edge (edge,): one on the rim, two inside.
     """
     ends = np.asarray(faces, dtype=np.int64)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     key = ends.min(axis=1) * (int(ends.max(initial=0)) + 1) + ends.max(axis=1)
@@ -31,7 +31,7 @@ def rim(faces: np.ndarray) -> np.ndarray:
 
 
 def distinct_triangles(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the indices (distinct,) of triangles in `faces` (face, 3) without repetitions, and for each face its place there.
+    """Return the indices (distinct,) of the distinct triangles in `faces` (face, 3), and the position of each face among them.
 
     Triangles are the same if they have the same corners in the same sense.
     """
@@ -42,8 +42,8 @@ def distinct_triangles(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def smooth_pieces(mesh: trimesh.Trimesh, indices: np.ndarray) -> np.ndarray:
     """Return the smooth piece of each triangle in `indices` (face,), from 0: no two neighbours in a piece meet in a crease."""
-    place = np.full(len(mesh.faces), -1)
-    place[indices] = np.arange(len(indices))
-    pairs = place[np.asarray(mesh.face_adjacency)].reshape(-1, 2)
+    position = np.full(len(mesh.faces), -1)
+    position[indices] = np.arange(len(indices))
+    pairs = position[np.asarray(mesh.face_adjacency)].reshape(-1, 2)
     smooth = (pairs >= 0).all(axis=1) & (np.cos(np.asarray(mesh.face_adjacency_angles)) > CREASE)
     return np.asarray(trimesh.graph.connected_component_labels(pairs[smooth], node_count=len(indices)))

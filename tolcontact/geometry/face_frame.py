@@ -1,4 +1,4 @@
-"""The frame of a face: it turns with the face, so that what is compared in it comes out the same in every other frame."""
+"""The frame of a face. It rotates with the face, so that comparisons in it do not depend on the pose of the face."""
 
 from typing import NamedTuple
 
@@ -8,13 +8,13 @@ import trimesh
 from tolcontact.geometry.edges import rim
 from tolcontact.geometry.subdivision import subdivided
 
-TIE = 1e-6  # of lengths that are equal but for rounding
+TIE = 1e-6  # relative difference of lengths that are equal except for rounding
 CELLS = 2.0**30  # in a length of about the face's size: coordinates are whole numbers of cells
 OFF_POWER = 1.1  # keeps the sizes of usual faces off powers of 2, between which the size of cells doubles
 
 
 class FaceFrame(NamedTuple):
-    """A centre (3,) [mm], unit vectors (3, 3) in columns, and the size [mm] of cells, to which coordinates may be rounded."""
+    """A centre (3,) [mm], unit vectors (3, 3) in columns, and the size [mm] of the cells for rounding coordinates."""
 
     centre: np.ndarray
     axes: np.ndarray
@@ -22,14 +22,14 @@ class FaceFrame(NamedTuple):
     rounds: bool = True
 
     def coordinates(self, points: np.ndarray) -> np.ndarray:
-        """Return the coordinates (point, 3) [cell] of points (point, 3) [mm], if rounded so that no earlier rounding shows."""
+        """Return the coordinates (point, 3) [cell] of points (point, 3) [mm], optionally rounded to hide earlier rounding."""
         coordinates = (points - self.centre) @ self.axes / self.cell
         return np.round(coordinates) if self.rounds else coordinates
 
     def subdivided(self, vertices: np.ndarray, faces: np.ndarray, max_edge: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return vertices (vertex, 3) [mm], faces (face, 3) with edges of at most `max_edge` [mm], and coordinates (vertex, 3).
 
-        The coordinates [cell] alone decide which edges are halved.
+        Only the coordinates [cell] decide which edges are halved.
         """
         rows = np.hstack([self.coordinates(vertices), vertices])
         rows, faces, _ = subdivided(rows, faces, max_edge / self.cell)
@@ -39,9 +39,9 @@ class FaceFrame(NamedTuple):
 def face_frame(mesh: trimesh.Trimesh) -> FaceFrame:
     """Return the frame of the triangles of a face.
 
-    Its origin is the centre of the area. The first axis is along the longest edge of the rim, or of the triangles of a closed
+    Its origin is the centroid of the area. The first axis is along the longest edge of the rim, or of the triangles of a closed
     face; the second points towards the corner that is farthest from the first. Where several are equal, as on symmetric
-    faces, the first in the order of the triangles is taken.
+    faces, the first in the order of the triangles is used.
     """
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     triangles = vertices[faces]

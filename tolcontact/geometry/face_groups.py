@@ -1,7 +1,7 @@
-"""Faces that a drawing names as one thing: slots, and patterns of equal holes. Part's own frame, lengths in mm.
+"""Faces that a drawing treats as one feature: slots, and patterns of equal holes. Part's own frame, lengths in mm.
 
-A slot has two parallel planes that face each other, and as its ends two hollow cylinders of one radius, tangent to both planes.
-The holes of a pattern are cylinders of one radius, with parallel axes, that go around their axis by more than half a turn.
+A slot has two parallel planes that face each other, and two hollow cylinders of one radius as its ends, tangent to both planes.
+The holes of a pattern are cylinders of one radius with parallel axes that span more than half a turn each.
 """
 
 import itertools
@@ -18,17 +18,17 @@ from tolcontact.geometry.analytic_surfaces import Cylinder
 from tolcontact.geometry.face_in_file import FaceInFile
 from tolcontact.geometry.interrupted_surfaces import FaceOnSurface
 
-MAX_LEAN = 1e-4  # [rad] between directions that count as parallel
+MAX_TILT = 1e-4  # [rad] between directions that count as parallel
 MARGIN = 1e-5  # of a part's size: difference of lengths that count as equal
 RESIDUAL_FACTOR = 10  # times the residual of a fitted cylinder: the same
-MAX_HOLE_GAP = 3.0  # [rad] of the turn around the axis: the end of a slot leaves pi
+MAX_HOLE_GAP = 3.0  # [rad] around the axis: the end of a slot has a gap of pi
 
 Group = tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class HollowCylinder:
-    """A hollow cylinder of a part: the numbers of its faces from 1, its surface, and the places (point, 3) of its vertices."""
+    """A hollow cylinder of a part: its face numbers from 1, its surface, and the positions (point, 3) of its vertices."""
 
     numbers: Group
     surface: Cylinder
@@ -36,7 +36,7 @@ class HollowCylinder:
 
     @cached_property
     def is_hole(self) -> bool:
-        """Whether it goes around its axis by more than half a turn."""
+        """Whether it spans more than half a turn around its axis."""
         x, y = np.linalg.svd(self.surface.axis[None])[2][1:]
         offsets = self.vertices - self.surface.origin
         azimuths = np.sort(np.arctan2(offsets @ y, offsets @ x))
@@ -45,23 +45,23 @@ class HollowCylinder:
     def equals(self, neighbour: "HollowCylinder", margin: float) -> bool:
         """Return whether another one has the same radius, and an axis parallel to this one."""
         difference = abs(self.surface.radius - neighbour.surface.radius)
-        lean = float(np.linalg.norm(np.cross(self.surface.axis, neighbour.surface.axis)))
-        return difference < margin + RESIDUAL_FACTOR * (self.surface.residual + neighbour.surface.residual) and lean < MAX_LEAN
+        tilt = float(np.linalg.norm(np.cross(self.surface.axis, neighbour.surface.axis)))
+        return difference < margin + RESIDUAL_FACTOR * (self.surface.residual + neighbour.surface.residual) and tilt < MAX_TILT
 
     def is_tangent(self, plane: FaceInFile, margin: float) -> bool:
-        """Return whether a plane, which looks towards the axis, is tangent to it."""
+        """Return whether a plane that faces the axis is tangent to the cylinder."""
         height = float((self.surface.origin - np.array(plane.point)) @ np.array(plane.direction))
         slack = margin + RESIDUAL_FACTOR * self.surface.residual
-        is_parallel = abs(float(self.surface.axis @ np.array(plane.direction))) < MAX_LEAN
+        is_parallel = abs(float(self.surface.axis @ np.array(plane.direction))) < MAX_TILT
         return is_parallel and abs(height - self.surface.radius) < slack
 
 
 class FaceGroups:
     """The slots and the patterns of holes of a part.
 
-    faces      descriptions with their whole surfaces
+    faces      descriptions, including their whole surfaces
     surfaces   the surface and the triangles of each face
-    touching   (pair, 2) numbers from 0 of faces that share an edge
+    touching   (pair, 2) indices of faces that share an edge
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class FaceGroups:
         }
 
     def slots(self) -> list[Group]:
-        """Return the numbers from 1 of the faces of each slot."""
+        """Return the face numbers, from 1, of each slot."""
         walls: dict[tuple[Group, Group], list[Group]] = defaultdict(list)  # of the two ends of a slot
         for plane, ends in self._tangent_ends().items():
             for pair in itertools.combinations(sorted(ends), 2):
@@ -91,7 +91,7 @@ class FaceGroups:
         ]
 
     def patterns(self) -> list[Group]:
-        """Return the numbers from 1 of the faces of each pattern of at least two holes."""
+        """Return the face numbers, from 1, of each pattern of at least two holes."""
         patterns: list[list[HollowCylinder]] = []
         for hole in self._cylinders.values():
             if hole.is_hole:
@@ -114,17 +114,17 @@ class FaceGroups:
 
     def _are_opposed(self, left: Group, right: Group) -> bool:
         normals = [np.array(self._faces[plane[0] - 1].direction) for plane in (left, right)]
-        return bool(np.linalg.norm(normals[0] + normals[1]) < MAX_LEAN)
+        return bool(np.linalg.norm(normals[0] + normals[1]) < MAX_TILT)
 
 
 def _vertices(mesh: trimesh.Trimesh, surfaces: Sequence[FaceOnSurface], numbers: Group) -> np.ndarray:
-    """Return the places (point, 3) of the vertices of some faces."""
+    """Return the positions (point, 3) of the vertices of faces."""
     triangles = np.concatenate([surfaces[number - 1][1] for number in numbers])
     return np.asarray(mesh.vertices)[np.unique(np.asarray(mesh.faces)[triangles])]
 
 
 def group_lines(faces: Sequence[FaceInFile]) -> Iterator[str]:
-    """Yield a line for each slot and each pattern of holes among the faces of a part, with the code that chooses it."""
+    """Yield a line for each slot and each hole pattern among the faces of a part, with the code that selects it."""
     for word in FACE_GROUPS:
         for group in dict.fromkeys(getattr(face, word) for face in faces):
             if group:

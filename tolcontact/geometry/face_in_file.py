@@ -19,14 +19,14 @@ class FaceInFile(Readable):
     direction   outward normal of a plane; axis of a cylinder, cone or torus; otherwise None
     radius      [mm] of a cylinder or sphere, or of the circle inside a torus; otherwise None
     is_inner    whether a round face is hollow: its outside is towards its axis or centre
-    centre      the point of its axis beside `point`, or the centre of a sphere or torus [mm]; otherwise None
-    area        [mm2]; of its triangles, if the file states it by triangles
+    centre      the projection of `point` on its axis, or the centre of a sphere or torus [mm]; otherwise None
+    area        [mm2]; of its triangles, if the file contains only triangles
     residual    [mm] largest distance of its vertices from a fitted surface; 0 if the file states the surface
-    name        its name in the file, which other faces may have too; empty if it has none
-    whole       numbers of the faces that make up its surface, and it; empty if it has the surface for itself
-    slot        numbers of the faces of the slot of which it is a wall; empty if there is none
-    pattern     numbers of the faces of the equal holes of which it is one, or a part of one; empty if there are none
-    copies      number of other faces in the same place, which have no numbers of their own
+    name        its name in the file, not necessarily unique; empty if it has none
+    whole       numbers of the faces that form its surface, including its own; empty if it is the only one
+    slot        face numbers of its slot; empty if there is none
+    pattern     face numbers of its pattern of equal holes; empty if there is none
+    copies      number of other faces in the same position, which have no numbers of their own
     """
 
     number: int
@@ -59,7 +59,7 @@ class FaceInFile(Readable):
             neighbours = ", ".join(str(number) for number in self.whole if number != self.number)
             entries.append(f"one surface with {neighbours}")
         if self.copies:
-            entries.append(f"stands {self.copies + 1} times in the file")
+            entries.append(f"occurs {self.copies + 1} times in the file")
         return ", ".join([*entries, f"{self.area:.4g} mm2", "at ({:.4g}, {:.4g}, {:.4g})".format(*self.point)])
 
 

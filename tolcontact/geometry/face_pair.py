@@ -1,9 +1,9 @@
-"""The depth to which the faces of a contact pair lie in each other, also between contact points.
+"""The penetration depth of the faces of a contact pair, including between contact points.
 
-A plane with form is the boundary of its body over the nominal plane up to its rim, and no farther: each of its points is
-displaced along the normal of the plane. The faces beside it keep their nominal places, and end where they meet the displaced
-rim along that normal. The other body is thus inside as far as it reaches behind the displaced plane, also with its rim; the
-height of a plane counts along its own normal, never along the normals of other faces.
+A plane with form deviation bounds its body over the nominal plane up to the rim, and no further: each of its points is
+displaced along the normal of the plane. Adjacent faces keep their nominal positions, and end where they meet the displaced rim
+along that normal. The penetration of the other body is therefore its depth behind the displaced plane, including at the rim.
+The form deviation of a plane counts along its own normal, never along the normals of other faces.
 """
 
 from dataclasses import dataclass
@@ -22,21 +22,21 @@ from tolcontact.geometry.subdivision import subdivided
 from tolcontact.geometry.surface import Piece, Surface
 from tolcontact.vocabulary import ROUNDED
 
-MIN_POINTS = 2000  # of a face, beside the corners of its triangles
-DENSITY = 4  # times as close as contact points
+MIN_POINTS = 2000  # of a face, in addition to the corners of its triangles
+DENSITY = 4  # ratio of contact-point spacing to the spacing of these points
 MAX_POINTS = 20_000
-MAX_HALVED = 20  # times the desired number of points: if halving long triangles gives more, points are drawn
+MAX_HALVED = 20  # times the desired number of points: if halving long triangles gives more, points are sampled at random
 POSES_PER_BLOCK = 16
-MORE_POINTS = 8  # times as many points of a row are looked at next
-MIN_MEAN = 0.5  # length of the mean of normals: it is 1 of a plane, and 0 of a closed body
-THINNED = 32  # every 32nd point tells nearly always that faces penetrate each other
+MORE_POINTS = 8  # growth factor per round of the number of points checked in each row
+MIN_MEAN = 0.5  # length of the mean normal: 1 for a plane, 0 for a closed body
+THINNED = 32  # every 32nd point is enough to detect nearly every penetration
 
 
 @dataclass(frozen=True, eq=False)
 class BodyFace:
-    """A face in its nominal place, and the body to which it belongs.
+    """A face in its nominal pose, and its body.
 
-    points   (point, 3) [mm], spread all over the face, its corners among them
+    points   (point, 3) [mm], spread over the whole face, including its corners
     normals  (point, 3): outward normals there
     """
 
@@ -46,10 +46,10 @@ class BodyFace:
     normals: np.ndarray
 
     def raise_to_depths(self, largest: np.ndarray, row: np.ndarray, points: np.ndarray) -> None:
-        """Raise depths `largest` (row,) [mm] to those of `points` (point, 3) [mm] of some rows (point,).
+        """Raise depths `largest` (row,) [mm] to the depths of `points` (point, 3) [mm] that belong to rows `row` (point,).
 
-        The depth of a point is its distance to the face, behind the face and in the body; 0 elsewhere. Everything behind a face
-        is inside a body that is not closed.
+        The depth of a point behind the face and inside the body is its distance to the face; elsewhere it is 0. If the body is
+        not closed, everything behind the face counts as inside.
         """
         lower, upper = self.body.bounds
         inside = np.flatnonzero(((points >= lower) & (points <= upper)).all(axis=1))
@@ -62,7 +62,7 @@ class BodyFace:
             return
         is_certain = depth <= max(self._bulge, ROUNDED)  # points that only touch count as inside
         np.maximum.at(largest, row[is_certain], depth[is_certain])
-        # The deepest points of a row come first: mostly one of them is in the body, and the others need not be looked at.
+        # The deepest points of a row come first: usually one of them is in the body, and the others need no check.
         order = np.lexsort((-depth, row))
         count = 1
         while (order := order[depth[order] > largest[row[order]]]).size:
@@ -77,14 +77,14 @@ class BodyFace:
     def behind(
         self, motion: np.ndarray, other: "BodyFace", outward: np.ndarray, raised: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return rows and numbers of points of another face that may lie behind this one when it is moved.
+        """Return rows and indices of the points of another face that may lie behind this one after its motion.
 
-        Of a flat face these are points more than ROUNDED behind its plane, which few are where faces touch; of a face all of
-        whose triangles stand for analytic surfaces those behind any of these; else all points.
+        Behind a flat face these are the points more than ROUNDED behind its plane, which are few where faces touch. If all
+        triangles of the face approximate analytic surfaces, they are the points behind any of these surfaces; otherwise all.
 
         motion    (row, 12)
-        outward   (row,) [mm]: how far the points lie out of their face, or bounds of that
-        raised    (row,) [mm]: how far this face lies out of its nominal place, or bounds of that
+        outward   (row,) [mm]: outward offset of the points from their face, or a bound of it
+        raised    (row,) [mm]: outward offset of this face from its nominal position, or a bound of it
         """
         if self.plane is None:
             return self._behind_round(motion, other, np.abs(outward) + np.abs(raised))
@@ -97,7 +97,7 @@ class BodyFace:
         return row, point
 
     def _behind_round(self, motion: np.ndarray, other: "BodyFace", outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return rows and numbers as `behind` does, of a face that is not flat."""
+        """Return rows and indices as `behind` does, for a face that is not flat."""
         if len(self._unknown.mesh.faces):
             row, point = np.indices((len(motion), len(other.points)))
             return row.ravel(), point.ravel()
@@ -106,17 +106,17 @@ class BodyFace:
         for surface, is_hollow, _ in self._pieces:
             along, *across = np.linalg.svd(surface.axis[None])[2]
             axes = np.array([*across, along if along @ surface.axis > 0 else -along])
-            places = (axes @ R) @ other.points.T + ((t - surface.origin) @ axes.T)[..., None]
-            level = surface.height_beside_axis(np.hypot(places[:, 0], places[:, 1]), places[:, 2])
+            coordinates = (axes @ R) @ other.points.T + ((t - surface.origin) @ axes.T)[..., None]
+            level = surface.height_beside_axis(np.hypot(coordinates[:, 0], coordinates[:, 1]), coordinates[:, 2])
             is_near |= (-level if is_hollow else level) < outward[:, None]
         row, point = np.nonzero(is_near)
         return row, point
 
-    def feet(self, points: np.ndarray, turns: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the places (k, 3) [mm] of this face at which its heights count for points (k, 3), and its inward normals.
+    def projections(self, points: np.ndarray, turns: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the projections (k, 3) [mm] of points (k, 3) at which this face's form deviation counts, and inward normals.
 
-        turns     (k, 3, 3), and
-        normals   (k, 3) of the other face, before it is turned: the opposite normals of a face that is not flat
+        turns     (k, 3, 3): rotations of the other face
+        normals   (k, 3) of the other face before its rotation; rotated, they are the inward normals of a face that is not flat
         """
         if self.plane is None:
             return points, np.einsum("kij,kj->ki", turns, normals)
@@ -144,7 +144,7 @@ class BodyFace:
 
     @cached_property
     def plane(self) -> tuple[np.ndarray, float] | None:
-        """Normal and height of the plane behind which a flat face lies; None if the face is not flat."""
+        """Normal and height of the bounding plane of a flat face; None if the face is not flat."""
         return _plane_of(self.face)
 
     @cached_property
@@ -161,41 +161,40 @@ class BodyFace:
 
 
 class PairForm(Protocol):
-    """The forms of both faces of a pair."""
+    """The form deviations of both faces of a pair."""
 
     def take(self, rows: slice | np.ndarray) -> "PairForm":
-        """Return the forms of some rows."""
+        """Return the form deviations of some rows."""
 
     def at_face(self, k: int, row: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """Return the heights (k,) [mm] of one face at its `places` (k, 3), each of its own row; face 0 is the moving one."""
+        """Return the form deviation (k,) [mm] of one face at `places` (k, 3), each in its own row; face 0 is the moving one."""
 
     def highest(self) -> np.ndarray:
-        """Return bounds (face, row) [mm] of the heights of both faces."""
+        """Return upper bounds (face, row) [mm] of the form deviations of both faces."""
 
 
 @dataclass(frozen=True, eq=False)
 class FacePair:
-    """The faces of a pair, for checks at any pose. Depths up to `rounding` [mm], of coordinates in files, do not count."""
+    """The faces of a pair, for checks at any pose. Depths up to `rounding` [mm], the coordinate error of files, are ignored."""
 
     moving: BodyFace
     reference: BodyFace
     rounding: float = 0.0
 
     def penetrate(self, X_RM: np.ndarray, heights: np.ndarray, form: "PairForm | None" = None) -> np.ndarray:
-        """Return whether (row,) either face lies in the other's body at X_RM (row, 12), `heights` and `form` as for `depth`."""
+        """Return whether (row,) either face penetrates the other body at X_RM (row, 12); `heights` and `form` as in `depth`."""
         hits = np.zeros(len(X_RM), dtype=bool)
         for every in (THINNED, 1):
             rows = np.flatnonzero(~hits)
-            of_rows = None if form is None else form.take(rows)
-            hits[rows] = self.depth(X_RM[rows], heights[rows], of_rows, every=every) > 0
+            row_form = None if form is None else form.take(rows)
+            hits[rows] = self.depth(X_RM[rows], heights[rows], row_form, every=every) > 0
         return hits
 
     def depth(self, X_RM: np.ndarray, heights: np.ndarray, form: "PairForm | None" = None, *, every: int = 1) -> np.ndarray:
         """Return the largest depth (row,) [mm] of either face in the other's body at X_RM (row, 12).
 
-        `heights` (row,) [mm] are the sum by which both faces lie farther out than nominally; each face counts it in full.
-        With a `form`, the heights of both faces in each place are added. Of the points that may lie inside, one in `every` is
-        looked at.
+        `heights` (row,) [mm] is the sum of the outward offsets of both faces; each face counts it in full. With a `form`, the
+        local form deviations of both faces are added. Of the points that may lie inside, one in `every` is checked.
         """
         largest = np.zeros(len(X_RM))
         highest = np.zeros((2, len(X_RM))) if form is None else form.highest()
@@ -211,18 +210,20 @@ class FacePair:
                 if row.size:
                     points, outward = side.points[point], heights[rows][row]
                     if form is not None:
-                        of_rows = form.take(rows)
-                        outward = outward + of_rows.at_face(k, row, points)
-                    places = _moved(motion, row, points + outward[:, None] * side.normals[point])
+                        row_form = form.take(rows)
+                        outward = outward + row_form.at_face(k, row, points)
+                    displaced = _moved(motion, row, points + outward[:, None] * side.normals[point])
                     if form is not None:
-                        feet, towards = body.feet(_moved(motion, row, points), pose.rotation(motion)[row], side.normals[point])
-                        places += of_rows.at_face(1 - k, row, feet)[:, None] * towards
-                    body.raise_to_depths(largest[rows], row, places)
+                        projections, towards = body.projections(
+                            _moved(motion, row, points), pose.rotation(motion)[row], side.normals[point]
+                        )
+                        displaced += row_form.at_face(1 - k, row, projections)[:, None] * towards
+                    body.raise_to_depths(largest[rows], row, displaced)
         return np.maximum(largest - self.rounding, 0) if self.rounding else largest
 
 
 def _moved(motion: np.ndarray, row: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return points (k, 3) moved by the motion (row, 12) of the row (k,) of each."""
+    """Return points (k, 3), each moved by the motion (row, 12) of its row (k,)."""
     return np.asarray(np.einsum("kij,kj->ki", pose.rotation(motion)[row], points) + pose.translation(motion)[row])
 
 
@@ -236,8 +237,8 @@ def body_face(face: Surface, body: trimesh.Trimesh, contacts: int) -> BodyFace:
     flat = _plane_of(face)
     if flat is not None:
         return BodyFace(face, body, points, np.broadcast_to(flat[0], points.shape))
-    feet, normals, _ = face.project(points)
-    return BodyFace(face, body, feet if face.surfaces else points, normals)
+    projections, normals, _ = face.project(points)
+    return BodyFace(face, body, projections if face.surfaces else points, normals)
 
 
 def _plane_of(face: Surface) -> tuple[np.ndarray, float] | None:
@@ -251,9 +252,10 @@ def _plane_of(face: Surface) -> tuple[np.ndarray, float] | None:
 
 
 def _spread(mesh: trimesh.Trimesh, step: float, count: int) -> np.ndarray:
-    """Return points (point, 3) of a face about `step` [mm] apart, its rim and vertices among them.
+    """Return points (point, 3) of a face about `step` [mm] apart, including its rim and vertices.
 
-    Where halving the edges of long slivers would give too many points, `count` are drawn inside, with a fixed seed.
+    Where halving the edges of long slivers would give too many points, `count` random points inside are used, with a fixed
+    seed.
     """
     vertices, corners = np.asarray(mesh.vertices), np.asarray(mesh.triangles)
     longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
@@ -264,7 +266,7 @@ def _spread(mesh: trimesh.Trimesh, step: float, count: int) -> np.ndarray:
 
 
 def _along(edges: np.ndarray, step: float) -> np.ndarray:
-    """Return points (point, 3) at most a `step` [mm] apart on edges (edge, end, 3), their ends among them."""
+    """Return points (point, 3) at most a `step` [mm] apart on edges (edge, end, 3), including their ends."""
     vectors = edges[:, 1] - edges[:, 0]
     parts = np.ceil(np.linalg.norm(vectors, axis=1) / step).astype(int)
     edge = np.repeat(np.arange(len(edges)), parts)

@@ -1,4 +1,4 @@
-"""Faces: the triangles of a part that meet all criteria of a face, as a surface. Part's own frame, mm."""
+"""Faces: the triangles of a part that meet all criteria of a face, as a surface, in the part's own frame. Lengths in mm."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -23,29 +23,29 @@ from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.surface_recognition import analytic_surfaces
 
 NEAR_DIVISIONS = 100
-CUT = 4  # how much finer the pieces of triangles become in one step
-BREP_REACH = 1e-3  # of the part's size: how far a point may stand off the B-rep face that it names
+CUT = 4  # refinement factor of the pieces of triangles in one step
+BREP_REACH = 1e-3  # of the part's size: largest distance of a point from the B-rep face that it selects
 FLAT_ANGLE = 2e-4  # rad: between neighbouring triangles of one flat face, after single precision
 RADIUS_TOLERANCE = 1e-6  # of a radius: radii that differ by less are equal
 MAX_LISTED = 12  # faces in a message
 OPPOSING_COSINE = -0.5  # between the outward normals of two surfaces that face each other
-MAX_COMPARISONS = 4_000_000  # of pieces with triangles: looking for the nearest ones takes less time than more
-CUT_MARGIN = 1e-9  # of the part's size: what lies in a side of a box is inside
+MAX_COMPARISONS = 4_000_000  # of pieces with triangles: above this, a search for the nearest ones takes less time
+CUT_MARGIN = 1e-9  # of the part's size: geometry on a side of a box counts as inside
 
 Meshes = Mapping[Part, trimesh.Trimesh]
-# By the meshes of a part and of its neighbour: which triangles of the part are near, for each pair of places and distance.
+# By the meshes of a part and of its neighbour: which triangles of the part are near, for each pair of poses and distance.
 _NEARNESS: WeakKeyDictionary[trimesh.Trimesh, WeakKeyDictionary[trimesh.Trimesh, dict[Any, np.ndarray]]] = WeakKeyDictionary()
 
 
 class FaceArea(NamedTuple):
-    """The area [mm^2] of a face: of its triangles (triangle,) in its part's mesh, as far as they lie in all boxes."""
+    """The area [mm^2] of a face: the area of its triangles (triangle,) in its part's mesh that lies inside all boxes."""
 
     triangles: np.ndarray
     boxes: tuple[Inside, ...]
     area: float
 
     def share(self, other: "FaceArea", mesh: trimesh.Trimesh) -> float:
-        """Return the share of this area that another face of the same part, which has the `mesh`, covers too."""
+        """Return the share of this area that another face of the same part also covers; `mesh` is the mesh of the part."""
         common = np.intersect1d(self.triangles, other.triangles)
         if not common.size:
             return 0.0
@@ -72,7 +72,7 @@ def _area(mesh: trimesh.Trimesh, indices: np.ndarray, boxes: Sequence[Inside]) -
 
 
 def patch(face: Face, meshes: Meshes) -> Surface:
-    """Return the surface of a face. `meshes` holds the mesh of each part in that part's own frame.
+    """Return the surface of a face. `meshes` contains the mesh of each part in that part's own frame.
 
     Raises GeometryFault if the face is empty, or if its outside is undefined.
     """
@@ -96,7 +96,7 @@ def patch(face: Face, meshes: Meshes) -> Surface:
 
 
 def triangles(face: Face, meshes: Meshes) -> np.ndarray:
-    """Return the indices (triangle,) of the triangles that meet all criteria but boxes, which may cut them.
+    """Return the indices (triangle,) of the triangles that meet all criteria except boxes, which may cut triangles.
 
     Raises GeometryFault if there are none.
     """
@@ -142,7 +142,7 @@ def _by_function(face: Face, mesh: trimesh.Trimesh, selection: Picked) -> np.nda
 
 
 def _by_kind(face: Face, mesh: trimesh.Trimesh, selection: Cylinder | Largest) -> np.ndarray:
-    number_of, _ = number_faces(mesh)
+    face_of, _ = number_faces(mesh)
     faces = describe_faces(mesh)
     if isinstance(selection, Cylinder):
         hits = [candidate for candidate in faces if _is_cylinder(candidate, selection)]
@@ -152,11 +152,11 @@ def _by_kind(face: Face, mesh: trimesh.Trimesh, selection: Cylinder | Largest) -
     if not hits:
         listed = "; ".join(f"{candidate}" for candidate in faces[:MAX_LISTED]) + ("; ..." if len(faces) > MAX_LISTED else "")
         raise GeometryFault(f"face {face}: the part has no such face; its {len(faces)} faces are: {listed}")
-    return np.isin(number_of, [hit.number - 1 for hit in hits])
+    return np.isin(face_of, [hit.number - 1 for hit in hits])
 
 
 def _is_cylinder(face: FaceInFile, selection: Cylinder) -> bool:
-    """Return whether a face is a cylinder with the radius and on the side that a selection requires."""
+    """Return whether a face is a cylinder with the required radius and side."""
     if face.kind != "cylinder" or face.radius is None or selection.inner not in (None, face.is_inner):
         return False
     radius = selection.radius
@@ -164,7 +164,7 @@ def _is_cylinder(face: FaceInFile, selection: Cylinder) -> bool:
 
 
 def _is_along(face: FaceInFile, direction: Vector | None) -> bool:
-    """Return whether a plane looks in a direction, or an axis lies along it either way; True if no direction is required."""
+    """Return whether a plane faces a direction, or an axis is parallel to it; True if no direction is required."""
     if direction is None or face.direction is None:
         return direction is None
     cosine = float(np.dot(face.direction, direction))
@@ -183,7 +183,7 @@ def _by_brep(face: Face, mesh: trimesh.Trimesh, selection: Brep) -> np.ndarray:
 
 
 def _group(face: Face, faces: Sequence[FaceInFile], description: FaceInFile, whole: bool | str) -> tuple[int, ...]:
-    """Return the numbers of the faces of a B-rep face's surface, slot or pattern of holes. Raises GeometryFault without one."""
+    """Return the face numbers of the surface, slot or hole pattern of a B-rep face. Raises GeometryFault if there is none."""
     if whole is True:
         return description.whole or (description.number,)
     if group := getattr(description, str(whole)):
@@ -193,7 +193,7 @@ def _group(face: Face, faces: Sequence[FaceInFile], description: FaceInFile, who
 
 
 def _brep_numbers(face: Face, mesh: trimesh.Trimesh, which: int | str | Vector) -> np.ndarray:
-    """Return the numbers of B-rep faces, from 0, that a number from 1, a name or a point chooses."""
+    """Return the indices of the B-rep faces that a number from 1, a name or a point selects."""
     if isinstance(which, str):
         return _by_name(face, mesh.metadata[FACE_NAMES], which)
     if isinstance(which, tuple):
@@ -215,8 +215,8 @@ def _by_name(face: Face, names: Sequence[str], name: str) -> np.ndarray:
     return np.flatnonzero(np.array(names) == name)
 
 
-def _by_point(face: Face, mesh: trimesh.Trimesh, place: Vector) -> np.ndarray:
-    numbers, distance = faces_at(mesh, place)
+def _by_point(face: Face, mesh: trimesh.Trimesh, point: Vector) -> np.ndarray:
+    numbers, distance = faces_at(mesh, point)
     if distance > BREP_REACH * mesh.scale:
         raise GeometryFault(
             f"face {face}: the point is {distance:.4g} mm away from the part, which spans {_span(mesh)}; "
@@ -228,7 +228,7 @@ def _by_point(face: Face, mesh: trimesh.Trimesh, place: Vector) -> np.ndarray:
 
 
 def _by_nearness(face: Face, meshes: Meshes, selection: Near) -> np.ndarray:
-    """Return the mask of a selection. A model needs it several times, so it is kept as long as both meshes are."""
+    """Return the mask of a selection. A model needs it several times, so it is cached for the lifetime of both meshes."""
     parts = face.part, selection.part
     masks = _NEARNESS.setdefault(meshes[face.part], WeakKeyDictionary()).setdefault(meshes[selection.part], {})
     key = (*((part.at, part.rotation) for part in parts), selection.within)
@@ -240,10 +240,10 @@ def _by_nearness(face: Face, meshes: Meshes, selection: Near) -> np.ndarray:
 
 def _near_mask(mesh: trimesh.Trimesh, neighbour: trimesh.Trimesh, within: float) -> np.ndarray:
     mask = np.zeros(len(mesh.faces), dtype=bool)
-    # A flat face is chosen as a whole, however it is cut into triangles.
+    # A flat face is selected as a whole, however it is triangulated.
     flat = np.asarray(mesh.face_adjacency)[np.asarray(mesh.face_adjacency_angles) < FLAT_ANGLE]
     face_of = trimesh.graph.connected_component_labels(flat, node_count=len(mesh.faces))
-    # Both are sampled, since either part may be small beside the other.
+    # Both are sampled, since either part may be small compared with the other.
     for sampled, target in ((mesh, neighbour), (neighbour, mesh)):
         origin, hit = _near_pieces(sampled, target, within, ~mask if target is mesh else np.ones(len(target.faces), dtype=bool))
         mask[(origin if sampled is mesh else hit)[_are_opposing(sampled, origin, target, hit)]] = True
@@ -262,12 +262,12 @@ def _near_pieces(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return where the pieces of a mesh come close to a target: their triangle, and the nearest triangle of the target.
 
-    Pieces are parts of triangles whose centres lie `within` [mm] of the target. Triangles are cut step by step. Before each
-    step, pieces are left out that lie too far away, or face no near triangle of the target among those that `is_open`
-    (triangle,) marks.
+    Pieces are parts of triangles whose centres lie `within` [mm] of the target. Triangles are cut step by step. Each step first
+    drops the pieces that are too far away, and the pieces that face no near triangle of the target marked in `is_open`
+    (triangle,).
     """
     finest, surface = max(within, sampled.scale / NEAR_DIVISIONS), Surface(target)
-    # What lies outside of this box is too far away.
+    # Triangles outside this box are too far away.
     low, high = np.asarray(target.bounds) + within * np.array([[-1.0], [1.0]])
     corners = np.asarray(sampled.triangles)
     origin = np.flatnonzero(((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1))
@@ -294,7 +294,7 @@ def _near_pieces(
 def _facing_pieces(
     pieces: np.ndarray, normals: np.ndarray, targets: np.ndarray, target_normals: np.ndarray, reach: float
 ) -> np.ndarray:
-    """Return the numbers of pieces (piece, 3, 3) with opposite triangles (triangle, 3, 3) whose boxes are within `reach` [mm].
+    """Return the indices of pieces (piece, 3, 3) with opposite triangles (triangle, 3, 3) whose boxes are within `reach` [mm].
 
     All pieces are returned if there are too many to compare.
     """
@@ -322,14 +322,14 @@ def _cut(surface: Surface, box: Inside, margin: float) -> Surface:
     cut.remove_unreferenced_vertices()
     if len(cut.faces) == 0:
         return Surface(cut, np.zeros((0, 3, 3)))
-    # A cut does not change the face: the normals are still those of the whole, also where its triangles end now.
+    # A cut does not change the face: it keeps the normals of the whole, even at its new boundary.
     origin, _ = surface.nearest(cut.triangles_center)
     normals = np.stack([surface.normals(origin, cut.triangles[:, k]) for k in range(3)], axis=1)
     return Surface(cut, normals, surface.surfaces, surface.surface_numbers[origin])
 
 
 def _sliced(vertices: np.ndarray, faces: np.ndarray, box: Inside, margin: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the part of triangles, vertices (vertex, 3) [mm] and faces (face, 3), in a box larger by `margin` [mm]."""
+    """Return the triangles, vertices (vertex, 3) [mm] and faces (face, 3), clipped by a box enlarged by `margin` [mm]."""
     for corner, inward in ((box.lower, 1.0), (box.upper, -1.0)):
         for axis in np.eye(3):
             origin = np.array(corner) - inward * margin * axis

@@ -9,24 +9,24 @@ import scipy
 
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, Plane, Sphere
 
-MIN_DIRECTIONS = 5  # of facets, by which a round surface differs from a fold
+MIN_DIRECTIONS = 5  # of facets: with fewer, a surface is a fold, not round
 NORMAL_TOLERANCE = 1e-9  # normals that differ by less are one direction
-MIN_CONE_ANGLE = 1e-4  # rad: of a cone to its axis, and to the plane across it
-SAMPLED_TRIANGLES = 300  # triangles that are tried before all are
-SAMPLE_TOLERANCE = 10  # times the tolerance: distance at which these still pass
-RADIUS_TOLERANCE = 0.1  # of the distance of vertices from a surface: uncertainty of its radius
-EXACT = 1e-14  # of a size: distance of vertices from a surface that is rounding
-DIFFERENCE = 1e-8  # of the size of a number: change by which slopes are computed
-MAX_DIGITS = 12  # of a radius behind the point
-MAX_SIZE = 1e4  # radii, in sizes of what they are fitted to; larger ones are a plane's rounding
+MIN_CONE_ANGLE = 1e-4  # rad: between a cone and its axis, and between a cone and the plane across it
+SAMPLED_TRIANGLES = 300  # triangles in a first trial
+SAMPLE_TOLERANCE = 10  # times the tolerance: largest residual in the first trial
+RADIUS_TOLERANCE = 0.1  # of the residual of a surface: uncertainty of its radius
+EXACT = 1e-14  # of a size: residual that is due to rounding
+DIFFERENCE = 1e-8  # of the size of a variable: step of finite differences
+MAX_DIGITS = 12  # decimals of a radius
+MAX_SIZE = 1e4  # largest radius, in sizes of the fitted vertices; larger radii are the rounding of a plane
 
 
 def fit_surface(triangles: np.ndarray, tolerance: float) -> AnalyticSurface | None:
-    """Return the surface on which the corners of `triangles` (face, 3, 3) [mm] lie within `tolerance` [mm], if there is one.
+    """Return a surface within `tolerance` [mm] of the corners of `triangles` (face, 3, 3) [mm], if there is one.
 
-    Both a sphere and a cone pass through two rings of vertices: the simpler one is taken. Triangles in fewer than
-    MIN_DIRECTIONS directions are a plane, or bent. Fasteners, features and contact pairs ask for the same faces, and parts of
-    one shape have them, too: each is fitted once.
+    Both a sphere and a cone pass through two rings of vertices: the simpler one is used. Triangles in fewer than
+    MIN_DIRECTIONS directions are a plane or a fold. Fasteners, features and contact pairs request the same faces, and parts of
+    one shape share them, so each face is fitted once.
     """
     key = hashlib.blake2b(triangles.tobytes()).digest(), tolerance
     if key not in _known_fits:
@@ -57,18 +57,18 @@ def _fit(triangles: np.ndarray, tolerance: float) -> AnalyticSurface | None:
 
 
 def _vertices(triangles: np.ndarray) -> np.ndarray:
-    """Return the corners (vertex, 3) of triangles without repetitions."""
+    """Return the distinct corners (vertex, 3) of triangles."""
     return np.unique(triangles.reshape(-1, 3), axis=0)
 
 
 def nearest_surface(triangles: np.ndarray) -> AnalyticSurface:
     """Return the plane, cylinder, cone or sphere that is nearest to `triangles` (face, 3, 3) [mm]."""
     vertices = _vertices(triangles)
-    places = np.vstack([vertices, triangles.mean(axis=1)])  # two rings of vertices alone lie on a sphere, too
+    samples = np.vstack([vertices, triangles.mean(axis=1)])  # two rings of vertices alone also lie on a sphere
     surfaces = [fit(vertices, triangles) for fit in FITS]
     return min(
         (surface for surface in surfaces if surface is not None),
-        key=lambda surface: np.abs(surface.distance(places)[0]).max(),
+        key=lambda surface: np.abs(surface.distance(samples)[0]).max(),
     )
 
 
@@ -89,9 +89,9 @@ def fit_plane(vertices: np.ndarray, triangles: np.ndarray) -> AnalyticSurface:
 
 
 def fit_cylinder(vertices: np.ndarray, triangles: np.ndarray) -> AnalyticSurface | None:
-    """Return the cylinder next to `vertices` (vertex, 3), None if there is none.
+    """Return the cylinder that fits `vertices` (vertex, 3) best, None if there is none.
 
-    The normals of a cylinder are across its axis: it starts as the direction that they have least of.
+    The normals of a cylinder are perpendicular to its axis: the start is the direction of their smallest components.
     """
     _, spread, directions = np.linalg.svd(_normals(triangles), full_matrices=False)
     if spread[1] < 1e-3 * spread[0]:
@@ -114,9 +114,9 @@ def fit_cylinder(vertices: np.ndarray, triangles: np.ndarray) -> AnalyticSurface
 
 
 def fit_cone(vertices: np.ndarray, triangles: np.ndarray) -> AnalyticSurface | None:
-    """Return the cone next to `vertices` (vertex, 3), None if there is none.
+    """Return the cone that fits `vertices` (vertex, 3) best, None if there is none.
 
-    The normals of a cone make one angle with its axis, and its tangent planes meet in its apex.
+    The normals of a cone form a constant angle with its axis, and its tangent planes meet in its apex.
     """
     normals = _normals(triangles)
     _, spread, directions = np.linalg.svd(normals - normals.mean(axis=0), full_matrices=False)
@@ -145,7 +145,7 @@ def fit_cone(vertices: np.ndarray, triangles: np.ndarray) -> AnalyticSurface | N
 
 
 def fit_sphere(vertices: np.ndarray, triangles: np.ndarray) -> AnalyticSurface | None:
-    """Return the sphere next to `vertices` (vertex, 3), None if it is far too large."""
+    """Return the sphere that fits `vertices` (vertex, 3) best, None if it is far too large."""
     centre, size = vertices.mean(axis=0), float(np.ptp(vertices, axis=0).max())
     offset = vertices - centre
     linear = np.linalg.lstsq(np.column_stack([2 * offset, np.ones(len(offset))]), (offset**2).sum(axis=1), rcond=None)[0]
@@ -157,16 +157,16 @@ def fit_sphere(vertices: np.ndarray, triangles: np.ndarray) -> AnalyticSurface |
     return _with_residual(sphere, vertices)
 
 
-# From the simplest to the most general; all but the plane are round.
+# From the simplest to the most general; all except the plane are round.
 FITS: tuple[Callable[[np.ndarray, np.ndarray], AnalyticSurface | None], ...] = (fit_plane, fit_cylinder, fit_cone, fit_sphere)
 
 
 def _least_squares(
     residuals: Callable[[np.ndarray], np.ndarray], start: Sequence[float], scale: Sequence[float] | float
 ) -> np.ndarray:
-    """Return the numbers (n,) with the least sum of squared residuals [mm], from a start, of sizes as in `scale`.
+    """Return the variables (n,) with the least sum of squared residuals [mm], from a start; `scale` states their sizes.
 
-    Where vertices are exact, the start is, too, but for its rounding: one step of Gauss and Newton takes that away.
+    Where vertices are exact, so is the start except for its rounding, and one Gauss-Newton step removes this rounding.
     """
     numbers, sizes = np.array(start), np.broadcast_to(scale, len(start))
     errors = residuals(numbers)
@@ -180,14 +180,14 @@ def _least_squares(
 
 
 def _circle(points: np.ndarray) -> tuple[float, float, float]:
-    """Return centre and radius of the circle next to `points` (point, 2), from linear equations."""
+    """Return centre and radius of the circle that fits `points` (point, 2) best, from linear equations."""
     linear = np.linalg.lstsq(np.column_stack([2 * points, np.ones(len(points))]), (points**2).sum(axis=1), rcond=None)[0]
     x, y, constant = (float(number) for number in linear)
     return x, y, float(np.sqrt(max(constant + x**2 + y**2, 0.0)))
 
 
 def _with_residual(surface: AnalyticSurface, vertices: np.ndarray) -> AnalyticSurface:
-    """Return the surface with the largest distance of `vertices` (vertex, 3), and a round radius if they allow one."""
+    """Return the surface with its residual over `vertices` (vertex, 3), and with a rounded radius if they permit one."""
     residual = float(np.abs(surface.distance(vertices)[0]).max())
     if isinstance(surface, Cylinder | Sphere):
         rounded = (round(surface.radius, digits) for digits in range(MAX_DIGITS))

@@ -1,4 +1,4 @@
-"""Compiled heights of planes with form, from spline tables, and the gap between two such planes."""
+"""Compiled form deviations of planes, from spline tables, and the gap between two planes with form deviation."""
 
 import math
 from typing import NamedTuple
@@ -9,11 +9,11 @@ from tolcontact.compiled import compiled, inner
 
 
 class HeightTable(NamedTuple):
-    """The modes of a form on a plane, as cubic B-splines over a square grid; without nodes the plane has no form.
+    """The form modes of a plane, as cubic B-splines over a square grid; without nodes the plane has no form deviation.
 
     low           (2,) [mm]: the coordinates at which the first interval between nodes begins
     step          [mm] between nodes
-    coefficients  (node along the first axis, node along the second axis, mode), with one more node around the grid
+    coefficients  (node along the first axis, node along the second axis, mode), with one additional node on each side
     """
 
     low: np.ndarray
@@ -29,7 +29,7 @@ class Plane(NamedTuple):
     normal   (3,) out of the material
     edges    (edge, 7) [mm] of its rim: start (2,), unit direction (2,), length, and unit vector into the face (2,)
     corners  (2, 2) [mm]: least and largest coordinates
-    table    of the heights of its form
+    table    of its form deviation
     """
 
     origin: np.ndarray
@@ -42,7 +42,7 @@ class Plane(NamedTuple):
 
 @inner
 def _weights(x, values, slopes, bends):  # type: ignore[no-untyped-def]
-    """Write the weights (4,) of four neighbouring coefficients at a share x of an interval, and their two derivatives."""
+    """Write the weights (4,) of four neighbouring coefficients at a share x of an interval, and their first two derivatives."""
     y = 1 - x
     values[0], values[3] = y * y * y / 6, x * x * x / 6
     values[1], values[2] = 2 / 3 - x * x * (2 - x) / 2, 2 / 3 - y * y * (2 - y) / 2
@@ -52,11 +52,11 @@ def _weights(x, values, slopes, bends):  # type: ignore[no-untyped-def]
 
 
 class HeightSums(NamedTuple):
-    """Factors of the modes of a plane, and sums of the modes at the nodes of its table, formed where a realization needs them.
+    """Factors of the modes of a plane, and sums of the modes at the nodes of its table, computed on demand.
 
     factors   (realization, mode)
     values    (node along the first axis, node along the second axis) [mm]
-    rows      of the same shape: the realization to which a sum belongs, -1 for none
+    rows      of the same shape: the realization of each sum, -1 for none
     """
 
     factors: np.ndarray
@@ -65,14 +65,14 @@ class HeightSums(NamedTuple):
 
     @classmethod
     def of(cls, table: HeightTable, factors: np.ndarray) -> "HeightSums":
-        """Return factors, and no sums yet."""
+        """Return factors with empty sums."""
         nodes = table.coefficients.shape[:2]
         return cls(factors, np.empty(nodes), np.full(nodes, -1))
 
 
 @inner
 def _sum(factors, node):  # type: ignore[no-untyped-def]
-    """Return the sum of factors (mode,) times coefficients (mode,): four sums that do not wait for each other."""
+    """Return the sum of factors (mode,) times coefficients (mode,), as four independent sums that can run in parallel."""
     first, second, third, fourth, whole = 0.0, 0.0, 0.0, 0.0, factors.size // 4 * 4
     for k in range(0, whole, 4):
         first, second = first + factors[k] * node[k], second + factors[k + 1] * node[k + 1]
@@ -84,9 +84,9 @@ def _sum(factors, node):  # type: ignore[no-untyped-def]
 
 @inner
 def height(table, sums, row, u, v, weights):  # type: ignore[no-untyped-def]
-    """Return the height [mm] of a realization at coordinates u, v, and its derivatives by u, v, uu, uv, vv.
+    """Return the form deviation [mm] of a realization at coordinates u, v, and its derivatives by u, v, uu, uv, vv.
 
-    weights   (6, 4): room for the weights of nodes
+    weights   (6, 4): work array for the weights of nodes
     """
     nodes, factors, values, rows = table.coefficients, sums.factors, sums.values, sums.rows
     if nodes.shape[0] == 0:
@@ -112,9 +112,9 @@ def height(table, sums, row, u, v, weights):  # type: ignore[no-untyped-def]
 
 @inner
 def write_map(moving, reference, X, along):  # type: ignore[no-untyped-def]
-    """Write how coordinates u, v of the moving plane become those of their foot on the reference plane, and the nominal gap.
+    """Write the affine map from coordinates u, v of the moving plane to their projection on the reference plane and the gap.
 
-    along   (3, 3): rows of two coordinates [mm] and the gap [mm], each a factor of u, a factor of v and a constant
+    along   (3, 3): rows of two coordinates [mm] and the nominal gap [mm], each a factor of u, a factor of v and a constant
     """
     for axis in range(3):
         for i in range(3):
@@ -159,11 +159,12 @@ def coordinates(plane, point):  # type: ignore[no-untyped-def]
 
 @compiled
 def write_heights(moving, reference, poses, sums_m, sums_r, P_m, is_wanted, heights):  # type: ignore[no-untyped-def]
-    """Write the sums of both heights (n, point) [mm] at points of the moving plane, and their feet, at X_RM (n, 12).
+    """Write the sums of both form deviations (n, point) [mm] at points of the moving plane and their projections.
 
+    poses       X_RM (n, 12)
     sums_m, sums_r   HeightSums of both planes
     P_m         (n, point, 3) [mm], or (1, point, 3) if they are the same at all poses
-    is_wanted   (n, point): which heights are written
+    is_wanted   (n, point): which sums are written
     """
     along, weights, scratch = np.empty((3, 3)), np.empty((6, 4)), np.empty(5)
     for k in range(poses.shape[0]):

@@ -1,7 +1,7 @@
-"""Bodies whose files rounded coordinates, smaller by that error: what fits as drawn fits again.
+"""Bodies from files that round coordinates, offset inward by that error, so that bodies that fit as drawn also fit as stored.
 
-Rounding tilts the triangles of a plane against each other, by the error of coordinates over their height, and lets bodies that
-touch as drawn lie in each other. Planes are made flat again, and all faces move into the material by the error.
+Rounding tilts the triangles of a plane relative to each other, by the coordinate error over their height, and lets bodies that
+touch as drawn penetrate each other. Planes are made flat again, and all faces move into the material by the error.
 """
 
 from typing import NamedTuple
@@ -13,16 +13,16 @@ from tolcontact.arrays import Array, Float, Int
 from tolcontact.geometry.vertex_displacements import TINY, capped, displacements
 
 MIN_ANGLE, MAX_ANGLE = 1e-6, 0.05  # rad: triangles at a smaller angle may always be one plane, at a larger one never
-MAX_ERRORS = 2.0  # errors of coordinates: distance of a vertex from a plane that is fitted to it
-MAX_DISPLACEMENT = 20.0  # errors, by which a vertex moves at most: where faces meet at sharp angles
+MAX_ERRORS = 2.0  # coordinate errors: largest distance of a vertex from its fitted plane
+MAX_DISPLACEMENT = 20.0  # coordinate errors: largest displacement of a vertex, where faces meet at sharp angles
 MIN_CROSSING = 1e-3  # smallest singular value of the normals of planes that meet in a line or a corner
-ROUNDED = 1e-9  # parts of normals below are 0
+ROUNDED = 1e-9  # smaller components of normals are 0
 
 
 class Planes(NamedTuple):
-    """The planes of a mesh, and the vertices of each in pairs.
+    """The planes of a mesh, in pairs of a plane and one of its vertices.
 
-    number, vertex   (pair,) number of a plane, and of a vertex of it
+    number, vertex   (pair,) index of the plane, and of the vertex
     normals          (pair, 3) outward
     heights          (pair,) [mm] of the plane above the vertex
     """
@@ -34,7 +34,7 @@ class Planes(NamedTuple):
 
 
 def smaller(body: trimesh.Trimesh, error: float) -> trimesh.Trimesh:
-    """Return a body with flat planes, all faces of which lie inside by an `error` [mm]; the body itself if that is 0."""
+    """Return a body with flat planes and all faces offset inward by an `error` [mm]; the body itself if that is 0."""
     if not error:
         return body
     whole = trimesh.Trimesh(body.vertices, np.asarray(body.faces)[np.asarray(body.area_faces) > 0], process=False)
@@ -42,11 +42,11 @@ def smaller(body: trimesh.Trimesh, error: float) -> trimesh.Trimesh:
 
 
 def inset(mesh: trimesh.Trimesh, error: float) -> Float[Array, "vertex 3"]:
-    """Return the vertices [mm] of a mesh with flat planes, all faces of which lie inside by an `error` [mm].
+    """Return the vertices [mm] of a mesh with flat planes and all faces offset inward by an `error` [mm].
 
-    Triangles are one plane if the error of their vertices explains all angles between them; it is fitted to these vertices.
-    Each vertex moves to the intersection of the planes around it. Where more than three meet, planes of several triangles come
-    first, and the others fit as well as possible.
+    Triangles form one plane if the error of their vertices explains all angles between them; the plane is fitted to these
+    vertices. Each vertex moves to the intersection of its planes. Where more than three meet, planes of several triangles come
+    first, and the others are fitted as well as possible.
     """
     label = _coplanar(mesh, error)
     planes = _fitted(mesh, label)
@@ -60,17 +60,17 @@ def inset(mesh: trimesh.Trimesh, error: float) -> Float[Array, "vertex 3"]:
     N, heights, count = planes.normals, planes.heights - error, len(mesh.vertices)
     vertex, joint = planes.vertex[is_joint], N[is_joint]
     moved = displacements(vertex, joint, np.column_stack([heights[is_joint], joint]), count, MIN_CROSSING)
-    motions, free = moved[..., 0], np.eye(3) - moved[..., 1:]  # free: onto the directions that these planes leave open
+    motions, free = moved[..., 0], np.eye(3) - moved[..., 1:]  # free: projection onto the directions left free by these planes
     vertex, lone = planes.vertex[~is_joint], N[~is_joint]
-    rest = heights[~is_joint] - (lone * motions[vertex]).sum(axis=1)
+    remainder = heights[~is_joint] - (lone * motions[vertex]).sum(axis=1)
     lone = (lone[:, None] @ free[vertex])[:, 0]
     lone[np.abs(lone) < ROUNDED] = 0
-    motions = motions + displacements(vertex, lone, rest[:, None], count, MIN_CROSSING)[..., 0]
+    motions = motions + displacements(vertex, lone, remainder[:, None], count, MIN_CROSSING)[..., 0]
     return np.asarray(mesh.vertices) + capped(motions, MAX_DISPLACEMENT * error)
 
 
 def _coplanar(mesh: trimesh.Trimesh, error: float) -> Int[Array, " face"]:
-    """Return the plane of each triangle: neighbours are in one if an error of their vertices explains their angle."""
+    """Return the plane of each triangle: neighbours share one if an error of their vertices explains their angle."""
     neighbours, ends = np.asarray(mesh.face_adjacency), np.asarray(mesh.face_adjacency_edges)
     lengths = np.linalg.norm(np.subtract(*np.asarray(mesh.vertices)[ends.T]), axis=1)
     heights = 2 * np.asarray(mesh.area_faces)[neighbours] / np.maximum(lengths, TINY)[:, None]

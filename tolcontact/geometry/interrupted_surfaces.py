@@ -1,7 +1,7 @@
-"""Cylinders and cones whose faces do not touch: two keyways, slots or splines interrupt them. Lengths in mm.
+"""Cylinders and cones that are interrupted by two keyways, slots or splines, so that their faces do not touch. Lengths in mm.
 
-Such faces make up one surface if they overlap along the axis, and if there is no material between them on the surface. So a
-bore with two keyways is one hole; holes in two lugs are two holes, and walls of curved slots around one axis stay apart.
+Such faces form one surface if they overlap along the axis, and if there is no material between them on the surface. So a bore
+with two keyways is one hole; holes in two lugs are two holes, and walls of curved slots around one axis remain separate.
 """
 
 import itertools
@@ -17,7 +17,7 @@ FaceOnSurface = tuple[AnalyticSurface | None, np.ndarray]  # a surface, if one i
 SameSurface = Callable[[FaceOnSurface, FaceOnSurface], bool]
 
 MIN_COMMON_SHARE = 0.5  # of the shorter face along the axis
-DIRECTIONS = 360  # in which the circle around the axis is looked at
+DIRECTIONS = 360  # samples around the axis
 COINCIDENCE = 1e-6  # of a part's size
 CHORD_FACTOR = 2.0  # times the height of the surface over its triangles
 
@@ -25,9 +25,9 @@ CHORD_FACTOR = 2.0  # times the height of the surface over its triangles
 def interruptions(
     mesh: trimesh.Trimesh, faces: Sequence[FaceOnSurface], label: np.ndarray, is_same: SameSurface
 ) -> Iterator[tuple[int, int]]:
-    """Yield pairs of numbers of faces that make up one interrupted cylinder or cone.
+    """Yield pairs of indices of faces that form one interrupted cylinder or cone.
 
-    label     (face,) equal for faces that touch and make up one surface already
+    label     (face,) equal for faces that touch and already form one surface
     is_same   whether two faces are parts of one surface
     """
     firsts = [int(number) for number in np.unique(label, return_index=True)[1]]
@@ -43,7 +43,7 @@ def interruptions(
 
 
 def _triangles(faces: Sequence[FaceOnSurface], label: np.ndarray, number: int) -> np.ndarray:
-    """Return the triangles (face,) of all faces that make up one surface with a face."""
+    """Return the triangles (face,) of all faces that form one surface with a face."""
     return np.concatenate([faces[int(member)][1] for member in np.flatnonzero(label == label[number])])
 
 
@@ -58,8 +58,8 @@ def _is_interrupted(body: SolidBody, surface: Cylinder | Cone, parts: Sequence[n
     """Return whether two parts of a surface, the triangles (face,) of each, overlap along its axis without material between."""
     corners = [np.asarray(body.mesh.triangles)[triangles].reshape(-1, 3) for triangles in parts]
     along = [(points - surface.origin) @ surface.axis for points in corners]
-    lower, upper = max(places.min() for places in along), min(places.max() for places in along)
-    if upper - lower < MIN_COMMON_SHARE * min(float(np.ptp(places)) for places in along):
+    lower, upper = max(coordinates.min() for coordinates in along), min(coordinates.max() for coordinates in along)
+    if upper - lower < MIN_COMMON_SHARE * min(float(np.ptp(coordinates)) for coordinates in along):
         return False
     middle = (lower + upper) / 2
     radius = surface.radius if isinstance(surface, Cylinder) else abs(middle) * np.tan(surface.angle)

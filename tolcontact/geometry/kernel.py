@@ -1,4 +1,4 @@
-"""Compiled gaps of the places at which two bodies can touch: corners on facets, and edges across edges."""
+"""Compiled gaps at the points where two bodies can touch: corners on facets, and edges across edges."""
 
 import math
 from typing import NamedTuple
@@ -21,20 +21,20 @@ from tolcontact.geometry.vector_kernel import (
     turn_back,
 )  # fmt: skip
 
-CORNER_ON_FACET, FACET_ON_CORNER, EDGE_ON_EDGE = 0, 1, 2  # the moving body's part first
-MARGIN = 1e-9  # of the size: places that lie no farther beside an edge still count
-LEANING = 0.2  # sine of the angle by which a normal may lean out of the cone of a corner or an edge
+CORNER_ON_FACET, FACET_ON_CORNER, EDGE_ON_EDGE = 0, 1, 2  # the moving body comes first
+MARGIN = 1e-9  # of the size: largest distance outside an edge at which a contact point counts
+MAX_TILT_SINE = 0.2  # largest sine of the tilt of a normal out of the cone of a corner or an edge
 MIN_CROSSING = 1e-3  # rad: edges of facing planes that cross at a smaller angle meet at their corners
 PARALLEL = 1e-6  # rad: edges at a smaller angle have no common normal
-MIN_SLANT, MAX_SLANT = 1.02, 1.5  # lengths between which the slope of a gap between rims counts, not the plane's normal
-INSIDE = 1e-9  # mm: places that are no deeper touch
+MIN_SLANT, MAX_SLANT = 1.02, 1.5  # range of lengths where the slope of a gap between rims counts, not the plane's normal
+INSIDE = 1e-9  # mm: contact points that are no deeper count as touching
 TINY = 1e-300
 ORIGIN = (0.0, 0.0, 0.0)
-NOWHERE = (np.inf, ORIGIN, ORIGIN, ORIGIN)  # gap, place, foot and normal of parts that do not meet
+NOWHERE = (np.inf, ORIGIN, ORIGIN, ORIGIN)  # gap, point, projection and normal of elements that do not meet
 
 
 class Body(NamedTuple):
-    """The parts of a polyhedron at which it can touch another body (see Polyhedron), and the triangles of its whole body."""
+    """The corners, edges and facets of a polyhedron (see Polyhedron), and the triangles of its whole body."""
 
     vertices: np.ndarray
     cones: np.ndarray
@@ -50,36 +50,36 @@ class Body(NamedTuple):
 
 
 @inlined_uncounted
-def _leaning(body, corner, n):  # type: ignore[no-untyped-def]
-    """Return the sine of the angle by which edges at a corner rise above the plane across n."""
-    leaning = 0.0
+def _tilt_sine(body, corner, n):  # type: ignore[no-untyped-def]
+    """Return the sine of the largest angle of edges at a corner above the plane across n."""
+    tilt_sine = 0.0
     for j in range(body.cones[corner], body.cones[corner + 1]):
-        leaning = max(leaning, dot(row(body.directions, j), n))
-    return leaning
+        tilt_sine = max(tilt_sine, dot(row(body.directions, j), n))
+    return tilt_sine
 
 
 @inlined_uncounted
-def corner_on_facet(A, B, number_A, number_B, plane, spare, reach, X, x):  # type: ignore[no-untyped-def]
-    """Return gap, place, foot and normal of a corner, now at x, of the moving body on a facet of the reference body."""
-    n = row(B.normals, number_B)
-    height = dot(n, minus(x, row_of(B.facets, number_B, 0)))
-    if not (-reach[0] <= height <= reach[1]) or (plane < 0 and not is_over(B.facets, B.inward, number_B, x, spare)):
+def corner_on_facet(A, B, index_A, index_B, plane, spare, reach, X, x):  # type: ignore[no-untyped-def]
+    """Return gap, point, projection and normal of a corner, now at x, of the moving body on a facet of the reference body."""
+    n = row(B.normals, index_B)
+    height = dot(n, minus(x, row_of(B.facets, index_B, 0)))
+    if not (-reach[0] <= height <= reach[1]) or (plane < 0 and not is_over(B.facets, B.inward, index_B, x, spare)):
         return NOWHERE
-    if _leaning(A, number_A, scaled(-1.0, turn_back(X, n))) > LEANING:
+    if _tilt_sine(A, index_A, scaled(-1.0, turn_back(X, n))) > MAX_TILT_SINE:
         return NOWHERE
     if plane < 0 and height < -INSIDE and not is_inside(B.triangles, x):
         return NOWHERE
-    return height, row(A.vertices, number_A), along(x, -height, n), n
+    return height, row(A.vertices, index_A), along(x, -height, n), n
 
 
 @inlined_uncounted
-def facet_on_corner(A, B, number_A, number_B, flat, plane, spare, reach, X, y):  # type: ignore[no-untyped-def]
-    """Return gap, place, foot and normal of a facet of the moving body on a corner of the reference body.
+def facet_on_corner(A, B, index_A, index_B, flat, plane, spare, reach, X, y):  # type: ignore[no-untyped-def]
+    """Return gap, point, projection and normal of a facet of the moving body on a corner of the reference body.
 
     flat   the facet of the reference body along whose normal facing planes touch
     y      the corner in the frame of the moving body
     """
-    down = row(A.normals, number_A)
+    down = row(A.normals, index_A)
     if plane < 0:
         d = scaled(-1.0, down)
         n = turn(X, d)
@@ -87,34 +87,34 @@ def facet_on_corner(A, B, number_A, number_B, flat, plane, spare, reach, X, y): 
         n = row(B.normals, flat)
         d = turn_back(X, n)
     fall = dot(d, down)
-    height = -dot(down, minus(y, row_of(A.facets, number_A, 0))) / fall
+    height = -dot(down, minus(y, row_of(A.facets, index_A, 0))) / fall
     if not (fall < -0.5 and -reach[0] <= height <= reach[1]):
         return NOWHERE
     place = along(y, height, d)
-    if (plane < 0 and not is_over(A.facets, A.inward, number_A, place, spare)) or _leaning(B, number_B, n) > LEANING:
+    if (plane < 0 and not is_over(A.facets, A.inward, index_A, place, spare)) or _tilt_sine(B, index_B, n) > MAX_TILT_SINE:
         return NOWHERE
     if plane < 0 and height < -INSIDE and not is_inside(A.triangles, y):
         return NOWHERE
-    return height, place, row(B.vertices, number_B), n
+    return height, place, row(B.vertices, index_B), n
 
 
 @inlined_uncounted
-def _rises(A, B, number_A, number_B, X, n):  # type: ignore[no-untyped-def]
-    """Return how far n and -n lean towards the facets beside two edges, if they point from the reference to the moving body.
+def _rises(A, B, index_A, index_B, X, n):  # type: ignore[no-untyped-def]
+    """Return the tilts of n and of -n towards the facets at two edges, as a normal from the reference to the moving body.
 
     Both are sines of the largest angle.
     """
     y = turn_back(X, n)
     rises, falls = -1.0, -1.0
     for f in range(2):
-        on_B, on_A = dot(n, row_of(B.into, number_B, f)), dot(y, row_of(A.into, number_A, f))
+        on_B, on_A = dot(n, row_of(B.into, index_B, f)), dot(y, row_of(A.into, index_A, f))
         rises, falls = max(rises, on_B, -on_A), max(falls, -on_B, on_A)
     return rises, falls
 
 
 @inlined_uncounted
 def _inner(x, share, d, n, height, normals, edge):  # type: ignore[no-untyped-def]
-    """Return the place on the edge x + s d that is equally deep below both facets beside another edge.
+    """Return the point on the edge x + s d that is equally deep below both facets at another edge.
 
     It lies inside the other body if x is below that edge by -height along n. Where facets meet sharply, x may lie outside.
     """
@@ -132,14 +132,14 @@ def _is_past(share, edge, spare):  # type: ignore[no-untyped-def]
 
 
 @inlined_uncounted
-def edge_on_edge(A, B, number_A, number_B, flat, plane, spare, reach, X, x, d):  # type: ignore[no-untyped-def]
-    """Return gap, place, foot and normal of an edge of the moving body across one of the reference body.
+def edge_on_edge(A, B, index_A, index_B, flat, plane, spare, reach, X, x, d):  # type: ignore[no-untyped-def]
+    """Return gap, point, projection and normal of an edge of the moving body across one of the reference body.
 
     The edge, now at x + s d, meets q + u e where s = (q - x) x e . m / c . m and u = (q - x) x d . m / c . m, with c = d x e,
     seen along m: their common normal, or the normal of the reference plane; then the gap's slope is c / c . m.
     """
-    q = row_of(B.edges, number_B, 0)
-    e, w = minus(row_of(B.edges, number_B, 1), q), minus(q, x)
+    q = row_of(B.edges, index_B, 0)
+    e, w = minus(row_of(B.edges, index_B, 1), q), minus(q, x)
     c = cross(d, e)
     m = c if plane < 0 else row(B.normals, flat)
     crossing = dot(c, m)
@@ -152,21 +152,21 @@ def edge_on_edge(A, B, number_A, number_B, flat, plane, spare, reach, X, x, d): 
     if not abs(crossing) > (PARALLEL if plane < 0 else MIN_CROSSING) * lengths:
         return NOWHERE
     if plane < 0:
-        rises, falls = _rises(A, B, number_A, number_B, X, m)
-        if min(rises, falls) > LEANING:
+        rises, falls = _rises(A, B, index_A, index_B, X, m)
+        if min(rises, falls) > MAX_TILT_SINE:
             return NOWHERE
         if falls < rises:
             m = scaled(-1.0, m)
-    y, foot = along(x, s, d), along(q, u, e)
-    height = dot(minus(y, foot), m)
+    y, projection = along(x, s, d), along(q, u, e)
+    height = dot(minus(y, projection), m)
     if not (-reach[0] <= height <= reach[1]):
         return NOWHERE
     if plane < 0 and height < -INSIDE:
-        back, up, under = turn_back(X, e), turn_back(X, scaled(-1.0, m)), move_back(X, foot)
+        back, up, under = turn_back(X, e), turn_back(X, scaled(-1.0, m)), move_back(X, projection)
         if not (
-            is_inside(B.triangles, _inner(y, s, d, m, height, B.edge_normals, number_B))
-            and is_inside(A.triangles, _inner(under, u, back, up, height, A.edge_normals, number_A))
+            is_inside(B.triangles, _inner(y, s, d, m, height, B.edge_normals, index_B))
+            and is_inside(A.triangles, _inner(under, u, back, up, height, A.edge_normals, index_A))
         ):
             return NOWHERE
     is_slanted = plane >= 0 and MIN_SLANT * abs(crossing) < length < MAX_SLANT * abs(crossing)
-    return height, move_back(X, y), foot, scaled(1 / crossing, c) if is_slanted else m
+    return height, move_back(X, y), projection, scaled(1 / crossing, c) if is_slanted else m

@@ -1,6 +1,6 @@
-"""Tolerances and dimensions of a STEP file as the CAD kernel reads them by itself, for a comparison. Lengths in mm.
+"""Tolerances and dimensions of a STEP file as read by the CAD kernel alone, for comparison. Lengths in mm.
 
-The kernel reads less than the file states, and may crash, so that it runs in a process of its own.
+The kernel reads less than the file states, and may crash, so it runs in a separate process.
 """
 
 import json
@@ -20,7 +20,7 @@ PROGRAM = Path(__file__).parents[1] / "kernel" / "step_annotations.py"
 
 @dataclass(frozen=True)
 class KernelItems:
-    """The shapes to which an annotation applies: numbers of the records of faces, and the number of other shapes."""
+    """The shapes that an annotation applies to: record numbers of faces, and the count of other shapes."""
 
     face_records: frozenset[int]
     others: int
@@ -28,12 +28,12 @@ class KernelItems:
 
 @dataclass(frozen=True)
 class KernelTolerance:
-    """A geometric tolerance with the number of its record. Words are those of `tolcontact.pmi`.
+    """A geometric tolerance with its record number. Terms are the same as in `tolcontact.pmi`.
 
     value, projected   [mm]; None without a projected zone
     zone               "diameter", "spherical diameter" or empty
     extent             "all around", "all over" or empty
-    datums             letters and modifiers of each place of the datum system
+    datums             letters and modifiers of each position in the datum system
     """
 
     record: int
@@ -49,11 +49,11 @@ class KernelTolerance:
 
 @dataclass(frozen=True)
 class KernelDimension:
-    """A dimension with the number of its record. Lengths are in mm, angles in degrees.
+    """A dimension with its record number. Lengths are in mm, angles in degrees.
 
-    nominal      None if there is none, or if limits are all that the kernel keeps
+    nominal      None if there is none, or if the kernel keeps limits only
     limits       the lower and the upper limit
-    deviations   of the lower limit, without its sign, and of the upper limit
+    deviations   the lower deviation without its sign, and the upper deviation
     """
 
     record: int

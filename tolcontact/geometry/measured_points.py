@@ -7,12 +7,12 @@ import trimesh
 
 from tolcontact.errors import GeometryFault
 
-MIN_FILES = 3  # parts whose spread means something
+MIN_FILES = 3  # smallest number of parts with a meaningful spread
 EXPECTED = "expected lines of three numbers x, y, z [mm], in the frame of the part"
 
 
 def measured_points(pattern: str) -> dict[Path, np.ndarray]:
-    """Return the points (point, 3) [mm] of each file that a path with wildcards in its last part names, by name.
+    """Return the points (point, 3) [mm] of each file that matches a path with wildcards in its last part, by name.
 
     Raises GeometryFault for too few files, and for a file without points.
     """
@@ -44,7 +44,7 @@ def _points(path: Path) -> np.ndarray:
 
 
 def _of_table(path: Path) -> np.ndarray:
-    """Return the points of a table with commas, semicolons or blanks between columns, and a heading or none."""
+    """Return the points of a table with commas, semicolons or blanks between columns, with or without a heading."""
     lines = path.read_text(encoding="utf-8-sig").splitlines()
     rows = [
         (number, line.replace(",", " ").replace(";", " ").split())

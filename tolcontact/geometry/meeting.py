@@ -1,15 +1,15 @@
 """Where two bodies can meet: a corner on a facet, a facet on a corner, an edge across an edge, or corners of facing planes.
 
-Two polyhedra touch first at one of three kinds of places: a corner of the moving body on a facet of the reference body, a
-corner of the reference body on a facet of the moving body, or an edge across an edge. A place counts only while it lies within
-the facet or on both edges, and while its normal fits between the facets around the corner or edge; so faces have ends.
+Two polyhedra first touch in one of three ways: a corner of the moving body on a facet of the reference body, a corner of the
+reference body on a facet of the moving body, or an edge across an edge. A contact point counts only while it lies within the
+facet or on both edges, and while its normal fits between the facets around the corner or edge. This bounds the faces.
 
 Planes that face each other touch at the corners of their overlap. There the gap is measured along the normal of the reference
-plane, since the common normal of two rims leans without limit as they become parallel.
+plane, since the common normal of two rims can tilt without limit as they become parallel.
 
-A body that lies on another one with its end alone is nominally beyond that one's side, by as much as it overlaps. When it
-sinks in, its corners are behind that side, too, but have not come in through it: such places do not count where a corner
-beside them is held by another facet.
+A body that rests on another one with its end only is nominally behind the side of the other body, by the length of the
+overlap. If it penetrates, its corners are also behind that side, although it did not penetrate through it. Such contact points
+do not count where a neighbouring corner is already held by another facet.
 """
 
 import itertools
@@ -28,27 +28,27 @@ from tolcontact.geometry.sorted_candidates import sorted_candidates
 from tolcontact.geometry.surface import Surface
 
 FACING = -0.99  # cosine of the angle between the normals of planes that face each other
-SPARE_LEANING = 0.1  # beside the largest tilt, by which places may lean that are looked at
+TILT_MARGIN = 0.1  # rad: tilt of candidates in addition to the largest tilt of the body
 MAX_COMPARISONS = 100_000_000  # of corners with facets, and of edges with edges
 MAX_CANDIDATES = 100_000
-NEARNESS = 2.0  # margins beside edges: how far from a place where planes touch such a place may lie
-FARTHER = 4.0  # times the travel and the turn, of bodies that are beyond reach
+NEARNESS = 2.0  # margins outside edges: largest distance of such a contact point from a point where the planes touch
+EXTENSION_FACTOR = 4.0  # factor of travel and rotation for bodies beyond reach
 MAX_TRAVEL = 1e4  # in sizes
-MAX_PLACES = 32  # that are returned of one pose
+MAX_POINTS = 32  # contact points returned per pose
 DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if 0 < np.abs(d).sum() < 3])  # 18
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 ARC = np.linspace(0, 1, 17)  # shares at which the normals between two facets are compared
 ARC_SPACING = np.pi / 16  # rad: the largest angle between two of them
-BLOCK_ARCS = 4096  # pairs of edges whose arcs are compared together
+BLOCK_ARCS = 4096  # pairs of edges whose arcs are compared in one block
 TINY = 1e-300
 
 
 class Places(NamedTuple):
-    """Places at which two bodies can touch, at n poses.
+    """Points at which two bodies can touch, at n poses.
 
-    labels    (n, place): numbers of the places among the candidates of the meeting, -1 where there is none
-    gaps      (n, place) [mm], infinite where there is none
-    P_m, P_r, n_r   (n, place, 3): the places on both bodies, and the normal, in the frames of the paper
+    labels    (n, point): indices of the points among the candidates of the meeting, -1 for none
+    gaps      (n, point) [mm], infinite for none
+    P_m, P_r, n_r   (n, point, 3): the points on both bodies, and the normal, in the frames of the paper
     """
 
     labels: Int[Array, "n p"]
@@ -59,12 +59,12 @@ class Places(NamedTuple):
 
 
 class Reach(NamedTuple):
-    """How far a moving body may be from its nominal place relative to a reference body.
+    """Bounds on the displacement of a moving body from its nominal pose relative to a reference body.
 
-    travel, tilt   [mm], [rad]: how far it may move and turn
-    spread         [mm]: how far deviations alone, without contact, may move it
-    overlap        [mm]: how deep the bodies lie in each other nominally, at most
-    clearance      [mm]: their nominal gap, at least
+    travel, tilt   [mm], [rad]: largest translation and rotation
+    spread         [mm]: largest translation from deviations alone, without contact
+    overlap        [mm]: largest nominal penetration of the bodies
+    clearance      [mm]: smallest nominal gap between them
     """
 
     travel: float
@@ -75,30 +75,30 @@ class Reach(NamedTuple):
 
     @property
     def depth(self) -> float:
-        """The largest depth [mm] at which a place counts."""
+        """The largest depth [mm] at which a contact point counts."""
         return self.travel + self.overlap
 
     @property
     def height(self) -> float:
-        """The largest gap [mm] at which a place counts."""
+        """The largest gap [mm] at which a contact point counts."""
         return self.clearance + self.depth
 
     @property
-    def leaning(self) -> float:
-        """The sine of the angle by which normals may nominally lean out of a cone."""
-        return min(kernel.LEANING + self.tilt + SPARE_LEANING, 1.0)
+    def tilt_sine(self) -> float:
+        """The largest sine of the nominal tilt of normals out of a cone."""
+        return min(kernel.MAX_TILT_SINE + self.tilt + TILT_MARGIN, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Meeting:
-    """The places at which two faces can touch as long as they stay near their nominal places.
+    """The points at which two faces can touch as long as they stay near their nominal poses.
 
-    candidates   kinds, firsts, seconds (candidate,): the kind, and the numbers of the moving and the reference body's part;
-             planes (candidate,): for corners of facing planes the number of these planes, else -1; facing (plane, 2): a facet
-             of the moving and of the reference plane
-    reach    how far the bodies may be from their nominal places
+    candidates   kinds, firsts, seconds (candidate,): the kind, and the indices of the corner, edge or facet of the moving and
+             of the reference body; planes (candidate,): for corners of facing planes the index of these planes, else -1;
+             facing (plane, 2): a facet of the moving and of the reference plane
+    reach    bounds on the displacement of the bodies from their nominal poses
     size     [mm] of the larger face
-    beside   [mm]: how far beside its edges any place counts
+    overhang [mm]: largest distance outside its edges at which a contact point counts
     """
 
     moving: Polyhedron
@@ -106,57 +106,57 @@ class Meeting:
     candidates: places_kernel.Candidates
     reach: Reach
     size: float
-    beside: float = field(default=0.0, kw_only=True)
+    overhang: float = field(default=0.0, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.candidates.kinds)
 
-    def widened(self, beside: float) -> "Meeting":
-        """Return the same candidates, which count up to `beside` [mm] beside their edges."""
-        return replace(self, beside=beside)
+    def widened(self, overhang: float) -> "Meeting":
+        """Return the same candidates, which count up to `overhang` [mm] outside their edges."""
+        return replace(self, overhang=overhang)
 
     @property
     def kinds(self) -> Int[Array, " c"]:
-        """The kinds of the candidates, and then of those farther away that have been looked for."""
-        farther = self.__dict__.get("farther")
-        return self.candidates.kinds if farther is None else np.concatenate([self.candidates.kinds, farther.kinds])
+        """The kinds of the candidates, followed by the kinds of the extended meeting's candidates if it has been built."""
+        extended = self.__dict__.get("extended")
+        return self.candidates.kinds if extended is None else np.concatenate([self.candidates.kinds, extended.kinds])
 
     @cached_property
-    def farther(self) -> "Meeting | None":
-        """The meeting for bodies that are farther apart; None if there is no end of it, or too much to compare."""
+    def extended(self) -> "Meeting | None":
+        """The meeting for bodies that are further apart; None if its travel has no bound, or if it has too many candidates."""
         if self.reach.travel > MAX_TRAVEL * self.size:
             return None
-        travel, tilt = FARTHER * self.reach.travel, FARTHER * (self.reach.tilt + SPARE_LEANING)
-        farther = _meeting(self.moving, self.reference, self.reach._replace(travel=travel, tilt=tilt), self.size)
-        return None if farther is None else farther.widened(self.beside)
+        travel, tilt = EXTENSION_FACTOR * self.reach.travel, EXTENSION_FACTOR * (self.reach.tilt + TILT_MARGIN)
+        extended = _meeting(self.moving, self.reference, self.reach._replace(travel=travel, tilt=tilt), self.size)
+        return None if extended is None else extended.widened(self.overhang)
 
     @property
     def turn(self) -> float:
-        """The turn [rad] that moves the ends of the moving face about its middle as far as the body may travel."""
+        """The rotation [rad] about the centre of the moving face that moves its ends by the largest travel of the body."""
         return 2 * self.reach.travel / float(np.ptp(self.moving.vertices, axis=0).max())
 
     def covers(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
-        """Return whether the bodies stay so near to their nominal places that no candidate is missed (n,)."""
+        """Return whether the bodies are near enough to their nominal poses that no candidate is missed (n,)."""
         covered = np.empty(len(X_RM), dtype=bool)
-        turn = self.reach.tilt + SPARE_LEANING if self.reach.leaning < 1 else np.inf
+        turn = self.reach.tilt + TILT_MARGIN if self.reach.tilt_sine < 1 else np.inf
         places_kernel.cover(np.ascontiguousarray(X_RM), self._extremes, self.reach.travel, turn, covered)
         return covered
 
     def reaches(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
-        """Return whether no candidate is missed at poses X_RM (n, 12), also of those farther away (n,)."""
+        """Return whether no candidate is missed at poses X_RM (n, 12), including the extended meetings (n,)."""
         reached = self.covers(X_RM)
-        if not reached.all() and self.farther is not None:
-            reached[~reached] = self.farther.reaches(X_RM[~reached])
+        if not reached.all() and self.extended is not None:
+            reached[~reached] = self.extended.reaches(X_RM[~reached])
         return reached
 
     @cached_property
     def _bodies(self) -> tuple[kernel.Body, kernel.Body]:
-        """The moving and the reference body as compiled passes take them."""
+        """The moving and the reference body in the form that compiled functions take."""
         return _touching_parts(self.moving), _touching_parts(self.reference)
 
     @cached_property
     def _extremes(self) -> Float[Array, "v 3"]:
-        """The vertices of the moving body that are outermost in some directions."""
+        """The outermost vertices of the moving body in a set of fixed directions."""
         numbers = np.unique((self.moving.vertices @ np.vstack([DIRECTIONS, CORNERS]).T).argmax(axis=0))
         return np.ascontiguousarray(self.moving.vertices[numbers])
 
@@ -167,49 +167,51 @@ class Meeting:
         error: float = 0.0,
         nearness: float = NEARNESS,
     ) -> Places:
-        """Return the places that may matter at poses X_RM (n, 12), among them the candidates in `retained` (n, k), -1 for none.
+        """Return the relevant contact points at poses X_RM (n, 12), including the candidates in `retained` (n, k), -1 for none.
 
-        Where bodies are beyond reach, these are places of the `farther` meeting, whose numbers follow those of this one.
+        Where bodies are beyond reach, the points belong to the `extended` meeting. Its indices follow the indices of this one.
 
-        Facing planes count beyond their edges as far as they err there by no more than `error` [mm], and as near to a place
-        where they touch as `nearness` says. Steps need it: without it a corner that hangs over an edge comes and goes.
+        Facing planes count beyond their edges up to an error of `error` [mm], within the distance of a touching point that
+        `nearness` states. Steps need this: otherwise a corner that overhangs an edge becomes active and inactive in turn.
         """
         beyond = np.flatnonzero(~self.covers(X_RM))
-        if beyond.size and self.farther is not None:
+        if beyond.size and self.extended is not None:
             return self._beyond(beyond, X_RM, retained, error, nearness)
         return self._near(X_RM, retained, error, nearness)
 
     def _beyond(self, rows: np.ndarray, X_RM: np.ndarray, retained: np.ndarray | None, error: float, nearness: float) -> Places:
-        """Return places at poses of which some `rows` are beyond reach."""
-        assert self.farther is not None
+        """Return contact points at poses; at some of them, `rows`, the bodies are beyond reach."""
+        assert self.extended is not None
         count = len(self)
         nearby = self._near(X_RM, retained, error, nearness)
-        far_kept = None if retained is None else np.maximum(retained[rows] - count, -1)
-        farther_places = self.farther.at(X_RM[rows], far_kept, error, nearness)
-        farther_places = farther_places._replace(labels=np.where(farther_places.labels >= 0, farther_places.labels + count, -1))
-        room = max(nearby.gaps.shape[1], farther_places.gaps.shape[1])
+        extended_retained = None if retained is None else np.maximum(retained[rows] - count, -1)
+        extended_places = self.extended.at(X_RM[rows], extended_retained, error, nearness)
+        extended_places = extended_places._replace(
+            labels=np.where(extended_places.labels >= 0, extended_places.labels + count, -1)
+        )
+        width = max(nearby.gaps.shape[1], extended_places.gaps.shape[1])
         padded = []
-        for empty, of_all, of_some in zip((-1, np.inf, 0.0, 0.0, 0.0), nearby, farther_places, strict=True):
-            values = np.full((len(X_RM), room, *of_all.shape[2:]), empty, dtype=of_all.dtype)
-            values[:, : of_all.shape[1]] = of_all
-            values[rows], values[rows, : of_some.shape[1]] = empty, of_some
+        for empty, nearby_values, extended_values in zip((-1, np.inf, 0.0, 0.0, 0.0), nearby, extended_places, strict=True):
+            values = np.full((len(X_RM), width, *nearby_values.shape[2:]), empty, dtype=nearby_values.dtype)
+            values[:, : nearby_values.shape[1]] = nearby_values
+            values[rows], values[rows, : extended_values.shape[1]] = empty, extended_values
             padded.append(values)
         return Places(*padded)
 
     def _near(self, X_RM: np.ndarray, retained: np.ndarray | None, error: float, nearness: float) -> Places:
-        """Return places at poses that are within reach."""
-        room = max(min(len(self), MAX_PLACES), 1)
-        shape = (len(X_RM), room)
+        """Return contact points at poses within reach."""
+        width = max(min(len(self), MAX_POINTS), 1)
+        shape = (len(X_RM), width)
         places = Places(np.empty(shape, dtype=np.int64), np.empty(shape), *(np.zeros((*shape, 3)) for _ in range(3)))
-        # Bodies that were beyond reach before may have kept candidates of the farther meeting.
+        # Bodies that were beyond reach before may have kept candidates of the extended meeting.
         retained = (
             np.zeros((len(X_RM), 0), dtype=np.int64) if retained is None else np.where(retained < len(self), retained, -1)
         )
         places_kernel.find(
             *self._bodies, self.candidates,
             np.array([self.reach.depth, self.reach.height, _passed(self.reach, self.size)]),
-            kernel.MARGIN * self.size + self.beside,
-            np.array([error, self.reach.depth, nearness, self.beside]),
+            kernel.MARGIN * self.size + self.overhang,
+            np.array([error, self.reach.depth, nearness, self.overhang]),
             np.ascontiguousarray(X_RM), retained, DIRECTIONS, *places,
         )  # fmt: skip
         return places
@@ -225,7 +227,7 @@ def _touching_parts(body: Polyhedron) -> kernel.Body:
 def meeting(faces: tuple[Surface, Surface], bodies: tuple, reach: Reach) -> Meeting | None:
     """Return where a moving and a reference face can touch; None if they have too many corners and edges to compare.
 
-    faces, bodies   in their nominal places
+    faces, bodies   in their nominal poses
     """
     A, B = (polyhedron(face, body) for face, body in zip(faces, bodies, strict=True))
     return _meeting(A, B, reach, float(max(np.ptp(face.mesh.vertices, axis=0).max() for face in faces)))
@@ -235,12 +237,12 @@ def _meeting(A: Polyhedron, B: Polyhedron, reach: Reach, size: float) -> Meeting
     comparisons = len(A.vertices) * len(B.facets) + len(A.facets) * len(B.vertices) + len(A.edges) * len(B.edges)
     if comparisons > MAX_COMPARISONS:
         return None
-    travel, leaning = reach.depth, reach.leaning
+    travel, tilt_sine = reach.depth, reach.tilt_sine
     facing, facets = _facing_planes(A, B, reach, size)
     parts = [
-        _on_facets(A, B, facing, travel, leaning, CORNER_ON_FACET),
-        _on_facets(B, A, facing.T, travel, leaning, FACET_ON_CORNER),
-        _across_edges(A, B, facing, travel, leaning),
+        _on_facets(A, B, facing, travel, tilt_sine, CORNER_ON_FACET),
+        _on_facets(B, A, facing.T, travel, tilt_sine, FACET_ON_CORNER),
+        _across_edges(A, B, facing, travel, tilt_sine),
     ]
     if sum(len(part) for part in parts) > MAX_CANDIDATES:
         return None
@@ -250,15 +252,15 @@ def _meeting(A: Polyhedron, B: Polyhedron, reach: Reach, size: float) -> Meeting
 
 
 def _passed(reach: Reach, size: float) -> float:
-    """Return the nominal depth [mm] beyond which a body has not come in through a facet, or across an edge."""
+    """Return the nominal depth [mm] beyond which a body cannot have penetrated through a facet, or across an edge."""
     return reach.overlap + kernel.MARGIN * size
 
 
 def _facing_planes(A: Polyhedron, B: Polyhedron, reach: Reach, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the numbers of facing planes in a table (plane of A + 1, plane of B + 1), -1 for others, and their facets (n, 2).
+    """Return the indices of facing planes in a table (plane of A + 1, plane of B + 1), -1 for others, and their facets (n, 2).
 
-    The last row and column stand for no plane. Only planes count that are nominally near each other, and through which the
-    bodies may have come into each other: those of a short overlap's ends are beyond each other already.
+    The last row and column mean no plane. Only planes count that are nominally near each other and through which the bodies
+    may have penetrated each other: the planes at the ends of a short overlap are already beyond each other.
     """
     passed = _passed(reach, size)
     table, facets = np.full((_plane_count(A) + 1, _plane_count(B) + 1), -1), list[tuple[int, int]]()
@@ -278,22 +280,22 @@ def _plane_count(body: Polyhedron) -> int:
 
 
 def _on_facets(
-    corners: Polyhedron, facets: Polyhedron, facing: np.ndarray, travel: float, leaning: float, kind: int
+    corners: Polyhedron, facets: Polyhedron, facing: np.ndarray, travel: float, tilt_sine: float, kind: int
 ) -> np.ndarray:
     """Return candidates (candidate, 3), first, second and plane, of the corners of one body on the facets of the other.
 
-    `facing` is the table of facing planes, its rows those of `corners`.
+    `facing` is the table of facing planes; its rows are the planes of `corners`.
     """
     candidates = [np.zeros((0, 3), dtype=int)]
     boxes = facets.facets.min(axis=1) - travel, facets.facets.max(axis=1) + travel
     for block in blocks(len(corners.vertices), len(facets.facets)):
         starts = corners.cones[block.start : block.stop + 1]
         slopes = corners.directions[starts[0] : starts[-1]] @ facets.normals.T
-        fits = np.minimum.reduceat(slopes, starts[:-1] - starts[0], axis=0) >= -leaning
+        fits = np.minimum.reduceat(slopes, starts[:-1] - starts[0], axis=0) >= -tilt_sine
         corner, facet = np.nonzero(fits & overlaps(corners.vertices[block], corners.vertices[block], *boxes))
         corner += block.start
         plane = facing[corners.vertex_planes[corner], facets.facet_planes[facet][:, None]].max(axis=1, initial=-1)
-        # Facets of facing planes count together.
+        # The facets of a facing plane count as one.
         keys = corner * (len(facets.facets) + facing.size) + np.where(plane >= 0, plane, -1 - facet)
         _, distinct = np.unique(keys, return_index=True)
         first, second = (corner, facet) if kind == CORNER_ON_FACET else (facet, corner)
@@ -301,7 +303,7 @@ def _on_facets(
     return np.concatenate(candidates)
 
 
-def _across_edges(A: Polyhedron, B: Polyhedron, facing: np.ndarray, travel: float, leaning: float) -> np.ndarray:
+def _across_edges(A: Polyhedron, B: Polyhedron, facing: np.ndarray, travel: float, tilt_sine: float) -> np.ndarray:
     """Return candidates (candidate, 3), first, second and plane, of edges of the moving body across edges of the reference."""
     candidates = [np.zeros((0, 3), dtype=int)]
     boxes = B.edges.min(axis=1) - travel, B.edges.max(axis=1) + travel
@@ -315,13 +317,13 @@ def _across_edges(A: Polyhedron, B: Polyhedron, facing: np.ndarray, travel: floa
         retained = plane >= 0
         for some in np.array_split(meets, len(meets) // BLOCK_ARCS + 1):
             cosine = -np.einsum("pai,pki->pak", arcs_A[first[some]], arcs_B[second[some]]).min(axis=(1, 2))
-            retained[some] = cosine >= np.cos(min(np.arcsin(leaning) + ARC_SPACING, np.pi))
+            retained[some] = cosine >= np.cos(min(np.arcsin(tilt_sine) + ARC_SPACING, np.pi))
         candidates.append(np.stack([first, second, plane], axis=1)[retained])
     return np.concatenate(candidates)
 
 
 def _arcs(body: Polyhedron) -> np.ndarray:
-    """Return normals (edge, share, 3) at equal angles between those of the two facets at each edge."""
+    """Return normals (edge, share, 3) at equal angles between the normals of the two facets at each edge."""
     first, second = body.edge_normals[:, 0], body.edge_normals[:, 1]
     cosine = (first * second).sum(axis=1, keepdims=True)
     across = second - cosine * first

@@ -1,4 +1,4 @@
-"""A mesh whose vertices are merged where they are one, and apart where different parts of a surface touch."""
+"""A mesh whose coincident vertices are merged, except where different parts of a surface touch."""
 
 from typing import NamedTuple
 
@@ -9,14 +9,14 @@ from scipy.sparse.csgraph import connected_components
 
 from tolcontact.arrays import Array, Int
 
-MERGE_SHARE = 1e-9  # of the size: vertices that are no farther apart are one
-ROUNDED = 1e-9  # of a full turn: triangles at an edge that are no farther apart are in one place
+MERGE_SHARE = 1e-9  # of the size: largest distance between vertices that are merged
+ROUNDED = 1e-9  # of a full turn: largest angle between triangles at an edge that count as coincident
 
 
 class MergedSurface(NamedTuple):
     """The triangles of a body that have an area, with merged vertices.
 
-    sources    (t,): which of the triangles of the body these are
+    sources    (t,): indices of these triangles in the body
     is_closed  whether each triangle of the body continues into others along all its edges
     """
 
@@ -28,20 +28,21 @@ class MergedSurface(NamedTuple):
 def merged_surface(body: trimesh.Trimesh) -> MergedSurface:
     """Return the triangles of a body that have an area, with merged vertices.
 
-    Two blocks that touch along an edge, or in a corner, have an edge of four triangles, or a corner of two fans. They are
-    closed all the same: each triangle continues into the one on the other side of its material, and each fan has a vertex.
+    Two blocks that touch along an edge, or in a corner, have an edge with four triangles, or a corner with two fans. They are
+    closed nevertheless: each triangle continues into the triangle on the other side of its material, and each fan has its own
+    vertex.
     """
     surface = trimesh.Trimesh(body.vertices, body.faces, process=False)
     surface.merge_vertices(digits_vertex=int(np.ceil(-np.log10(MERGE_SHARE * max(surface.scale, 1e-9)))))
-    kept = np.flatnonzero((np.diff(np.sort(surface.faces, axis=1), axis=1) > 0).all(axis=1))
-    twins = _twins(np.asarray(surface.vertices), np.asarray(surface.faces)[kept])
+    proper_faces = np.flatnonzero((np.diff(np.sort(surface.faces, axis=1), axis=1) > 0).all(axis=1))
+    twins = _twins(np.asarray(surface.vertices), np.asarray(surface.faces)[proper_faces])
     if twins is not None:
-        surface = _apart(np.asarray(surface.vertices), np.asarray(surface.faces)[kept], twins)
+        surface = _apart(np.asarray(surface.vertices), np.asarray(surface.faces)[proper_faces], twins)
     else:
-        surface.update_faces(kept)
+        surface.update_faces(proper_faces)
     has_area = np.asarray(surface.area_faces) > 0
     surface.update_faces(has_area)
-    return MergedSurface(surface, kept[has_area], twins is not None)
+    return MergedSurface(surface, proper_faces[has_area], twins is not None)
 
 
 def _twins(vertices: np.ndarray, faces: np.ndarray) -> Int[Array, " h"] | None:
@@ -53,15 +54,15 @@ def _twins(vertices: np.ndarray, faces: np.ndarray) -> Int[Array, " h"] | None:
     is_forward = start < end
     key = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
     order = np.lexsort([is_forward, key])
-    first = np.flatnonzero(np.append(True, np.diff(key[order]) > 0))
-    counts = np.diff(np.append(first, len(order)))
-    if (np.add.reduceat(np.where(is_forward, 1, -1)[order], first) != 0).any():
+    starts = np.flatnonzero(np.append(True, np.diff(key[order]) > 0))
+    counts = np.diff(np.append(starts, len(order)))
+    if (np.add.reduceat(np.where(is_forward, 1, -1)[order], starts) != 0).any():
         return None
     twins = np.empty(len(order), dtype=np.int64)
-    pairs = order[first[counts == 2][:, None] + np.arange(2)]
+    pairs = order[starts[counts == 2][:, None] + np.arange(2)]
     twins[pairs] = pairs[:, ::-1]
-    for place, count in zip(first[counts > 2], counts[counts > 2], strict=True):
-        edge = order[place : place + count]
+    for start, count in zip(starts[counts > 2], counts[counts > 2], strict=True):
+        edge = order[start : start + count]
         for back, forth in _across_material(vertices, faces, edge, is_forward[edge]):
             twins[back], twins[forth] = forth, back
     return twins
@@ -79,19 +80,19 @@ def _across_material(
     arms -= np.outer(arms @ along, along)
     u = arms[np.argmax(np.linalg.norm(arms, axis=1))]
     turns = np.arctan2(arms @ np.cross(along, u), arms @ u) / (2 * np.pi)
-    # Of triangles in one place the one that ends material comes first: flush blocks remain two.
+    # Among coincident triangles the one that ends material comes first, so that flush blocks remain two.
     order = np.lexsort([~is_forward, np.round(turns / ROUNDED) % (1 / ROUNDED)])
     opened, pairs = list[int](), list[tuple[int, int]]()
-    for place in [*order, *order]:  # twice around
-        if not is_forward[place] and edge[place] not in [back for back, _ in pairs] and place not in opened:
-            opened.append(place)
-        elif is_forward[place] and opened and edge[place] not in [forth for _, forth in pairs]:
-            pairs.append((int(edge[opened.pop()]), int(edge[place])))
+    for half_edge in [*order, *order]:  # twice around
+        if not is_forward[half_edge] and edge[half_edge] not in [back for back, _ in pairs] and half_edge not in opened:
+            opened.append(half_edge)
+        elif is_forward[half_edge] and opened and edge[half_edge] not in [forth for _, forth in pairs]:
+            pairs.append((int(edge[opened.pop()]), int(edge[half_edge])))
     return pairs
 
 
 def _apart(vertices: np.ndarray, faces: np.ndarray, twins: np.ndarray) -> trimesh.Trimesh:
-    """Return closed faces in which corners are one vertex if a chain of twins connects their triangles."""
+    """Return closed faces whose corners share a vertex if a chain of twins connects their triangles."""
     half_edges = np.arange(len(twins))
     ends = half_edges - half_edges % 3 + (half_edges + 1) % 3
     ones = np.ones(len(twins), dtype=bool)

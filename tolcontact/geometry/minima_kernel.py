@@ -1,4 +1,4 @@
-"""Compiled local minima of the gap between two planes with form."""
+"""Compiled local minima of the gap between two planes with form deviation."""
 
 import math
 
@@ -7,14 +7,14 @@ import numpy as np
 from tolcontact.compiled import compiled, inner
 from tolcontact.geometry.height_kernel import coordinates, gap_at, write_map
 
-MAX_STEPS = 10  # of the search of one minimum
-STEP_SHARE = 1e-2  # of the reach: a smaller step is the last one
-SPARE_FALL = 6.0  # times the fall that a step foresees
-BASIN_SHARE = 0.5  # of the reach: a start that is nearer to the end of an earlier search is spared
-NEAR_SHARE = 0.05  # of the reach: minima that are nearer to each other are one
+MAX_STEPS = 10  # per local search
+STEP_SHARE = 1e-2  # of the reach: a smaller step ends the search
+SPARE_FALL = 6.0  # times the predicted decrease of a step
+BASIN_SHARE = 0.5  # of the reach: a start nearer than this to the end of an earlier search is skipped
+NEAR_SHARE = 0.05  # of the reach: minima nearer than this to each other are one
 ON_EDGE = 1e-9  # of the reach
-CELLS = 1 << 26  # along each side of the box around a moving plane, in labels of its places
-FIRST_PLACE = 1 << 60  # label of the first of these places
+CELLS = 1 << 26  # along each side of the box around a moving plane, in the labels of its points
+FIRST_PLACE = 1 << 60  # label of the first of these points
 
 
 @inner
@@ -41,7 +41,7 @@ def _write_edges(moving, reference, along, edges):  # type: ignore[no-untyped-de
 
 @inner
 def _share(edges, u, v, du, dv, slack, skipped):  # type: ignore[no-untyped-def]
-    """Return the share of a step du, dv after which it leaves the faces; 1 if it does not. One edge may be skipped."""
+    """Return the share of a step du, dv at which it leaves the faces; 1 if it does not. One edge may be skipped."""
     share = 1.0
     for e in range(edges.shape[0]):
         rate = du * edges[e, 5] + dv * edges[e, 6]
@@ -60,7 +60,7 @@ def _share(edges, u, v, du, dv, slack, skipped):  # type: ignore[no-untyped-def]
 
 @inner
 def _slide(edges, u, v, du, dv, derivatives, reach, slack):  # type: ignore[no-untyped-def]
-    """Return the longest step du, dv along an edge that blocks a step at u, v towards the least gap there."""
+    """Return the longest step du, dv towards the least gap along an edge that blocks a step at u, v."""
     g_u, g_v, g_uu, g_uv, g_vv = derivatives
     longest, best_u, best_v = 0.0, 0.0, 0.0
     for e in range(edges.shape[0]):
@@ -80,9 +80,9 @@ def _slide(edges, u, v, du, dv, derivatives, reach, slack):  # type: ignore[no-u
 
 @inner
 def _descend(moving, reference, sums_m, sums_r, row, along, edges, u, v, reach, level, weights, scratch, best):  # type: ignore
-    """Write coordinates and value (3,) of the local minimum of the gap over both faces, near u, v over them.
+    """Write the coordinates and the value (3,) of the local minimum of the gap over both faces, from a start at u, v.
 
-    The search ends where the gap will hardly fall below a level [mm].
+    The search ends once the gap is unlikely to fall below a level [mm].
     """
     slack = ON_EDGE * reach
     best[2] = np.inf
@@ -115,7 +115,7 @@ def _descend(moving, reference, sums_m, sums_r, row, along, edges, u, v, reach, 
 
 @inner
 def _is_over(edges, first, end, u, v, slack):  # type: ignore[no-untyped-def]
-    """Return whether coordinates lie within the rim of the edges from `first` to `end`, or beside it by at most a slack."""
+    """Return whether coordinates lie within the rim of the edges from `first` to `end`, or outside it by at most a slack."""
     is_inside = False
     for e in range(first, end):
         x, y = u - edges[e, 0], v - edges[e, 1]
@@ -131,8 +131,8 @@ def _is_over(edges, first, end, u, v, slack):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def choose_starts(points, gaps, limits, distance, chosen):  # type: ignore[no-untyped-def]
-    """Write the numbers (n, start) of points with the least gaps, a distance [mm] apart from each other; -1 for none.
+def choose_starts(points, gaps, limits, distance, starts):  # type: ignore[no-untyped-def]
+    """Write the indices (n, start) of the points with the least gaps, at least a distance [mm] apart; -1 for none.
 
     points   (n, point, 3) [mm], or (1, point, 3) if they are the same in all rows
     gaps     (n, point) [mm]
@@ -140,37 +140,37 @@ def choose_starts(points, gaps, limits, distance, chosen):  # type: ignore[no-un
     """
     nearby, order = np.empty(gaps.shape[1], dtype=np.int64), np.empty(gaps.shape[1])
     for k in range(gaps.shape[0]):
-        of_row, count, found = points[k % points.shape[0]], 0, 0
+        row_points, count, start_count = points[k % points.shape[0]], 0, 0
         for p in range(gaps.shape[1]):
             if gaps[k, p] < limits[k]:
                 nearby[count], order[count], count = p, gaps[k, p], count + 1
-        while found < chosen.shape[1]:
-            least, start = np.inf, -1
+        while start_count < starts.shape[1]:
+            least_gap, start = np.inf, -1
             for c in range(count):
-                if order[c] < least:
-                    least, start = order[c], nearby[c]
+                if order[c] < least_gap:
+                    least_gap, start = order[c], nearby[c]
             if start < 0:
                 break
-            chosen[k, found], found = start, found + 1
+            starts[k, start_count], start_count = start, start_count + 1
             for c in range(count):
-                away = 0.0
+                square = 0.0
                 for i in range(3):
-                    away += (of_row[nearby[c], i] - of_row[start, i]) ** 2
-                if away <= distance * distance:
+                    square += (row_points[nearby[c], i] - row_points[start, i]) ** 2
+                if square <= distance * distance:
                     order[c] = np.inf
-        chosen[k, found:] = -1
+        starts[k, start_count:] = -1
 
 
 @compiled
 def find_minima(moving, reference, poses, sums_m, sums_r, grown, points, starts, reach, slack, depth, labels):  # type: ignore
-    """Write the labels (n, place) of the deepest local minima of the gap that are deeper than `depth` [mm]; -1 for none.
+    """Write the labels (n, point) of the deepest local minima of the gap that are deeper than `depth` [mm]; -1 for none.
 
     sums_m, sums_r   HeightSums of both planes
-    grown    (n,) [mm]: the sum by which both faces have grown
+    grown    (n,) [mm]: the sum of the outward offsets of both faces
     points   (n, point, 3) [mm] of the moving plane, or (1, point, 3) if they are the same at all poses
-    starts   (n, start): numbers of the points from which minima are searched; -1 for none
-    reach    [mm] of one step of the search
-    slack    [mm] by which starts may stand beside a rim
+    starts   (n, start): indices of the starting points of searches for minima; -1 for none
+    reach    [mm]: longest step of the search
+    slack    [mm]: largest distance of a start outside a rim
     """
     along, weights, scratch, best = np.empty((3, 3)), np.empty((6, 4)), np.empty(5), np.empty(3)
     count = moving.edges.shape[0]
@@ -178,7 +178,7 @@ def find_minima(moving, reference, poses, sums_m, sums_r, grown, points, starts,
     ends = np.empty((starts.shape[1], 2))
     for k in range(poses.shape[0]):
         write_map(moving, reference, poses[k], along)
-        are_edges_known, found, searches = False, 0, 0
+        are_edges_known, minimum_count, searches = False, 0, 0
         for s in range(starts.shape[1]):
             if starts[k, s] < 0:
                 break
@@ -200,24 +200,24 @@ def find_minima(moving, reference, poses, sums_m, sums_r, grown, points, starts,
             if not best[2] < -depth:
                 continue
             is_known = False
-            for m in range(found):
+            for m in range(minimum_count):
                 distance = (minima[m, 0] - best[0]) ** 2 + (minima[m, 1] - best[1]) ** 2
                 is_known = is_known or distance < (NEAR_SHARE * reach) ** 2
-            if is_known or (found == labels.shape[1] and best[2] >= minima[found - 1, 2]):
+            if is_known or (minimum_count == labels.shape[1] and best[2] >= minima[minimum_count - 1, 2]):
                 continue
-            m = min(found, labels.shape[1] - 1)
+            m = min(minimum_count, labels.shape[1] - 1)
             while m > 0 and minima[m - 1, 2] > best[2]:
                 minima[m] = minima[m - 1]
                 m -= 1
-            minima[m], found = best, min(found + 1, labels.shape[1])
+            minima[m], minimum_count = best, min(minimum_count + 1, labels.shape[1])
         for m in range(labels.shape[1]):
-            labels[k, m] = _label(moving, minima[m, 0], minima[m, 1]) if m < found else -1
+            labels[k, m] = _label(moving, minima[m, 0], minima[m, 1]) if m < minimum_count else -1
 
 
 @compiled
 def join(labels, former, joined):  # type: ignore[no-untyped-def]
-    """Write labels (n, a), and after them other former ones (n, b), to joined (n, c), then -1; return the most of a row."""
-    most = 0
+    """Write labels (n, a), then further former labels (n, b), then -1 to joined (n, c); return the largest count of a row."""
+    largest_count = 0
     for k in range(labels.shape[0]):
         count = 0
         for group in (labels, former):
@@ -228,13 +228,13 @@ def join(labels, former, joined):  # type: ignore[no-untyped-def]
                 if is_new:
                     joined[k, count], count = label, count + 1
         joined[k, count:] = -1
-        most = max(most, count)
-    return most
+        largest_count = max(largest_count, count)
+    return largest_count
 
 
 @inner
 def _label(plane, u, v):  # type: ignore[no-untyped-def]
-    """Return the label of a place on a plane: its coordinates in whole cells."""
+    """Return the label of a point on a plane: its coordinates in whole cells."""
     low, high = plane.corners[0], plane.corners[1]
     i = min(max(int((u - low[0]) / (high[0] - low[0]) * CELLS), 0), CELLS - 1)
     j = min(max(int((v - low[1]) / (high[1] - low[1]) * CELLS), 0), CELLS - 1)
@@ -242,10 +242,10 @@ def _label(plane, u, v):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def write_places(moving, reference, poses, sums_m, sums_r, labels, slack, places, feet, gaps, heights):  # type: ignore
-    """Write places (n, place, 3) of labels, feet (n, place, 3), nominal gaps (n, place), and the sums of both heights [mm].
+def write_places(moving, reference, poses, sums_m, sums_r, labels, slack, places, projections, gaps, heights):  # type: ignore
+    """Write the points (n, point, 3) of labels, their projections, nominal gaps (n, point), and sums of both heights [mm].
 
-    Gaps are infinite where there is no place: of labels -1, and of places that stand beside a face by more than a slack.
+    The gap of a label -1 is infinite, and so is the gap of a point that overhangs a face by more than a slack.
     """
     along, weights, scratch = np.empty((3, 3)), np.empty((6, 4)), np.empty(5)
     low, high, count = moving.corners[0], moving.corners[1], moving.edges.shape[0]
@@ -267,7 +267,7 @@ def write_places(moving, reference, poses, sums_m, sums_r, labels, slack, places
             y = along[1, 0] * u + along[1, 1] * v + along[1, 2]
             for i in range(3):
                 places[k, p, i] = moving.origin[i] + u * moving.axes[0, i] + v * moving.axes[1, i]
-                feet[k, p, i] = reference.origin[i] + x * reference.axes[0, i] + y * reference.axes[1, i]
+                projections[k, p, i] = reference.origin[i] + x * reference.axes[0, i] + y * reference.axes[1, i]
             if _is_over(edges, count, edges.shape[0], u, v, slack):
                 gap = gap_at(moving, reference, sums_m, sums_r, k, along, u, v, weights, scratch)
                 gaps[k, p] = along[2, 0] * u + along[2, 1] * v + along[2, 2]

@@ -1,6 +1,6 @@
-"""The corners, triangles and edges of two meshes that are nearest to each other: between them is their least distance.
+"""The nearest corners, triangles and edges of two meshes, which determine their least distance. Lengths in mm.
 
-Two disjoint polyhedra are nearest to each other at a corner and a facet, or at two convex edges or their ends. Lengths in mm.
+The nearest points of two disjoint polyhedra lie at a corner and a facet, or at two convex edges or their ends.
 """
 
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ from tolcontact.errors import GeometryFault
 from tolcontact.geometry.body_overlap import SolidBody
 from tolcontact.geometry.edges import edges
 
-SPARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the smaller mesh: by how much more others may be apart
-MIN_SPARE = 1e-3  # of this size: what must remain if there are too many elements
-MAX_ELEMENTS = (500, 500, 200)  # pairs of a corner and a triangle of the other mesh, and of edges
+SPARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the smaller mesh's size: distance of the horizon beyond the least distance
+MIN_SPARE = 1e-3  # of this size: smallest permitted spare if there are too many elements
+MAX_ELEMENTS = (500, 500, 200)  # pairs of a corner and a triangle (both ways), and pairs of edges
 MAX_COMPARISONS = 30_000_000  # of triangles with triangles
 CHUNK = 1_000_000
 FLAT = 1e-6  # [rad] between triangles of one plane
@@ -24,13 +24,13 @@ TINY = 1e-300
 
 @dataclass(frozen=True, eq=False)
 class Corners:
-    """Corners (pair, 3) of a mesh, and the triangles (pair, 3, 3) of the other one that are near.
+    """Corners (pair, 3) of a mesh, and nearby triangles (pair, 3, 3) of the other mesh.
 
-    numbers   (pair,) of the corners: the same for all triangles near one corner
-    slopes    (pair, 3) tangent of half the angle by which a triangle turns at its edges towards its outside, 0 at convex edges
+    indices   (pair,) indices of the corners: equal for all triangles near one corner
+    slopes    (pair, 3) tangent of half the angle between normals at each concave edge of a triangle, 0 at convex edges
     """
 
-    numbers: np.ndarray
+    indices: np.ndarray
     points: np.ndarray
     triangles: np.ndarray
     slopes: np.ndarray
@@ -40,7 +40,7 @@ class Corners:
 class EdgePairs:
     """Convex edges (pair, end, 3) of two meshes that are near each other.
 
-    senses   (pair,) 1 or -1, so that sense times the cross product of both edges points from the second mesh to the first one;
+    senses   (pair,) 1 or -1: sense times the cross product of both edges points from the second mesh to the first one;
              0 where this normal does not fit between the triangles at both edges
     """
 
@@ -51,7 +51,7 @@ class EdgePairs:
 
 @dataclass(frozen=True, eq=False)
 class NearestElements:
-    """Elements of two meshes; all others are at least `horizon` [mm] apart. `line` (2, 3) joins the nearest places found.
+    """Elements of two meshes; all others are at least `horizon` [mm] apart. `line` (2, 3) joins the nearest points found.
 
     corners   of the first mesh over triangles of the second one, and the reverse
     """
@@ -65,9 +65,9 @@ class NearestElements:
 class Edged:
     """A mesh with its convex edges and rims.
 
-    ends      (edge, 2) numbers of vertices
-    normals   (edge, 2, 3) of the triangles on both sides, twice the same on a rim
-    slopes    (triangle, 3) as of Corners
+    ends      (edge, 2) vertex indices
+    normals   (edge, 2, 3) of the triangles on both sides, two equal ones on a rim
+    slopes    (triangle, 3) as in Corners
     """
 
     def __init__(self, mesh: trimesh.Trimesh) -> None:
@@ -93,42 +93,42 @@ class Edged:
 
 
 def nearest_elements(mesh: trimesh.Trimesh, other_mesh: trimesh.Trimesh, distance: float) -> NearestElements:
-    """Return the elements of two meshes between which their least distance is, also after small motions.
+    """Return the elements of two meshes that determine their least distance, including after small motions.
 
-    distance   [mm] a bound of the least distance from above
+    distance   [mm] an upper bound of the least distance
 
     Raises GeometryFault if there are too many of them.
     """
     left, right = Edged(mesh), Edged(other_mesh)
     size = min(left.size, right.size)
-    for share in SPARES:  # a wider horizon has many more pairs, and is looked at only while there are few
+    for share in SPARES:  # a wider horizon has many more pairs, and is tried only while there are few
         horizon = distance + share * size
         pairs = _near_triangles(left.triangles, right.triangles, horizon)
         corners = _corner_pairs(left, right, pairs), _corner_pairs(right, left, pairs[:, ::-1])
         kinds = [*corners, _edge_pairs(left, right, pairs)]
-        places = [
+        nearest_points = [
             _corner_places(left.vertices[kinds[0][:, 0]], right.triangles[kinds[0][:, 1]]),
             _corner_places(right.vertices[kinds[1][:, 0]], left.triangles[kinds[1][:, 1]]),
             _segment_places(left.vertices[left.ends[kinds[2][:, 0]]], right.vertices[right.ends[kinds[2][:, 1]]]),
         ]
-        lengths = [np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) for ends in places]
-        if any(np.count_nonzero(values < horizon) > most for values, most in zip(lengths, MAX_ELEMENTS, strict=True)):
+        lengths = [np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) for ends in nearest_points]
+        if any(np.count_nonzero(values < horizon) > limit for values, limit in zip(lengths, MAX_ELEMENTS, strict=True)):
             break
-    for values, most in zip(lengths, MAX_ELEMENTS, strict=True):
-        if len(values) > most:
-            horizon = min(horizon, float(np.partition(values, most)[most]))
+    for values, limit in zip(lengths, MAX_ELEMENTS, strict=True):
+        if len(values) > limit:
+            horizon = min(horizon, float(np.partition(values, limit)[limit]))
     if horizon < min(float(values.min(initial=np.inf)) for values in lengths) + MIN_SPARE * size:
         raise GeometryFault(
             f"more than {MAX_ELEMENTS[-1]} corners or edges are within {MIN_SPARE * size:.2g} mm of being nearest; choose "
             "smaller faces, or read the part with a larger chord"
         )
-    near = [values < horizon for values in lengths]
-    left_corners, right_corners, edge_pairs = (kind[mask] for kind, mask in zip(kinds, near, strict=True))
+    is_near = [values < horizon for values in lengths]
+    left_corners, right_corners, edge_pairs = (kind[mask] for kind, mask in zip(kinds, is_near, strict=True))
     return NearestElements(
         (_corners(left, right, left_corners), _corners(right, left, right_corners)),
-        _edges(left, right, edge_pairs, places[2][near[2]]),
+        _edges(left, right, edge_pairs, nearest_points[2][is_near[2]]),
         horizon,
-        np.concatenate(places)[np.concatenate(lengths).argmin()],
+        np.concatenate(nearest_points)[np.concatenate(lengths).argmin()],
     )
 
 
@@ -150,42 +150,42 @@ def _near_triangles(A: np.ndarray, B: np.ndarray, horizon: float) -> np.ndarray:
     pairs = [np.zeros((0, 2), dtype=np.int64)]
     for start in range(0, len(rows[0]), step):
         gaps = np.maximum(other_lower - upper[start : start + step, None], lower[start : start + step, None] - other_upper)
-        near = np.argwhere((np.maximum(gaps, 0) ** 2).sum(axis=2) <= horizon**2)
-        pairs.append(np.column_stack([rows[0][near[:, 0] + start], rows[1][near[:, 1]]]))
+        nearby = np.argwhere((np.maximum(gaps, 0) ** 2).sum(axis=2) <= horizon**2)
+        pairs.append(np.column_stack([rows[0][nearby[:, 0] + start], rows[1][nearby[:, 1]]]))
     return np.concatenate(pairs)
 
 
 def _corner_pairs(body: Edged, target: Edged, pairs: np.ndarray) -> np.ndarray:
-    """Return the corners of a body, and the triangles of a target (pair, 2), of pairs of triangles.
+    """Return the corners of a body and the triangles of a target (pair, 2) from pairs of triangles.
 
-    A corner outside of the target has no height over triangles at the back of it.
+    Triangles on the far side of the target are left out for corners outside it.
     """
     rows = np.unique(np.column_stack([body.faces[pairs[:, 0]].ravel(), pairs[:, 1].repeat(3)]), axis=0)
-    corners, places = np.unique(rows[:, 0], return_inverse=True)
+    corners, corner_rows = np.unique(rows[:, 0], return_inverse=True)
     if not len(corners):
         return rows
     offsets = body.vertices[rows[:, 0]] - target.triangles[rows[:, 1], 0]
     is_behind = (offsets * target.face_normals[rows[:, 1]]).sum(axis=1) < -MARGIN * target.size
     is_inside = target.solid.depth(body.vertices[corners]) > MARGIN * target.size
-    return rows[~is_behind | is_inside[places]]
+    return rows[~is_behind | is_inside[corner_rows]]
 
 
 def _edge_pairs(left: Edged, right: Edged, pairs: np.ndarray) -> np.ndarray:
     """Return the convex edges (pair, 2) of pairs of triangles."""
-    ours, theirs = left.edge_of[pairs[:, 0]], right.edge_of[pairs[:, 1]]
-    both = np.stack(np.broadcast_arrays(ours[:, :, None], theirs[:, None]), axis=-1).reshape(-1, 2)
-    return np.unique(both[(both >= 0).all(axis=1)], axis=0)
+    left_edges, right_edges = left.edge_of[pairs[:, 0]], right.edge_of[pairs[:, 1]]
+    edge_pairs = np.stack(np.broadcast_arrays(left_edges[:, :, None], right_edges[:, None]), axis=-1).reshape(-1, 2)
+    return np.unique(edge_pairs[(edge_pairs >= 0).all(axis=1)], axis=0)
 
 
 def _corner_places(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return points (pair, 3), each with the nearest place of its triangle (pair, 3, 3): (pair, 2, 3)."""
+    """Return points (pair, 3), each with the nearest point of its triangle (pair, 3, 3): (pair, 2, 3)."""
     if not len(points):
         return np.zeros((0, 2, 3))
     return np.stack([points, trimesh.triangles.closest_point(triangles, points)], axis=1)
 
 
 def _segment_places(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Return the nearest places (pair, 2, 3) of segments p and q (pair, end, 3) (Ericson, 5.1.9)."""
+    """Return the nearest points (pair, 2, 3) of segments p and q (pair, end, 3) (Ericson, 5.1.9)."""
     u, v, r = p[:, 1] - p[:, 0], q[:, 1] - q[:, 0], p[:, 0] - q[:, 0]
     uu, vv, uv = ((a * b).sum(axis=1) for a, b in ((u, u), (v, v), (u, v)))
     ur, vr = (u * r).sum(axis=1), (v * r).sum(axis=1)
@@ -200,18 +200,18 @@ def _corners(body: Edged, target: Edged, pairs: np.ndarray) -> Corners:
     return Corners(corner, body.vertices[corner], target.triangles[triangle], target.slopes[triangle])
 
 
-def _edges(left: Edged, right: Edged, pairs: np.ndarray, places: np.ndarray) -> EdgePairs:
-    ours, theirs = pairs.T
-    p, q = left.vertices[left.ends[ours]], right.vertices[right.ends[theirs]]
+def _edges(left: Edged, right: Edged, pairs: np.ndarray, nearest_points: np.ndarray) -> EdgePairs:
+    left_edges, right_edges = pairs.T
+    p, q = left.vertices[left.ends[left_edges]], right.vertices[right.ends[right_edges]]
     n = np.cross(p[:, 1] - p[:, 0], q[:, 1] - q[:, 0])
-    side = ((places[:, 0] - places[:, 1]) * n).sum(axis=1)
+    side = ((nearest_points[:, 0] - nearest_points[:, 1]) * n).sum(axis=1)
     outward = np.sign(side)[:, None] * n
-    fits = _is_between(outward, right.normals[theirs]) & _is_between(-outward, left.normals[ours])
+    fits = _is_between(outward, right.normals[right_edges]) & _is_between(-outward, left.normals[left_edges])
     return EdgePairs(p, q, np.where(fits, np.sign(side), 0.0))
 
 
 def _is_between(n: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Return a mask (pair,) of directions n (pair, 3) across an edge that lie between its normals (pair, 2, 3)."""
+    """Return a mask (pair,) of directions n (pair, 3) at an edge that lie between its normals (pair, 2, 3)."""
     middle = normals.sum(axis=1)
     middle /= np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), TINY)
     cosine = (normals[:, 0] * middle).sum(axis=1)

@@ -1,11 +1,11 @@
-"""Points where the rim of one face lies over or under the other face: there they touch first at any tilt."""
+"""Points where the rim of one face lies over or under the other face, where the faces touch first at any tilt."""
 
 import numpy as np
 
 from tolcontact.geometry.edges import edges, rim
 from tolcontact.geometry.surface import Surface
 
-MAX_EDGES = 2000  # of a rim; beyond that its corners are everywhere, and points spread evenly meet them
+MAX_EDGES = 2000  # of a rim; above this its corners are so dense that evenly spread points suffice
 MIN_ANGLE = np.radians(1.0)  # between edges that cross
 INWARD = 1e-5  # of the face's size: distance of points inside the rim
 DROP_ITERATIONS = 8  # of points that drop onto a curved face
@@ -14,7 +14,7 @@ DROP_ITERATIONS = 8  # of points that drop onto a curved face
 def overlap_corners(face: Surface, target: Surface) -> np.ndarray:
     """Return points (corner, 3) [mm] of a face below or above corners of the target's rim, and where both rims cross.
 
-    Corners of the face's own rim are not among them.
+    Corners of the face's own rim are not included.
     """
     face_rim, target_rim = (rim(np.asarray(surface.mesh.faces)) for surface in (face, target))
     if not _are_few(face_rim, target_rim):
@@ -23,7 +23,7 @@ def overlap_corners(face: Surface, target: Surface) -> np.ndarray:
     edges_p, edges_q = np.asarray(face.mesh.vertices)[face_rim], np.asarray(target.mesh.vertices)[target_rim]
     row, _, share = _crossings(edges_p, edges_q, n)
     crossings = edges_p[row, 0] + share[:, None] * (edges_p[row, 1] - edges_p[row, 0])
-    # Corners of the target's rim, moved along its normal into this face.
+    # Corners of the target's rim, projected along its normal onto this face.
     normal = face.corner_normals.reshape(-1, 3).mean(axis=0)
     corners = np.asarray(target.mesh.vertices)[np.unique(target_rim)]
     if abs(n @ normal) < MIN_ANGLE:
@@ -35,7 +35,7 @@ def overlap_corners(face: Surface, target: Surface) -> np.ndarray:
 
 
 def crossing_edges(face: Surface, target: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Return edges (crossing, end, 3) [mm] of the rim of a face, and those of the target's rim that cross them."""
+    """Return edges (crossing, end, 3) [mm] of the rim of a face, and the edges of the target's rim that cross them."""
     face_rim, target_rim = (rim(np.asarray(surface.mesh.faces)) for surface in (face, target))
     edges_p, edges_q = np.asarray(face.mesh.vertices)[face_rim], np.asarray(target.mesh.vertices)[target_rim]
     if not _are_few(face_rim, target_rim):
@@ -49,7 +49,7 @@ def _are_few(*rims: np.ndarray) -> bool:
 
 
 def _crossings(edges_p: np.ndarray, edges_q: np.ndarray, n: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return which edges p and q (edge, end, 3) cross, seen along n (3,): their numbers, and the share of p where they do.
+    """Return which edges p and q (edge, end, 3) cross, seen along n (3,): their indices, and the share of p at the crossing.
 
     Where p + a r meets q + b s in the plane across n, a = (q - p) x s / (r x s) and b = (q - p) x r / (r x s).
     """
@@ -82,7 +82,7 @@ def rim_points(face: Surface, target: Surface, step: float, within: float) -> np
     ends, edge, triangles = edges(faces)
     outer = np.flatnonzero(triangles[edge] == 1)
     n = _mean_normal(target)
-    places = []
+    starts = []
     length = np.linalg.norm(vertices[ends[outer, 1]] - vertices[ends[outer, 0]], axis=1)
     step = max(step, float(length.sum()) / MAX_EDGES)
     for number, size in zip(outer, length, strict=True):
@@ -90,19 +90,19 @@ def rim_points(face: Surface, target: Surface, step: float, within: float) -> np
         inward = np.cross(n, b - a) / max(size, 1e-300)
         inward *= np.sign(inward @ (vertices[faces[number // 3]].mean(axis=0) - a))
         share = np.linspace(0, 1, max(int(np.ceil(size / step)), 1) + 1)[:, None]
-        places.append(a + share * (b - a) + INWARD * target.mesh.scale * inward)
-    start = np.concatenate(places)
+        starts.append(a + share * (b - a) + INWARD * target.mesh.scale * inward)
+    start = np.concatenate(starts)
     points = start
     for _ in range(DROP_ITERATIONS):
-        _, feet = face.nearest(points)
-        points = start + ((feet - start) @ n)[:, None] * n
-    has_arrived = np.linalg.norm(points - feet, axis=1) < 0.1 * INWARD * target.mesh.scale
+        _, projections = face.nearest(points)
+        points = start + ((projections - start) @ n)[:, None] * n
+    has_arrived = np.linalg.norm(points - projections, axis=1) < 0.1 * INWARD * target.mesh.scale
     is_near = np.linalg.norm(points - start, axis=1) <= within
-    return feet[has_arrived & is_near]
+    return projections[has_arrived & is_near]
 
 
 def points_on_rim(face: Surface, step: float) -> np.ndarray:
-    """Return points (point, 3) [mm] along the rim of a face, corners of its triangles among them, at most `step` [mm] apart."""
+    """Return points (point, 3) [mm] along the rim of a face, at most `step` [mm] apart, including its triangles' corners."""
     starts, ends = np.asarray(face.mesh.vertices)[rim(np.asarray(face.mesh.faces))].swapaxes(0, 1)
     pieces = np.maximum(np.ceil(np.linalg.norm(ends - starts, axis=1) / step), 1).astype(int)
     return np.concatenate([np.linspace(a, b, count, endpoint=False) for a, b, count in zip(starts, ends, pieces, strict=True)])

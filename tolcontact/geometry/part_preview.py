@@ -1,4 +1,4 @@
-"""Previews of parts before anything is computed: shapes in their places, and code that chooses each face."""
+"""Previews of parts before a run: shapes in their poses, and code that selects each face."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -23,10 +23,10 @@ class PartPreview(NamedTuple):
 
     mesh          the same triangles in the part's own frame
     rotation      (3, 3) of the part
-    face_of       (triangle,) numbers of faces from 0: of the B-rep faces of a STEP file, or of smooth pieces
+    face_of       (triangle,) face indices: of the B-rep faces of a STEP file, or of smooth pieces
     descriptions  of the faces
-    snippets      Python code that chooses each face
-    groups        Python code that chooses the slot and the pattern of holes to which each face belongs
+    snippets      Python code that selects each face
+    groups        Python code that selects the slot and the hole pattern of each face
     """
 
     mesh: trimesh.Trimesh
@@ -40,7 +40,7 @@ class PartPreview(NamedTuple):
 
 
 def preview(part: Part) -> PartPreview | None:
-    """Return the preview of a part, None if its shape or its place is wrong."""
+    """Return the preview of a part, None if its shape or its pose is invalid."""
     if any(part.faults()):
         return None
     try:

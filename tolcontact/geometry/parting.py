@@ -1,8 +1,8 @@
-"""How two convex bodies part: the axis along which they are farthest apart, or least deep in each other.
+"""The separating axis of two convex bodies: the axis of the largest gap, or of the least penetration.
 
-Convex bodies that do not lie in each other are on different sides of a plane. Of the normals of all planes of both bodies, and
-of the common normals of their edges, the one with the largest gap tells: this gap is negative if, and only if, they lie in each
-other (Gottschalk, Lin and Manocha, OBBTree, 1996). Where it is zero they touch.
+Convex bodies that do not penetrate each other are on different sides of a plane. The candidate axes are the normals of all
+planes of both bodies and the common normals of their edges. The largest gap along these axes is negative if and only if the
+bodies penetrate each other (Gottschalk, Lin and Manocha, OBBTree, 1996). If it is zero, they touch.
 """
 
 from dataclasses import dataclass
@@ -17,16 +17,16 @@ from tolcontact.geometry.coordinate_error import coordinate_error
 from tolcontact.geometry.inset import smaller
 
 SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
-CONVEX_SHARE = 1e-6  # of the hull's size, by which the surface of a convex body may lie inside its hull: files are rounded
+CONVEX_SHARE = 1e-6  # of the hull's size: largest depth of a convex body's surface inside its hull, since files are rounded
 MAX_COMPARISONS = 10_000_000  # of edges with edges
 
 
 class Axis(NamedTuple):
-    """The axis along which two convex bodies part best, at n poses.
+    """The separating axis of two convex bodies, at n poses.
 
     edges          (n,): the index of the pair of edges that cross along it, -1 if it is the normal of a plane
-    gaps           (n,) [mm] of the bodies along the axis; negative if they lie in each other
-    P_m, P_r, n_r  (n, 3): the places of both bodies that are nearest along it, and the axis, in the frames of the paper
+    gaps           (n,) [mm] of the bodies along the axis; negative if they penetrate each other
+    P_m, P_r, n_r  (n, 3): the nearest points of both bodies along it, and the axis, in the frames of the paper
     """
 
     edges: Int[Array, " n"]
@@ -40,7 +40,7 @@ class Crossings(NamedTuple):
     """Pairs of edges of two bodies, at n poses.
 
     gaps           (n, k) [mm] along their common normals; infinite where they do not cross
-    P_m, P_r, n_r  (n, k, 3): the places on the edges, and their common normals, in the frames of the paper
+    P_m, P_r, n_r  (n, k, 3): the points on the edges, and their common normals, in the frames of the paper
     """
 
     gaps: Float[Array, "n k"]
@@ -51,13 +51,13 @@ class Crossings(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Parting:
-    """A moving and a reference body, both convex, in their nominal places."""
+    """A moving and a reference body, both convex, in their nominal poses."""
 
     moving: parting_kernel.Convex
     reference: parting_kernel.Convex
 
     def at(self, X_RM: Float[Array, "n 12"]) -> Axis:
-        """Return the axis along which the bodies part best at poses X_RM (n, 12)."""
+        """Return the separating axis of the bodies at poses X_RM (n, 12)."""
         count = len(X_RM)
         axis = Axis(np.empty(count, dtype=np.int64), np.empty(count), *np.empty((3, count, 3)))
         parting_kernel.part(self.moving, self.reference, np.ascontiguousarray(X_RM), *axis)
@@ -65,14 +65,14 @@ class Parting:
 
     def crossings(self, X_RM: Float[Array, "n 12"], edges: Int[Array, "n k"], axes: Float[Array, "n 3"]) -> Crossings:
         """Return pairs of `edges` (n, k), -1 for none, at poses X_RM (n, 12), with normals in the sense of `axes` (n, 3)."""
-        found = Crossings(np.empty(edges.shape), *np.zeros((3, *edges.shape, 3)))
+        crossings = Crossings(np.empty(edges.shape), *np.zeros((3, *edges.shape, 3)))
         poses, pairs, senses = (np.ascontiguousarray(values) for values in (X_RM, edges, axes))
-        parting_kernel.cross_edges(self.moving, self.reference, poses, pairs, senses, *found)
-        return found
+        parting_kernel.cross_edges(self.moving, self.reference, poses, pairs, senses, *crossings)
+        return crossings
 
 
 def parting(moving: trimesh.Trimesh, reference: trimesh.Trimesh) -> Parting | None:
-    """Return how two bodies, in their nominal places, part; None if one is not convex, or they have too many edges."""
+    """Return the parting of two bodies in their nominal poses; None if one is not convex, or if they have too many edges."""
     A, B = convex(moving), convex(reference)
     if A is None or B is None or len(A.edges) * len(B.edges) > MAX_COMPARISONS:
         return None
@@ -96,14 +96,14 @@ def convex(body: trimesh.Trimesh) -> parting_kernel.Convex | None:
     normals = facet_normals[order[np.unique(np.asarray(planes)[order], return_index=True)[1]]]
     heights = (vertices @ normals.T).max(axis=0)
     triangles = np.asarray(body.triangles)
-    places = np.concatenate([triangles, (triangles + np.roll(triangles, 1, axis=1)) / 2]).reshape(-1, 3)
-    depths = (heights - places @ normals.T).min(axis=1)
+    samples = np.concatenate([triangles, (triangles + np.roll(triangles, 1, axis=1)) / 2]).reshape(-1, 3)
+    depths = (heights - samples @ normals.T).min(axis=1)
     if depths.max() > CONVEX_SHARE * float(hull.scale):
         return None
-    beside = neighbours[is_sharp]
+    sharp_neighbours = neighbours[is_sharp]
     ends = vertices[np.asarray(hull.face_adjacency_edges)[is_sharp]]
     along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
-    into = np.cross(facet_normals[beside], along[:, None])
-    towards = np.asarray(hull.triangles_center)[beside] - ends[:, :1]
+    into = np.cross(facet_normals[sharp_neighbours], along[:, None])
+    towards = np.asarray(hull.triangles_center)[sharp_neighbours] - ends[:, :1]
     into *= np.where((into * towards).sum(axis=2) < 0, -1.0, 1.0)[..., None]
     return parting_kernel.Convex(*(np.ascontiguousarray(values) for values in (vertices, normals, heights, ends, into)))

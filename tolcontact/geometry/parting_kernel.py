@@ -1,4 +1,4 @@
-"""Compiled search for the axis along which two convex bodies are farthest apart, or least deep in each other."""
+"""Compiled search for the separating axis of two convex bodies: the largest gap, or the least penetration."""
 
 import math
 from typing import NamedTuple
@@ -17,7 +17,7 @@ class Convex(NamedTuple):
 
     vertices   (v, 3) [mm]
     normals    (f, 3): outward unit normals of its planes
-    heights    (f,) [mm]: how far the body reaches along these normals
+    heights    (f,) [mm]: largest height of the body along these normals
     edges      (e, 2, 3) [mm]: the ends of its edges
     into       (e, 2, 3): unit vectors across each edge into the two planes that meet there
     """
@@ -32,19 +32,19 @@ class Convex(NamedTuple):
 @inlined_uncounted
 def _lowest(vertices, n):  # type: ignore[no-untyped-def]
     """Return the vertex that is lowest along n, and its height."""
-    best, least = 0, np.inf
+    best, lowest = 0, np.inf
     for j in range(vertices.shape[0]):
         height = dot(n, row(vertices, j))
-        if height < least:
-            best, least = j, height
-    return best, least
+        if height < lowest:
+            best, lowest = j, height
+    return best, lowest
 
 
 @inlined_uncounted
 def _common_normal(d, e, into_A, into_B, i, j):  # type: ignore[no-untyped-def]
-    """Return the common normal of two edges, from B to A, and its length; 0 if other axes separate the bodies better there.
+    """Return the common normal of two edges, from B to A, and its length; 0 if another axis separates the bodies better there.
 
-    The length is that of d x e. The normal leaves both planes beside either edge on the same side.
+    The length is |d x e|. At each edge, both adjacent planes lie on the same side of the normal.
     """
     c = cross(d, e)
     length = math.sqrt(dot(c, c))
@@ -67,8 +67,8 @@ def _nearest_shares(w, d, e):  # type: ignore[no-untyped-def]
 
 
 @uncounted
-def _across_edges(B, lines, into, least):  # type: ignore[no-untyped-def]
-    """Return the pair of edges whose common normal separates the bodies by most, and by how much; -1 if not by over `least`."""
+def _across_edges(B, lines, into, largest_gap):  # type: ignore[no-untyped-def]
+    """Return the pair of edges whose common normal gives the largest gap, and that gap; -1 if it is not above `largest_gap`."""
     best = -1, -1
     for i in range(lines.shape[0]):
         start, d = row_of(lines, i, 0), row_of(lines, i, 1)
@@ -79,9 +79,9 @@ def _across_edges(B, lines, into, least):  # type: ignore[no-untyped-def]
             c, length = _common_normal(d, e, into, B.into, i, j)
             if length > PARALLEL * length_d * math.sqrt(dot(e, e)):
                 gap = dot(c, minus(start, q)) / length
-                if gap > least:
-                    best, least = (i, j), gap
-    return best, least
+                if gap > largest_gap:
+                    best, largest_gap = (i, j), gap
+    return best, largest_gap
 
 
 @uncounted
@@ -96,38 +96,38 @@ def _place_edges(A, X, lines, into):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def part(A, B, poses, edges, gaps, places, feet, normals):  # type: ignore[no-untyped-def]
-    """Write how convex bodies part at poses X_BA (n, 12): along the axis that separates them by the largest gap.
+def part(A, B, poses, edges, gaps, points, projections, normals):  # type: ignore[no-untyped-def]
+    """Write the separating axes of convex bodies at poses X_BA (n, 12): the axes with the largest gap.
 
-    It is a normal of a plane of either body, or a common normal of two edges that separate them. Bodies that lie in each other
-    have negative gaps only.
+    An axis is a normal of a plane of either body, or a common normal of two edges. Bodies that penetrate each other have a
+    negative gap along every axis.
 
     edges           (n,): e i + j if the axis is the common normal of edge i of A and edge j of the e edges of B, else -1
-    gaps            (n,) [mm], how far apart they are along the axis
-    places, feet    (n, 3) [mm] on A and on B, in the frames of these bodies
+    gaps            (n,) [mm]: gap along the axis
+    points, projections    (n, 3) [mm]: points on A and on B, in the frames of these bodies
     normals         (n, 3): the axis from B to A, in the frame of B
     """
     lines, into = np.empty(A.edges.shape), np.empty(A.into.shape)
     for k in range(poses.shape[0]):
         X = poses[k]
         _place_edges(A, X, lines, into)
-        gap, place, foot, n = -np.inf, ORIGIN, ORIGIN, ORIGIN
+        gap, point, projection, n = -np.inf, ORIGIN, ORIGIN, ORIGIN
         for f in range(B.normals.shape[0]):
             normal = row(B.normals, f)
             vertex, height = _lowest(A.vertices, turn_back(X, normal))
             height += dot(normal, (X[9], X[10], X[11])) - B.heights[f]
             if height > gap:
                 corner = row(A.vertices, vertex)
-                gap, n, place, foot = height, normal, corner, along(move(X, corner), -height, normal)
+                gap, n, point, projection = height, normal, corner, along(move(X, corner), -height, normal)
         for f in range(A.normals.shape[0]):
             down = row(A.normals, f)
             normal = turn(X, scaled(-1.0, down))
-            # The highest vertex of B along the normal is the lowest one against it.
+            # The highest vertex of B along the normal is the lowest one along its opposite.
             vertex, height = _lowest(B.vertices, scaled(-1.0, normal))
             height += dot(normal, (X[9], X[10], X[11])) - A.heights[f]
             if height > gap:
                 corner = row(B.vertices, vertex)
-                gap, n, foot, place = height, normal, corner, move_back(X, along(corner, height, normal))
+                gap, n, projection, point = height, normal, corner, move_back(X, along(corner, height, normal))
         (i, j), gap = _across_edges(B, lines, into, gap)
         edges[k] = i * B.edges.shape[0] + j if i >= 0 else -1
         if i >= 0:
@@ -136,18 +136,18 @@ def part(A, B, poses, edges, gaps, places, feet, normals):  # type: ignore[no-un
             c, length = _common_normal(d, e, into, B.into, i, j)
             n = scaled(1.0 / length, c)
             s, u = _nearest_shares(minus(y, x), d, e)
-            place, foot = move_back(X, along(x, s, d)), along(y, u, e)
+            point, projection = move_back(X, along(x, s, d)), along(y, u, e)
         gaps[k] = gap
         for i in range(3):
-            places[k, i], feet[k, i], normals[k, i] = place[i], foot[i], n[i]
+            points[k, i], projections[k, i], normals[k, i] = point[i], projection[i], n[i]
 
 
 @compiled
-def cross_edges(A, B, poses, edges, axes, gaps, places, feet, normals):  # type: ignore[no-untyped-def]
-    """Write gaps of some pairs of `edges` (n, k), see `part`, along their common normals nearest to the `axes` (n, 3).
+def cross_edges(A, B, poses, edges, axes, gaps, points, projections, normals):  # type: ignore[no-untyped-def]
+    """Write the gaps of pairs of `edges` (n, k), see `part`, along their common normals nearest to the `axes` (n, 3).
 
-    gaps                     (n, k) [mm], infinite where edges do not cross, seen along their common normal, or for edges -1
-    places, feet, normals    (n, k, 3), as in `part`
+    gaps                     (n, k) [mm], infinite for -1 and where edges do not cross as seen along their common normal
+    points, projections, normals    (n, k, 3), as in `part`
     """
     gaps[:] = np.inf
     for k in range(poses.shape[0]):
@@ -165,6 +165,6 @@ def cross_edges(A, B, poses, edges, axes, gaps, places, feet, normals):  # type:
                 continue
             n = scaled((1.0 if dot(c, row(axes, k)) > 0.0 else -1.0) / math.sqrt(square), c)
             gaps[k, m] = -dot(n, w)
-            place, foot = move_back(X, along(x, s / square, d)), along(y, u / square, e)
+            point, projection = move_back(X, along(x, s / square, d)), along(y, u / square, e)
             for f in range(3):
-                places[k, m, f], feet[k, m, f], normals[k, m, f] = place[f], foot[f], n[f]
+                points[k, m, f], projections[k, m, f], normals[k, m, f] = point[f], projection[f], n[f]

@@ -1,4 +1,4 @@
-"""Compiled look at places through which bodies have not come into each other: there they pass nominally."""
+"""Compiled filter of contact points at which bodies are nominally behind each other, and so cannot have penetrated."""
 
 import numpy as np
 
@@ -6,16 +6,16 @@ from tolcontact.compiled import inlined_uncounted, uncounted
 from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, INSIDE
 from tolcontact.geometry.vector_kernel import along, dot, minus, row, row_of, turn_back
 
-NEARLY_PARALLEL = 1e-3  # sine of the angle between edges whose common normal does not tell how far they are apart
+NEARLY_PARALLEL = 1e-3  # sine of the angle between edges, below which their common normal does not give their distance
 
 
 @inlined_uncounted
-def _nominal_height(A, B, candidates, s, X, n, place, foot):  # type: ignore[no-untyped-def]
-    """Return the height of candidate s in the nominal assembly: that of its place over its foot along n, or along R'n.
+def _nominal_height(A, B, candidates, s, X, n, point, projection):  # type: ignore[no-untyped-def]
+    """Return the nominal height of candidate s: the height of its point over its projection along n, or along R'n.
 
-    Two edges have shifted along each other since: their height is that of the lines on which they lie.
+    Two edges may have shifted along each other: their height is the distance of their lines.
     """
-    arm = minus(place, foot)
+    arm = minus(point, projection)
     if candidates.kinds[s] == EDGE_ON_EDGE:
         start_A, start_B = row_of(A.edges, candidates.firsts[s], 0), row_of(B.edges, candidates.seconds[s], 0)
         d = minus(row_of(A.edges, candidates.firsts[s], 1), start_A)
@@ -29,19 +29,19 @@ def _nominal_height(A, B, candidates, s, X, n, place, foot):  # type: ignore[no-
 
 
 @uncounted
-def drop_passed(A, B, candidates, passed, X, touching, gaps, all_places, is_held):  # type: ignore[no-untyped-def]
-    """Drop places that lie nominally deeper than `passed` [mm], where a corner beside them is held: there the body came in.
+def drop_passed(A, B, candidates, passed, X, touching, gaps, all_points, is_held):  # type: ignore[no-untyped-def]
+    """Drop points that are nominally deeper than `passed` [mm] and have a held corner: the body penetrated at that corner.
 
-    Beside a place are the corner itself, and the ends of both edges. `is_held` (corner,) is false before and after, of the
-    corners of the moving and then of the reference body.
+    The corners of a point are the corner itself, or the ends of both edges. `is_held` (corner,) is false before and after, for
+    the corners of the moving body followed by the corners of the reference body.
     """
-    places, feet, normals = all_places
+    points, projections, normals = all_points
     count = A.vertices.shape[0]
     for is_first in (True, False):
         for s in touching:
             is_edge = candidates.kinds[s] == EDGE_ON_EDGE
             owner = candidates.firsts[s] if candidates.kinds[s] == CORNER_ON_FACET else count + candidates.seconds[s]
-            height = _nominal_height(A, B, candidates, s, X, row(normals, s), row(places, s), row(feet, s))
+            height = _nominal_height(A, B, candidates, s, X, row(normals, s), row(points, s), row(projections, s))
             has_passed = height < -passed
             if is_first and not is_edge and not has_passed and gaps[s] <= INSIDE:
                 is_held[owner] = True

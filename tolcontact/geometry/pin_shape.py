@@ -1,11 +1,11 @@
-"""The triangles of a pin. Own frame, mm."""
+"""The triangles of a pin, in its own frame. Lengths in mm."""
 
 import trimesh
 
 from tolcontact.declaration import Pin
 
 SECTIONS = 72  # triangles around it
-HEAD_WIDTH, HEAD_HEIGHT = 1.6, 0.65  # times the diameter, as of the hexagon head bolts of ISO 4014
+HEAD_WIDTH, HEAD_HEIGHT = 1.6, 0.65  # times the diameter, as for hexagon head bolts to ISO 4014
 
 
 def pin_shape(pin: Pin) -> trimesh.Trimesh:

@@ -1,4 +1,4 @@
-"""Compiled search for the places at which two bodies touch, among all candidates, at given relative poses."""
+"""Compiled search for the points at which two bodies touch, among all candidates, at given relative poses."""
 
 import math
 from typing import NamedTuple
@@ -31,19 +31,20 @@ from tolcontact.geometry.vector_kernel import (
     turn,
 )
 
-MAX_SHEAR = 1.8  # by which a corner's place beside a facet changes with its height, where planes face each other
+MAX_SHEAR = 1.8  # lateral shift of a corner's projection per unit height, where planes face each other
 EVERYWHERE = (-np.inf, -np.inf, np.inf, np.inf)
 
 
 class Candidates(NamedTuple):
-    """The places at which two bodies can touch (see Meeting), those of a corner or edge of one body one after the other.
+    """The points at which two bodies can touch (see Meeting), grouped by the corner or edge of one body.
 
-    Those of a corner or edge and one facing plane, or no such plane, are a run; runs begin at `runs` (run + 1,). From `middles`
-    (run,) on they are sorted by the first value of their boxes, which are no wider than `widths` (run,) [mm].
-    `boxes` (candidate, 4) [mm] are least and largest coordinates, in a facing plane, of the facets or the edge that a corner or
-    an edge may touch there, along the vectors in `frames` (facing planes, body, 2, 3). `segments` (segment, 5) are the outlines
-    of facing planes in these coordinates (see is_within); those of a plane of the moving and of the reference body begin at
-    `outlines` (2 planes + 1,); their sorted segments begin at `outline_middles` and are no taller than `tallest` (2 planes,).
+    The candidates of a corner or edge and one facing plane, or no plane, are a run; runs begin at `runs` (run + 1,). From
+    `middles` (run,) on they are sorted by the first value of their boxes, which are no wider than `widths` (run,) [mm].
+    `boxes` (candidate, 4) [mm] are the least and largest coordinates of the facets or the edge that a corner or an edge may
+    touch in a facing plane, along the vectors in `frames` (facing planes, body, 2, 3). `segments` (segment, 5) are the outlines
+    of facing planes in these coordinates (see is_within). The outlines of a plane of the moving and of the reference body begin
+    at `outlines` (2 planes + 1,). Their sorted segments begin at `outline_middles`, and are no taller than `tallest` (2
+    planes,).
     """
 
     kinds: np.ndarray
@@ -64,7 +65,7 @@ class Candidates(NamedTuple):
 
 @compiled
 def cover(poses, corners, travel, turn, covered):  # type: ignore[no-untyped-def]
-    """Write whether corners (v, 3) travel by at most `travel` [mm], and turn by at most `turn` [rad], at X_RM (n, 12)."""
+    """Write whether corners (v, 3) travel by at most `travel` [mm], and rotate by at most `turn` [rad], at X_RM (n, 12)."""
     largest = 8 * math.sin(turn / 2) ** 2 if turn < math.pi else np.inf  # |R - I|^2
     for k in range(poses.shape[0]):
         X, square = poses[k], 0.0
@@ -80,9 +81,9 @@ def cover(poses, corners, travel, turn, covered):  # type: ignore[no-untyped-def
 
 @uncounted
 def _keep_shallowest(candidates, touching, gaps, least):  # type: ignore[no-untyped-def]
-    """Drop all but the nearest of the facets that a corner is behind: by that one it leaves. Facing planes hold all corners.
+    """Drop all but the nearest facet of a corner that is behind several: it leaves through that one. Facing planes are kept.
 
-    It may be behind several by no more than `least` [mm].
+    A corner may be behind several facets by no more than `least` [mm].
     """
     best, owner_of_best = -1, -1
     for s in touching:
@@ -102,95 +103,96 @@ def _keep_shallowest(candidates, touching, gaps, least):  # type: ignore[no-unty
 
 
 @inlined_uncounted
-def _is_over_plane(candidates, plane, body, x, spare):  # type: ignore[no-untyped-def]
+def _is_over_plane(candidates, plane, body, x, slack):  # type: ignore[no-untyped-def]
     """Return whether x, in the frame of a body (0: moving, 1: reference), lies over one of two facing planes."""
     outline, frames = 2 * plane + body, candidates.frames
     coordinate_1 = frames[plane, body, 0, 0] * x[0] + frames[plane, body, 0, 1] * x[1] + frames[plane, body, 0, 2] * x[2]
     coordinate_2 = frames[plane, body, 1, 0] * x[0] + frames[plane, body, 1, 1] * x[1] + frames[plane, body, 1, 2] * x[2]
     start, end = candidates.outlines[outline], candidates.outlines[outline + 1]
     middle, tallest = candidates.outline_middles[outline], candidates.tallest[outline]
-    return is_within(candidates.segments, start, middle, end, tallest, coordinate_1, coordinate_2, spare)
+    return is_within(candidates.segments, start, middle, end, tallest, coordinate_1, coordinate_2, slack)
 
 
 @inlined_uncounted
-def _place(A, B, candidates, s, spare, reach, X, moved):  # type: ignore[no-untyped-def]
-    """Return gap, place, foot and normal of candidate s, which may lie `spare` [mm] beside edges."""
+def _place(A, B, candidates, s, slack, reach, X, moved):  # type: ignore[no-untyped-def]
+    """Return gap, point, projection and normal of candidate s, which may lie `slack` [mm] outside edges."""
     corners, lines, back = moved
-    kind, number_A, number_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
+    kind, index_A, index_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
     flat = 0 if plane < 0 else candidates.facing[plane, 1]
     if kind == EDGE_ON_EDGE:
         return edge_on_edge(
-            A, B, number_A, number_B, flat, plane, spare, reach, X, row_of(lines, number_A, 0), row_of(lines, number_A, 1)
+            A, B, index_A, index_B, flat, plane, slack, reach, X, row_of(lines, index_A, 0), row_of(lines, index_A, 1)
         )
     if kind == CORNER_ON_FACET:
-        results = corner_on_facet(A, B, number_A, number_B, plane, spare, reach, X, row(corners, number_A))
-        is_over = plane < 0 or results[0] == np.inf or _is_over_plane(candidates, plane, 1, row(corners, number_A), spare)
+        results = corner_on_facet(A, B, index_A, index_B, plane, slack, reach, X, row(corners, index_A))
+        is_over = plane < 0 or results[0] == np.inf or _is_over_plane(candidates, plane, 1, row(corners, index_A), slack)
     else:
-        results = facet_on_corner(A, B, number_A, number_B, flat, plane, spare, reach, X, row(back, number_B))
-        is_over = plane < 0 or results[0] == np.inf or _is_over_plane(candidates, plane, 0, results[1], spare)
+        results = facet_on_corner(A, B, index_A, index_B, flat, plane, slack, reach, X, row(back, index_B))
+        is_over = plane < 0 or results[0] == np.inf or _is_over_plane(candidates, plane, 0, results[1], slack)
     return results if is_over else NOWHERE
 
 
 @inlined_uncounted
-def _write(results, s, gaps, places, feet, normals):  # type: ignore[no-untyped-def]
-    """Write gap, place, foot and normal of candidate s."""
+def _write(results, s, gaps, points, projections, normals):  # type: ignore[no-untyped-def]
+    """Write gap, point, projection and normal of candidate s."""
     gaps[s] = results[0]
-    for vectors, vector in ((places, results[1]), (feet, results[2]), (normals, results[3])):
+    for vectors, vector in ((points, results[1]), (projections, results[2]), (normals, results[3])):
         vectors[s, 0], vectors[s, 1], vectors[s, 2] = vector
 
 
 @uncounted
-def _is_near(candidates, s, foot, feet, touching, gaps, distance):  # type: ignore[no-untyped-def]
-    """Return whether a place of facing planes is no farther than `distance` from another one at which they touch."""
+def _is_near(candidates, s, projection, projections, touching, gaps, distance):  # type: ignore[no-untyped-def]
+    """Return whether a contact point of facing planes is within `distance` of another one at which they touch."""
     for neighbour in touching:
         if candidates.planes[neighbour] == candidates.planes[s] and gaps[neighbour] < np.inf:
-            difference = minus(row(feet, neighbour), foot)
+            difference = minus(row(projections, neighbour), projection)
             if dot(difference, difference) <= distance * distance:
                 return True
     return False
 
 
 @inlined_uncounted
-def _range(A, candidates, s, moved, spare):  # type: ignore[no-untyped-def]
-    """Return least and largest coordinates of the corner or edge of candidate s in the plane that faces it."""
+def _range(A, candidates, s, moved, slack):  # type: ignore[no-untyped-def]
+    """Return the least and largest coordinates of the corner or edge of candidate s in the plane that faces it."""
     corners, lines, back = moved
-    kind, number_A, number_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
+    kind, index_A, index_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
     body = 0 if kind == FACET_ON_CORNER else 1
     axis_1, axis_2 = row_of(candidates.frames[plane], body, 0), row_of(candidates.frames[plane], body, 1)
     if kind == EDGE_ON_EDGE:
-        start, vector = row_of(lines, number_A, 0), row_of(lines, number_A, 1)
+        start, vector = row_of(lines, index_A, 0), row_of(lines, index_A, 1)
         low, high, low_2, high_2 = dot(axis_1, start), dot(axis_1, vector), dot(axis_2, start), dot(axis_2, vector)
         return (
-            low + min(high, 0.0) - spare, low_2 + min(high_2, 0.0) - spare,
-            low + max(high, 0.0) + spare, low_2 + max(high_2, 0.0) + spare,
+            low + min(high, 0.0) - slack, low_2 + min(high_2, 0.0) - slack,
+            low + max(high, 0.0) + slack, low_2 + max(high_2, 0.0) + slack,
         )  # fmt: skip
-    shear = spare
+    shear = slack
     if kind == FACET_ON_CORNER:
-        x, facet = row(back, number_B), candidates.facing[plane, 0]
+        x, facet = row(back, index_B), candidates.facing[plane, 0]
         shear += MAX_SHEAR * abs(dot(row(A.normals, facet), minus(x, row_of(A.facets, facet, 0))))
     else:
-        x = row(corners, number_A)
+        x = row(corners, index_A)
     return dot(axis_1, x) - shear, dot(axis_2, x) - shear, dot(axis_1, x) + shear, dot(axis_2, x) + shear
 
 
 @uncounted
-def _find_at(A, B, candidates, reach, margins, nearness, beside, retained, X, moved, touching, is_held, gaps, all_places):  # type: ignore
-    """Write gap, places and normal of the candidates that touch at one pose X_RM (12,); return how many there are.
+def _find_at(A, B, candidates, reach, margins, nearness, overhang, retained, X, moved, touching, is_held, gaps, all_points):  # type: ignore
+    """Write gap, points and normal of the candidates that touch at one pose X_RM (12,); return how many there are.
 
-    Of facing planes, candidates that are kept count a little beside their edges: there, near a corner of the overlap, the
-    planes themselves err little. Far from it, or where planes no longer overlap, another body may be free.
+    Retained candidates of facing planes count slightly outside their edges: near a corner of the overlap the error of the
+    extended planes is small. Far from it, or where planes no longer overlap, the other body may be free.
 
-    margins       (p + 1,) [mm] by which places may lie beside edges: those that are kept, of each two facing planes; all others
-    nearness      in margins: how far from a place where the planes touch such a place may lie
-    retained      (k,): numbers of the candidates that are kept, or -1
+    margins       (p + 1,) [mm]: largest distance of contact points outside edges: for retained candidates of each pair of
+                  facing planes, and last for all other candidates
+    nearness      in margins: largest distance of such a contact point from a point where the planes touch
+    retained      (k,): indices of the retained candidates, or -1
     moved         corners (v, 3), and starts and vectors of edges (e, 2, 3), of the moving body in the reference frame, and
                   corners of the reference body in the moving frame
-    touching      (c,): numbers of the candidates that touch
-    is_held       (corner,), false: see _drop_passed
-    gaps          (c,) [mm], infinite before
-    all_places    places, feet, normals (3, c, 3): P^m, P^r, n^r of the paper
+    touching      (c,): indices of the candidates that touch
+    is_held       (corner,), false: see drop_passed
+    gaps          (c,) [mm], initially infinite
+    all_points    points, projections, normals (3, c, 3): P^m, P^r, n^r of the paper
     """
-    (places, feet, normals), margin, boxes = all_places, margins[-1], candidates.boxes
+    (points, projections, normals), margin, boxes = all_points, margins[-1], candidates.boxes
     count = 0
     for run in range(candidates.widths.size):
         s, middle, end = candidates.runs[run], candidates.middles[run], candidates.runs[run + 1]
@@ -202,26 +204,28 @@ def _find_at(A, B, candidates, reach, margins, nearness, beside, retained, X, mo
             if s >= end or (s >= middle and boxes[s, 0] > high):
                 break
             if not (boxes[s, 2] < low or boxes[s, 3] < low_2 or boxes[s, 1] > high_2):
-                _write(_place(A, B, candidates, s, margin, reach, X, moved), s, gaps, places, feet, normals)
+                _write(_place(A, B, candidates, s, margin, reach, X, moved), s, gaps, points, projections, normals)
                 if gaps[s] < np.inf:
                     touching[count], count = s, count + 1
             s += 1
-    drop_passed(A, B, candidates, reach[2], X, touching[:count], gaps, all_places, is_held)
-    _keep_shallowest(candidates, touching[:count], gaps, max(INSIDE, beside))
+    drop_passed(A, B, candidates, reach[2], X, touching[:count], gaps, all_points, is_held)
+    _keep_shallowest(candidates, touching[:count], gaps, max(INSIDE, overhang))
     strict = count
     for s in retained:
         if s >= 0 and candidates.planes[s] >= 0 and gaps[s] == np.inf:
-            spare = margins[candidates.planes[s]]
-            results = _place(A, B, candidates, s, spare, reach, X, moved)
-            if results[0] < np.inf and _is_near(candidates, s, results[2], feet, touching[:strict], gaps, nearness * spare):
-                _write(results, s, gaps, places, feet, normals)
+            slack = margins[candidates.planes[s]]
+            results = _place(A, B, candidates, s, slack, reach, X, moved)
+            if results[0] < np.inf and _is_near(
+                candidates, s, results[2], projections, touching[:strict], gaps, nearness * slack
+            ):
+                _write(results, s, gaps, points, projections, normals)
                 touching[count], count = s, count + 1
     return count
 
 
 @uncounted
-def _choose(touching, gaps, feet, retained, directions, is_chosen, labels):  # type: ignore[no-untyped-def]
-    """Write the labels (p,) of places that may matter: those kept, those of the least gaps, and the outermost; -1 for none."""
+def _choose(touching, gaps, projections, retained, directions, is_chosen, labels):  # type: ignore[no-untyped-def]
+    """Write the labels (p,) of relevant points: retained ones, those with the least gaps, and the outermost; -1 for none."""
     number = 0
     for s in touching:
         is_chosen[s] = gaps[s] == np.inf
@@ -240,7 +244,7 @@ def _choose(touching, gaps, feet, retained, directions, is_chosen, labels):  # t
         outermost, farthest = -1, -np.inf
         for s in touching:
             if gaps[s] < np.inf:
-                distance = dot(direction, row(feet, s))
+                distance = dot(direction, row(projections, s))
                 if distance > farthest:
                     outermost, farthest = s, distance
         if outermost >= 0 and not is_chosen[outermost]:
@@ -250,7 +254,7 @@ def _choose(touching, gaps, feet, retained, directions, is_chosen, labels):  # t
 
 @uncounted
 def _move(A, B, facing, X, corners, lines, back, sines):  # type: ignore[no-untyped-def]
-    """Write what moves at a pose X_RM (12,): see `moved` in _find_at; and sines of the angles between facing planes."""
+    """Write the moved geometry at a pose X_RM (12,), see `moved` in _find_at, and sines of the angles between facing planes."""
     for j in range(corners.shape[0]):
         corners[j, 0], corners[j, 1], corners[j, 2] = move(X, row(A.vertices, j))
     for j in range(lines.shape[0]):
@@ -266,10 +270,10 @@ def _move(A, B, facing, X, corners, lines, back, sines):  # type: ignore[no-unty
 
 @uncounted
 def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, directions, results, scratch):  # type: ignore
-    """Write what `find` writes, found = (labels, gaps, places, feet, normals)."""
-    corners, lines, back, margins, touching, is_held, is_chosen, all_gaps, all_places = scratch
-    labels, gaps, places, feet, normals = results
-    places_at, feet_at, normals_at = all_places
+    """Write the results of `find`: labels, gaps, points, projections and normals."""
+    corners, lines, back, margins, touching, is_held, is_chosen, all_gaps, all_points = scratch
+    labels, gaps, points, projections, normals = results
+    points_at, projections_at, normals_at = all_points
     count, room, facing = candidates.kinds.size, labels.shape[1], candidates.facing
     for k in range(poses.shape[0]):
         X = poses[k]
@@ -279,40 +283,45 @@ def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, direc
             margins[j] = max(margin, min(error[0] / max(margins[j], TINY), error[1]))
         moved = (corners, lines, back)
         number = _find_at(
-            A, B, candidates, reach, margins, error[2], error[3], retained[k], X, moved, touching, is_held, all_gaps, all_places
+            A, B, candidates, reach, margins, error[2], error[3], retained[k], X, moved, touching, is_held, all_gaps, all_points
         )
         if count <= room:
             for p in range(room):
                 labels[k, p] = p if p < count else -1
         else:
-            _choose(touching[:number], all_gaps, feet_at, retained[k], directions, is_chosen, labels[k])
+            _choose(touching[:number], all_gaps, projections_at, retained[k], directions, is_chosen, labels[k])
         for p in range(room):
             s = labels[k, p]
             gaps[k, p] = np.inf if s < 0 else all_gaps[s]
             if gaps[k, p] < np.inf:
                 for i in range(3):
-                    places[k, p, i], feet[k, p, i], normals[k, p, i] = places_at[s, i], feet_at[s, i], normals_at[s, i]
+                    points[k, p, i], projections[k, p, i], normals[k, p, i] = (
+                        points_at[s, i],
+                        projections_at[s, i],
+                        normals_at[s, i],
+                    )
         for s in touching[:number]:
             all_gaps[s] = np.inf
 
 
 @compiled
-def find(A, B, candidates, reach, margin, error, poses, retained, directions, labels, gaps, places, feet, normals):  # type: ignore
-    """Write the places at which bodies can touch, at poses X_RM (n, 12): of all candidates those that may matter.
+def find(A, B, candidates, reach, margin, error, poses, retained, directions, labels, gaps, points, projections, normals):  # type: ignore
+    """Write the relevant points at which bodies can touch, at poses X_RM (n, 12).
 
-    These are first those in `retained` (n, k), then the ones with the least gaps, then the outermost in each of the
+    First come the candidates in `retained` (n, k), then the candidates with the least gaps, then the outermost in each of the
     `directions` (direction, 3). All are written if there is room for them.
 
     A, B          Body, the moving and the reference one
     candidates    Candidates
-    reach         (3,) [mm]: the largest depth, and the largest gap, that a place may have; from which nominal depth on a body
-                  has come in elsewhere
-    margin        [mm] by which places may lie beside edges
-    error         (4,) [mm] that facing planes may make beside their edges, the margin in which they may make it, how many
-                  margins away from a place where they touch, and the depth up to which a corner counts behind several facets
-    labels        (n, p): numbers of the candidates, -1 where there is none
-    gaps          (n, p) [mm], infinite where there is none
-    places, feet, normals   (n, p, 3), left as they are where there is none
+    reach         (3,) [mm]: the largest depth and the largest gap of a contact point; the nominal depth beyond which a body
+                  must have penetrated elsewhere
+    margin        [mm]: largest distance of contact points outside edges
+    error         (4,): the permitted error [mm] of facing planes outside their edges, the margin [mm] where it is permitted,
+                  the distance in margins from a point where they touch, and the largest depth [mm] of a corner that counts
+                  behind several facets
+    labels        (n, p): indices of the candidates, -1 for none
+    gaps          (n, p) [mm], infinite for none
+    points, projections, normals   (n, p, 3), left unchanged for none
     """
     count = candidates.kinds.size
     scratch = (
@@ -321,5 +330,5 @@ def find(A, B, candidates, reach, margin, error, poses, retained, directions, la
         np.zeros(A.vertices.shape[0] + B.vertices.shape[0], dtype=np.bool_), np.zeros(count, dtype=np.bool_),
         np.full(count, np.inf), np.empty((3, count, 3)),
     )  # fmt: skip
-    results = (labels, gaps, places, feet, normals)
+    results = (labels, gaps, points, projections, normals)
     _find_at_each(A, B, candidates, reach, margin, error, poses, retained, directions, results, scratch)

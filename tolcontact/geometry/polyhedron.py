@@ -19,7 +19,7 @@ SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
 class Polyhedron:
     """The triangles of a face, and the edges and corners around them, in the nominal assembly frame [mm].
 
-    Vertices inside a plane, and edges between facets of one plane, cannot touch anything first; they are left out.
+    Vertices inside a plane, and edges between facets of one plane, cannot be the first to touch anything, and are left out.
 
     vertices     (v, 3): the corners of the face
     cones        (v + 1,): the first direction of each corner, and the end
@@ -32,8 +32,8 @@ class Polyhedron:
     into         (e, 2, 3): unit vectors across each edge into the two facets of the body that meet there
     edge_normals (e, 2, 3): outward unit normals of these two facets
     convex       (e,): whether the body is convex there
-    facet_planes, vertex_planes, edge_planes   number of the plane of each facet (t,); planes around each vertex (v, plane)
-                 and beside each edge (e, 2), as numbers, -1 where there is none
+    facet_planes, vertex_planes, edge_planes   index of the plane of each facet (t,); indices of the planes around each vertex
+                 (v, plane) and on both sides of each edge (e, 2), -1 for none
     body         (f, 3, 3): all triangles of the body, none if it is not closed
     """
 
@@ -55,9 +55,9 @@ class Polyhedron:
 
 
 def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
-    """Return the polyhedron of a face of a body, both in their nominal places.
+    """Return the polyhedron of a face of a body, both in their nominal poses.
 
-    Planes of the body count as a whole, also where the face was cut out of them: the body does not end there. If its file
+    Planes of the body count as a whole, even where the face was cut out of them: the body does not end there. If its file
     rounds coordinates, it is smaller by their error.
     """
     merged, _, is_closed = merged_surface(body)
@@ -74,7 +74,7 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
     is_convex = np.concatenate([merged.face_adjacency_convex, np.ones(len(lone), dtype=bool)])
     planes = trimesh.graph.connected_component_labels(neighbours[~is_sharp], node_count=len(faces))
     is_chosen = np.isin(planes, planes[numbers])
-    chosen = np.flatnonzero(is_chosen)
+    indices = np.flatnonzero(is_chosen)
     is_ours = is_sharp & is_chosen[neighbours].any(axis=1)
     start, end = vertices[ends[:, 0]], vertices[ends[:, 1]]
     along = (end - start) / np.linalg.norm(end - start, axis=1)[:, None]
@@ -82,10 +82,10 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
     towards = np.asarray(merged.triangles_center)[neighbours] - start[:, None]
     into *= np.where((into * towards).sum(axis=2) < 0, -1.0, 1.0)[..., None]
     corners = np.unique(ends[is_ours])
-    corners = corners[np.isin(corners, faces[chosen])]
+    corners = corners[np.isin(corners, faces[indices])]
     cones, directions = _cones(corners, ends[is_sharp], vertices)
     edge_planes = np.where(is_chosen[neighbours], planes[neighbours], -1)
-    triangles = vertices[faces[chosen]]
+    triangles = vertices[faces[indices]]
     sides = np.roll(triangles, -1, axis=1) - triangles
     sides /= np.linalg.norm(sides, axis=2)[..., None]
     return Polyhedron(
@@ -93,25 +93,25 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
         cones=cones,
         directions=directions,
         facets=triangles,
-        normals=facet_normals[chosen],
-        inward=np.cross(facet_normals[chosen][:, None], sides),
+        normals=facet_normals[indices],
+        inward=np.cross(facet_normals[indices][:, None], sides),
         edges=np.stack([start, end], axis=1)[is_ours],
         ends=np.searchsorted(corners, ends[is_ours]),
         into=into[is_ours],
         edge_normals=facet_normals[neighbours][is_ours],
         convex=is_convex[is_ours].astype(np.int64),
-        facet_planes=planes[chosen],
-        vertex_planes=_planes_around(corners, faces[chosen], planes[chosen]),
+        facet_planes=planes[indices],
+        vertex_planes=_planes_around(corners, faces[indices], planes[indices]),
         edge_planes=edge_planes[is_ours],
         body=vertices[faces] if is_closed else np.zeros((0, 3, 3)),
     )
 
 
 def _cones(corners: np.ndarray, edges: np.ndarray, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return cones (corner + 1,) and directions (d, 3) of `corners` (corner,), from the numbers of the ends of edges."""
+    """Return cones (corner + 1,) and directions (d, 3) of `corners` (corner,), from the vertex indices of edges."""
     starts, ends = np.concatenate([edges, edges[:, ::-1]]).T
-    kept = np.isin(starts, corners)
-    starts, ends = starts[kept], ends[kept]
+    is_corner = np.isin(starts, corners)
+    starts, ends = starts[is_corner], ends[is_corner]
     order = np.argsort(starts, kind="stable")
     directions = vertices[ends[order]] - vertices[starts[order]]
     directions /= np.linalg.norm(directions, axis=1)[:, None]
@@ -119,12 +119,12 @@ def _cones(corners: np.ndarray, edges: np.ndarray, vertices: np.ndarray) -> tupl
 
 
 def _planes_around(corners: np.ndarray, faces: np.ndarray, planes: np.ndarray) -> np.ndarray:
-    """Return the planes (corner, plane) of the `faces` (face, 3) around each corner, filled up with -1."""
+    """Return the planes (corner, plane) of the `faces` (face, 3) around each corner, padded with -1."""
     pairs = np.unique(np.stack([faces.ravel(), planes.repeat(3)], axis=1), axis=0)
-    place = np.searchsorted(corners, pairs[:, 0])
+    corner_index = np.searchsorted(corners, pairs[:, 0])
     is_corner = np.isin(pairs[:, 0], corners)
-    place, plane = place[is_corner], pairs[is_corner, 1]
-    rank = np.arange(len(place)) - np.searchsorted(place, place)
+    corner_index, plane = corner_index[is_corner], pairs[is_corner, 1]
+    rank = np.arange(len(corner_index)) - np.searchsorted(corner_index, corner_index)
     table = np.full((len(corners), rank.max(initial=0) + 1), -1)
-    table[place, rank] = plane
+    table[corner_index, rank] = plane
     return table

@@ -1,4 +1,4 @@
-"""Geometry to triangle surfaces whose normals point outward. Part's own frame, mm."""
+"""Conversion of a geometry to triangles with outward normals, in the part's own frame. Lengths in mm."""
 
 import logging
 
@@ -15,11 +15,11 @@ from tolcontact.geometry.subdivision import subdivided
 
 log = logging.getLogger(__name__)
 
-FIELD_DIVISIONS = 12  # of a part's size, over which displacement is shown
+FIELD_DIVISIONS = 12  # number of edges across a part for showing its displacement field
 
 
 def shape(geometry: Geometry, contents: Contents | None = None) -> Shape:
-    """Return the closed or open triangle surface of a geometry. `contents` are those of files that were read together.
+    """Return the closed or open triangle surface of a geometry. `contents` are the contents of files read in one pass.
 
     Raises GeometryFault if a mesh cannot be read, is empty, or its outside is undefined.
     """
@@ -30,7 +30,7 @@ def shape(geometry: Geometry, contents: Contents | None = None) -> Shape:
     surface = read(geometry, read_files([geometry]) if contents is None else contents)
     mesh = surface.mesh
     if len(mesh.faces) == 0:
-        raise GeometryFault(f"{geometry} holds no triangles; expected a triangle surface")
+        raise GeometryFault(f"{geometry} has no triangles; expected a triangle surface")
     if not mesh.area > 0:
         raise GeometryFault(f"{geometry} has no area: all its triangles are degenerate")
     _leave_out_repetitions(mesh, geometry)
@@ -39,11 +39,11 @@ def shape(geometry: Geometry, contents: Contents | None = None) -> Shape:
 
 
 def _leave_out_repetitions(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
-    """Leave out triangles of a mesh that stand twice: a body that stands twice in its file is one body."""
-    _, place = trimesh.grouping.unique_rows(mesh.vertices)
-    distinct, _ = distinct_triangles(place[mesh.faces])
+    """Remove repeated triangles of a mesh: a body that its file contains twice is one body."""
+    _, position = trimesh.grouping.unique_rows(mesh.vertices)
+    distinct, _ = distinct_triangles(position[mesh.faces])
     if len(distinct) < len(mesh.faces):
-        log.info("%s: %d triangles that stand twice are left out", geometry, len(mesh.faces) - len(distinct))
+        log.info("%s: %d repeated triangles are left out", geometry, len(mesh.faces) - len(distinct))
         mesh.update_faces(np.sort(distinct))
         mesh.remove_unreferenced_vertices()
 
@@ -65,7 +65,7 @@ def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
     is_open[body[~_is_matched(body, edge, sense)]] = True
     corners = np.asarray(mesh.triangles) - mesh.vertices.mean(axis=0)
     volume = np.bincount(body, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6, count)
-    # A body whose normals point inward is a cavity if another one is around it, else a mistake.
+    # A body with inward normals is a cavity if another body encloses it, otherwise an error.
     lower, upper = (_per_body(limit, corners, body, count) for limit in (np.minimum, np.maximum))
     for k in np.flatnonzero(~is_open & (volume < -1e-12 * mesh.scale**3)):
         outer = np.flatnonzero((volume > 0) & (lower <= lower[k]).all(axis=1) & (upper >= upper[k]).all(axis=1))
@@ -78,16 +78,16 @@ def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
 
 
 def _is_matched(body: np.ndarray, edge: np.ndarray, sense: np.ndarray) -> np.ndarray:
-    """Return a mask (face,) of the triangles along whose edges (3 face,) their body runs as often one way as the other.
+    """Return a mask (face,) of the triangles whose edges (3 face,) occur equally often in both senses in their body.
 
-    Where bodies touch along an edge, more than two triangles have it, and a part of one body alone may not close there.
+    Where bodies touch along an edge, more than two triangles share it, and the triangles of one body may not close there.
     """
     _, pair = np.unique(np.repeat(body, 3) * (int(edge.max()) + 1) + edge, return_inverse=True)
     return (np.bincount(pair, sense)[pair] == 0).reshape(-1, 3).all(axis=1)
 
 
 def _encloses(mesh: trimesh.Trimesh, faces: np.ndarray, point: np.ndarray) -> bool:
-    """Return whether the body of some `faces` (face,) is around `point` (1, 3)."""
+    """Return whether the body of the `faces` (face,) encloses `point` (1, 3)."""
     turns = igl.winding_number(np.array(mesh.vertices), np.array(mesh.faces[faces], dtype=np.int64), np.array(point))
     return bool(np.abs(turns).max() > 0.5)
 
@@ -99,7 +99,7 @@ def _per_body(limit: np.ufunc, corners: np.ndarray, body: np.ndarray, count: int
 
 
 def field_surface(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
-    """Return vertices (vertex, 3) and faces (face, 3) fine enough to show how displacement varies over a part."""
+    """Return vertices (vertex, 3) and faces (face, 3) fine enough to show the displacement field of a part."""
     step = mesh.scale / FIELD_DIVISIONS
     vertices, faces, _ = subdivided(mesh.vertices, mesh.faces, step)
     merged = trimesh.Trimesh(vertices, faces, process=True)

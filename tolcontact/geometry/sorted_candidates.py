@@ -1,4 +1,4 @@
-"""Candidates for places of contact, with what lets a search pass over most of them."""
+"""Candidate contact points, sorted so that a search can skip most of them."""
 
 from typing import NamedTuple
 
@@ -10,16 +10,16 @@ from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_C
 from tolcontact.geometry.places_kernel import Candidates
 from tolcontact.geometry.polyhedron import Polyhedron
 
-WIDE_SHARE = 1 / 8  # of the whole: wider intervals come first
+WIDE_SHARE = 1 / 8  # of the whole range: wider intervals come first
 
 
 class Sorted(NamedTuple):
-    """Runs of intervals, in each the wide ones first, and then the others by where they begin.
+    """Runs of intervals: in each run first the wide intervals, then the narrow ones in ascending order of their start.
 
-    order     (n,): numbers of the intervals
+    order     (n,): indices of the intervals
     runs      (run + 1,): where runs begin, and the end
     middles   (run,): where their narrow intervals begin
-    widths    (run,): no narrow interval is wider
+    widths    (run,): largest width of a narrow interval
     """
 
     order: Int[Array, " n"]
@@ -29,12 +29,12 @@ class Sorted(NamedTuple):
 
 
 def sorted_candidates(A: Polyhedron, B: Polyhedron, table: Int[Array, "c 4"], facing: Int[Array, "p 2"]) -> Candidates:
-    """Return candidates (kind, first, second, plane), those of one corner or edge and plane together."""
+    """Return candidates (kind, first, second, plane), grouped by corner or edge and plane."""
     kinds, firsts, seconds, planes = table.T
     frames = np.array([[_across(body.normals[k]) for body, k in zip((A, B), facets, strict=True)] for facets in facing])
     frames = frames.reshape(-1, 2, 2, 3)
-    outlines = [_outline(body, k) @ frame.T for facets, of in zip(facing, frames, strict=True)
-                for body, k, frame in zip((A, B), facets, of, strict=True)]  # fmt: skip
+    outlines = [_outline(body, k) @ frame.T for facets, body_frames in zip(facing, frames, strict=True)
+                for body, k, frame in zip((A, B), facets, body_frames, strict=True)]  # fmt: skip
     boxes = np.tile([-np.inf, -np.inf, np.inf, np.inf], (len(table), 1))
     for plane in range(len(facing)):
         for kind, coordinates in (
@@ -59,7 +59,7 @@ def sorted_candidates(A: Polyhedron, B: Polyhedron, table: Int[Array, "c 4"], fa
 
 
 def _sorted(lows: Float[Array, " n"], highs: Float[Array, " n"], keys: Int[Array, "key n"]) -> Sorted:
-    """Return intervals in runs that have the same keys, the first key first."""
+    """Return intervals in runs of equal keys; the first key is the most significant."""
     if not len(lows):
         return Sorted(*(np.zeros(0, dtype=int), np.zeros(1, dtype=int)), np.zeros(0, dtype=int), np.zeros(0))
     codes = np.zeros(len(lows), dtype=np.int64)
@@ -81,7 +81,7 @@ def _sorted(lows: Float[Array, " n"], highs: Float[Array, " n"], keys: Int[Array
 
 
 def _outline(body: Polyhedron, facet: int) -> Float[Array, "segment 2 3"]:
-    """Return the outline of the facets of the face that lie in the plane of a facet: the edges that only one of them has."""
+    """Return the outline of the face's facets in the plane of a facet: the edges that belong to only one of them."""
     triangles = body.facets[body.facet_planes == body.facet_planes[facet]]
     corners, numbers = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     ends, edge, count = edges(numbers.reshape(-1, 3))

@@ -1,4 +1,4 @@
-"""Contact points on a surface: spread evenly, by number or by spacing, or the mesh's own vertices (paper, 2.2)."""
+"""Contact points on a surface: spread evenly, by count or by spacing, or the vertices of the mesh (paper, 2.2)."""
 
 import numpy as np
 import trimesh
@@ -8,20 +8,20 @@ from tolcontact.geometry.edges import rim
 from tolcontact.geometry.face_frame import FaceFrame, face_frame
 
 PART_FRAME = FaceFrame(np.zeros(3), np.eye(3), 1.0, rounds=False)
-FLAT = 1e-6  # of unit normals, which differ by less
+FLAT = 1e-6  # largest difference between the unit normals of a flat surface
 CANDIDATES_PER_SPACING = 2.0
-MAX_CANDIDATES_PER_POINT = 50  # above which they are thinned out
+MAX_CANDIDATES_PER_POINT = 50  # above this, candidates are thinned out
 BLOCK_CANDIDATES = 512
 CORNER_ANGLE = np.radians(30.0)
 
 
 def spread(surface: trimesh.Trimesh, count: int | None, spacing: float | None) -> np.ndarray:
-    """Return points (point, 3) [mm] on `surface`, each as far as possible from the points before it.
+    """Return points (point, 3) [mm] on `surface`, each as far as possible from the previous points.
 
-    There are `count` points, or as many as bring every place within `spacing` [mm] of one. They begin with the corners of the
-    rim, where contact comes first, and follow in farthest-point order over a fine subdivision of the triangles. On a flat face
-    distances are compared in its own frame, so that a face that is turned keeps its points. On a curved one equal distances
-    differ by rounding: points in straight rows would let a shaft roll between them.
+    There are `count` points, or enough points that none of the surface is further than `spacing` [mm] from one. They start with
+    the corners of the rim, where contact occurs first, and continue in farthest-point order over a fine subdivision of the
+    triangles. On a flat face distances are compared in its own frame, so that a rotated face keeps its points. On a curved face
+    equal distances differ by rounding: points in straight rows would let a shaft roll between them.
     """
     step = spacing if spacing is not None else float(np.sqrt(surface.area / count))  # type: ignore[operator]
     frame = face_frame(surface) if _is_flat(surface) else PART_FRAME
@@ -47,11 +47,11 @@ def _is_flat(surface: trimesh.Trimesh) -> bool:
 
 
 def _farthest(candidates: np.ndarray, numbers: list[int], count: int | None, spacing: float | None) -> list[int]:
-    """Return the numbers of candidates (candidate, 3), the given ones first, each as far as possible from those before it."""
+    """Return the indices of candidates (candidate, 3), `numbers` first, each as far as possible from the previous ones."""
     numbers = list(numbers)
     distance2 = np.min([((candidates - candidates[number]) ** 2).sum(axis=1) for number in numbers], axis=0)
     tree = cKDTree(candidates)
-    # The farthest of many candidates is the farthest of the farthest of each block: a point changes few blocks.
+    # The farthest candidate is the maximum over the blocks' farthest candidates: a new point changes few blocks.
     blocks = np.full((-(-len(candidates) // BLOCK_CANDIDATES), BLOCK_CANDIDATES), -1.0)
     distances = blocks.reshape(-1)[: len(candidates)]
     distances[:] = distance2
@@ -62,7 +62,7 @@ def _farthest(candidates: np.ndarray, numbers: list[int], count: int | None, spa
         if (len(numbers) == count) if spacing is None else (distances[farthest] <= spacing**2):
             return numbers
         numbers.append(farthest)
-        # No candidate is farther than this one from the points, so that it changes nothing beyond that distance.
+        # No candidate is further from the points than this one, so it changes nothing beyond that distance.
         reach = np.sqrt(distances[farthest]) * (1 + 1e-9)
         neighbours = np.asarray(tree.query_ball_point(candidates[farthest], reach, return_sorted=False))
         distance2 = ((candidates[neighbours] - candidates[farthest]) ** 2).sum(axis=1)
@@ -72,7 +72,7 @@ def _farthest(candidates: np.ndarray, numbers: list[int], count: int | None, spa
 
 
 def _thinned(points: np.ndarray, faces: np.ndarray, cell: float) -> np.ndarray:
-    """Return the numbers of one of the points (point, 3) in each cube of side `cell`, one on the rim if possible."""
+    """Return the index of one of the points (point, 3) in each cube of side `cell`, if possible a point on the rim."""
     inner = np.ones(len(points), dtype=bool)
     inner[rim(faces).ravel()] = False
     order = np.argsort(inner, kind="stable")
@@ -81,7 +81,7 @@ def _thinned(points: np.ndarray, faces: np.ndarray, cell: float) -> np.ndarray:
 
 
 def _separated(points: np.ndarray, min_distance: float) -> list[int]:
-    """Return the numbers of points (point, 3) at least `min_distance` from those before: corners of a jagged rim are one."""
+    """Return the indices of points (point, 3) at least `min_distance` from earlier ones: corners of a jagged rim are merged."""
     separated: list[int] = []
     for number, point in enumerate(points):
         if all(((point - points[earlier]) ** 2).sum() >= min_distance**2 for earlier in separated):
@@ -94,7 +94,7 @@ def _are_corners(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     start, end = rim(faces).T
     along = vertices[end] - vertices[start]
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1)  # edges shorter than a cell have no direction
-    # Where the rim goes straight on, the unit vectors to both neighbours cancel.
+    # Where the rim is straight, the unit vectors to both neighbours cancel.
     turn, rims = np.zeros_like(vertices), np.zeros(len(vertices))
     np.add.at(turn, start, along)
     np.add.at(turn, end, -along)
@@ -108,7 +108,7 @@ def distinct_vertices(surface: trimesh.Trimesh) -> np.ndarray:
 
 
 def distinct(points: np.ndarray) -> np.ndarray:
-    """Return points (point, 3), each once, in the order of their coordinates. NumPy's `unique` takes several times as long."""
+    """Return points (point, 3), each once, sorted by their coordinates. NumPy's `unique` takes several times as long."""
     points = points[np.lexsort(points.T[::-1])]
     is_new = np.append(True, (points[1:] != points[:-1]).any(axis=1))[: len(points)]
     return np.asarray(points[is_new])

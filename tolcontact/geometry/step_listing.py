@@ -1,4 +1,4 @@
-"""The content of a STEP file before anything is declared, and all of its bodies as parts. Lengths in mm."""
+"""The bodies and faces of a STEP file, and the declaration of its bodies as parts. Lengths in mm."""
 
 import logging
 import re
@@ -22,7 +22,7 @@ from tolcontact.geometry.files.product import Product
 from tolcontact.geometry.files.reader import UnfinishedRead
 from tolcontact.readable import Readable
 
-LISTING_CHORD = 0.5  # [mm] of triangles that only tell which faces there are, and which of them touch
+LISTING_CHORD = 0.5  # [mm] of triangles that only show which faces exist and which of them touch
 
 log = logging.getLogger(__name__)
 
@@ -31,13 +31,13 @@ log = logging.getLogger(__name__)
 class BodyInFile(Readable):
     """A body of a STEP file.
 
-    number, name   from 1 in the file's order; a name that no other body of the file has
-    path           names of the products that contain the body, from the root on
-    lower, upper   corners of the box around the body in its place [mm]
-    at, rotation   place of its own frame, as of a Part [mm, rad]
+    number, name   from 1 in the file's order; a name that is unique in the file
+    path           names of the products that contain the body, starting at the root
+    lower, upper   corners of the box around the body in its pose [mm]
+    at, rotation   pose of its own frame, as for a Part [mm, rad]
     faces          number of its B-rep faces
-    is_open        whether its faces do not close
-    units          unit of length in the file, as the file calls it; empty if it states none. All lengths here are in mm
+    is_open        whether its faces do not form a closed body
+    units          unit of length in the file, as named there; empty if it states none. All lengths here are in mm
     """
 
     number: int
@@ -76,15 +76,15 @@ def faces_in(path: str | Path, body: str | int | None = None) -> tuple[FaceInFil
     is_fitted = any(
         surface is None and face.kind != GENERAL for surface, face in zip(mesh.metadata[SURFACES], faces, strict=True)
     )
-    # A surface that does not fit to a few vertices does not fit to many; one that does may not.
+    # A surface that does not fit a few vertices does not fit many; a surface that does may still fail for many.
     return describe_faces(_part(_product(path), body)) if is_fitted else faces
 
 
 @dataclass(frozen=True, repr=False)
 class RecordedFace(Readable):
-    """A B-rep face by its `number` and `name` in a body, and the numbers of the `bodies` that have it, one for each place.
+    """A B-rep face by its `number` and `name` in a body, and the numbers of the `bodies` that have it, one per occurrence.
 
-    kind   of its surface; empty if the shape of the body was not looked at
+    kind   of its surface; empty if the shape of the body was not examined
     """
 
     number: int
@@ -104,13 +104,13 @@ def faces_of_records(path: str | Path) -> dict[int, RecordedFace]:
 
     Raises OptionError if the file cannot be read.
     """
-    found: dict[int, RecordedFace] = {}
+    recorded_faces: dict[int, RecordedFace] = {}
     for number, body in enumerate(_listed_product(path).bodies, start=1):
         for face_number, face in enumerate(body.faces, start=1):
             for record in face.records:
-                bodies = (*(found[record].bodies if record in found else ()), number)
-                found[record] = RecordedFace(face_number, face.name, bodies)
-    return found
+                bodies = (*(recorded_faces[record].bodies if record in recorded_faces else ()), number)
+                recorded_faces[record] = RecordedFace(face_number, face.name, bodies)
+    return recorded_faces
 
 
 class PartsOfFile(dict[str, Part]):
@@ -129,30 +129,32 @@ def parts_from(
     fixed: bool | Sequence[str] | None = None,
     chord: float | None = None,
 ) -> "PartsOfFile":
-    """Declare bodies of a STEP file as parts of a model, each in its place, and return the parts by their names.
+    """Declare bodies of a STEP file as parts of a model, each in its pose, and return the parts by their names.
 
-    All bodies are declared, or those in `names`. A part has the name of its body in the file, without characters that a
-    part's name may not have; where a name repeats, the second body is "name (2)" and so on. The part's own frame is the
-    frame of its product, which is the same in all places of the product. `fixed` is as of a Part and applies to all of them, or
-    it lists the bodies that are fixed, as in fixed=["plate"]. `chord` [mm] is as of a Mesh.
-    Raises ModelError if the file cannot be read, or holds no body of a name; TypeError if `names` or `fixed` is one text.
+    All bodies are declared, or only the bodies in `names`. A part has the name of its body in the file, without the characters
+    that are not permitted in part names; where a name repeats, the second body is "name (2)" and so on. The part's own frame is
+    the frame of its product, which is the same for all occurrences of the product. `fixed` is as for a Part and applies to all
+    parts, or it lists the fixed bodies, as in fixed=["plate"]. `chord` [mm] is as for a Mesh.
+    Raises ModelError if the file cannot be read, or has no body of a name; TypeError if `names` or `fixed` is one text.
     """
     if not isinstance(model, Assembly):
         raise TypeError(f'model is a {type(model).__name__}; expected an assembly, as in tc.parts_from(model, "file.stp")')
-    wanted = None if names is None else _names("names", names)
+    selected_names = None if names is None else _names("names", names)
     fixed_names = [] if fixed is None or isinstance(fixed, bool) else _names("fixed", fixed)
     try:
         bodies = _bodies(_product(path, chord))  # with the triangles that the parts will have
     except OptionError as error:
         raise ModelError(model.name, [str(error)]) from error
     by_name = {body.name: body for body in bodies}
-    if missing := [name for name in (*(wanted or ()), *fixed_names) if name not in by_name]:
+    if missing := [name for name in (*(selected_names or ()), *fixed_names) if name not in by_name]:
         listed = _first([body.name for body in bodies])
         faults = [f'"{path}" holds no body "{name}"; it holds {listed}{nearest_name(name, by_name)}' for name in missing]
         raise ModelError(model.name, faults)
-    declared = bodies if wanted is None else [by_name[name] for name in wanted]
+    declared = bodies if selected_names is None else [by_name[name] for name in selected_names]
     if undeclared := [name for name in fixed_names if by_name[name] not in declared]:
-        raise ModelError(model.name, [f'fixed has the body "{name}", which names has not; add it there' for name in undeclared])
+        raise ModelError(
+            model.name, [f'fixed has the body "{name}", which is not in names; add it there' for name in undeclared]
+        )
     parts = PartsOfFile()
     for body in declared:
         is_fixed = fixed if isinstance(fixed, bool) else body.name in fixed_names or None
@@ -168,7 +170,7 @@ def _first(names: Sequence[str]) -> str:
 
 
 def _names(option: str, value: Any) -> list[str]:
-    """Return the names of bodies that an option lists. Raises TypeError for anything but a list of texts."""
+    """Return the names of bodies that an option lists. Raises TypeError for anything except a list of texts."""
     is_list = isinstance(value, Iterable) and not isinstance(value, str | Mapping)
     names = list(value) if is_list else []
     if not is_list or not all(isinstance(name, str) for name in names):
@@ -178,13 +180,13 @@ def _names(option: str, value: Any) -> list[str]:
 
 
 def part_name(body: BodyInFile) -> str:
-    """Return the name of a body without characters that the name of a part may not have."""
+    """Return the name of a body without the characters that are not permitted in part names."""
     name = re.sub(r"[/\t\n]", "_", CONTROL_CHARACTERS.sub("_", body.name)).strip()
     return name if re.match(r"\w", name) else f"body {body.number} {name}".strip()
 
 
 def _listed_product(path: str | Path) -> Product:
-    """Return a product for its bodies and faces, with few triangles if these are enough."""
+    """Return a product for listing its bodies and faces, with a coarse triangulation if that is enough."""
     try:
         product = _product(path, LISTING_CHORD if Mesh(path).is_step else None)
     except OptionError as error:

@@ -1,4 +1,4 @@
-"""Faces as surfaces: nearest points on them, with normals (paper, 2.2)."""
+"""Faces as surfaces: nearest points and normals (paper, 2.2)."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -14,14 +14,14 @@ from tolcontact.geometry.edges import CREASE, on_rim, rim
 from tolcontact.geometry.region_kernel import Region
 from tolcontact.geometry.triangle_tree import triangle_tree
 
-RIM_TOLERANCE = 1e-6  # of a face's size: a point over a face stands no farther beside its rim
-MAX_TURN = 0.3  # rad: between the normals of a triangle and of the analytic surface for which it stands
-MAX_BULGE = 0.05  # of a face's size: between a triangle and the analytic surface for which it stands
-FLAT_ANGLE = 1e-6  # rad: faces whose normals turn by less, from end to end, are planes
+RIM_TOLERANCE = 1e-6  # of a face's size: largest overhang of a point that counts as over the face
+MAX_TURN = 0.3  # rad: between the normals of a triangle and of the analytic surface that it approximates
+MAX_BULGE = 0.05  # of a face's size: between a triangle and the analytic surface that it approximates
+FLAT_ANGLE = 1e-6  # rad: faces whose normals rotate by less from end to end are planes
 
 
-class Standing(NamedTuple):
-    """The rows, triangles or points, that stand for an analytic surface; `side` is 1, or -1 if the triangles are hollow."""
+class Approximation(NamedTuple):
+    """The rows (triangles or points) that approximate an analytic surface; `side` is 1, or -1 if the triangles are hollow."""
 
     surface: AnalyticSurface
     rows: np.ndarray
@@ -31,10 +31,10 @@ class Standing(NamedTuple):
 class Surface:
     """The triangles of a face, with a search tree for nearest points.
 
-    corner_normals   (face, 3, 3): outward unit normals at the corners of each triangle, between which they are interpolated;
-                     by default they follow from the neighbouring facets
-    surfaces         analytic surfaces; where a triangle stands for one of them, feet and normals are those of that surface
-    surface_numbers  (face,): the number of the surface for which each triangle stands, -1 for none
+    corner_normals   (face, 3, 3): outward unit normals at the corners of each triangle, interpolated inside the triangle; by
+                     default they follow from the neighbouring facets
+    surfaces         analytic surfaces; where a triangle approximates one, projections and normals refer to that surface
+    surface_numbers  (face,): the index of the surface that each triangle approximates, -1 for none
     """
 
     def __init__(
@@ -59,52 +59,55 @@ class Surface:
     def corner_normals(self) -> np.ndarray:
         """Outward unit normals at the corners of each triangle (face, 3, 3)."""
         normals = np.array(_corner_normals(self.mesh) if self._stated_normals is None else self._stated_normals)
-        for surface, rows, side in self._standings:
+        for surface, rows, side in self._approximations:
             corners = np.asarray(self.mesh.triangles)[rows].reshape(-1, 3)
             normals[rows] = _normals_of(surface, side, corners, normals[rows].reshape(-1, 3)).reshape(-1, 3, 3)
         return normals
 
     @cached_property
-    def _standings(self) -> list[Standing]:
-        """The triangles that stand for each analytic surface."""
+    def _approximations(self) -> list[Approximation]:
+        """The triangles that approximate each analytic surface."""
         centres, facets = np.asarray(self.mesh.triangles_center), np.asarray(self.mesh.face_normals)
-        standings = []
+        approximations = []
         for number, surface in enumerate(self.surfaces):
             rows = np.flatnonzero(self.surface_numbers == number)
             if rows.size:
                 _, slope = surface.distance(centres[rows])
-                standings.append(Standing(surface, rows, 1.0 if (slope * facets[rows]).sum() > 0 else -1.0))
-        return standings
+                approximations.append(Approximation(surface, rows, 1.0 if (slope * facets[rows]).sum() > 0 else -1.0))
+        return approximations
 
     @property
     def pieces(self) -> "list[Piece]":
         """The parts of the face that lie on its analytic surfaces."""
-        return [Piece(surface, side < 0, self.part(rows)) for surface, rows, side in self._standings]
+        return [Piece(surface, side < 0, self.part(rows)) for surface, rows, side in self._approximations]
 
     @cached_property
     def bulge(self) -> float:
-        """The largest distance [mm] of triangles, in their middle and on their edges, from their analytic surfaces."""
+        """The largest distance [mm] of triangles, at their centroids and edge midpoints, from their analytic surfaces."""
         corners = np.asarray(self.mesh.triangles)
-        middles = np.concatenate([(corners + np.roll(corners, -1, axis=1)) / 2, corners.mean(axis=1, keepdims=True)], axis=1)
+        midpoints = np.concatenate([(corners + np.roll(corners, -1, axis=1)) / 2, corners.mean(axis=1, keepdims=True)], axis=1)
         return max(
-            (float(np.abs(surface.distance(middles[rows].reshape(-1, 3))[0]).max()) for surface, rows, _ in self._standings),
+            (
+                float(np.abs(surface.distance(midpoints[rows].reshape(-1, 3))[0]).max())
+                for surface, rows, _ in self._approximations
+            ),
             default=0.0,
         )
 
     @property
     def unknown(self) -> "Surface":
-        """The triangles that stand for no analytic surface."""
+        """The triangles that approximate no analytic surface."""
         return self.part(np.flatnonzero(self.surface_numbers < 0))
 
     def part(self, faces: np.ndarray) -> "Surface":
-        """Return the surface of some of the triangles (face,)."""
+        """Return the surface of a subset of the triangles (face,)."""
         used, renumbered = np.unique(self._faces[faces], return_inverse=True)
         mesh = trimesh.Trimesh(self._vertices[used], renumbered.reshape(-1, 3), process=False)
         return Surface(mesh, self.corner_normals[faces], self.surfaces, self.surface_numbers[faces])
 
     @cached_property
     def curvature(self) -> float:
-        """The median by area of how fast the normals turn [1/mm]; 0 for a flat face."""
+        """The area-weighted median of the curvature [1/mm], from the rotation of normals; 0 for a flat face."""
         corners, normals = np.asarray(self.mesh.triangles), self.corner_normals
         length, turn = (np.linalg.norm(np.roll(values, -1, axis=1) - values, axis=2) for values in (corners, normals))
         rate = (turn / np.maximum(length, 1e-300)).max(axis=1)
@@ -135,7 +138,7 @@ class Surface:
         return Region(np.ascontiguousarray(axes), np.ascontiguousarray(edges), RIM_TOLERANCE * float(self.mesh.scale))
 
     def nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the triangle (point,) and the place on it (point, 3) [mm] nearest to each of `points` (point, 3) [mm]."""
+        """Return the triangle (point,), and the point on it (point, 3) [mm], nearest to each of `points` (point, 3) [mm]."""
         points = np.ascontiguousarray(points, dtype=np.float64)
         _, triangle, nearest = self._tree.squared_distance(self._vertices, self._faces, points)
         return triangle, nearest
@@ -145,22 +148,22 @@ class Surface:
         barycentric = self._barycentric(triangle, points)
         normals = (barycentric[..., None] * self.corner_normals[triangle]).sum(axis=1)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        for surface, rows, side in self._standing_points(triangle):
+        for surface, rows, side in self._approximating_points(triangle):
             normals[rows] = _normals_of(surface, side, points[rows], normals[rows])
         return normals
 
-    def _standing_points(self, triangle: np.ndarray) -> list[Standing]:
-        """Return the points on `triangle` (point,) that stand for each analytic surface."""
+    def _approximating_points(self, triangle: np.ndarray) -> list[Approximation]:
+        """Return, for each analytic surface, the points on `triangle` (point,) that belong to it."""
         if not self.surfaces:
             return []
         numbers = self.surface_numbers[triangle]
         return [
-            standing._replace(rows=np.flatnonzero(numbers == self.surface_numbers[standing.rows[0]]))
-            for standing in self._standings
+            approximation._replace(rows=np.flatnonzero(numbers == self.surface_numbers[approximation.rows[0]]))
+            for approximation in self._approximations
         ]
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "Surface":
-        """Return the surface turned by R (3, 3), then moved by t (3,) [mm]."""
+        """Return the surface rotated by R (3, 3), then translated by t (3,) [mm]."""
         mesh = trimesh.Trimesh(np.asarray(self.mesh.vertices) @ R.T + t, self.mesh.faces, process=False)
         surfaces = [surface.placed(R, t) for surface in self.surfaces]
         return Surface(mesh, self.corner_normals @ R.T, surfaces, self.surface_numbers)
@@ -172,71 +175,73 @@ class Surface:
         """Project `points` (point, 3) [mm] onto the surface.
 
         Returns the nearest points (point, 3) [mm], the outward unit normals there (point, 3), and a mask (point,) of the
-        points that lie over the surface, that is do not overhang its rim by more than `margin` [mm]. Where a triangle stands
-        for an analytic surface, nearest points and normals are those of that surface. On other curved faces normals are
-        interpolated between the corners of a facet: they change steadily as a point moves.
+        points that lie over the surface, that is, overhang its rim by at most `margin` [mm]. Where a triangle approximates an
+        analytic surface, nearest points and normals refer to that surface. On other curved faces normals are interpolated
+        between the corners of a facet, so that they change continuously as a point moves.
         """
-        triangle, feet, is_over = self._feet(points, margin)
-        return feet, self.normals(triangle, feet), is_over
+        triangle, projections, is_over = self._projections(points, margin)
+        return projections, self.normals(triangle, projections), is_over
 
-    def feet(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def projections(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the nearest points and the mask that `project` returns, without the normals."""
-        _, feet, is_over = self._feet(points, 0.0)
-        return feet, is_over
+        _, projections, is_over = self._projections(points, 0.0)
+        return projections, is_over
 
-    def _feet(self, points: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _projections(self, points: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the nearest triangles (point,), and the nearest points and the mask that `project` returns."""
         triangle, nearest = self.nearest(points)
-        sideways, at_rim = self._sideways(points, triangle, nearest)
-        is_over = ~at_rim | (sideways <= max(margin, RIM_TOLERANCE * self.mesh.scale))
-        feet = np.array(nearest)
-        for surface, rows, _ in self._standing_points(triangle):
+        lateral, at_rim = self._lateral_distances(points, triangle, nearest)
+        is_over = ~at_rim | (lateral <= max(margin, RIM_TOLERANCE * self.mesh.scale))
+        projections = np.array(nearest)
+        for surface, rows, _ in self._approximating_points(triangle):
             nearby, direct = surface.project(nearest[rows]), surface.project(points[rows])
             shift = np.linalg.norm(direct - nearest[rows], axis=1)
             height = np.linalg.norm(points[rows] - nearest[rows], axis=1)
-            # For points near its axis, and beyond, a surface has feet elsewhere.
+            # Points near the axis of a surface, or beyond it, have projections elsewhere.
             is_direct = ~at_rim[rows] & (shift <= MAX_TURN * height + MAX_BULGE * self.mesh.scale)
-            feet[rows] = np.where(is_direct[:, None], direct, nearby)
-        return triangle, feet, is_over
+            projections[rows] = np.where(is_direct[:, None], direct, nearby)
+        return triangle, projections, is_over
 
     def depth(self, points: np.ndarray) -> np.ndarray:
-        """Return the depth (point,) [mm] of `points` (point, 3) [mm] behind the surface; 0 in front of it and beside it."""
+        """Return the depth (point,) [mm] of `points` (point, 3) [mm] behind the surface; 0 in front of it or beyond its rim."""
         triangle, nearest = self.nearest(points)
         offset = nearest - points
         height = -(offset * np.asarray(self.mesh.face_normals)[triangle]).sum(axis=1)
         distance = np.linalg.norm(offset, axis=1)
-        for surface, rows, side in self._standing_points(triangle):
+        for surface, rows, side in self._approximating_points(triangle):
             height[rows] = side * surface.distance(points[rows])[0]
             distance[rows] = np.abs(height[rows])
         behind = np.flatnonzero(height < 0)
-        sideways, at_rim = self._sideways(points[behind], triangle[behind], nearest[behind])
-        is_over = ~at_rim | (sideways <= RIM_TOLERANCE * self.mesh.scale)
+        lateral, at_rim = self._lateral_distances(points[behind], triangle[behind], nearest[behind])
+        is_over = ~at_rim | (lateral <= RIM_TOLERANCE * self.mesh.scale)
         depth = np.zeros(len(points))
         depth[behind[is_over]] = distance[behind[is_over]]
         return depth
 
     def overhang(self, points: np.ndarray) -> np.ndarray:
-        """Return the distance (point,) [mm] by which `points` (point, 3) [mm] stand beside the rim; 0 over the surface."""
-        sideways, at_rim = self._sideways(points, *self.nearest(points))
-        return np.where(at_rim, sideways, 0.0)
+        """Return the overhang (point,) [mm] of `points` (point, 3) [mm] beyond the rim; 0 over the surface."""
+        lateral, at_rim = self._lateral_distances(points, *self.nearest(points))
+        return np.where(at_rim, lateral, 0.0)
 
-    def _sideways(self, points: np.ndarray, triangle: np.ndarray, nearest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return distances (point,) [mm] from the nearest places across normals, and a mask of the places on the rim."""
+    def _lateral_distances(
+        self, points: np.ndarray, triangle: np.ndarray, nearest: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return lateral distances (point,) [mm] from the nearest points, and a mask of the nearest points on the rim."""
         normal = np.array(np.asarray(self.mesh.face_normals)[triangle])
-        for surface, rows, _ in self._standing_points(triangle):
+        for surface, rows, _ in self._approximating_points(triangle):
             normal[rows] = surface.distance(nearest[rows])[1]
         offset = points - nearest
-        sideways = np.linalg.norm(offset - (offset * normal).sum(axis=1, keepdims=True) * normal, axis=1)
+        lateral = np.linalg.norm(offset - (offset * normal).sum(axis=1, keepdims=True) * normal, axis=1)
         coordinates = self._barycentric(triangle, nearest)
-        # Edge j of a triangle runs from corner j to corner j+1, so it faces corner j+2: there that coordinate is zero. A
-        # triangle may also touch the rim with a corner only.
+        # Edge j of a triangle runs from corner j to corner j+1, so on it the coordinate of corner j+2 is zero. A triangle may
+        # also touch the rim with a corner only.
         at_rim = (np.abs(coordinates[:, [2, 0, 1]]) < 1e-9) & self._rim_edges[triangle]
         at_rim |= (coordinates > 1 - 1e-9) & self._rim_corners[triangle]
-        return sideways, at_rim.any(axis=1)
+        return lateral, at_rim.any(axis=1)
 
 
 class Piece(NamedTuple):
-    """The part of a face that lies on an analytic surface; it is hollow if the material is around it."""
+    """The part of a face that lies on an analytic surface; it is hollow if the material surrounds it."""
 
     surface: AnalyticSurface
     is_hollow: bool
@@ -251,14 +256,14 @@ def _normals_of(surface: AnalyticSurface, side: float, points: np.ndarray, fallb
 
 
 def _corner_normals(mesh: trimesh.Trimesh) -> np.ndarray:
-    """Return normals at the corners of each triangle (face, 3, 3): the mean of the facets around, on this side of creases.
+    """Return normals at the corners of each triangle (face, 3, 3): the mean of the adjacent facets on this side of creases.
 
-    Facets are weighted by their angles there, so that normals do not depend on the triangulation. A flat face keeps its
+    Facets are weighted by their corner angles, so that normals do not depend on the triangulation. A flat face keeps its
     normal to the last bit.
     """
     facet, corner = np.asarray(mesh.face_normals), np.asarray(mesh.faces).ravel()
     of_vertex = csr_array((np.ones(len(corner)), (np.arange(len(corner)), corner)), shape=(len(corner), len(mesh.vertices)))
-    row, column = (of_vertex @ of_vertex.T).nonzero()  # corners in one vertex
+    row, column = (of_vertex @ of_vertex.T).nonzero()  # pairs of corners that share a vertex
     cosine = (facet[row // 3] * facet[column // 3]).sum(axis=1)
     row, column, is_flat = row[cosine > CREASE], column[cosine > CREASE], cosine[cosine > CREASE] > 1 - 1e-14
     weight = np.asarray(mesh.face_angles).ravel()[column]

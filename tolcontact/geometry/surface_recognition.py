@@ -1,4 +1,4 @@
-"""The analytic surfaces for which triangles stand: a file states them, or they are fitted to vertices."""
+"""The analytic surfaces that triangles approximate: stated by a file, or fitted to vertices."""
 
 from collections.abc import Sequence
 
@@ -13,10 +13,10 @@ from tolcontact.geometry.fitting import fit_surface
 
 
 def analytic_surfaces(mesh: trimesh.Trimesh, triangles: np.ndarray) -> tuple[list[AnalyticSurface], np.ndarray]:
-    """Return the analytic surfaces of some triangles (face,) of a mesh, and the number of the surface of each, -1 for none.
+    """Return the analytic surfaces of triangles (face,) of a mesh, and the index of each triangle's surface, -1 for none.
 
     A STEP file states the surfaces of its B-rep faces. Where it does not, and for smooth pieces of other meshes, they are
-    fitted. Planes are not: flat triangles are exact.
+    fitted. Planes need no fit: flat triangles are exact.
     """
     surfaces: list[AnalyticSurface] = []
     numbers = np.full(len(triangles), -1)
@@ -27,7 +27,7 @@ def analytic_surfaces(mesh: trimesh.Trimesh, triangles: np.ndarray) -> tuple[lis
         surface = (None if brep is None else mesh.metadata[SURFACES][label]) or _round_fit(mesh, triangles[rows])
         if surface is None:
             continue
-        for number, earlier in enumerate(surfaces):  # round faces come in halves
+        for number, earlier in enumerate(surfaces):  # files split round faces in halves
             union = _union(mesh, earlier, surface, triangles[numbers == number], triangles[rows])
             if union is not None:
                 surfaces[number], numbers[rows] = union, number
@@ -57,9 +57,9 @@ def _round_fit(mesh: trimesh.Trimesh, faces: np.ndarray) -> AnalyticSurface | No
 
 
 def known_surfaces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, list[AnalyticSurface | None], Sequence[str]] | None:
-    """Return the B-rep face of each triangle (face,), from 0, their surfaces and their names; None if there are no B-rep faces.
+    """Return the B-rep face of each triangle (face,), from 0, their surfaces and their names; None without B-rep faces.
 
-    The names are empty if the file names no face.
+    There are no names if the file names no face.
     """
     brep = mesh.face_attributes.get(BREP)
     return None if brep is None else (np.asarray(brep).ravel(), mesh.metadata[SURFACES], mesh.metadata[FACE_NAMES])
@@ -68,7 +68,7 @@ def known_surfaces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, list[AnalyticSurf
 def with_known_surfaces(
     vertices: np.ndarray, faces: np.ndarray, brep: np.ndarray, surfaces: list[AnalyticSurface | None], names: Sequence[str]
 ) -> trimesh.Trimesh:
-    """Return a mesh with B-rep faces, from what `known_surfaces` returned."""
+    """Return a mesh with B-rep faces, from the results of `known_surfaces`."""
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     mesh.face_attributes[BREP] = brep
     mesh.metadata[SURFACES], mesh.metadata[FACE_NAMES] = surfaces, names

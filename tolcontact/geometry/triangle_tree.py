@@ -1,4 +1,4 @@
-"""The search tree of triangles, which finds the nearest places on them."""
+"""The search tree of triangles, for nearest points."""
 
 import igl
 import numpy as np

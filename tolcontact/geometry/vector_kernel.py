@@ -7,7 +7,7 @@ from tolcontact.compiled import inlined_uncounted, uncounted
 
 @inlined_uncounted
 def row(vectors, k):  # type: ignore[no-untyped-def]
-    """Return row k of an array (n, 3). Vectors are three numbers: views of arrays would cost more than the arithmetic."""
+    """Return row k of an array (n, 3). Vectors are tuples: array views would cost more than the arithmetic."""
     return vectors[k, 0], vectors[k, 1], vectors[k, 2]
 
 
@@ -81,7 +81,7 @@ def move_back(X, x):  # type: ignore[no-untyped-def]
 
 @inlined_uncounted
 def is_over(facets, inward, facet, x, margin):  # type: ignore[no-untyped-def]
-    """Return whether x lies over a facet, or beside one of its edges by no more than a margin [mm]."""
+    """Return whether x lies over a facet, or outside one of its edges by no more than a margin [mm]."""
     lowest = 0.0
     for j in range(3):
         lowest = min(lowest, dot(row_of(inward, facet, j), minus(x, row_of(facets, facet, j))))
@@ -90,7 +90,7 @@ def is_over(facets, inward, facet, x, margin):  # type: ignore[no-untyped-def]
 
 @inlined_uncounted
 def first_from(values, start, end, least):  # type: ignore[no-untyped-def]
-    """Return the first of rows start to end, whose first values ascend, with a first value that is not below `least`."""
+    """Return the first of the rows start to end, in ascending order of their first value, whose first value is >= `least`."""
     while start < end:
         middle = (start + end) // 2
         if values[middle, 0] < least:
@@ -102,7 +102,7 @@ def first_from(values, start, end, least):  # type: ignore[no-untyped-def]
 
 @uncounted
 def is_within(segments, start, middle, end, tallest, x, y, spare):  # type: ignore[no-untyped-def]
-    """Return whether (x, y) lies inside an outline, or no farther than `spare` beside it.
+    """Return whether (x, y) lies inside an outline, or outside it by no more than `spare`.
 
     The outline is rows start to end of `segments` (segment, 5): least y, then x and y of both ends. From row `middle` they are
     sorted, and none of them is taller than `tallest`.
@@ -127,9 +127,9 @@ def is_within(segments, start, middle, end, tallest, x, y, spare):  # type: igno
 
 @uncounted
 def is_inside(triangles, x):  # type: ignore[no-untyped-def]
-    """Return whether x lies in a closed body: its triangles fill half of all solid angles or more. No triangles hold all.
+    """Return whether x lies in a closed body: its triangles cover at least half of the full solid angle.
 
-    The solid angle of a triangle is that of van Oosterom and Strackee (1983).
+    The result is True if there are no triangles. Solid angles follow van Oosterom and Strackee (1983).
     """
     if triangles.shape[0] == 0:
         return True

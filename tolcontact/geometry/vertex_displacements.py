@@ -1,4 +1,4 @@
-"""Displacements that keep vertices on the planes around them."""
+"""Displacements that keep vertices on their adjacent planes."""
 
 import numpy as np
 
@@ -10,12 +10,12 @@ TINY = 1e-300
 def displacements(
     vertex: Int[Array, " p"], normals: Float[Array, "p 3"], heights: Float[Array, "p k"], count: int, min_singular: float
 ) -> Float[Array, "count 3 k"]:
-    """Return how `count` vertices move onto planes around them: N u = h, in the sense of least squares, with the shortest u.
+    """Return displacements u of `count` vertices onto their adjacent planes: N u = h, by least squares, with the shortest u.
 
-    Each of the k columns is a case of its own. A direction is left alone if the planes determine it with a singular value below
-    `min_singular`, as a share of the largest one, or of 1 if that is larger.
+    Each of the k columns is a separate case. There is no displacement in directions whose singular value is below
+    `min_singular`, as a share of the largest singular value, or of 1 if that is larger.
 
-    vertex    (p,): the vertex to which each plane belongs
+    vertex    (p,): the vertex of each plane
     normals   (p, 3): of unit length, or shorter
     heights   (p, k) of the planes above the vertices
     """

@@ -35,8 +35,8 @@ def mesh_clearance(clearance: MeshClearance, X_21: Pose) -> ca.SX:
 def _heights(corners: Corners, X: Pose) -> list[ca.SX]:
     """Return the height [mm] of each corner at pose X over the nearest facet that it projects onto, or NO_HEIGHT."""
     heights = []
-    for corner in np.unique(corners.numbers):
-        rows = np.flatnonzero(corners.numbers == corner)
+    for corner in np.unique(corners.indices):
+        rows = np.flatnonzero(corners.indices == corner)
         p, nearest = X.apply(ca.DM(corners.points[rows[0]])), ca.SX(NO_HEIGHT)
         for row in rows:
             height = _height(p, corners.triangles[row], corners.slopes[row])

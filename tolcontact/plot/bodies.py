@@ -27,7 +27,7 @@ VIEWPOINT = (-1.0, -2.4, 1.5)  # the direction from the assembly to the viewer
 
 
 class _Body(NamedTuple):
-    """A body in its nominal place [mm]."""
+    """A body in its nominal pose [mm]."""
 
     name: str
     vertices: np.ndarray
@@ -45,9 +45,9 @@ def assembly(
 ) -> Any:
     """Draw the bodies of results or of a declared model, with locators, contact points, measures and forces.
 
-    The bodies stand in their nominal places, or as in a `realization` of results and its `state`; marks always stand in their
-    nominal places. Returns a pyvista.Plotter.
-    Raises OptionError for a realization or a state that does not exist, and ModelError for a model with faults.
+    The bodies are drawn in their nominal poses, or in their poses in a `realization` of results and its `state`; marks are
+    always drawn in their nominal positions. Returns a pyvista.Plotter. Raises OptionError for a realization or a state that
+    does not exist, and ModelError for a model with faults.
     """
     is_new = plotter is None
     plotter = _new_plotter() if is_new else plotter
@@ -166,7 +166,7 @@ def _add_edges(plotter: Any, mesh: Any) -> None:
 
 def _add_marks(plotter: Any, marks: Marks, size: float) -> None:
     def arrow(mark: Mark, length: float, colour: str) -> None:
-        """Add an arrow that points at the place of the mark."""
+        """Add an arrow that points at the position of the mark."""
         along = np.array(mark["along"]) / np.linalg.norm(mark["along"])
         start = np.array(mark["at"]) - length * along
         plotter.add_mesh(pv.Arrow(start=start, direction=along, scale=length, tip_radius=0.2, shaft_radius=0.08), color=colour)

@@ -35,7 +35,7 @@ def histogram(
 
     The name may be left out if there is only one measure. Heights are the shares of realizations in each bin, in %; both states
     have the same bins. Returns the matplotlib axes.
-    Raises OptionError for an unknown measure or state, and for a measure with values that are no numbers.
+    Raises OptionError for an unknown measure or state, and for a measure with NaN values.
     """
     rows = results.to_dataset().isel({terms.REALIZATION: slice(finished(results))})
     place = _place(rows, measure)
@@ -46,7 +46,7 @@ def histogram(
     both_states = np.concatenate(list(values.values()))
     name, units = str(column[terms.MEASURE].values), str(column[terms.MEASURE_UNITS.name].values)
     if not np.isfinite(both_states).all():
-        raise OptionError(f'measurement "{name}" has values that are no numbers, so it cannot be drawn')
+        raise OptionError(f'measurement "{name}" has NaN values, so it cannot be drawn')
     if axes is None:
         axes = plt.figure(layout="constrained").add_subplot()
     edges = np.histogram_bin_edges(both_states, bins)
@@ -73,7 +73,7 @@ def histogram(
 
 
 def _place(rows: xr.Dataset, name: str | None) -> int:
-    """Return the index of a measure; without a name, that of the only one."""
+    """Return the index of a measure; without a name, the index of the only one."""
     names = [str(label) for label in rows[terms.MEASURE].values]
     if name is None and len(names) == 1:
         return 0

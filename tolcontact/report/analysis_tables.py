@@ -1,4 +1,4 @@
-"""Tables of analyses, the same for the terminal and the page; each analysis has a function that makes them from its dataset."""
+"""Tables of analyses, the same for the terminal and the page; one function per analysis makes them from its dataset."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -13,11 +13,11 @@ from tolcontact.errors import ArchiveError
 from tolcontact.limits import GAP_ACCURACY
 from tolcontact.report.figures import grouped, number, percent, share
 
-SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are counted only
-SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are counted only
-AT_END = 1.001  # times the smallest factor of a tolerance: below, it is as small as allowed
+SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are only counted
+SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are only counted
+AT_END = 1.001  # times the smallest factor of a tolerance: below this, it is as small as permitted
 MAX_HOLDERS = 3  # of a part, in a table
-FEW_SEARCHES = 0.25  # of all: if no more end at a value, a remark states that there may be worse ones
+FEW_SEARCHES = 0.25  # of all: if no more than this share end at a value, a remark states that there may be worse ones
 
 
 @dataclass(frozen=True)
@@ -33,10 +33,10 @@ class AnalysisTable:
 
 @dataclass(frozen=True)
 class AnalysisReport:
-    """What people read of an analysis.
+    """The report of an analysis for readers.
 
-    name     before the titles of its tables on a page
-    count    what was simulated, in words
+    name     prefix of the titles of its tables on a page
+    count    the simulated realizations, in words
     notes    lines that explain the tables
     """
 
@@ -47,7 +47,7 @@ class AnalysisReport:
 
 
 def archived_analysis(results: xr.DataTree, record: terms.AnalysisRecord) -> xr.Dataset | None:
-    """Return an analysis that an archive holds, or None. Raises ArchiveError if it is not what was written."""
+    """Return an analysis from an archive, or None. Raises ArchiveError if it differs from what was written."""
     if terms.ANALYSES_GROUP not in results.children or record.name not in results[terms.ANALYSES_GROUP].children:
         return None
     group = f"{terms.ANALYSES_GROUP}/{record.name}"
@@ -60,7 +60,7 @@ def archived_analysis(results: xr.DataTree, record: terms.AnalysisRecord) -> xr.
 
 
 def analysis_report(record: terms.AnalysisRecord, dataset: xr.Dataset) -> AnalysisReport:
-    """Return what people read of the dataset of an analysis."""
+    """Return the report of the dataset of an analysis."""
     return _REPORTS[record.name](dataset)
 
 
@@ -94,7 +94,7 @@ def _shares(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
         if float(largest[group]) < SMALL_SHARE:
             continue
         shares = dataset.isel(group=group)
-        # Without contact, measures are nearly sums: shares alone and in total hardly differ there.
+        # Without contact, measures are nearly additive: first-order and total shares hardly differ.
         cells = [
             percent(shares["total"].isel(state=terms.RAW).values),
             percent(shares["first"].isel(state=terms.CORRECTED).values),
@@ -131,8 +131,8 @@ def _by_size(shares: xr.DataArray) -> np.ndarray:
 
 def _sensitivities(dataset: xr.Dataset) -> AnalysisReport:
     notes = [
-        "Mean derivatives with 95 % intervals: over realizations in which parts stay",
-        "apart, and over those in which they touch, both without kinks and jumps;",
+        "Mean derivatives with 95 % intervals: over realizations without contact, and",
+        "over realizations with contact, both without kinks and jumps;",
         '"all" includes kinks and jumps, and "kinks" is their share.',
         *_lost(_unresolved(dataset)),
     ]
@@ -147,7 +147,7 @@ def _sensitivities(dataset: xr.Dataset) -> AnalysisReport:
 
 
 def _slopes(dataset: xr.Dataset) -> AnalysisTable:
-    """Return the derivatives of a measure, those of the contributors with the largest effect first."""
+    """Return the derivatives of a measure, starting with the contributors that have the largest effect."""
     mean = np.abs(dataset["sensitivity"].sel(interval="estimate").values).max(axis=0)
     size = np.fmax(mean, dataset["spread"].max("state").values)
     rows = []
@@ -186,7 +186,7 @@ def _worst_case(dataset: xr.Dataset) -> AnalysisReport:
 
 
 def _extremes(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
-    """Yield both ends of a measure in both states, and the combinations that give the corrected ends."""
+    """Yield both ends of a measure in both states, and the combinations that cause the corrected ends."""
     rows, searches = [], int(dataset.attrs["searches"])
     for state in terms.STATES:
         for end, word in terms.WORD_OF_END.items():
@@ -224,7 +224,7 @@ def _tails(dataset: xr.Dataset) -> AnalysisReport:
         rows.append([str(event), "-" if math.isnan(ppm[0]) else f"{estimate} [{lower}, {upper}]"])
     count = f"{grouped(int(dataset['simulated'].sum()))} realizations"
     notes = ["Probabilities in ppm, with contact, by searches and importance sampling; 95 % intervals."]
-    disagreement = dataset["disagreement"].values if "disagreement" in dataset else np.ones(len(rows))  # of older archives
+    disagreement = dataset["disagreement"].values if "disagreement" in dataset else np.ones(len(rows))  # older archives
     for event, factor in zip(dataset["event"].values, disagreement, strict=True):
         if factor > 1:
             differ = f"disagree by a factor of {factor:.2g}" if math.isfinite(factor) else "disagree: only one of them found it"
@@ -285,7 +285,7 @@ def _remark_on(row: xr.Dataset, attributes: dict) -> str:
 
 
 def _effects(effect: xr.DataArray) -> AnalysisTable:
-    """Return the effects (of_effect, group, interval) on a measure, that of the group with the largest one first."""
+    """Return the effects (of_effect, group, interval) on a measure, starting with the largest one."""
     rows = []
     for k in np.argsort(effect.values[0, :, 0], kind="stable"):
         spread, outside = effect.values[:, k]
@@ -306,11 +306,11 @@ def _relocation(dataset: xr.Dataset) -> AnalysisReport:
     columns = [dataset.attrs["locator"], statistic if is_share else f"{statistic} [{dataset['measure_units'].values}]"]
     samples, fresh = (grouped(dataset.attrs[word]) for word in ("samples", "fresh"))
     notes = [
-        f"{samples} realizations for each place tried;",
+        f"{samples} realizations for each trial position;",
         f"{fresh} fresh ones for the figures below, with 95 % intervals.\n",
     ]
     table = AnalysisTable("", columns, rows, _lost(int(dataset["unresolved"].max())))
-    return AnalysisReport("Place of a locator", f"{grouped(dataset.sizes['trial'])} places tried", notes, [table])
+    return AnalysisReport("Position of a locator", f"{grouped(dataset.sizes['trial'])} trial positions", notes, [table])
 
 
 def _seating(dataset: xr.Dataset) -> AnalysisReport:
@@ -328,7 +328,7 @@ def _seating(dataset: xr.Dataset) -> AnalysisReport:
 
 
 def _seat(dataset: xr.Dataset) -> list[str]:
-    """Return the row of a seat: the contacts that hold most come first."""
+    """Return the row of a seat, starting with the contacts that have the largest shares."""
     critical, reserve, shares = (dataset[name].values for name in ("critical", "reserve", "share"))
     holders = [k for k in np.argsort(-shares, kind="stable") if shares[k] >= SMALL_SHARE and critical > 0]
     names = [f"{dataset['holder'].values[k]} {100 * shares[k]:.0f} %" for k in holders[:MAX_HOLDERS]]

@@ -22,8 +22,8 @@ class Marks:
     """Annotations by kind, each with a name.
 
     locators   at (3,), along (3,)
-    contacts   part (its number), points (point, 3), gaps (point,), None where only an archive is known
-    measures   points (point, 3), along (3,), or None, lines (line, 2, 3) between points, and at (3,), the place of the name
+    contacts   part (its index), points (point, 3), gaps (point,), None if they come from an archive
+    measures   points (point, 3), along (3,), or None, lines (line, 2, 3) between points, and at (3,), the position of the name
     features   at (3,), the centre of the face
     forces     at (3,), or None at the end of an axis, along (3,)
     """
@@ -72,7 +72,7 @@ def marks_of_nominal(nominal: Nominal) -> Marks:
 
 
 def fixed_points(pair: ContactPoints) -> tuple[np.ndarray, np.ndarray]:
-    """Return contact points (point, 3) and gaps (point,) [mm], without nearest tangents of hollow walls, which move."""
+    """Return contact points (point, 3) and gaps (point,) [mm], except on nearest tangents of hollow walls, which move."""
     is_fixed = ~pair.round.points["is_hollow"] if pair.round else np.ones(len(pair.P_m), dtype=bool)
     return pair.P_m[is_fixed], ((pair.P_m - pair.P_r) * pair.n_r).sum(axis=1)[is_fixed]
 
@@ -107,7 +107,7 @@ def _features(results: xr.DataTree) -> list[Mark]:
 
 
 def _lines(results: xr.DataTree) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lines (line, 2, 3) that show measurements, and the number of the measure (line,) of each; none if old."""
+    """Return the lines (line, 2, 3) that show measurements, and their measure indices (line,); none in old archives."""
     model = results["model"].to_dataset()
     if terms.LINE_ENDS.name not in model:
         return np.zeros((0, 2, 3)), np.zeros(0, dtype=int)
@@ -118,13 +118,13 @@ def _measures(document: Mark, lines: np.ndarray, measure_of_line: np.ndarray) ->
     for number, measure in enumerate(document["measures"]):
         declared = [measure[word] for word in ("of", "to") if "part" in (measure.get(word) or {})]
         positions = [end for end in (_at(document, point) for point in declared) if end is not None]
-        own = lines[measure_of_line == number]
-        if positions or len(own):
-            yield _measure(measure["name"], measure["along"], positions, own)
+        measure_lines = lines[measure_of_line == number]
+        if positions or len(measure_lines):
+            yield _measure(measure["name"], measure["along"], positions, measure_lines)
 
 
 def _measure(name: str, along: Any, positions: list[list[float]], lines: np.ndarray) -> Mark:
-    """Return the mark of a measure of points, or of a measurement that lines show."""
+    """Return the mark of a measure of points, or of a measurement shown by lines."""
     if not positions:
         ends = dict.fromkeys(tuple(map(float, end)) for line in lines for end in line)
         at = [float(x) for x in lines[-1].mean(axis=0)]

@@ -1,4 +1,4 @@
-"""The settings of a run, as pages and spreadsheets list them."""
+"""The settings of a run, for pages and spreadsheets."""
 
 from typing import Any
 

@@ -11,14 +11,14 @@ from tolcontact import vocabulary as terms
 from tolcontact.report.figures import grouped, percent
 from tolcontact.statistics.linear_shares import MIN_R2, LinearShares, linear_shares, required_realizations
 
-MAX_REALIZATIONS = 20_000  # that shares are estimated from; more would not change what is read
-MAX_CONTRIBUTORS = 1000  # of a regression that takes seconds
+MAX_REALIZATIONS = 20_000  # for the estimate of shares; more would not change the displayed digits
+MAX_CONTRIBUTORS = 1000  # above this, a regression would take too long
 
 
 class ContributorShares(NamedTuple):
-    """The shares of the contributors of one measurement, the largest first, and what to know about them.
+    """The shares of the contributors of one measurement, the largest first, with a note.
 
-    groups   contributors, or features with all their freedoms, joined if they are drawn together
+    groups   contributors, or features with all their freedoms, joined if they are drawn jointly
     shares   (group, interval) of the variance with contact; empty if none are shown
     note     a sentence: R^2, or the reason why no shares are shown
     """
@@ -29,7 +29,7 @@ class ContributorShares(NamedTuple):
 
 
 def contributor_shares(results: xr.DataTree, realizations: int) -> list[ContributorShares]:
-    """Return the shares of each measurement of a run with this number of finished realizations."""
+    """Return the shares for each measurement of a run with this number of finished realizations."""
     names = results.to_dataset()[terms.MEASURE].values
     sample = results["sample"].to_dataset()
     if terms.DEVIATION.name not in sample:
@@ -53,7 +53,7 @@ def contributor_shares(results: xr.DataTree, realizations: int) -> list[Contribu
 def _shown(names: list[str], shares: LinearShares | None, count: int) -> ContributorShares:
     if shares is None:
         return _without("The measurement does not vary, or is not a number.")
-    r2 = percent(np.maximum(shares.r2, 0.0))  # adjusted for the number of contributors, which may leave less than none
+    r2 = percent(np.maximum(shares.r2, 0.0))  # adjusted for the number of contributors, so it may be negative
     if not shares.r2[0] >= MIN_R2:
         return _without(
             f"A linear model explains only {r2} of the variance with contact, so linear shares would mislead; "
@@ -74,7 +74,7 @@ def _without(note: str) -> ContributorShares:
 def _groups(results: xr.DataTree, sample: xr.Dataset, columns: np.ndarray) -> dict[str, np.ndarray]:
     """Return the positions in `columns` of each group, by name."""
     labels = [str(label) for label in sample[sample[terms.DEVIATION.name].dims[-1]].values]
-    is_stated = terms.CONTRIBUTOR_SOURCE.name in sample  # archives before format 4 have locators alone
+    is_stated = terms.CONTRIBUTOR_SOURCE.name in sample  # archives before format 4 have only locators
     sources = sample[terms.CONTRIBUTOR_SOURCE.name].values if is_stated else np.full(len(labels), "locator")
     owners = [_owner(label, source) for label, source in zip(labels, sources, strict=True)]
     leader = {owner: owner for owner in owners}
@@ -86,9 +86,9 @@ def _groups(results: xr.DataTree, sample: xr.Dataset, columns: np.ndarray) -> di
 
     owner_of = dict(zip(labels, owners, strict=True))
     for together in _drawn_together(results):
-        known = [find(owner_of[label]) for label in together if label in owner_of]
-        for owner in known[1:]:
-            leader[find(owner)] = find(known[0])
+        joined = [find(owner_of[label]) for label in together if label in owner_of]
+        for owner in joined[1:]:
+            leader[find(owner)] = find(joined[0])
     members: dict[str, list[int]] = {}
     for position, column in enumerate(columns):
         members.setdefault(find(owners[column]), []).append(position)
@@ -97,8 +97,8 @@ def _groups(results: xr.DataTree, sample: xr.Dataset, columns: np.ndarray) -> di
 
 
 def _owner(label: str, source: str) -> str:
-    """Return what a contributor belongs to: a feature, its form, a datum that touches form, or the contributor itself."""
-    if source == "datum" and ": " in label:  # its form is that of another feature
+    """Return the owner of a contributor: a feature, its form, a datum that touches form, or the contributor itself."""
+    if source == "datum" and ": " in label:  # its form belongs to another feature
         return label.rpartition(": ")[0]
     ends = {"feature": ".", "datum": ".", "form": " "}  # before the freedom of a feature, and the number of a mode of its form
     return label.rpartition(ends[source])[0] if source in ends else label

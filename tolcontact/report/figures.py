@@ -9,16 +9,16 @@ MAX_DECIMALS = 6
 MAX_DECIMALS_PERCENT = 2
 NO_INTERVAL = "[-]"
 PERCENT_FROM = 10_000  # ppm; smaller shares are in ppm
-NOISE = 1e-5  # of the scale of a declared value: a shorter text that is off by less is its rounding
+NOISE = 1e-5  # of the scale of a declared value: smaller differences from a shorter text are rounding
 
 
 def grouped(count: int) -> str:
-    """Return a count with separated thousands: 57 344."""
+    """Return a count with grouped thousands: 57 344."""
     return f"{count:,}".replace(",", " ")
 
 
 def plain(value: float, scale: float | None = None) -> str:
-    """Return a declared value in the fewest decimals that differ from it by less than `NOISE` of its scale; "" without a value.
+    """Return a declared value with the fewest decimals within `NOISE` of its scale; "" without a value.
 
     The scale is the width of the limits, or by default the size of the value.
     """
@@ -67,7 +67,7 @@ def number(values: object, *, sign: bool = False, max_decimals: int = MAX_DECIMA
 
 
 def _digits(width: float) -> int:
-    """Return one more digit for a half width that begins with 1 or 2: rounding stays below a fifth of it."""
+    """Return the number of digits, one more for a half width that begins with 1 or 2: rounding stays below a fifth of it."""
     return 1 if width / 10 ** math.floor(math.log10(width)) < 3 else 0
 
 

@@ -41,7 +41,7 @@ def cell_text(cell: Cell) -> str:
 
 
 def model_tables(results: xr.DataTree) -> list[ModelTable]:
-    """Return the tables of the model that have rows. Raises ArchiveError for a declaration that no run wrote."""
+    """Return the tables of the model that have rows. Raises ArchiveError for a damaged declaration."""
     document = json.loads(str(results["model"][terms.DECLARATION.name].values))
     makers: tuple[Callable[[Entry, xr.DataTree], ModelTable], ...] = (_parts, _features, _locators, _pairs, _measurements)
     try:
@@ -53,8 +53,8 @@ def model_tables(results: xr.DataTree) -> list[ModelTable]:
 
 def _filled(table: ModelTable) -> ModelTable:
     """Return a table without columns that are empty in all rows."""
-    kept = [k for k in range(len(table.columns)) if any(row[k] not in (None, "") for row in table.rows)]
-    return ModelTable(table.title, [table.columns[k] for k in kept], [[row[k] for k in kept] for row in table.rows])
+    filled = [k for k in range(len(table.columns)) if any(row[k] not in (None, "") for row in table.rows)]
+    return ModelTable(table.title, [table.columns[k] for k in filled], [[row[k] for k in filled] for row in table.rows])
 
 
 def _parts(document: Entry, results: xr.DataTree) -> ModelTable:
@@ -63,8 +63,8 @@ def _parts(document: Entry, results: xr.DataTree) -> ModelTable:
     for part in document["parts"]:
         geometry = part["geometry"]
         shape = f"box {_triple(geometry['box'])} mm" if "box" in geometry else str(next(iter(geometry.values())))
-        held = "fixed" if part.get("fixed") else f"located on {supports.get(part['name'], 'nothing')}"
-        rows.append([part["name"], shape, _triple(part["at"]), held])
+        support = "fixed" if part.get("fixed") else f"located on {supports.get(part['name'], 'nothing')}"
+        rows.append([part["name"], shape, _triple(part["at"]), support])
     return ModelTable("Parts", ["part", "shape", "position, mm", "held"], rows)
 
 
@@ -95,7 +95,7 @@ def _locators(document: Entry, results: xr.DataTree) -> ModelTable:
     dim = sample[terms.TOLERANCE_RANGE.name].dims[0]
     numbers = {str(label): k for k, label in enumerate(sample[dim].values)}
     rows: list[list[Cell]] = []
-    giving = _giving(results["contact"].to_dataset())
+    compliant = _compliant_locators(results["contact"].to_dataset())
     for k, label in enumerate(labels):
         part, _, name = label.rpartition(".")
         at, along = (sample[v.name].values[k] for v in (terms.LOCATOR_POINT, terms.LOCATOR_DIRECTION))
@@ -104,15 +104,15 @@ def _locators(document: Entry, results: xr.DataTree) -> ModelTable:
         distribution = str(sample[terms.DISTRIBUTION.name].values[numbers[label]]) if is_stated else ""
         one_sided = terms.ONE_SIDED.name in sample and bool(sample[terms.ONE_SIDED.name].values[k])
         kind = "one-sided" if one_sided else "two-sided"
-        if k in giving:
+        if k in compliant:
             kind += f", {float(sample[terms.STIFFNESS.name].values[k]):g} N/mm"
         rows.append([part, name, _triple(at), _triple(along), width if math.isfinite(width) else None, distribution, kind])
     columns = ["part", "locator", "point, mm", "direction", f"{terms.ZONE_WIDTH}, mm", "distribution", "held"]
     return ModelTable("Locators", columns, rows)
 
 
-def _giving(contact: xr.Dataset) -> set[int]:
-    """Return the numbers of the locators that give way."""
+def _compliant_locators(contact: xr.Dataset) -> set[int]:
+    """Return the indices of the compliant locators."""
     if terms.POINT_STIFFNESS.name not in contact:
         return set()
     gives = np.isfinite(contact[terms.POINT_STIFFNESS.name].values)
@@ -152,7 +152,7 @@ def _measurements(document: Entry, results: xr.DataTree) -> ModelTable:
         nominal = plain(float(root[terms.MEASURE_NOMINAL.name].values[k]), scale)
         rows.append(
             [
-                measure["name"], _of(measure), _end(measure.get("to")), along, str(measure["units"]),
+                measure["name"], _quantity(measure), _end(measure.get("to")), along, str(measure["units"]),
                 *(float(text) if text else None for text in (nominal, plain(lower, scale), plain(upper, scale))),
             ]
         )  # fmt: skip
@@ -160,7 +160,7 @@ def _measurements(document: Entry, results: xr.DataTree) -> ModelTable:
     return ModelTable("Measurements", columns, rows)
 
 
-def _of(measure: Entry) -> str:
+def _quantity(measure: Entry) -> str:
     if "of" not in measure:
         return "expression of the poses"
     return f"{measure['of']['kind']} of {', '.join(_named(measure['of']))}" if "kind" in measure["of"] else _end(measure["of"])

@@ -1,4 +1,4 @@
-"""The table of results: figures and a verdict for each measurement, for terminal, page and spreadsheet alike."""
+"""The table of results: figures and a verdict for each measurement, the same for terminal, page and spreadsheet."""
 
 import math
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ from tolcontact.report.figures import grouped, number, percent, plain
 from tolcontact.statistics.verdict import FAILS, UNDECIDED, Verdict, verdict
 
 PPM_BELOW = 0.01  # if all shares are smaller, the table states them in ppm
-DIGITS_OF_COUNTS = 2  # of a number of realizations that would decide
+DIGITS_OF_COUNTS = 2  # significant digits of the number of realizations that would decide
 STATISTICS = (terms.MEAN, terms.STANDARD_DEVIATION, terms.PPK, terms.BELOW, terms.ABOVE)
 
 
@@ -31,7 +31,7 @@ class StateFigures(NamedTuple):
 
 
 class ResultRow(NamedTuple):
-    """What the table says of a measurement.
+    """The rows of the table for a measurement.
 
     verdict   "" without limits
     states    with contact first
@@ -76,7 +76,7 @@ def share_heading(summary: Rows) -> str:
 
 
 def result_rows(summary: Rows) -> list[ResultRow]:
-    """Return what the table says of each measurement."""
+    """Return the rows of the table for each measurement."""
     return [_row(summary.sel(measure=name), summary) for name in summary["measure"].values]
 
 
@@ -122,7 +122,7 @@ def verdict_text(opinion: Verdict | None) -> str:
 
 
 def reservation(summary: Rows) -> str:
-    """Return what follows each verdict if parts without declared contact lie in each other; else ""."""
+    """Return the text after each verdict if parts without declared contact penetrate each other; otherwise ""."""
     share = summary["clash_share"].values
     return f"; but parts lie in each other in {percent(share)} of realizations" if share[0] > 0 else ""
 

@@ -1,4 +1,4 @@
-"""The tables of a report as a spreadsheet: one sheet a table, numbers as numbers, units in the headings."""
+"""The tables of a report as a spreadsheet: one sheet per table, numbers as numbers, units in the headings."""
 
 import importlib
 import math
@@ -35,7 +35,7 @@ class Sheet(NamedTuple):
 
 
 def write_spreadsheet(results: xr.DataTree, summary: xr.Dataset, path: Path, title_block: TitleBlock | None = None) -> None:
-    """Write the tables of a run with this summary as .xlsx; without a `title_block`, with that of the archive.
+    """Write the tables of a run with this summary as .xlsx; the default `title_block` comes from the archive.
 
     Raises OptionError if openpyxl is not installed, and ArchiveError if the file cannot be written.
     """
@@ -146,7 +146,7 @@ def _contact(summary: xr.Dataset) -> Sheet:
 
 
 def _plain(value: Any) -> Any:
-    """Return a cell as openpyxl takes it: no number that a spreadsheet does not have."""
+    """Return a cell for openpyxl, without numbers that a spreadsheet cannot contain."""
     if isinstance(value, np.generic):
         value = value.item()
     return None if isinstance(value, float) and not math.isfinite(value) else value

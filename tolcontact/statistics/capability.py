@@ -1,13 +1,13 @@
-"""Capability of a measure: the shares beyond its limits, and Pp and Ppk, by percentiles and as of a normal distribution.
+"""Capability of a measure: the shares beyond its limits, and Pp and Ppk, by percentiles and for a normal distribution.
 
-Contact cuts distributions off and skews them, so the figures by percentiles (the general method of ISO 22514-2) come first:
-half of the values lie below X50, and 99.73 % between X0.135 and X99.865.
+Contact truncates and skews distributions, so the figures by percentiles (the general method of ISO 22514-2) come first: half of
+the values lie below X50, and 99.73 % between X0.135 and X99.865.
 
     Pp  = (U - L) / (X99.865 - X0.135)
     Ppk = min((U - X50) / (X99.865 - X50), (X50 - L) / (X50 - X0.135))
 
-With one limit, Ppk is that of its side, and there is no Pp. As of a normal distribution, X50 is the mean, and the differences
-are 3 and 6 standard deviations.
+With one limit, Ppk comes from its side, and there is no Pp. For a normal distribution, X50 is the mean, and the differences are
+3 and 6 standard deviations.
 """
 
 import math
@@ -31,7 +31,7 @@ from tolcontact.statistics.sample import Sample
 from tolcontact.variation.sobol_points import scrambled_points
 
 PERCENTS = 0.135, 50.0, 99.865
-TRIALS = 1 << 11  # simulated triples of percentiles, of which an interval covers 95 %
+TRIALS = 1 << 11  # simulated triples of percentiles; an interval covers 95 % of them
 
 
 def share_below(x: Sample, limits: Limits) -> Estimate:
@@ -50,9 +50,9 @@ def share_outside(x: Sample, limits: Limits) -> Estimate:
 
 
 def without_stops(x: Sample, limits: Limits) -> Limits:
-    """Return the limits without those at which values stop: none lies beyond, and the outer percentile is the limit itself.
+    """Return the limits without stops. At a stop no value lies beyond, and the outer percentile is the limit itself.
 
-    Otherwise such a limit would have an index of exactly 1 for any values in between.
+    Such a limit would have an index of exactly 1 for any values in between.
     """
     low, _, high = (percentile.value for percentile in percentiles(x.map(limits.settled), PERCENTS))
     if low == limits.lower and not _is_any(x.map(limits.below)):
@@ -70,8 +70,8 @@ def by_percentiles(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
     """Return Pp and Ppk by percentiles; sides at which values stop are left out (see without_stops).
 
     The numbers of values below the three percentiles are multinomial for any distribution. Each percentile lies between the
-    two order statistics next to its simulated number; the interval takes the one that is on the safe side, and leaves out
-    2.5 % of the simulated indices on either side. A sample that is too small to bound a tail has 0 as the lower bound.
+    two order statistics next to its simulated number. The interval uses the conservative one, and leaves out 2.5 % of the
+    simulated indices on either side. The lower bound of a sample that is too small to bound a tail is 0.
     """
     if is_constant(x, limits.accuracy) or not np.isfinite(x.mean):
         return UNDEFINED, UNDEFINED
@@ -83,7 +83,7 @@ def by_percentiles(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
         worst, best = _pp(lows[0], highs[2], limits), _pp(highs[0], lows[2], limits)
         pp = _with_interval(_pp(low, high, limits), worst, [best])
     if not limits.are_open:
-        # Sides that are equally near must not make the least of them look worse: of the upper bounds of all, it is the least.
+        # Sides that are equally near must not bias their minimum: its upper bound is the least of all upper bounds.
         worst = np.stack([_sides(lows[0], middle, highs[2], limits) for middle in (lows[1], highs[1])])
         best = np.stack([_sides(highs[0], middle, lows[2], limits) for middle in (lows[1], highs[1])])
         worst_of_all = np.fmin.reduce(worst, axis=(0, 1))
@@ -110,7 +110,7 @@ def as_normal(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
 
 
 def _side(x: Sample, index: float, sign: float) -> Estimate:
-    """Return the index of one side as of a normal distribution; `sign` is 1 for the upper limit, -1 for the lower."""
+    """Return the index of one side for a normal distribution; `sign` is 1 for the upper limit, -1 for the lower."""
     return from_standardized_influence(x, index, [index / 2, -sign / 3, -index / 2])
 
 
@@ -132,7 +132,7 @@ def _sides(low: np.ndarray | float, median: np.ndarray | float, high: np.ndarray
 
 
 def _with_interval(estimate: np.ndarray, worst: np.ndarray, best: Sequence[np.ndarray]) -> Estimate:
-    """Return an estimate with the interval that covers 95 % of simulated indices, of which the worst and the best are known."""
+    """Return an estimate with the interval that covers 95 % of simulated indices, given their worst and best values."""
     low = np.quantile(np.where(np.isnan(worst), 0.0, worst), 0.5 - CONFIDENCE / 2, method="inverted_cdf")
     highs = [
         np.quantile(np.where(np.isnan(of_side), np.inf, of_side), 0.5 + CONFIDENCE / 2, method="inverted_cdf")

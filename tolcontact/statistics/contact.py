@@ -1,4 +1,4 @@
-"""Statistics of contact: pairs that carry, what they carry, points that touch, and bodies that lie in each other."""
+"""Statistics of contact: pairs under load, their reactions, touching points, and bodies that penetrate each other."""
 
 from collections import Counter
 from typing import Any
@@ -12,13 +12,13 @@ from tolcontact.statistics import intervals
 from tolcontact.statistics.sample import Sample
 from tolcontact.vocabulary import ArchiveVariable
 
-MAX_COMBINATIONS = 10  # of pairs that carry together
-MAX_PAIRS = 20  # of parts that are named, the most frequent ones
+MAX_COMBINATIONS = 10  # of pairs under load at the same time
+MAX_PAIRS = 20  # of parts, the most frequent ones
 VARIABLES = [variable.name for variable in (terms.CLASHES, terms.CLASH_DEPTH, terms.CLASH_PART, terms.CLASH_OTHER)]
 
 
 def carried(rows: Rows) -> np.ndarray:
-    """Return the share of realizations in which each pair carries, (pair, interval)."""
+    """Return the share of realizations with each pair under load, (pair, interval)."""
     counts = np.sum([(piece[terms.CARRYING.name].values > 0).sum(axis=0) for piece in pieces(rows)], axis=0)
     total = rows.sizes[terms.REALIZATION]
     return np.array([intervals.proportion_of(int(k), total) for k in counts]).reshape(-1, len(terms.ESTIMATE))
@@ -35,7 +35,7 @@ def reactions(rows: Rows) -> np.ndarray:
 
 
 def combinations(rows: Rows) -> list[tuple[tuple[str, ...], int]]:
-    """Return which pairs carry together, and in how many realizations: the most frequent combinations."""
+    """Return the most frequent combinations of pairs under load, with their numbers of realizations."""
     names, counts = [str(name) for name in rows[terms.PAIR].values], Counter[tuple[bool, ...]]()
     for piece in pieces(rows):
         masks, times = _unique_rows(piece[terms.CARRYING.name].values > 0)
@@ -45,7 +45,7 @@ def combinations(rows: Rows) -> list[tuple[tuple[str, ...], int]]:
 
 
 def _unique_rows(masks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the different rows of booleans (row, column), and how often each occurs. They are compared as whole numbers."""
+    """Return the distinct rows of booleans (row, column), and how often each occurs. They are compared as whole numbers."""
     words = np.zeros((len(masks), max(-(-masks.shape[1] // 64), 1)), dtype=np.uint64)
     words.view(np.uint8)[:, : -(-masks.shape[1] // 8)] = np.packbits(masks, axis=1)
     if words.shape[1] == 1:
@@ -57,7 +57,7 @@ def _unique_rows(masks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class TouchingShares:
-    """How often each contact point touches, summed up over realizations; nothing yet.
+    """The share of realizations with contact at each contact point, accumulated over realizations.
 
     is_new   whether realizations were added since the last `values`
     """
@@ -67,7 +67,7 @@ class TouchingShares:
         self.is_new = True
 
     def add(self, counts: np.ndarray, realizations: int) -> None:
-        """Add in how many of some `realizations` each point touches, counts (point,)."""
+        """Add the counts (point,) of contacts at each point in `realizations` further realizations."""
         self._counts += counts
         self._realizations += realizations
         self.is_new |= realizations > 0
@@ -84,7 +84,7 @@ class TouchingShares:
 
 
 def surface_values(results: Results, limit: float) -> dict[ArchiveVariable, Any]:
-    """Return what the check found, with shares of depths above `limit` [mm]; NaN for archives that lack a variable of it."""
+    """Return the results of the surface check, with shares of depths above `limit` [mm]; NaN where a variable is missing."""
     pairs = results.sizes[terms.PAIR]
     surface = results["surface"].to_dataset() if "surface" in results.children else Table({})
 
@@ -109,7 +109,7 @@ def surface_values(results: Results, limit: float) -> dict[ArchiveVariable, Any]
 
 
 def _over(reduce: Any, values: np.ndarray) -> float:
-    """Return a reduction of the values that are known; NaN if none is."""
+    """Return a reduction of the values that are not NaN; NaN if there are none."""
     return float(reduce(values)) if np.isfinite(values).any() else np.nan
 
 
@@ -121,12 +121,12 @@ def _share(depths: np.ndarray, at_random: np.ndarray, limit: float) -> np.ndarra
 
 
 class Clashes:
-    """How often two parts lie in each other, of the rows of an archive.
+    """The clashes between parts in the rows of an archive.
 
     watched     number of realizations that were tested
-    clashing    number of these in which parts without declared contact lie in each other
-    counts      by both parts, and whether their contact is declared: number of realizations in which they lie deepest
-    depths      [mm], by the same: their largest depth; missing if none is measured
+    clashing    number of these with penetration between parts without declared contact
+    counts      number of realizations with a pair as the deepest one; by both parts, and whether contact is declared
+    depths      [mm], by the same keys: their largest depth; missing if none was measured
     """
 
     def __init__(self, rows: Rows) -> None:
@@ -152,7 +152,7 @@ class Clashes:
 
     @property
     def pairs(self) -> list[tuple[int, int, bool]]:
-        """The most frequent pairs of parts."""
+        """The pairs of parts that clash most frequently."""
         return [pair for pair, _ in self.counts.most_common(MAX_PAIRS)]
 
     @property
@@ -161,7 +161,7 @@ class Clashes:
         return [f"{self._parts[first]} / {self._parts[second]}" for first, second, _ in self.pairs]
 
     def values(self) -> dict[ArchiveVariable, Any]:
-        """Return the share of realizations with clashes, and what is known of each pair of parts."""
+        """Return the share of realizations with clashes, and the counts and depths of each pair of parts."""
         share = intervals.proportion_of(self.clashing, self.watched) if self.watched else intervals.UNDEFINED
         return {
             terms.WATCHED: self.watched,

@@ -1,9 +1,9 @@
 """Displacement fields (14): u = (R - I) v + t at surface points v, over all realizations.
 
-u is linear in the 12 pose entries, so mean and spread of its components follow exactly from the mean and covariance of
-those. Its magnitude is not linear: its moments are summed up point by point, over the first realizations only. That is enough
-for a colour map, and the interval states the uncertainty. The worker that simulates a block also sums it up; the sums of all
-blocks are merged in order.
+u is linear in the 12 pose entries, so mean and spread of its components follow exactly from the mean and covariance of the
+poses. Its magnitude is not linear: its moments are accumulated point by point, over the first realizations only. That is enough
+for a colour map, and the interval states the uncertainty. The worker that simulates a block also computes its sums; the sums of
+all blocks are merged in order.
 """
 
 import sys
@@ -17,22 +17,22 @@ from tolcontact.discretization import Nominal
 from tolcontact.statistics import intervals, kernel
 from tolcontact.vocabulary import CORRECTED, RAW, ArchiveVariable
 
-SHIFT_REALIZATIONS = 64  # whose mean magnitude is close enough to that of all
-# "Some" realizations for magnitudes: more for parts with few points; all points together take a tenth of a second.
+SHIFT_REALIZATIONS = 64  # their mean magnitude is close enough to the mean of all
+# "Some" realizations for magnitudes: more for parts with few points; the sums of all points take a tenth of a second.
 MAX_REALIZATIONS, MIN_REALIZATIONS, MAX_POINTS = 16_384, 1024, 1 << 25
 
 
 def _magnitudes(fields: str, points: int) -> int:
-    """Return the number of realizations whose magnitudes at `points` points are summed up."""
+    """Return the number of realizations that the magnitudes at `points` points cover."""
     default = max(MIN_REALIZATIONS, min(MAX_REALIZATIONS, MAX_POINTS // points))
     return int(fields) if fields.isdigit() else {"some": default, "all": sys.maxsize, "none": 0}[fields]
 
 
 class FieldSums:
-    """Sums over realizations for the field of one part in one state, all in one array `numbers`."""
+    """Sums over realizations for the field of one part in one state, stored in one array `numbers`."""
 
     def __init__(self, points: int, numbers: np.ndarray | None = None) -> None:
-        """Start empty sums for `points` surface points, or views of the sums `numbers` (number,)."""
+        """Create empty sums for `points` surface points, or views of the sums `numbers` (number,)."""
         sizes = [1, 12, 48, 1, points, points, points, points]
         self.numbers = np.zeros(sum(sizes)) if numbers is None else numbers
         count, mean, scatter, magnitude_count, *moments = np.split(self.numbers, np.cumsum(sizes)[:-1])
@@ -44,7 +44,7 @@ class FieldSums:
         return FieldSums, (len(self.magnitude), self.numbers)  # the others are views of these
 
     def merge(self, addend: "FieldSums") -> None:
-        """Add the sums of the realizations that follow, at least one. Chan et al., Pébay (2008)."""
+        """Add the sums of at least one following realization (Chan et al.; Pébay, 2008)."""
         n, m = self.count, addend.count
         share = m / (n + m)
         step = addend.mean - self.mean
@@ -124,7 +124,7 @@ class DisplacementFields:
 
 
 class _Surface:
-    """The surface points of a part, about their centre."""
+    """The surface points of a part, relative to their centroid."""
 
     def __init__(self, vertices: np.ndarray) -> None:
         self._centre = vertices.mean(axis=0)
@@ -135,7 +135,7 @@ class _Surface:
         return len(self._v)
 
     def sums(self, poses: np.ndarray, count: int) -> FieldSums:
-        """Return the sums over poses (n, 12); magnitudes only over the first `count`, and no sums of points if that is 0."""
+        """Return the sums over poses (n, 12); magnitudes only over the first `count`, and no point sums if that is 0."""
         sums, A = FieldSums(len(self) if count else 0), np.empty((len(poses), 3, 4))
         kernel.affine_parts(poses, self._centre, A)
         kernel.add_scatter(A, sums.mean, sums.scatter)
@@ -145,7 +145,7 @@ class _Surface:
         return sums
 
     def _add_magnitudes(self, A: np.ndarray, sums: FieldSums) -> None:
-        # Powers are summed up about a shift close to the mean, to avoid cancellation.
+        # Powers are accumulated about a shift close to the mean, to avoid cancellation.
         shift, leading_powers, powers = np.zeros(len(self)), np.zeros((4, len(self))), np.zeros((4, len(self)))
         kernel.add_magnitudes(A[:SHIFT_REALIZATIONS], self._points, shift, leading_powers)
         shift = leading_powers[0] / len(A[:SHIFT_REALIZATIONS])
@@ -175,7 +175,7 @@ class _Surface:
         }
 
     def _state_field(self, sums: FieldSums) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the mean, six standard deviations, and the interval of those of the magnitude."""
+        """Return the mean, six standard deviations, and the interval of six standard deviations of the magnitude."""
         scatter = np.column_stack([((self._v @ axis_scatter) * self._v).sum(axis=1) for axis_scatter in sums.scatter])
         sigma = np.sqrt(np.maximum(scatter, 0) / max(sums.count[0] - 1, 1))
         n = int(sums.magnitude_count[0])

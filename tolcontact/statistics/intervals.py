@@ -1,7 +1,7 @@
 """Estimates from a Monte-Carlo sample with 95 % confidence intervals.
 
 Every function takes a sample, an array (realization,) or a Sample, and returns (estimate, lower, upper). No interval assumes a
-normal distribution: contact cuts distributions off.
+normal distribution, since contact truncates distributions.
 """
 
 import math
@@ -15,8 +15,8 @@ from scipy import special
 from tolcontact.statistics.sample import Sample
 
 CONFIDENCE = 0.95
-MIN_VARIANCE, MAX_SMALL = 10, 1000  # realizations: variances of fewer have no interval, of fewer the wider of two
-MIN_SHAPE, MAX_KURTOSIS = 1000, 3.5  # realizations, and their kurtosis: else skewness and kurtosis have no interval
+MIN_VARIANCE, MAX_SMALL = 10, 1000  # realizations: variances of fewer have no interval; below the second, the wider of two
+MIN_SHAPE, MAX_KURTOSIS = 1000, 3.5  # realizations, and their kurtosis: otherwise skewness and kurtosis have no interval
 MIN_SKEW = 1e-6
 
 _LOWER, _UPPER = 0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2
@@ -51,8 +51,8 @@ def from_influence(estimate: float, squares: float, count: int, fourths: float |
     """Return an estimate whose influence function over `count` realizations has the sum of squares `squares`.
 
     The influence of a realization is its contribution to the estimate times `count`. See Serfling, Approximation Theorems of
-    Mathematical Statistics (1980), chapter 6. With the sum of their fourth powers, `fourths`, Student's t has as many degrees
-    of freedom as the spread of the influences is known by: fewer if it comes from few realizations.
+    Mathematical Statistics (1980), chapter 6. The sum of their fourth powers, `fourths`, gives the effective degrees of freedom
+    of Student's t: there are fewer if the spread comes from few realizations.
     """
     freedom = count - 1.0
     if fourths is not None and squares > 0:
@@ -64,7 +64,7 @@ def from_influence(estimate: float, squares: float, count: int, fourths: float |
 def from_standardized_influence(x: Sample, estimate: float, influence: Sequence[float]) -> Estimate:
     """Return an estimate whose influence function is a polynomial of the standardized values, of degree 4 at most.
 
-    The polynomial is given by its coefficients, from the constant on. The estimate has no interval if the sample is too small.
+    The polynomial is given by its coefficients, starting with the constant. There is no interval if the sample is too small.
     """
     if x.count < MIN_VARIANCE:
         return Estimate(float(estimate), math.nan, math.nan)
@@ -75,12 +75,12 @@ def from_standardized_influence(x: Sample, estimate: float, influence: Sequence[
 
 
 def _sum_over(x: Sample, polynomial: np.ndarray) -> float:
-    """Return the sum of a polynomial without negative values, given by its coefficients, over standardized values."""
+    """Return the sum of a non-negative polynomial, given by its coefficients, over standardized values."""
     return max(float(polynomial @ x.standardized_moments[: len(polynomial)] * x.count), 0.0)  # no rounding below 0
 
 
 def is_shape_known(x: Sample) -> bool:
-    """Return whether skewness and kurtosis have an interval: their spread depends on moments that few samples tell."""
+    """Return whether skewness and kurtosis have an interval: their spread depends on moments that small samples do not give."""
     return x.count >= MIN_SHAPE and x.standardized_moments[4] < MAX_KURTOSIS
 
 
@@ -107,9 +107,9 @@ def kurtosis(x: np.ndarray | Sample) -> Estimate:
 
 
 def variance(x: np.ndarray | Sample) -> Estimate:
-    """Return the variance with the interval of Hall's transformation (1992), which knows how skewed squares are.
+    """Return the variance with the interval of Hall's transformation (1992), which accounts for the skewness of squares.
 
-    Of small samples it is Bonett's if that reaches farther (see variance_from_moments); the smallest have none.
+    Small samples use Bonett's interval if it is wider (see variance_from_moments); the smallest have none.
     """
     x = Sample.of(x)
     estimate, *bonett = (float(value) for value in variance_from_moments(x.count, *x.moments))
@@ -129,7 +129,7 @@ def variance(x: np.ndarray | Sample) -> Estimate:
 
 
 def _back(z: float, skew: float, count: int) -> float:
-    """Return the standard errors, over the root of the count, that Hall's transformation takes to z."""
+    """Return the inverse of Hall's transformation at z: standard errors over the root of the count."""
     if abs(skew) < MIN_SKEW:
         return z / math.sqrt(count)
     return float(3 / skew * (np.cbrt(1 + skew * (z / math.sqrt(count) - skew / (6 * count))) - 1))
@@ -147,9 +147,9 @@ def root(variance: Estimate, *, times: float = 1.0) -> Estimate:
 
 
 def percentiles(x: np.ndarray | Sample, percents: Sequence[float]) -> list[Estimate]:
-    """Return percentiles, whose intervals run between order statistics (binomial, distribution-free).
+    """Return percentiles with intervals between order statistics (binomial, distribution-free).
 
-    A bound is infinite if the sample is too small to have one.
+    A bound is infinite if the sample is too small.
     """
     x = Sample.of(x)
     ranks = [_quantile_ranks(x.count, percent / 100) for percent in percents]
@@ -189,7 +189,7 @@ def proportion_of(k: float, n: float) -> Estimate:
 
 
 def variance_ratio(sample: np.ndarray | Sample, baseline: np.ndarray | Sample) -> Estimate:
-    """Return the variance of `sample` over that of `baseline`, from the same realizations (paired, on the log scale)."""
+    """Return the ratio of the variances of `sample` and `baseline`, from the same realizations (paired, on the log scale)."""
     sample, baseline = Sample.of(sample), Sample.of(baseline)
     variance_sample, variance_baseline = sample.moments[0], baseline.moments[0]
     if is_constant(sample) or is_constant(baseline):
@@ -204,7 +204,7 @@ def variance_ratio(sample: np.ndarray | Sample, baseline: np.ndarray | Sample) -
     ratio, n = variance_sample / variance_baseline, sample.count
     if n < MIN_VARIANCE:
         return Estimate(ratio, math.nan, math.nan)
-    # The addition for small samples is Bonett's for one variance.
+    # The correction for small samples is Bonett's for one variance.
     half = from_influence(0.0, squares + 3, n, fourths).upper * influence.widening
     return Estimate(ratio, ratio * math.exp(-half), ratio * math.exp(half))
 
@@ -212,7 +212,8 @@ def variance_ratio(sample: np.ndarray | Sample, baseline: np.ndarray | Sample) -
 def variance_from_moments(count: int, moment2: ArrayLike, moment4: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return variances from the second and the fourth central moment of samples, arrays of any shape.
 
-    The intervals are Bonett's (2006): on the log scale, standard errors from the fourth moment. The smallest samples have none.
+    The intervals are Bonett's (2006): on the log scale, with standard errors from the fourth moment. The smallest samples have
+    none.
     """
     moment2, moment4 = np.asarray(moment2), np.asarray(moment4)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -227,7 +228,7 @@ def variance_from_moments(count: int, moment2: ArrayLike, moment4: ArrayLike) ->
 
 
 def is_constant(x: Sample, accuracy: float = 0.0) -> bool:
-    """Return whether the spread of a sample may be mere rounding, or that of a solver with some accuracy."""
+    """Return whether the spread of a sample may be due to rounding, or to a solver with a finite accuracy."""
     return not x.moments[0] > max(8 * np.finfo(float).eps * abs(x.mean), accuracy) ** 2
 
 
@@ -236,13 +237,13 @@ def _unbiased(x: Sample) -> float:
 
 
 class _QuantileRanks(NamedTuple):
-    """Ranks, counted from 0: the bounds of a quantile's interval, and the two values that the quantile lies between."""
+    """Ranks, from 0: the bounds of a quantile's interval, and the two values around the quantile."""
 
     lower: int
     upper: int
     floor: int
     ceiling: int
-    fraction: float  # place of the quantile between the two values
+    fraction: float  # position of the quantile between the two values
 
     def widened(self, widening: float) -> "_QuantileRanks":
         """Return the ranks with the bounds moved away from the quantile by the factor `widening`."""
@@ -262,11 +263,11 @@ def _quantile_ranks(n: int, p: float) -> _QuantileRanks:
 
 
 def _values_at(x: Sample, ranks: Sequence[_QuantileRanks]) -> np.ndarray:
-    """Return the values (quantile, 4) at ranks, with ranks beyond the sample replaced by its extremes."""
+    """Return the values (quantile, 4) at ranks; ranks beyond the sample give its extremes."""
     return x.ordered([min(max(rank, 0), x.count - 1) for quantile in ranks for rank in quantile[:4]]).reshape(-1, 4)
 
 
 def _binomial_quantile(q: float, n: int, p: float) -> int:
-    """Return the least number of hits among n trials of probability p that is not exceeded with probability `q`."""
+    """Return the least number of hits among n trials of probability p that is not exceeded with probability q."""
     k = max(int(np.ceil(special.bdtrik(q, n, p))), 0)
     return k - 1 if k > 0 and special.bdtr(k - 1, n, p) >= q else k

@@ -4,7 +4,7 @@ import numpy as np
 
 from tolcontact.compiled import compiled
 
-CHUNK_POINTS = 256  # summed up in one pass over the realizations
+CHUNK_POINTS = 256  # per pass over the realizations
 
 
 @compiled
@@ -23,7 +23,7 @@ def affine_parts(poses, centre, A):  # type: ignore[no-untyped-def]
 
 @compiled
 def add_scatter(A, mean, scatter):  # type: ignore[no-untyped-def]
-    """Write the mean (3, 4) of A (n, 3, 4), and add to scatter (3, 4, 4) the products of each row's deviations from it."""
+    """Write the mean (3, 4) of A (n, 3, 4), and add the products of the rows' deviations from it to scatter (3, 4, 4)."""
     n = A.shape[0]
     for i in range(3):
         x = y = z = t = 0.0

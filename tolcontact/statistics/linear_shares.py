@@ -1,12 +1,12 @@
-"""Linear shares of variance: which contributors a measurement's variance comes from, by regression on the draws of the run.
+"""Linear shares of variance: the contributors to the variance of a measurement, by regression on the draws of the run.
 
 With deviations x (standardized), a measurement y and least squares y = b0 + b.x + e, the share of a group g of contributors is
 
     S_g = cov(b_g . x_g, y) / var(y),     and they sum up to R^2 = 1 - var(e) / var(y).
 
 For independent groups S_g is the share of variance that the group explains linearly. Least squares on n realizations with p
-contributors explain (1 - R^2) p / (n - 1 - p) of the variance by chance; each group is relieved of its part of that. What
-contact makes nonlinear is in 1 - R^2, and in no share. Intervals are by the delete-one-block jackknife with Student's t.
+contributors explain (1 - R^2) p / (n - 1 - p) of the variance by chance; each share is corrected for this overfitting.
+Nonlinear effects of contact are in 1 - R^2, and in no share. Intervals use the delete-one-block jackknife with Student's t.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from tolcontact.statistics import intervals
 
 BLOCKS = 20  # of the jackknife
 ROWS_PER_CONTRIBUTOR = 5  # fewer realizations give no shares
-MIN_R2 = 0.5  # below, linear shares do not describe a measurement
+MIN_R2 = 0.5  # below this, linear shares do not describe a measurement
 
 
 class LinearShares(NamedTuple):
@@ -29,14 +29,14 @@ class LinearShares(NamedTuple):
 
 
 def required_realizations(contributors: int) -> int:
-    """Return the smallest number of realizations from which shares are estimated."""
+    """Return the smallest number of realizations for an estimate of shares."""
     return max(ROWS_PER_CONTRIBUTOR * (contributors + 1), 10 * BLOCKS)
 
 
 def linear_shares(x: np.ndarray, y: np.ndarray, groups: Sequence[np.ndarray]) -> list[LinearShares | None]:
     """Return the shares of groups of columns of `x` (n, contributor) for each column of `y` (n, measure).
 
-    A column of `y` that does not vary, or is not finite, has none. Raises ValueError for too few realizations.
+    The result is None for a column of `y` that does not vary or is not finite. Raises ValueError for too few realizations.
     """
     n, count = x.shape
     if n < required_realizations(count):

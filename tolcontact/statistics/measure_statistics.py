@@ -36,7 +36,7 @@ class MeasuredValues:
 
     @cached_property
     def capability_as_normal(self) -> tuple[Estimate, Estimate]:
-        """Pp and Ppk as of a normal distribution."""
+        """Pp and Ppk for a normal distribution."""
         return capability.as_normal(self.sample, self.limits)
 
     def share(self, share: Callable[[Sample, Limits], Estimate]) -> Estimate:
@@ -65,7 +65,7 @@ STATISTICS: dict[str, Callable[[MeasuredValues], Estimate]] = {
 class MeasureEstimates(NamedTuple):
     """The estimates of all measures.
 
-    statistics  (measure, state, statistic, interval)  of all `STATISTICS`
+    statistics  (measure, state, statistic, interval)  all `STATISTICS`
     changes     (measure, change_of, interval)         from raw to corrected
     stops       (measure,)                             the sides, "lower" or "upper" or both, at which corrected values stop
                                                        (see without_stops)
@@ -110,6 +110,6 @@ def limits(rows: Rows) -> list[Limits]:
     else:
         nominal, half = rows[terms.MEASURE_NOMINAL.name].values, rows[terms.MEASURE_TOLERANCE.name].values / 2
         lower, upper = nominal - half, nominal + half
-    is_stated = terms.MEASURE_ACCURACY.name in rows  # archives of former versions do not state it
+    is_stated = terms.MEASURE_ACCURACY.name in rows  # archives of earlier versions do not state it
     accuracies = rows[terms.MEASURE_ACCURACY.name].values if is_stated else np.full(len(lower), GAP_ACCURACY)
     return [Limits(*map(float, values)) for values in zip(lower, upper, accuracies, strict=True)]

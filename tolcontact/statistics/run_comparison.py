@@ -1,4 +1,4 @@
-"""Comparison of runs: the statistics of the measures that they share, and their changes from the first run."""
+"""Comparison of runs: the statistics of their common measures, and the changes from the first run."""
 
 import json
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.statistics.sample import Sample, measured_sample
 from tolcontact.statistics.summary_dataset import summarize
 
-DRAW_ATTRIBUTES = ("seed", "sampler")  # attributes that determine the numbers of a realization
+DRAW_ATTRIBUTES = ("seed", "sampler")  # attributes that determine the random numbers of a realization
 
 
 def compare_runs(runs: Mapping[str, xr.DataTree]) -> xr.Dataset:
@@ -25,14 +25,14 @@ def compare_runs(runs: Mapping[str, xr.DataTree]) -> xr.Dataset:
         value        (run, state, measure, statistic, interval)   mean, 6 sigma, Ppk and the share outside its own limits
         change       (run, state, measure, change_of, interval)   shift of the mean, ratio of 6 sigma, shift of the share;
                                                                   NaN for the first run itself
-        furthest     (run, state, measure)     largest difference of a realization; NaN if the draws are not the same
+        furthest     (run, state, measure)     largest difference in a realization; NaN if the draws are not the same
         by_status    (run, status_meaning)     number of realizations
         penetration  (run, state)              largest true penetration of any contact point [mm]
         draws        (run)                     "same", "same seed" or "other", compared with the first run
 
-    Runs of the same seed are compared realization by realization, as far as both go; others as independent runs.
-    Raises OptionError if they share no measurement of the same name, units and quantity, ArchiveError for a run with too few
-    finished realizations.
+    Runs with the same seed are compared realization by realization, up to the length of the shorter one; others as independent
+    runs. Raises OptionError if they share no measurement of the same name, units and quantity, and ArchiveError for a run with
+    too few finished realizations.
     """
     (reference_name, reference), *_ = runs.items()
     summaries = {name: summarize(run) for name, run in runs.items()}
@@ -144,7 +144,7 @@ class _Change:
         return np.array([[self._estimates(measure, state) for measure in measures] for state in terms.STATES])
 
     def furthest(self, measures: list[str]) -> np.ndarray:
-        """Return the largest difference of a realization, (state, measure)."""
+        """Return the largest difference in a realization, (state, measure)."""
         return np.array([[self._furthest(measure, state) for measure in measures] for state in terms.STATES])
 
     def _samples(self, measure: str, state: str) -> list[Sample]:

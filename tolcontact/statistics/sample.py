@@ -1,4 +1,4 @@
-"""A sample that need not fit into memory: it is read piece by piece, as often as needed."""
+"""A sample that is read piece by piece, as often as needed, so that it need not fit into memory."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache, cached_property
@@ -14,9 +14,9 @@ MAX_SORTED_VALUES = 1 << 20  # larger samples are not sorted in memory
 MAX_KEPT_VALUES = 1 << 20  # more values are read from the file for each statistic
 DIGIT = 16  # bits
 COUNTED_DIGITS = 2
-MAX_PREFIXES = 16  # that are counted in one pass, in 25 MB
+MAX_PREFIXES = 16  # counted in one pass, in 25 MB
 MIN_REPLICATES = 16
-ROUNDING = 1e-20  # of the variance of realizations: less between replicates is none
+ROUNDING = 1e-20  # of the variance of realizations: a smaller variance between replicates counts as 0
 STANDARDIZED_MOMENTS = 17  # the fourth powers of influences on the fourth moment, and the zeroth
 
 
@@ -45,19 +45,19 @@ class Sample:
 
     @property
     def widening(self) -> float:
-        """The factor by which the interval of a mean of independent realizations must be widened; below 1 it is narrowed.
+        """The widening factor for the interval of a mean of independent realizations; a factor below 1 narrows it.
 
         The factor is the root of the design effect (Kish, 1965), the variance of the means of replicates over the variance of
-        means of independent realizations, with Student's t for the number of replicates. The last replicate may be incomplete.
-        Its sum varies as that of equally many realizations at the start of the others. The factor is 1 with fewer than
-        MIN_REPLICATES replicates, whose spread is too uncertain.
+        means of independent realizations, with Student's t for the number of replicates. The last replicate may be incomplete;
+        its sum varies like the sum of equally many realizations at the start of the others. The factor is 1 with fewer than
+        MIN_REPLICATES replicates, since their spread is too uncertain.
         """
         if self.replicate == 1:
             return 1.0
         replicates, rest = divmod(self.count, self.replicate)
         if replicates < MIN_REPLICATES or not self.moments[0] > 0:
             return 1.0
-        sums, start = np.zeros((2, replicates)), 0  # of all realizations of a replicate, and of as many as the last one has
+        sums, start = np.zeros((2, replicates)), 0  # over a whole replicate, and over as many realizations as the last one has
         for piece in self.pieces():
             numbers, places = np.divmod(start + np.arange(len(piece)), self.replicate)
             for k, counts in enumerate((places >= 0, places < rest)):
@@ -75,7 +75,7 @@ class Sample:
 
     @cached_property
     def mean(self) -> float:
-        # Summed from the first value on: the mean of equal numbers equals them to the last bit.
+        # Summed relative to the first value: the mean of equal numbers equals them to the last bit.
         origin = float(next(piece[0] for piece in self.pieces() if len(piece)))
         return origin + float(sum((piece - origin).sum() for piece in self.pieces()) / self.count)
 
@@ -101,16 +101,16 @@ class Sample:
         return sums / self.count
 
     def ordered(self, ranks: Sequence[int]) -> np.ndarray:
-        """Return the order statistics of some ranks, from 0 (least) to count - 1; NaN if a value is not finite.
+        """Return the order statistics at ranks from 0 (least) to count - 1; NaN if a value is not finite.
 
         A sample that does not fit into memory is not sorted. Its values are counted by their leading digits instead, and only
-        those with the leading digits of the wanted ones are sorted.
+        the values with the leading digits of the required ones are sorted.
         """
         if not np.isfinite(self.mean):
             return np.full(len(ranks), np.nan)
         if self.count <= self.max_sorted:
             return self._sorted[list(ranks)]
-        # The leading digits of the wanted keys, and the rank of each key among the values with these leading digits.
+        # The leading digits of the required keys, and the rank of each key among the values with these leading digits.
         prefixes, inner_ranks, bits = np.zeros(len(ranks), dtype=np.uint64), np.array(ranks, dtype=np.int64), 64
         for _ in range(COUNTED_DIGITS):
             bits -= DIGIT
@@ -134,7 +134,7 @@ class Sample:
         return np.sort(np.concatenate(list(self.pieces())))
 
     def _digit_counts(self, prefixes: np.ndarray, shift: int) -> np.ndarray:
-        """Return how often each digit follows each prefix in the keys shifted by `shift` bits, (prefix, digit)."""
+        """Return the counts (prefix, digit) of each digit after each prefix in the keys shifted by `shift` bits."""
         counts = np.zeros(len(prefixes) << DIGIT, dtype=np.int64)
         for piece in self.pieces():
             keys = _keys(piece) >> np.uint64(shift)
@@ -145,7 +145,7 @@ class Sample:
         return counts.reshape(len(prefixes), -1)
 
     def _counted_keys(self, prefixes: np.ndarray, shift: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the different keys, in order, that begin with a prefix (all but `shift` bits), and their numbers."""
+        """Return the distinct keys, in order, that begin with a prefix (all except `shift` bits), and their counts."""
         found, times = [np.zeros(0, np.uint64)], [np.zeros(0, np.int64)]
         for piece in self.pieces():
             keys = _keys(piece)
@@ -159,9 +159,9 @@ class Sample:
 
 
 def measured_sample(rows: Rows, measure: int, state: str) -> Sample:
-    """Return the values of a measure, given by number, in a state; they are read from the rows when needed.
+    """Return the values of a measure, given by its index, in a state; they are read from the rows when needed.
 
-    Not too many are read once, and kept for as long as the sample is.
+    Up to MAX_KEPT_VALUES are read once, and kept for the lifetime of the sample.
     """
     column = rows[[terms.MEASURED.name]].sel({terms.STATE: state}).isel({terms.MEASURE: measure})
     is_planned = rows.attrs.get("sampler", terms.MONTE_CARLO) != terms.MONTE_CARLO

@@ -1,24 +1,24 @@
-"""Sobol' indices: what share of a measure's variance comes from which contributors, with contact as well as without.
+"""Sobol' indices: the shares of a measure's variance that contributors cause, with contact as well as without.
 
 A measure f of independent groups of contributors has the indices
 
-    first order  S_i = Var(E[f | x_i]) / Var(f)          what fixing the group would remove on average
+    first order  S_i = Var(E[f | x_i]) / Var(f)          mean share that fixing the group would remove
     total        T_i = E[Var(f | all but x_i)] / Var(f)  share that remains if all others are fixed
 
 With A and B two independent sets of draws, and A_i the set A with group i from B (Saltelli et al., 2010; Jansen, 1999)
 
     S_i = mean(f(B) (f(A_i) - f(A))) / V,    T_i = mean((f(A) - f(A_i))^2) / 2 V,    V = mean(f(A)^2 + f(B)^2) / 2, f centred
 
-Of groups that are correlated neither says what a group's share is. Shapley effects do: each is what a group adds to the
-variance that those before it explain, or that remains without it, on average over all orders (Owen, 2014; Song, Nelson, Staum,
-2016). They add up to 1. With f_m a realization that has the groups of A at the first m places of a random order, and others
-redrawn, given these, the group at place m has
+For correlated groups neither index is a share. Shapley effects are: each is the variance that a group adds to the variance
+explained by the previous groups, averaged over all orders (Owen, 2014; Song, Nelson, Staum, 2016). They add up to 1. If f_m is
+a realization that has the groups of A at the first m positions of a random order, with the others redrawn conditional on these,
+the group at position m has
 
     Sh = mean((f(A) - f_m)^2 - (f(A) - f_{m+1})^2) / mean((f(A) - f_0)^2)
 
-Each is a ratio of means over independent base realizations, so its interval is that of Student's t for its influence function,
-with as many degrees of freedom as the spread of the influences is known by. A measure that contact nearly always holds at a
-stop has its variance from few realizations: from fewer than 100, an index has no interval.
+Each is a ratio of means over independent base realizations, so its interval is Student's t interval of its influence function,
+with the effective degrees of freedom of the spread of the influences. The variance of a measure that contact nearly always
+holds at a stop comes from few realizations: from fewer than 100, an index has no interval.
 """
 
 import math
@@ -27,14 +27,14 @@ import numpy as np
 
 from tolcontact.statistics.intervals import UNDEFINED, Estimate, from_influence
 
-MIN_EFFECTIVE = 100  # realizations that carry the variance: from fewer an index has no interval
-CONSTANT = 1e-24  # of the square of the mean: less variance than that is rounding
+MIN_EFFECTIVE = 100  # effective number of realizations behind the variance: with fewer, an index has no interval
+CONSTANT = 1e-24  # of the square of the mean: a smaller variance is rounding
 
 
 def sobol_indices(f: np.ndarray, accuracy: float = 0.0) -> tuple[list[Estimate], list[Estimate]]:
     """Return first-order and total indices of each group, for values f (n, 2 + group) of A, B, and A with each group from B.
 
-    What spreads by less than its accuracy has none.
+    A measure whose spread is below its accuracy has no indices.
     """
     mean = f[:, :2].mean()
     A, B, mixed = f[:, 0] - mean, f[:, 1] - mean, f[:, 2:] - mean
@@ -45,12 +45,12 @@ def sobol_indices(f: np.ndarray, accuracy: float = 0.0) -> tuple[list[Estimate],
     return [ratio(u, v) for u in first_order.T], [ratio(u, v) for u in total.T]
 
 
-def shapley_effects(f: np.ndarray, places: np.ndarray, accuracy: float = 0.0) -> list[Estimate]:
-    """Return each group's Shapley effect, for values f (n, 1 + group) with ever more groups of A, at `places` (n, group)."""
+def shapley_effects(f: np.ndarray, positions: np.ndarray, accuracy: float = 0.0) -> list[Estimate]:
+    """Return each group's Shapley effect, from f (n, 1 + group) with 0, 1, ... groups of A, at `positions` (n, group)."""
     remaining = (f[:, -1:] - f) ** 2
     if not np.isfinite(f).all() or not remaining[:, 0].mean() > max(CONSTANT * f.mean() ** 2, accuracy**2):
-        return [UNDEFINED] * places.shape[1]
-    reductions = np.take_along_axis(remaining[:, :-1] - remaining[:, 1:], places, axis=1)
+        return [UNDEFINED] * positions.shape[1]
+    reductions = np.take_along_axis(remaining[:, :-1] - remaining[:, 1:], positions, axis=1)
     return [ratio(u, remaining[:, 0]) for u in reductions.T]
 
 

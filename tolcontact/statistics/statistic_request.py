@@ -1,4 +1,4 @@
-"""The text "measure: statistic value", with which options name a statistic of a corrected measure."""
+"""The text "measure: statistic value" of options that name a statistic of a corrected measure."""
 
 import re
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ NO_VALUE, VALUE, HALF_WIDTH = "", rf" *{NUMBER}", rf" *(?:\+-|±) *{NUMBER} *(?P
 
 @dataclass(frozen=True)
 class StatisticRequest:
-    """A statistic of a measure, with the value above 0 that is required of it, if there is one.
+    """A statistic of a measure, with its required value above 0 if there is one.
 
     option      the name of the option, for messages
     is_percent  whether the value is followed by a percent sign
@@ -28,7 +28,7 @@ class StatisticRequest:
     def parse(
         cls, text: str, option: str, *, statistics: Sequence[str], form: str = NO_VALUE, examples: tuple[str, str]
     ) -> "StatisticRequest":
-        """Return the request that a text states. Raises OptionError for other texts, and other statistics than `statistics`."""
+        """Return the request that a text states. Raises OptionError for other texts, and for statistics not in `statistics`."""
         match = re.fullmatch(rf"(?P<measure>.+): *(?P<statistic>.+?){form}", text.strip()) if isinstance(text, str) else None
         fields = match.groupdict() if match else {}
         value = float(fields.get("value", "nan"))
@@ -40,7 +40,7 @@ class StatisticRequest:
         return cls(option, fields["measure"], fields["statistic"], value, fields.get("percent") is not None)
 
     def number_of(self, measures: Sequence[str]) -> int:
-        """Return the position of the measure among the names of a model's measures. Raises OptionError if it has none."""
+        """Return the index of the measure among the names of a model's measures. Raises OptionError if it is not there."""
         if self.measure not in measures:
             raise OptionError(f'{self.option} has the measurement "{self.measure}"; expected one of: {", ".join(measures)}')
         return list(measures).index(self.measure)

@@ -1,4 +1,4 @@
-"""The summary of a run: estimates of each measure, each part and the contact, read from its archive piece by piece."""
+"""The summary of a run: estimates of measures, parts and contact, read from its archive piece by piece."""
 
 from collections import Counter
 from typing import Any
@@ -47,7 +47,7 @@ def summary_table(results: Results) -> Table:
             "realizations": count,
             "samples": _planned_samples(results, count),
             **{name: results.attrs[name] for name in terms.METHOD_ATTRIBUTES},
-            "search": results.attrs.get("search", "fixed"),  # formats 1 and 2 do not say it
+            "search": results.attrs.get("search", "fixed"),  # formats 1 and 2 do not state it
             "datum_shifts": ", ".join(_datum_shifts(results)),
             "smallest_range": smallest,
             terms.INTERFERENCE_DEPTH: float(results.attrs.get(terms.INTERFERENCE_DEPTH, np.nan)),
@@ -65,7 +65,7 @@ def estimate_of(results: Results, measure: str, statistic: str) -> Estimate:
 
 
 def in_conflict(rows: Rows, rigid: np.ndarray) -> np.ndarray:
-    """Return which pairs contradict each other where no pose is free of penetration, (realization, pair) bool.
+    """Return the pairs that contradict each other where no pose is free of penetration, (realization, pair) bool.
 
     These are the `rigid` pairs (pair,) that still penetrate at the pose of least penetration.
     """
@@ -75,7 +75,7 @@ def in_conflict(rows: Rows, rigid: np.ndarray) -> np.ndarray:
 
 
 def _coordinates(rows: Rows, combinations: list[tuple[tuple[str, ...], int]]) -> dict[str, Any]:
-    """Return the labels of all dimensions, and what describes each measure."""
+    """Return the labels of all dimensions, and the descriptions of measures."""
     return {
         terms.MEASURE: rows[terms.MEASURE].values,
         terms.STATE: list(terms.STATES),
@@ -101,7 +101,7 @@ def _coordinates(rows: Rows, combinations: list[tuple[tuple[str, ...], int]]) ->
 
 
 def _status_values(rows: Rows, rigid: np.ndarray) -> dict[ArchiveVariable, Any]:
-    """Return how many realizations have each status, and the shares and the conflicts of `rigid` pairs that follow."""
+    """Return the number of realizations of each status, and the resulting shares and conflicts of `rigid` pairs."""
     by_status = np.sum([np.bincount(piece, minlength=len(terms.STATUS_MEANINGS)) for piece in statuses(rows)], axis=0)
     total, not_assemblable = int(by_status.sum()), by_status[terms.Status.NOT_ASSEMBLABLE]
     return {
@@ -113,7 +113,7 @@ def _status_values(rows: Rows, rigid: np.ndarray) -> dict[ArchiveVariable, Any]:
 
 
 def _contact_values(rows: Rows, combinations: list[tuple[tuple[str, ...], int]]) -> dict[ArchiveVariable, Any]:
-    """Return how often pairs carry, alone and in combinations, and their reactions."""
+    """Return how often pairs are under load, alone and in combinations, and their reactions."""
     total = rows.sizes[terms.REALIZATION]
     shares = np.array([intervals.proportion_of(count, total) for _, count in combinations])
     return {
@@ -124,7 +124,7 @@ def _contact_values(rows: Rows, combinations: list[tuple[tuple[str, ...], int]])
 
 
 def _field_values(results: Results) -> dict[ArchiveVariable, Any]:
-    """Return the extremes of the displacement fields, and how many realizations all of them cover."""
+    """Return the extremes of the displacement fields, and the number of realizations that all of them cover."""
     parts = [str(part) for part in results.to_dataset()[terms.PART].values]
     return {
         terms.FIELD_EXTREME: np.array([_field_extremes(results, part) for part in parts]),
@@ -134,7 +134,7 @@ def _field_values(results: Results) -> dict[ArchiveVariable, Any]:
 
 
 def _is_rigid(results: Results) -> np.ndarray:
-    """Return whether no point of a pair gives way (pair,)."""
+    """Return whether no point of a pair is compliant, (pair,)."""
     rigid = np.ones(results.to_dataset().sizes[terms.PAIR], dtype=bool)
     if terms.POINT_STIFFNESS.name in (contact := results["contact"].to_dataset()):
         gives = np.isfinite(contact[terms.POINT_STIFFNESS.name].values)
@@ -151,7 +151,7 @@ def _penetration(rows: Rows, rigid: np.ndarray) -> np.ndarray:
 
 
 def _steps(rows: Rows) -> list[float]:
-    """Return the median and the largest number of linear steps, of the realizations that took any."""
+    """Return the median and the largest number of linear steps, over the realizations with at least one."""
     counts: Counter[int] = Counter()
     for piece in pieces(rows[[terms.ITERATIONS.name]]):
         steps, times = np.unique(piece[terms.ITERATIONS.name].values, return_counts=True)
@@ -168,7 +168,7 @@ def _smallest_range(results: Results, rows: Rows) -> float:
     """Return the smallest tolerance range above 0 of any contributor or measure [mm]; infinite if there is none."""
     sample = results["sample"].to_dataset()
     contributors = sample[terms.TOLERANCE_RANGE.name].values
-    if terms.CONTRIBUTOR_UNITS.name in sample:  # archives up to format 3 have locators alone
+    if terms.CONTRIBUTOR_UNITS.name in sample:  # archives up to format 3 have only locators
         contributors = contributors[sample[terms.CONTRIBUTOR_UNITS.name].values == "mm"]
     ranges = np.concatenate(
         [contributors, rows[terms.MEASURE_TOLERANCE.name].values[rows[terms.MEASURE_UNITS.name].values == "mm"]]
@@ -177,7 +177,7 @@ def _smallest_range(results: Results, rows: Rows) -> float:
 
 
 def _datum_shifts(results: Results) -> list[str]:
-    """Return the features with a datum at maximum or least material, as part.feature."""
+    """Return the features with a datum at maximum or least material condition, as part.feature."""
     sample = results["sample"].to_dataset()
     if terms.DISTRIBUTION.name not in sample or terms.CONTRIBUTOR not in sample[terms.DISTRIBUTION.name].dims:
         return []
@@ -198,13 +198,13 @@ def _planned_samples(results: Results, count: int) -> int:
 
 
 def _quantities(rows: Rows) -> np.ndarray:
-    """Return the quantity of each measure; empty in archives before format 4, which do not state it."""
+    """Return the quantity of each measure; empty for archives before format 4, which do not state it."""
     is_stated = terms.QUANTITY.name in rows
     return np.asarray(rows[terms.QUANTITY.name].values if is_stated else [""] * rows.sizes[terms.MEASURE], dtype=object)
 
 
 def _field_extremes(results: Results, part: str) -> np.ndarray:
-    """Return 6 sigma of |u|, and its interval, where the archived field is least and largest, (state, extreme, interval)."""
+    """Return the least and the largest 6 sigma of |u| in the archived field, with intervals, (state, extreme, interval)."""
     extremes = np.full((len(terms.STATES), len(terms.EXTREMES), len(terms.ESTIMATE)), np.nan)
     if not _summed(results, part):
         return extremes
@@ -221,14 +221,14 @@ def _field_extremes(results: Results, part: str) -> np.ndarray:
 def _summed(results: Results, part: str) -> int:
     """Return the number of realizations in the field of a part; 0 while the field is being written."""
     field = _field(results, part)
-    if terms.FIELD_REALIZATIONS.name not in field:  # archives of format 1 have fields of all their rows, or none
+    if terms.FIELD_REALIZATIONS.name not in field:  # archives of format 1 have fields over all their rows, or none
         return results.to_dataset().sizes[terms.REALIZATION]
     is_written = int(field[terms.GROUP_CHECKSUM.name]) != terms.UNFINISHED
     return int(field[terms.FIELD_REALIZATIONS.name]) if is_written else 0
 
 
 def _magnitudes(results: Results, part: str) -> int:
-    """Return the number of realizations in the magnitude of a part's field; before format 3 all of the field's."""
+    """Return the number of realizations in the magnitude of a part's field; before format 3, all realizations of the field."""
     field, summed = _field(results, part), _summed(results, part)
     is_stated = terms.MAGNITUDE_REALIZATIONS.name in field
     return min(int(field[terms.MAGNITUDE_REALIZATIONS.name]), summed) if is_stated else summed

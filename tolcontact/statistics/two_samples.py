@@ -1,8 +1,8 @@
-"""Differences of two samples with 95 % intervals: samples of the same realizations (paired), or of different ones.
+"""Differences of two samples with 95 % intervals, for samples of the same realizations (paired) or of different ones.
 
-Realization k of both samples is one pair. Pairs are independent of each other whether or not their two members are, so paired
-intervals hold for any two runs of equally many realizations; equal draws make them narrow. Of runs with a sampling plan the
-replicates are independent, and their differences tell how wide intervals are (see Sample.widening).
+Realization k of both samples forms a pair. Pairs are independent of each other whether or not their two members are, so paired
+intervals hold for any two runs with the same number of realizations; equal draws make them narrow. In runs with a sampling plan
+the replicates are independent, and their differences determine the width of intervals (see Sample.widening).
 """
 
 import math
@@ -66,15 +66,15 @@ def share_shift(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:
 
 
 def _weight(x: Sample) -> float:
-    """Return how many independent realizations tell as much about the mean as one of a sample does.
+    """Return the number of independent realizations that determine the mean as well as one realization of a sample does.
 
-    It is 1 if replicates do not differ, since that is no reason to be sure of a share.
+    It is 1 if replicates do not differ, since that does not make a share certain.
     """
     widening = x.widening
     return 1 / widening**2 if widening > 0 else 1.0
 
 
 def _bounded(estimate: float, middle: float, error: float) -> Estimate:
-    """Return an estimate with the interval of a normal distribution, cut off at -1 and 1."""
+    """Return an estimate with the interval of a normal distribution, clipped to -1 and 1."""
     lower, upper = np.clip([middle - _Z * error, middle + _Z * error], -1, 1)
     return Estimate(estimate, min(float(lower), estimate), max(float(upper), estimate))

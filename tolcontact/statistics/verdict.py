@@ -1,4 +1,4 @@
-"""Verdicts: whether the share of a measurement out of specification is small enough, as far as the realizations can tell."""
+"""Verdicts on measurements: whether the 95 % interval of the share out of specification is small enough."""
 
 import math
 from typing import NamedTuple
@@ -7,7 +7,7 @@ import numpy as np
 
 from tolcontact.statistics import intervals
 
-ALLOWED_SHARE = 0.0027  # of a normal distribution beyond three standard deviations: Ppk 1 on both sides
+ALLOWED_SHARE = 0.0027  # share of a normal distribution beyond three standard deviations: Ppk 1 on both sides
 MEETS, FAILS, UNDECIDED = "meets", "does not meet", "undecided"
 GROWTH = 1.25  # of the number of realizations between two trials
 MAX_REALIZATIONS = 1e8  # more are not proposed
@@ -21,7 +21,7 @@ class Verdict(NamedTuple):
     """The verdict on a measurement.
 
     word   one of MEETS, FAILS, UNDECIDED
-    more   realizations that would probably decide, in addition; 0 if it is decided, infinite if too many
+    more   number of additional realizations that would probably decide; 0 if it is decided, infinite if too many
     """
 
     word: str
@@ -42,7 +42,7 @@ def _word(lower: float, upper: float) -> str:
 
 
 def _more(estimate: float, realizations: int) -> float:
-    """Return how many more independent realizations would decide if the estimate stayed as it is."""
+    """Return the number of additional independent realizations that would decide if the estimate did not change."""
     count = float(realizations)
     while count < MAX_REALIZATIONS:
         count *= GROWTH

@@ -28,12 +28,12 @@ from tolcontact.errors import OptionError
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.method import Method
 from tolcontact.testing.archived_datums import tangents
-from tolcontact.testing.referee import ArchivedPair, NotKeptError, Rows
+from tolcontact.testing.referee import ArchivedPair, MissingVariableError, Rows
 from tolcontact.workflow import build
 
 Results = xr.DataTree | str | Path
-NAMED_REALIZATIONS = 5  # by a message
-MAX_GAPS = 500_000  # that are computed together
+NAMED_REALIZATIONS = 5  # in a message
+MAX_GAPS = 500_000  # per pass
 
 
 def assert_resolved(results: Results) -> None:
@@ -50,9 +50,9 @@ def assert_resolved(results: Results) -> None:
 
 
 def assert_no_clashes(results: Results) -> None:
-    """Assert that all bodies were tested in every realization, and none without declared contact lie in each other.
+    """Assert that all bodies were tested in every realization, and none without declared contact penetrate each other.
 
-    Raises AssertionError with the number of realizations in which parts do, or that were not tested, and the first of them.
+    Raises AssertionError with the number of realizations with clashes, or without a test, and the first of them.
     """
     with _opened(results) as tree:
         rows, numbers = _rows(tree), _numbers(tree)
@@ -71,21 +71,21 @@ def assert_no_clashes(results: Results) -> None:
 def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) -> None:
     """Assert that the archived points, poses and deviations give the least gaps `gap_min` (realization, state, pair) [mm].
 
-    A referee computes the gaps again from the archive alone: n'(x_m - x_r), with x = R p + t, p a nominal contact point of the
-    moving or the reference part, n the nominal normal turned with the reference part; less the deviation of the one-sided
-    locator that a point stands for. The gap of a ball or a shaft beside a wall is their distance, from their sizes and places.
-    Faces of features are displaced in their parts first, and then moved outwards by their heights, and those of their forms.
-    The two results may differ by `within` [mm].
+    A referee recomputes the gaps from the archive alone: n'(x_m - x_r), with x = R p + t, p a nominal contact point of the
+    moving or the reference part, and n the nominal normal rotated with the reference part; the deviation of the unilateral
+    locator that a point represents is subtracted. The gap between a ball or a shaft and a wall is their distance, from their
+    sizes and positions. Faces of features are first displaced in their parts, then offset outwards by their sizes and form
+    deviations. The two results may differ by `within` [mm].
 
     Where faces end (pairs that the archive calls `bounded`), contact is searched again at the archived poses, between archived
-    bodies. This is the simulation's own search, so it tells poses and gaps that do not belong together, not a fault of the
-    search; `studies/certificates` judges that by exact distances.
+    bodies. This is the simulation's own search, so it detects inconsistent poses and gaps, not an error of the search itself;
+    `studies/certificates` checks the search by exact distances.
 
-    Unfinished realizations are skipped, and so are realizations whose `searched` is 1: their contact points were projected
-    again, and are not archived. (Archives of format 1 do not say which; all their realizations are compared.)
+    Unfinished realizations are skipped, and so are realizations with `searched` equal to 1: their contact points were
+    reprojected, and are not archived. (Archives of format 1 do not state this; all their realizations are compared.)
 
-    Raises AssertionError with the largest difference and its place; also if the archive does not hold the poses (or, for
-    one-sided locators, the deviations).
+    Raises AssertionError with the largest difference and its location; also if the archive does not contain the poses (or, for
+    unilateral locators, the deviations).
     """
     with _opened(results) as tree:
         rows, numbers = _rows(tree), _numbers(tree)
@@ -113,10 +113,10 @@ def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) ->
 
 
 def assert_datums_recompute(results: Results) -> None:
-    """Assert that the archived planes which touch datum features with form lie where they do, outside of the material.
+    """Assert that the archived tangent datum planes of features with form deviation are correct, and outside the material.
 
     A linear programme finds the plane with the least distance from the archived heights of each face, from the archive alone.
-    Raises AssertionError with the first realization whose plane is another one, and if the archive has no deviations.
+    Raises AssertionError with the first realization that has another plane, and if the archive has no deviations.
     """
     with _opened(results) as tree:
         rows, planes = _rows(tree), tangents(tree)
@@ -133,10 +133,10 @@ def assert_datums_recompute(results: Results) -> None:
 def assert_same_run(a: Results, b: Results, *, variables: Sequence[str] | None = None) -> None:
     """Assert that two runs have the same values in every realization, to the last bit (NaN equals NaN).
 
-    The labels are compared, and all variables of realizations, or the named ones: "measured", "gap_min", ... Attributes,
-    history, solver and displacement fields are not compared.
+    The comparison covers the labels, and all variables of realizations, or the named ones: "measured", "gap_min", ...
+    Attributes, history, solver and displacement fields are not compared.
 
-    Raises AssertionError with the number of variables that differ, and the first realization of the first of them.
+    Raises AssertionError with the number of variables that differ, and the first realization that differs in the first of them.
     """
     names = [variable.name for variable in terms.BY_REALIZATION]
     if unknown := [name for name in variables or () if name not in names]:
@@ -160,7 +160,7 @@ def assert_same_run(a: Results, b: Results, *, variables: Sequence[str] | None =
 
 @contextlib.contextmanager
 def _opened(results: Results) -> Iterator[xr.DataTree]:
-    """Open results as a tree; close them afterwards if they are given by the name of a file."""
+    """Open results as a tree; close them afterwards if they are given as a file name."""
     if isinstance(results, str | Path):
         with open_archive(results) as tree:
             yield tree
@@ -173,7 +173,7 @@ def _opened(results: Results) -> Iterator[xr.DataTree]:
 
 
 def _rows(tree: xr.DataTree) -> Rows:
-    """Return the variables of realizations that are kept; those of stations with the paths of their groups."""
+    """Return the archived variables of realizations; names in stations include the paths of their groups."""
     groups = [tree.to_dataset(), *(tree.children[name].to_dataset() for name in ("sample",) if name in tree.children)]
     stations = tree.children[terms.STATIONS_GROUP].children.values() if terms.STATIONS_GROUP in tree.children else ()
     rows = {str(name): values for group in groups for name, values in group.data_vars.items()}
@@ -185,7 +185,7 @@ def _rows(tree: xr.DataTree) -> Rows:
 
 
 def _rows_in_station(tree: xr.DataTree, rows: Rows, pair: int) -> Rows:
-    """Return the variables of realizations with the poses of the station in which a pair may touch."""
+    """Return the variables of realizations with the poses of the station where a pair may touch."""
     if terms.PAIR_STATION.name not in rows:
         return rows
     group = terms.station_group(str(rows[terms.PAIR_STATION.name].values[pair]))
@@ -209,13 +209,13 @@ def _meaning(status: int) -> str:
 
 
 def _listed(numbers: np.ndarray) -> str:
-    """Return the number of some realizations, and the first of them."""
+    """Return the count of realizations, and the first of their numbers."""
     named = ", ".join(map(str, numbers[:NAMED_REALIZATIONS]))
     return f"{len(numbers)} (realization {named}{', ...' if len(numbers) > NAMED_REALIZATIONS else ''})"
 
 
 def _meetings(tree: xr.DataTree) -> dict[int, tuple[Meeting, ContactPoints]]:
-    """Return where those pairs can touch whose faces end, and their contact points, from the archived model and method."""
+    """Return the meetings and contact points of pairs with bounded faces, from the archived model and method."""
     bounded = tree["contact"].to_dataset().get(terms.BOUNDED.name)
     if bounded is None or not bounded.values.any():
         return {}
@@ -225,7 +225,7 @@ def _meetings(tree: xr.DataTree) -> dict[int, tuple[Meeting, ContactPoints]]:
 
 
 def _comparable(rows: Rows) -> np.ndarray:
-    """Return whether the archive holds the contact points that `gap_min` refers to, (realization,)."""
+    """Return whether the archive contains the contact points that `gap_min` refers to, (realization,)."""
     comparable = rows[terms.STATUS.name].values != terms.UNFINISHED
     if terms.SEARCHED.name in rows:
         comparable &= rows[terms.SEARCHED.name].values != 1
@@ -236,14 +236,14 @@ def _least_gaps(pair: ArchivedPair, rows: Rows, piece: slice) -> np.ndarray:
     """Return the least gaps (realization, state) [mm] of a piece of the realizations."""
     try:
         return pair.gaps(rows, piece).min(axis=-1)
-    except NotKeptError as error:
+    except MissingVariableError as error:
         raise AssertionError(
             f'gaps cannot be computed again without {error}, which was not kept: tc.run(..., keep="all")'
         ) from error
 
 
 def _difference(name: str, expected: Rows, actual: Rows, numbers: np.ndarray) -> str:
-    """Return a text that tells where two runs differ in a variable; an empty one if they do not."""
+    """Return a text that states where two runs differ in a variable; an empty text if they do not."""
     if name not in expected or name not in actual:
         return "" if (name in expected) == (name in actual) else f'"{name}", which only one of them keeps'
     x, y = expected[name].values, actual[name].values

@@ -1,6 +1,6 @@
-"""The form of a face, computed from an archive alone, in another way than by the simulation.
+"""The form deviation of a face, computed from an archive alone, independently of the simulation.
 
-Sections and lines are not displaced: what displaces them is fitted to many places of each by least squares.
+Sections and lines are not displaced: their displacements are fitted to many points of each by least squares.
 """
 
 from collections.abc import Mapping
@@ -9,12 +9,12 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 
-TURNS = 32  # places around the axis
-STEPS = 16  # places along a line, at the roots of a Legendre polynomial
+AZIMUTHS = 32  # points around the axis
+LINE_POINTS = 16  # points along a line, at the roots of a Legendre polynomial
 
 
 class ArchivedForm:
-    """The form of a face with a number, from the group `contact` of an archive, variables by name."""
+    """The form deviation of a face by its number, from the group `contact` of an archive, variables by name."""
 
     def __init__(self, contact: Mapping[str, np.ndarray], face: int) -> None:
         def value(variable: terms.ArchiveVariable) -> np.ndarray:
@@ -33,11 +33,11 @@ class ArchivedForm:
         self._angle = value(terms.FORM_SURFACE["angle"])
 
     def heights(self, places: np.ndarray) -> np.ndarray:
-        """Return the heights (..., mode) of modes at places (..., 3) [mm]."""
+        """Return the heights (..., mode) of modes at points (..., 3) [mm]."""
         points = places.reshape(-1, 3)
-        heights = {"surface": self._functions, "circles": self._beside_circles, "lines": self._beside_lines}[self._associated](
-            points
-        )
+        heights = {"surface": self._functions, "circles": self._without_circles, "lines": self._without_lines}[
+            self._associated
+        ](points)
         n = self._normals(points)
         displacement = self._removed[:, 0] + n @ self._removed[:, 1:4].T + np.cross(points, n) @ self._removed[:, 4:].T
         return (heights - displacement).reshape(*places.shape[:-1], -1)
@@ -59,19 +59,19 @@ class ArchivedForm:
         }[self._covariance]
         return (factor * covariance) @ self._weights
 
-    def _beside_circles(self, points: np.ndarray) -> np.ndarray:
-        """Return the sums without the place and the diameter of each section, by least squares."""
+    def _without_circles(self, points: np.ndarray) -> np.ndarray:
+        """Return the sums without the position and the diameter of each section, by least squares."""
         arms = points - self._origin
         along = (arms @ self._axis)[:, None] * self._axis
-        turns = 2 * np.pi * np.arange(TURNS) / TURNS
+        turns = 2 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
         copies = [self._origin + along + np.cos(t) * (arms - along) + np.sin(t) * np.cross(self._axis, arms) for t in turns]
-        terms_ = np.column_stack([np.ones(TURNS), np.cos(turns), np.sin(turns)])
-        return self._beside(points, copies, np.linalg.pinv(terms_)[None], np.array([[1.0, 1.0, 0.0]]))
+        terms_ = np.column_stack([np.ones(AZIMUTHS), np.cos(turns), np.sin(turns)])
+        return self._minus_fit(points, copies, np.linalg.pinv(terms_)[None], np.array([[1.0, 1.0, 0.0]]))
 
-    def _beside_lines(self, points: np.ndarray) -> np.ndarray:
-        """Return the sums without the place and the slope of each line, by least squares over even places."""
+    def _without_lines(self, points: np.ndarray) -> np.ndarray:
+        """Return the sums without the position and the slope of each line, by least squares over even points."""
         (start, end), along = self._ends, (points - self._origin) @ self._axis
-        nodes, weights = np.polynomial.legendre.leggauss(STEPS)
+        nodes, weights = np.polynomial.legendre.leggauss(LINE_POINTS)
         targets = (start + end) / 2 + (end - start) / 2 * nodes
         if self._kind == "cone":
             copies = [self._origin + (target / along)[:, None] * (points - self._origin) for target in targets]
@@ -79,13 +79,13 @@ class ArchivedForm:
             copies = [points + (target - along)[:, None] * self._axis for target in targets]
         root = np.sqrt(weights)
         terms_ = np.column_stack([root, root * nodes])
-        own = np.column_stack([np.ones(len(points)), (2 * along - start - end) / (end - start)])
-        return self._beside(points, copies, (np.linalg.pinv(terms_) * root)[None], own)
+        point_terms = np.column_stack([np.ones(len(points)), (2 * along - start - end) / (end - start)])
+        return self._minus_fit(points, copies, (np.linalg.pinv(terms_) * root)[None], point_terms)
 
-    def _beside(self, points: np.ndarray, copies: list[np.ndarray], fit: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """Return the sums at points less the fit (1, term, copy) to those at copies of each, by terms `own` (point, term)."""
+    def _minus_fit(self, points: np.ndarray, copies: list[np.ndarray], fit: np.ndarray, point_terms: np.ndarray) -> np.ndarray:
+        """Return the sums at points minus their fit (1, term, copy) to the sums at copies, by `point_terms` (point, term)."""
         values = np.stack([self._functions(places) for places in copies], axis=1)  # (point, copy, mode)
-        return self._functions(points) - ((own @ fit[0])[:, None] @ values)[:, 0]
+        return self._functions(points) - ((point_terms @ fit[0])[:, None] @ values)[:, 0]
 
     def _azimuth(self, points: np.ndarray) -> np.ndarray:
         u = np.cross(self._axis, np.roll(self._axis, 1) + np.array([0.3, 0.2, 0.1]))

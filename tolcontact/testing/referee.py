@@ -1,8 +1,8 @@
-"""The referee: gaps computed from an archive alone, in another way than by the simulation.
+"""The referee: gaps computed from an archive alone, independently of the simulation.
 
-No run uses it: equations of gaps stand in `mechanics/`, and this is what the assert compares them with. The distance of a ball
-from a wall is the distance of its centre, less its radius. A shaft inside a wall is as far from the wall as its end is from the
-nearest of the wall's tangent planes: the referee tries all directions, and narrows the nearest one down.
+No run uses it: the equations of gaps are in `mechanics/`, and the assertion compares them with the results of this module. The
+distance of a ball from a wall is the distance of its centre minus its radius. The distance of a shaft inside a wall is the
+distance of its end from the nearest tangent plane of the wall: the referee samples all directions, and refines the nearest one.
 """
 
 from collections.abc import Callable, Mapping
@@ -18,19 +18,19 @@ from tolcontact.geometry.meeting import Meeting
 from tolcontact.geometry.surface import Surface
 from tolcontact.testing.archived_form import ArchivedForm
 
-DIRECTIONS = 72  # that are tried at first
+DIRECTIONS = 72  # initial samples
 NARROWINGS = 60
 POSES_AT_ONCE = 256
 GOLDEN = (np.sqrt(5) - 1) / 2
 Rows = Mapping[str, xr.DataArray]  # variables (realization, ...) by name
 
 
-class NotKeptError(LookupError):
-    """An error of an archive that does not keep a variable which gaps are computed from."""
+class MissingVariableError(LookupError):
+    """An error for an archive without a variable that the computation of gaps needs."""
 
 
 def archived_points(contact: Mapping[str, np.ndarray], points: np.ndarray) -> "list[ArchivedPoint]":
-    """Return those of the contact points with numbers `points` (point,) that belong to round faces.
+    """Return the contact points that belong to round faces, out of the indices `points` (point,).
 
     contact   variables of the archive's group of that name, by name
     """
@@ -48,7 +48,7 @@ def archived_points(contact: Mapping[str, np.ndarray], points: np.ndarray) -> "l
 
 
 class ArchivedPoint(NamedTuple):
-    """A ball, or the end of a shaft, and a wall; their values by the names of the vocabulary."""
+    """A ball, or the end of a shaft, and a wall, with values named as in the vocabulary."""
 
     wall: Mapping[str, Any]
     body: Mapping[str, Any]
@@ -56,28 +56,28 @@ class ArchivedPoint(NamedTuple):
     def gaps(self, R: np.ndarray, t: np.ndarray, of_moving: Any = 0.0, of_reference: Any = 0.0) -> np.ndarray:
         """Return gaps (...) [mm] with the moving part at R (..., 3, 3), t (..., 3) [mm] in the reference part's frame.
 
-        The moving face has grown by `of_moving` (...), the reference face by `of_reference` (...) [mm].
+        The moving face is offset outwards by `of_moving` (...), the reference face by `of_reference` (...) [mm].
         """
         of_body, of_wall = (of_moving, of_reference) if self.body["on_moving"] else (of_reference, of_moving)
         grown = ArchivedPoint(self.wall, {**self.body, "radius": self.body["radius"] + of_body})
-        return grown._gaps_as_large(R, t) - of_wall
+        return grown._nominal_gaps(R, t) - of_wall
 
-    def _gaps_as_large(self, R: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Return gaps (...) [mm] at these poses, of faces that have not grown."""
+    def _nominal_gaps(self, R: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Return gaps (...) [mm] at these poses, for faces without offset."""
         if not self.body["on_moving"]:
             R = R.swapaxes(-1, -2)
             t = -np.einsum("...ij,...j->...i", R, t)
         centre, axis = R @ self.body["centre"] + t, R @ self.body["axis"]
         if terms.SURFACE_KINDS[self.wall["kind"]] == "plane":
-            return self._beside(-self.wall["axis"], centre, axis)
+            return self._distance_from_plane(-self.wall["axis"], centre, axis)
         if self.body["axis"].any():
-            return self._nearest(lambda e: self.wall["radius"] + self._beside(e, centre, axis), centre.shape[:-1])
+            return self._nearest(lambda e: self.wall["radius"] + self._distance_from_plane(e, centre, axis), centre.shape[:-1])
         offset = centre - self.wall["origin"]
         gap = self._inside(offset) if self.body["is_hollow"] else self._distance(offset)
         return gap - self.body["radius"]
 
-    def _beside(self, e: np.ndarray, centre: np.ndarray, axis: np.ndarray) -> np.ndarray:
-        """Return the distance from the plane through the wall's point with normal e (..., 3), which points into the wall."""
+    def _distance_from_plane(self, e: np.ndarray, centre: np.ndarray, axis: np.ndarray) -> np.ndarray:
+        """Return the distance from the plane through the wall's point with normal e (..., 3) into the wall."""
         tilt = (e * axis).sum(axis=-1)
         stretch = np.sqrt(1 - tilt**2)
         if self.body["cut"].any():
@@ -87,7 +87,7 @@ class ArchivedPoint(NamedTuple):
         return -(e * (centre - self.wall["origin"])).sum(axis=-1) - self.body["radius"] * stretch
 
     def _nearest(self, gap: Callable[[np.ndarray], np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
-        """Return the least gap (...) of all directions that the wall has."""
+        """Return the least gap (...) over all directions of the wall."""
         x, opening = self.body["towards"], self.body["opening"]
         y = np.cross(self.wall["axis"], x)
 
@@ -142,20 +142,20 @@ class ArchivedFaces:
         return twist[:, :3], twist[:, 3:]
 
     def height(self, face: int, deviations: np.ndarray) -> np.ndarray:
-        """Return by how much a face has grown outwards (realization,) [mm]; 0 for face -1."""
+        """Return the outward offset of a face (realization,) [mm]; 0 for face -1."""
         if face < 0:
             return np.zeros(len(deviations))
         return deviations @ self._contact[terms.FACE_HEIGHT.name][face]
 
     def modes(self, face: int, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return contributors (mode,), and their heights (..., mode) at places (..., 3) [mm], of the form of a face."""
+        """Return the contributors (mode,) of the form of a face, and their heights (..., mode) at points (..., 3) [mm]."""
         if face < 0 or terms.FORM_COVARIANCE.name not in self._contact or not self._contact[terms.FORM_COVARIANCE.name][face]:
             return np.zeros(0, dtype=int), np.zeros((*places.shape[:-1], 0))
         columns = self._contact[terms.FORM_CONTRIBUTOR.name][face]
         return columns[columns >= 0], ArchivedForm(self._contact, face).heights(places)[..., columns >= 0]
 
     def form(self, face: int, deviations: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """Return the heights (realization, place) [mm] of the form of a face at places (place, 3), or one place each."""
+        """Return the form deviation (realization, point) [mm] of a face at points (point, 3), or at one point each."""
         columns, heights = self.modes(face, places)
         if places.ndim == 2:
             return deviations[:, columns] @ heights.T if columns.size else np.zeros((len(deviations), len(places)))
@@ -175,7 +175,7 @@ class ArchivedFaces:
         return np.asarray(self._sample[terms.LOCATOR_DIRECTION.name][locators])
 
     def pushes(self, locators: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        """Return how far locators move their parts (realization, locator) [mm]."""
+        """Return the displacements (realization, locator) [mm] of parts by their locators."""
         pushes = deviations[:, locators].copy()
         none = np.full(max(locators, default=0) + 1, -1)
         for variable, sign in ((terms.FACE_OF_LOCATOR, -1.0), (terms.GROUND_OF_LOCATOR, 1.0)):
@@ -192,10 +192,10 @@ class ArchivedFaces:
 
 
 class ArchivedPair:
-    """The nominal contact points of a pair, and where the archived poses put them.
+    """The nominal contact points of a pair, and their positions at the archived poses.
 
-    With a `meeting`, the pair touches where its faces end, at places that are found again at the archived poses; with form
-    also between them, at points of the `nominal` pair.
+    With a `meeting`, the faces are bounded, and contact points are searched again at the archived poses; with form deviation
+    the pair also touches in between, at points of the `nominal` pair.
     """
 
     def __init__(
@@ -224,13 +224,13 @@ class ArchivedPair:
 
     @property
     def _needs_deviations(self) -> bool:
-        """Whether deviations matter beside poses: of supports, and of faces that deviate."""
+        """Whether gaps depend on deviations as well as on poses: for supports, and for deviating faces."""
         return bool((self.locators >= 0).any()) or max(self.moving_face, self.reference_face) >= 0
 
     def gaps(self, rows: Rows, piece: slice) -> np.ndarray:
         """Return the gaps (realization, state, point) [mm] of a piece of the realizations.
 
-        Raises NotKeptError, with the name of a variable that they need and the archive does not have.
+        Raises NotKeptError, with the name of a required variable that the archive does not have.
         """
         moving, reference = (_pose(rows, piece, part) for part in (self.moving_part, self.reference_part))
         deviations = _needed(rows, terms.DEVIATION.name, piece) if self._needs_deviations else np.zeros((1, 0))
@@ -245,7 +245,7 @@ class ArchivedPair:
                 return (self._gaps_at_ends(turn @ R_m, offset, deviations) - sum(grown))[..., None]
             grown = (of_moving[:, None], of_reference[:, None] - self.coordinate_error)
             return np.stack([point.gaps(turn @ R_m, offset, *grown) for point in self.round], axis=-1)
-        # (R_m P_m + t_m - R_r P_r - t_r) . R_r n / |R_r n|, multiplied out: sums over points that matrix products form.
+        # (R_m P_m + t_m - R_r P_r - t_r) . R_r n / |R_r n|, expanded into sums over points that are matrix products.
         back, n = R_r.swapaxes(-1, -2), self.normal
         offset = np.einsum("...ij,...j->...i", np.broadcast_to(back, R_m.shape), t_m - t_r)
         from_moving = _products(back @ R_m, n, self.moving_point) + offset @ n.T
@@ -263,7 +263,7 @@ class ArchivedPair:
         return gaps
 
     def _form(self, deviations: np.ndarray, P_m: np.ndarray, P_r: np.ndarray) -> np.ndarray:
-        """Return the heights (realization, place) [mm] of the forms of both faces at their places P_m, P_r."""
+        """Return the sum of the form deviations (realization, point) [mm] of both faces at their points P_m, P_r."""
         return self.faces.form(self.moving_face, deviations, P_m) + self.faces.form(self.reference_face, deviations, P_r)
 
     @property
@@ -271,7 +271,7 @@ class ArchivedPair:
         return any(self.faces.modes(face, np.zeros((1, 3)))[0].size for face in (self.moving_face, self.reference_face))
 
     def _gaps_at_ends(self, R: np.ndarray, t: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        """Return least gaps (realization, state) [mm] of all places, above faces that have not grown.
+        """Return the least gaps (realization, state) [mm] over all contact points, for faces without offset.
 
         The moving part is at R (realization, state, 3, 3), t (realization, state, 3) [mm] in the reference part's frame.
         """
@@ -290,7 +290,7 @@ class ArchivedPair:
         return np.concatenate(pieces).reshape(R.shape[:-2])
 
     def _gaps_over_face(self, X_RM: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        """Return gaps (n, point) [mm] of points between the ends of the faces; infinite ones of points beside them."""
+        """Return gaps (n, point) [mm] of points inside the faces; infinite for points outside their rims."""
         assert self.nominal is not None
         rim, R, t = rim_points(self.nominal, X_RM), X_RM[:, :9].reshape(-1, 3, 3), X_RM[:, None, 9:]
         moved = self.moving_point @ R.swapaxes(1, 2) + t
@@ -303,13 +303,13 @@ class ArchivedPair:
 
 
 def _are_over(face: Surface | None, places: np.ndarray) -> np.ndarray:
-    """Return whether places (n, place, 3) stand over a face, by their nearest points on its triangles."""
+    """Return whether points (n, point, 3) are over a face, according to their nearest points on its triangles."""
     assert face is not None
     return np.asarray(face.project(places.reshape(-1, 3))[2].reshape(places.shape[:2]))
 
 
 def _products(matrix: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return a . matrix b (..., point) of matrices (..., 3, 3) and vectors (point, 3)."""
+    """Return a . matrix b (..., point) for matrices (..., 3, 3) and vectors (point, 3)."""
     entries = a[:, :, None] * b[:, None, :]
     return matrix.reshape(*matrix.shape[:-2], 9) @ entries.reshape(-1, 9).T
 
@@ -323,5 +323,5 @@ def _pose(rows: Rows, piece: slice, part: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _needed(rows: Rows, name: str, piece: slice) -> np.ndarray:
     if name not in rows:
-        raise NotKeptError(f'"{name}"')
+        raise MissingVariableError(f'"{name}"')
     return np.asarray(rows[name][piece].values)

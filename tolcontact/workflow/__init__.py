@@ -1,4 +1,4 @@
-"""The whole flow from Python: run, build, check, compare, summarize, and methods of results. A chapter of the guide.
+"""The whole workflow in Python: run, build, check, compare, summarize, and methods of results. A chapter of the guide.
 
 All these functions accept a model as an assembly, as the function that declares it, or as the path of its script.
 
@@ -55,7 +55,7 @@ ones.
 >>> designs.design.values.tolist()[:2]
 ['stand, linearized, seed 1', 'stand, linearized, seed 2']
 >>> spreads = designs.measured.sel(state="raw").std("realization")  # one graph, which workers may share
->>> bool((spreads.groupby("seed").std() < 1e-12).all())  # the raw state does not know how contact is resolved
+>>> bool((spreads.groupby("seed").std() < 1e-12).all())  # the raw state does not depend on how contact is resolved
 True
 
 `tc.compare` runs several solvers or methods on the same draws, and reports agreement, failures, residuals and time.
@@ -76,8 +76,8 @@ narrow; other runs are compared as independent samples.
 >>> str(comparison.draws.sel(run="linearized").values), change.dims
 ('same', ('state', 'measure', 'interval'))
 
-`tc.check_population` draws the features of a model and measures them as a coordinate measuring machine would: it returns the
-share inside every zone, with its interval, beside the stated share (see `tolcontact.variation`).
+`tc.check_population` draws the features of a model and measures them as a coordinate measuring machine would. It returns the
+share inside every zone, with its interval, and the stated share (see `tolcontact.variation`).
 
 `tolcontact.analyses` has further analyses of a model.
 
@@ -90,7 +90,7 @@ Methods of results are under `results.tolcontact`, also for archives that were o
 >>> results.tolcontact.where_status("not_assemblable").sizes["realization"]
 0
 
-`results.tolcontact.plot` has the pictures of `tolcontact.plot`.
+`results.tolcontact.plot` draws the pictures of `tolcontact.plot`.
 
 `tc.summarize` returns the statistics of results, or of the archive at a path (see `tolcontact.statistics`).
 

@@ -50,7 +50,7 @@ class Plots:
 
 
 class Results:
-    """The verbs of results. A notebook shows them as figures and a report."""
+    """The methods of results. A notebook shows them as figures and a report."""
 
     def __init__(self, results: xr.DataTree) -> None:
         self._results = results
@@ -102,7 +102,7 @@ class Results:
         return self._results.isel({terms.REALIZATION: rows})
 
     def touching(self) -> xr.Dataset:
-        """Return the places of contact points and how often they touch (see tolcontact.statistics.touching)."""
+        """Return the positions of contact points and how often they touch (see tolcontact.statistics.touching)."""
         return touching(self._results)
 
     def __repr__(self) -> str:

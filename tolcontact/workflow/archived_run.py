@@ -18,7 +18,7 @@ from tolcontact.workflow.run_sums import RunSums
 from tolcontact.workflow.until import Target
 
 SURFACES = 64
-RunProgress = Callable[[int], None]  # is called with the number of finished realizations
+RunProgress = Callable[[int], None]  # called with the number of finished realizations
 
 log = logging.getLogger(__name__)
 
@@ -36,7 +36,7 @@ def write_run(
     client: Any = None,
     progress: RunProgress | None = None,
 ) -> Path:
-    """Simulate into the archive `out` (see `run`), and return the path of the file, which is another if `out` is a link."""
+    """Simulate into the archive `out` (see `run`), and return the path of the file; it differs from `out` if that is a link."""
     check_counts(samples=settings.samples, seed=settings.seed, surfaces=settings.surfaces)
     _check_choices(settings)
     check_program(model, solver, method)
@@ -55,7 +55,7 @@ def write_run(
 
 
 def _check_choices(settings: Run) -> None:
-    """Raise OptionError for a choice that `run` does not offer."""
+    """Raise OptionError for an invalid choice of `run`."""
     keep, fields, plan = settings.keep, settings.fields, settings.plan
     if keep not in KEPT:
         raise OptionError(f"keep is {keep!r}; expected one of: {', '.join(KEPT)}")
@@ -94,7 +94,7 @@ def write_archive(
 def _simulate(
     program: Program, writer: ArchiveWriter, sums: RunSums, seed: int, blocks: MapBlocks, progress: RunProgress | None
 ) -> None:
-    """Simulate the rows that an archive lacks, write them with their sums, and check some against the surfaces."""
+    """Simulate the missing rows of an archive, write them with their sums, and check some of them against the surfaces."""
     sums.start_from(writer)
     is_summed = bool(writer.rows)
     try:
@@ -112,7 +112,7 @@ def _simulate(
     except KeyboardInterrupt:
         if is_summed and writer.is_between_blocks:
             writer.write_checkpoint(sums.numbers)
-        elif not is_summed:  # the interrupt may have come within a sum: only sums of the last checkpoint are sure
+        elif not is_summed:  # the interrupt may have come during a summation: only the sums of the last checkpoint are valid
             is_summed = sums.start_from(writer)
         if is_summed:
             sums.write_to(writer)

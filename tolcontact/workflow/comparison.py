@@ -1,4 +1,4 @@
-"""Comparisons: of runs in archives, and of solvers and methods on the same draws."""
+"""Comparisons of runs in archives, and of solvers and methods on the same draws."""
 
 import itertools
 import time
@@ -28,7 +28,7 @@ from tolcontact.workflow.lazy_runs import simulate
 from tolcontact.workflow.models import Choice, Model, assembly_of, check_counts, method_of, program_of
 
 WARM_UP_ROWS = 64  # realizations before the clock starts
-SELF_EXPLANATORY = ("resolution", "objective")  # choices whose values need no name beside them
+SELF_EXPLANATORY = ("resolution", "objective")  # choices with values that are clear without their names
 QUANTILES = {"median": 0.5, "largest": 1.0}
 
 
@@ -43,19 +43,19 @@ def compare(
 ) -> xr.Dataset:
     """Simulate the same realizations of a model (see `build`) with each solver and method.
 
-    Differences are taken from the first one, in the corrected state. Labels along the dimension `solver` name the solver and
-    the choices in which the methods differ.
+    Differences are relative to the first one, in the corrected state. Labels along the dimension `solver` name the solver and
+    the choices that differ between the methods.
 
         seconds            (solver)                   wall time of all realizations, from draws to measures [s]
         by_status          (solver, status_meaning)   number of realizations
-        kkt_residual       (solver)                   largest of the certified realizations [mm]
-        penetration        (solver)                   largest true penetration left [mm]
+        kkt_residual       (solver)                   largest value in the certified realizations [mm]
+        penetration        (solver)                   largest remaining true penetration [mm]
         pose_difference    (solver, extent)           largest distance of a part's bounding corners between both answers [mm]
         measure_difference (solver, extent, measure)  in the measure's units
         both_resolved      (solver)                   number of realizations that the differences cover
 
-    With a `client` of dask.distributed its workers simulate (see tolcontact.simulation); all but `seconds` is the same to the
-    last bit.
+    With a `client` of dask.distributed its workers simulate (see tolcontact.simulation); all results except `seconds` are the
+    same to the last bit.
     Raises OptionError for a solver that cannot be used or is named twice, and ModelError for a model with faults.
     """
     check_counts(samples=samples, seed=seed)
@@ -95,7 +95,7 @@ def compare(
 
 
 def _programs(assembly: Assembly, contestants: Sequence[tuple[str, Method]]) -> list[Program]:
-    """Return the program of each solver and method, and warn of what is probably a mistake in the nominal assembly."""
+    """Return the program of each solver and method, and warn of probable mistakes in the nominal assembly."""
     presses = dict.fromkeys(method.minimizes.presses for _, method in contestants)
     nominals = {choice: discretize(assembly, presses=choice) for choice in presses}
     programs = [compile_program(nominals[method.minimizes.presses], solver, method) for solver, method in contestants]
@@ -121,7 +121,7 @@ def _timed_results(program: Program, blocks: MapBlocks, samples: int, seed: int)
     seconds = time.perf_counter() - start
     names = ("status", "kkt_residual", "poses", "measured", "gap_min")
     arrays = dict(zip(names, map(np.concatenate, zip(*results, strict=True)), strict=True))
-    rigid = [not pair.is_springy for pair in program.nominal.pairs]  # what gives way does not penetrate
+    rigid = [not pair.is_springy for pair in program.nominal.pairs]  # compliant pairs do not count as penetrating
     return {"seconds": seconds, **arrays, "gap_min": arrays["gap_min"][:, rigid]}
 
 
@@ -131,7 +131,7 @@ def _compared(block: Block) -> tuple[np.ndarray, ...]:
 
 
 def distinctions(method: Method, methods: Sequence[Method]) -> list[str]:
-    """Return the choices of a method in which `methods` differ, in words; without searches that follow from the resolution."""
+    """Return the choices of a method that differ among `methods`, in words, except searches implied by the resolution."""
     values = {
         field.name: getattr(method, field.name)
         for field in fields(Method)

@@ -25,7 +25,7 @@ MAX_SECONDS = 30 * 86_400.0
 def announce(program: Program, *, samples: int, seed: int, keep: str, threads: int) -> None:
     """Log a warning with the time and space that `samples` more realizations need on `threads` threads, if that is much.
 
-    Raises OptionError if nobody can wait for it.
+    Raises OptionError if the run would take more than 30 days.
     """
     if samples < MIN_ANNOUNCED_ROWS and block_rows(program) == BLOCK_ROWS:
         return
@@ -43,7 +43,7 @@ def announce(program: Program, *, samples: int, seed: int, keep: str, threads: i
 
 
 def check_affordable(program: Program, *, samples: int, seed: int, threads: int, kept: int | None = None) -> None:
-    """Raise OptionError if `samples` realizations, with `kept` numbers kept of each, would take too much time or memory.
+    """Raise OptionError if `samples` realizations, with `kept` stored numbers each, would take too much time or memory.
 
     By default the numbers are deviations, and measures in both states.
     """
@@ -53,7 +53,7 @@ def check_affordable(program: Program, *, samples: int, seed: int, threads: int,
 
 
 def check_memory(samples: int, kept: int) -> None:
-    """Raise OptionError if the machine has no memory for `kept` numbers of each of `samples` realizations."""
+    """Raise OptionError if the machine has too little memory for `kept` numbers in each of `samples` realizations."""
     needed = np.dtype(float).itemsize * samples * kept
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if needed > memory:
@@ -64,7 +64,7 @@ def check_memory(samples: int, kept: int) -> None:
 
 
 def _checked_seconds(program: Program, samples: int, seed: int, threads: int) -> float:
-    """Return the time that `samples` realizations need on some threads [s]. Raises OptionError if nobody can wait for it."""
+    """Return the time [s] that `samples` realizations need on `threads` threads. Raises OptionError above 30 days."""
     seconds = _seconds_per_realization(program, seed) / threads
     if seconds * samples > MAX_SECONDS:
         raise OptionError(
@@ -75,7 +75,7 @@ def _checked_seconds(program: Program, samples: int, seed: int, threads: int) ->
 
 
 def _seconds_per_realization(program: Program, seed: int) -> float:
-    """Return the time of a realization [s], from trials of growing size, at most a block."""
+    """Return the time per realization [s], from trials of growing size, at most a block."""
     trial = FIRST_TRIAL_ROWS
     list(simulate_blocks(program, samples=trial, seed=seed, threads=1))  # loading takes longer than a block
     while True:

@@ -16,7 +16,7 @@ from tolcontact.simulation import Block
 from tolcontact.simulation.lazy import chunk_rows, dask_arrays, lazy_draws, lazy_realizations
 from tolcontact.workflow.models import Choice, Model, check_counts, program_of
 
-ARCHIVE_SETTINGS = ("kept", "fields")  # settings of a run that do not concern its realizations
+ARCHIVE_SETTINGS = ("kept", "fields")  # settings of a run that do not affect its realizations
 
 
 def simulate(
@@ -30,12 +30,12 @@ def simulate(
     """Return the realizations of a run as a lazy dataset with the variables of archives; nothing is simulated yet.
 
     `samples` is the number of realizations, or an xarray.DataArray of deviations (realization, contributor), in memory or
-    chunked. Contributors of that array are labelled, or stand in the order of the model; labels of realizations are kept. The
+    chunked. Contributors of that array are labelled, or are in the order of the model; labels of realizations are kept. The
     `seed` has no effect on it.
     Each variable is a dask array. Its chunks are simulated when a computation needs them, and are not stored: by threads of
     this process, or by the workers of the latest client of dask.distributed. `to_netcdf`, `to_zarr` and reductions such as
     `.measured.mean("realization")` stream. Two computations simulate twice.
-    Drawn realizations equal those of `run` to the last bit, however dask schedules them.
+    Drawn realizations equal the realizations of `run` to the last bit, regardless of how dask schedules them.
     Raises ModelError, and OptionError for options or deviations that cannot be used, or if dask is not installed.
     """
     program = program_of(model, solver, method)

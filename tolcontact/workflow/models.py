@@ -1,4 +1,4 @@
-"""Models: what `run` and the analyses take, from the path of a script or an archive to the compiled program."""
+"""Models, the input of `run` and of analyses: from the path of a script or an archive to the compiled program."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
@@ -28,7 +28,7 @@ def build(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None =
 
     The model of an archive has the method of its run. `method` replaces the model's own; a mapping, such as
     {"resolution": "exact"}, replaces single choices.
-    A NominalWarning names what is probably a mistake in the nominal assembly (see tolcontact.plausibility).
+    A NominalWarning names probable mistakes in the nominal assembly (see tolcontact.plausibility).
     Raises ModelError with all faults of the model, and OptionError for a solver or a method that cannot be used.
     """
     assembly, method_of_run = _loaded(model) if isinstance(model, str | Path) else (assembly_of(model), None)
@@ -50,9 +50,9 @@ def check(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None =
 def write_model(model: Model, path: str | Path) -> None:
     """Write a model as JSON to `path`: its declarations (see tolcontact.declaration).
 
-    Shapes are named as files, relative to the folder of `path` if they lie in it. Faces that a function picks become
+    Shapes are stated as file names, relative to the folder of `path` if they are in it. Faces that a function selects become
     triangles, and functions of poses become the steps of their expressions.
-    Raises ModelError for a model with faults, and ScriptError for a mesh that is no file.
+    Raises ModelError for a model with faults, and ScriptError for a mesh that is not a file.
     """
     assembly = assembly_of(model)
     program = build(assembly)
@@ -60,13 +60,13 @@ def write_model(model: Model, path: str | Path) -> None:
 
 
 def program_of(model: Model | Program, solver: str | None, method: Choice | None) -> Program:
-    """Return the program of a model (see `build`). A Program is returned as it is: it has its solver and method already."""
+    """Return the program of a model (see `build`). A Program already has its solver and method, and is returned unchanged."""
     check_program(model, solver, method)
     return model if isinstance(model, Program) else build(model, solver=solver or DEFAULT_SOLVER, method=method)
 
 
 def check_program(model: Model | Program, solver: str | None, method: Choice | None) -> None:
-    """Raise OptionError for a Program with a solver or a method beside it, which would have no effect."""
+    """Raise OptionError for a Program together with a solver or a method, which would have no effect."""
     if isinstance(model, Program) and not (solver is None and method is None):
         raise OptionError(
             "a Program has its solver and method; leave them out, or build it with them: tc.build(..., solver=..., method=...)"
@@ -74,7 +74,7 @@ def check_program(model: Model | Program, solver: str | None, method: Choice | N
 
 
 def assembly_of(model: Model) -> Assembly:
-    """Return the assembly that a model declares. Raises OptionError for what is no model."""
+    """Return the assembly that a model declares. Raises OptionError for anything that is not a model."""
     if isinstance(model, str | Path):
         return _loaded(model)[0]
     if not isinstance(model, Assembly) and callable(model):
@@ -100,12 +100,12 @@ def _loaded(path: str | Path) -> tuple[Assembly, Method | None]:
 
 
 def is_archive(path: str | Path) -> bool:
-    """Return whether a path is that of an archive, by its ending."""
+    """Return whether a path has the extension of an archive."""
     return Path(path).suffix.lower() == ".nc"
 
 
 def method_of(assembly: Assembly, method: Choice | None, default: Method | None = None) -> Method:
-    """Return the method that resolves an assembly. Raises OptionError for a choice that no method has.
+    """Return the method that resolves an assembly. Raises OptionError for an unknown choice.
 
     `default` replaces the assembly's own method.
     """
@@ -122,8 +122,8 @@ def method_of(assembly: Assembly, method: Choice | None, default: Method | None 
 
 
 def check_counts(**counts: int) -> None:
-    """Raise OptionError for a count that is no whole number, or outside of `COUNTS`."""
+    """Raise OptionError for a count that is not a whole number, or outside `COUNTS`."""
     for option, value in counts.items():
-        least, most = COUNTS[option]
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            raise OptionError(f"{option} is {value!r}; expected a whole number from {least} to {most}")
+        smallest, largest = COUNTS[option]
+        if isinstance(value, bool) or not isinstance(value, int) or not smallest <= value <= largest:
+            raise OptionError(f"{option} is {value!r}; expected a whole number from {smallest} to {largest}")

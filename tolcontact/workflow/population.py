@@ -1,4 +1,4 @@
-"""Populations of features: drawn, and measured against their zones."""
+"""Populations of features, drawn and measured against their zones."""
 
 import numpy as np
 import xarray as xr
@@ -18,7 +18,7 @@ def check_population(model: Model, *, samples: int = 10_000, seed: int = 1) -> x
     The result has one zone for each size and each tolerance:
 
         share_inside  (zone, interval)  estimate, and its exact 95 % interval
-        stated_share  (zone)            share that the rule from zone to spread states; NaN if it states none
+        stated_share  (zone)            share according to the rule from zone to spread; NaN if it states none
         needed_width  (zone) [mm]       width of the zone that 99.73 % of the features need
 
     Nested tolerances, and tolerances that fill a bonus, may have a larger share inside than stated.

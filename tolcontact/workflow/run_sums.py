@@ -1,4 +1,4 @@
-"""Sums over the realizations of a run: displacement fields, and how often contact points touch."""
+"""Sums over the realizations of a run: displacement fields, and counts of touching contact points."""
 
 import functools
 from collections.abc import Callable
@@ -24,27 +24,27 @@ MAX_GAPS = 20_000_000  # of all points in all realizations
 
 
 class TouchingCounts(NamedTuple):
-    """In how many realizations each contact point touches, `points` (point,), and the number of realizations looked at."""
+    """The counts of contacts at each contact point, `points` (point,), and the number of realizations."""
 
     points: Int[Array, " point"]
     realizations: int
 
 
 def counted_realizations(nominal: Nominal) -> int:
-    """Return the number of realizations, the first ones of a run, in which touching points are counted."""
+    """Return the number of realizations at the start of a run that are used for counting touching points."""
     points = sum(len(pair.P_m) for pair in nominal.pairs)
     return min(MAX_REALIZATIONS, -(-MAX_GAPS // max(points, 1)))
 
 
 def gaps_need_deviations(nominal: Nominal) -> bool:
-    """Return whether gaps depend on deviations as well as on poses, as those of supports and of deviating faces do."""
+    """Return whether gaps depend on deviations as well as on poses, as with supports and deviating faces."""
     return any(pair.is_supports or any(face is not None for face in pair.deviating) for pair in nominal.pairs)
 
 
 def count_in_block(program: Program, block: Block, end: int) -> TouchingCounts:
-    """Return the counts of those realizations of a block that stand before the realization `end`.
+    """Return the counts over the realizations of a block before the realization `end`.
 
-    Realizations whose contact points were projected again are left out: they have other points than the model.
+    Realizations with reprojected contact points are left out, since their points differ from the points of the model.
     """
     rows = np.flatnonzero(block.searched[: max(end - block.start, 0)] == 0)
     return count_touching(program, block.poses[rows, CORRECTED], block.deviations[rows])
@@ -72,7 +72,7 @@ def count_touching(
 def _nearest_counts(
     program: Program, k: int, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"]
 ) -> Int[Array, " point"]:
-    """Return in how many realizations pair k, whose places are found at every pose, touches nearest to each contact point."""
+    """Return the counts of contacts of pair k, which are found at every pose, by the nearest contact point."""
     pair = program.nominal.pairs[k]
     raised = raised_places(pair, program.meetings[k], X_RM, deviations)
     row, place = np.nonzero(raised.gaps < terms.TOUCHING_GAP)
@@ -86,10 +86,10 @@ ReducedBlock = tuple[StoredBlock, tuple[BlockSums, TouchingCounts]]
 
 @dataclass(frozen=True, eq=False)
 class _BlockReduction:
-    """Reduction of a block, where it is simulated, to the rows that are stored and to sums.
+    """Reduction of a block, where it is simulated, to stored rows and sums.
 
     kept      labels of the stored variables
-    counted   number of realizations, from the first of the run, in which touching points are counted
+    counted   number of realizations, starting with the first, for counting touching points
     """
 
     kept: tuple[str, ...]
@@ -120,13 +120,13 @@ class RunSums:
 
     @property
     def numbers(self) -> list[np.ndarray]:
-        """The sums of the fields, for each part (state, number), as a checkpoint holds them."""
+        """The sums of the fields, for each part (state, number), as stored in a checkpoint."""
         return self._fields.numbers
 
     def start_from(self, writer: ArchiveWriter) -> bool:
         """Start from the last checkpoint of an archive, and return whether it has one."""
         kept = {row.variable for row in writer.kept}
-        # Touching points are known only where a reader of the archive could compute gaps again.
+        # Touching points are counted only if a reader of the archive could recompute the gaps.
         is_known = terms.ROTATION in kept and (terms.DEVIATION in kept or not gaps_need_deviations(self._program.nominal))
         counted = counted_realizations(self._program.nominal) if is_known else 0
         self.of_blocks = _BlockReduction(tuple(row.label for row in writer.kept), self._fields, counted)
@@ -145,7 +145,7 @@ class RunSums:
         self._touching.add(*counts)
 
     def write_to(self, writer: ArchiveWriter) -> None:
-        """Write fields and shares of the realizations so far."""
+        """Write fields and shares over the realizations so far."""
         writer.write_fields(self._fields.fields())
         if self._touching.is_new:
             writer.write_touching(*self._touching.values())

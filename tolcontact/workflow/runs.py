@@ -1,4 +1,4 @@
-"""Runs whose results xarray reads."""
+"""Runs with results that xarray reads."""
 
 import tempfile
 from pathlib import Path
@@ -16,7 +16,7 @@ from tolcontact.workflow.models import Choice, Model
 
 __all__ = ["open_archive", "run"]
 
-# Whoever runs a model or opens an archive finds the verbs of results on them.
+# The import registers the methods of results, for anyone who runs a model or opens an archive.
 xr.register_datatree_accessor("tolcontact")(Results)  # type: ignore[no-untyped-call]
 
 
@@ -43,16 +43,16 @@ def run(
     `model` is anything that `build` takes or returns. A Program has its solver and method already; the default solver is
     qpoases, and the default method is the model's own.
     `out` is the path of the archive. Without it, the results stay in memory.
-    `keep` states what the archive stores of each realization: "measures" (with gaps, status and residuals), "poses" (these as
-    well), or "all" (also the deviations). Displacement fields always come from all realizations.
+    `keep` states what the archive stores for each realization: "measures" (with gaps, status and residuals), "poses" (also the
+    poses), or "all" (also the deviations). Displacement fields always come from all realizations.
     `fields` is the number of realizations that the magnitudes of displacement fields cover, starting from the first: a number,
     "all", "none", or "some" (16 384, or fewer where a part has many vertices). The components x, y, z are always exact.
     `plan` is the sampling plan: "monte-carlo", "latin hypercube" or "sobol" (see tolcontact.variation). The latter two draw
-    replicates of 256 realizations; from 16 replicates on, intervals come from the replicates and are narrower, most of all
-    with a multiple of 256 `samples`.
+    replicates of 256 realizations; with 16 replicates or more, intervals come from the replicates and are narrower, especially
+    if `samples` is a multiple of 256.
     `until` states how narrow the 95 % interval of a corrected measure must become, for example "corner height: 6 sigma +-1 %",
-    "gap: mean +-0.001" or "gap: ppm +-20 %". The run then starts with `samples` realizations and adds more until it is. If that
-    takes too many, it stops, and a warning is logged.
+    "gap: mean +-0.001" or "gap: ppm +-20 %". The run then starts with `samples` realizations and adds more until the interval
+    is narrow enough. If that needs too many realizations, the run stops with a warning.
     `client` is a client of dask.distributed. Its workers simulate, this process writes, and the results are the same to the
     last bit (see tolcontact.simulation).
     `surfaces` is the number of certified realizations that are checked against the surfaces between contact points at the end.

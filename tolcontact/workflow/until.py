@@ -13,15 +13,15 @@ from tolcontact.statistics.statistic_request import HALF_WIDTH, StatisticRequest
 from tolcontact.vocabulary import OUTSIDE, PPM
 
 MIN_GROWTH, MAX_GROWTH = 1.25, 16.0
-MARGIN = 1.05  # times the realizations that the interval seems to need
+MARGIN = 1.05  # times the estimated number of realizations that the interval needs
 MAX_REALIZATIONS = 100_000_000
-MAX_WITHOUT_INTERVAL = 10_000  # realizations: an estimate that has no interval then will not have one
+MAX_WITHOUT_INTERVAL = 10_000  # realizations: an estimate without an interval at this number will not get one
 EXAMPLES = ("corner height: 6 sigma +-1 %", "gap: mean +-0.001")
 
 
 @dataclass(frozen=True)
 class Target:
-    """The half-width that the 95 % interval of a corrected measure's statistic may have at most.
+    """The largest permitted half-width of the 95 % interval of a corrected measure's statistic.
 
     half  in the units of the measure, or as a fraction of the estimate if `is_relative`
     """
@@ -62,7 +62,7 @@ class Target:
         return -(-int(samples * min(max(growth, MIN_GROWTH), MAX_GROWTH)) // rows) * rows
 
     def shortfall(self, results: Results) -> str:
-        """Return a sentence that says why the interval of finished results is not narrow enough; empty if it is."""
+        """Return a sentence that states why the interval of finished results is not narrow enough; empty if it is."""
         estimate, half, target_half = self._widths(results)
         if math.isnan(estimate):
             return f"{self.statistic} of {self.measure} has no value (are there limits?); no more realizations were added"
@@ -74,7 +74,7 @@ class Target:
         )
 
     def _widths(self, results: Results) -> tuple[float, float, float]:
-        """Return the estimate, the half-width of its interval, and the half-width that it may have."""
+        """Return the estimate, the half-width of its interval, and the largest permitted half-width."""
         estimate, lower, upper = estimate_of(results, self.measure, self.statistic)
         return estimate, (upper - lower) / 2, self.half * (abs(estimate) if self.is_relative else 1.0)
 

@@ -1,5 +1,5 @@
 "use strict";
-// What all charts share, drawn with plotly.
+// Common parts of all charts, drawn with plotly.
 
 const COLOURS = ["#7f8894", "#d97706"];
 
@@ -22,7 +22,7 @@ function chart(title, into = byId("charts")) {
   return box;
 }
 
-// Where nothing can hover, the bar of buttons would always lie over the title.
+// On devices without hover, the button bar would always cover the title.
 const HAS_BUTTONS = window.matchMedia("(hover: hover)").matches ? "hover" : false;
 const SETTINGS = {
   responsive: true, displaylogo: false, displayModeBar: HAS_BUTTONS, modeBarButtonsToRemove: ["lasso2d", "select2d"],

@@ -13,7 +13,7 @@ from tolcontact.report.html.scene import packed
 from tolcontact.statistics import intervals
 
 BINS = 60
-MAX_BARS = 10  # contributors beside a histogram
+MAX_BARS = 10  # contributors next to a histogram
 MAX_POINTS = 2000  # realizations in scatter charts
 CONVERGENCE_STEPS = 40
 FIGURES = {"mean": "mean", "sixSigma": "6 sigma"}
@@ -92,7 +92,7 @@ def relations_of(results: xr.DataTree, summary: xr.Dataset) -> dict[str, Any]:
         "contributors": [],
     }
     if terms.DEVIATION.name in sample:
-        dim = sample[terms.DEVIATION.name].dims[-1]  # archives before format 4 have locators alone
+        dim = sample[terms.DEVIATION.name].dims[-1]  # archives before format 4 have only locators
         deviations = sample[terms.DEVIATION.name].isel(selection).values
         is_varying = np.ptp(deviations, axis=0) > 0
         units = (
@@ -111,7 +111,7 @@ def _estimates(measure: xr.Dataset, statistic: str) -> xr.DataArray:
 
 
 def _convergence(rows: xr.Dataset, measure: int, state: int) -> dict[str, Any]:
-    """Return the range of a measure, and its mean by number of realizations, with half of its 95 % interval (Student's t)."""
+    """Return the range of a measure, and its mean by number of realizations, with the half width of its 95 % interval."""
     total = rows.sizes[terms.REALIZATION]
     steps = np.unique(np.geomspace(2, total, CONVERGENCE_STEPS).round().astype(int))
     low, high, count, centre = np.inf, -np.inf, 0, None

@@ -1,7 +1,7 @@
 "use strict";
-// Runs side by side: the distributions of each measure, as shares, so that runs of different sizes can be compared.
+// Comparison of runs: the distributions of each measure, as shares, so that runs of different sizes can be compared.
 
-// Okabe and Ito's colours, which the colour-blind tell apart.
+// Okabe and Ito's colours, which are safe for colour-blind readers.
 const OF_RUN = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#7f8894"];
 
 function distribution(measure, state, box) {

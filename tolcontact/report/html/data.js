@@ -1,5 +1,5 @@
 "use strict";
-// What all pages share: their data.
+// The data of a page, for all pages.
 
 const data = JSON.parse(document.getElementById("data").textContent);
 const byId = (id) => document.getElementById(id);

@@ -16,11 +16,11 @@ Entry = dict[str, Any]
 
 
 def feature_lists(assembly: Assembly, meshes: Meshes) -> list[Entry]:
-    """Return the features and patterns of each part that has any. `meshes` holds the meshes of all drawn parts, in order.
+    """Return the features and patterns of each part that has any. `meshes` contains the meshes of all drawn parts, in order.
 
     number    of the drawn part; None if it is not drawn
-    members   of a feature: itself. The faces of a member consist of `runs`, the first triangle and the one after the last of
-              each sequence of triangles of the mesh, as far as these lie in all `boxes`, lower and upper corner [mm]
+    members   the feature itself, or the features of a pattern. The faces of a member consist of `runs` of consecutive triangles
+              of the mesh (first triangle, and one after the last), clipped by all `boxes` (lower and upper corner [mm])
     """
     numbers: Mapping[Part, int] = {part: number for number, part in enumerate(meshes)}
     return [
@@ -47,7 +47,7 @@ def _entry(declared: Feature | Pattern, meshes: Meshes) -> Entry:
 
 
 def _text(tolerance: Size | GeometricTolerance) -> str:
-    """Return a tolerance as it prints, or its kind alone if a fault keeps it from printing."""
+    """Return a tolerance as printed, or only its kind if a fault prevents printing."""
     return tolerance.kind if any(tolerance.faults()) else str(tolerance)
 
 
@@ -63,7 +63,7 @@ def _faces(member: Feature, part: Part, meshes: Meshes) -> Iterator[Entry]:
 
 
 def _runs(indices: np.ndarray) -> list[int]:
-    """Return the first number, and the one after the last, of each sequence of consecutive `indices` (index,)."""
+    """Return the first index, and one after the last, of each run of consecutive `indices` (index,)."""
     ends = np.flatnonzero(np.diff(indices) != 1)
     first, last = indices[np.r_[0, ends + 1]], indices[np.r_[ends, len(indices) - 1]]
     return [int(index) for index in np.column_stack([first, last + 1]).ravel()]

@@ -1,11 +1,11 @@
 "use strict";
-// Features and patterns with their tolerances: a list beside the scene, and their faces in it.
+// Features and patterns with their tolerances: a list next to the scene, and their faces in it.
 
 const OF_FEATURE = "#2563eb", OF_FACE = "#f59e0b";
 const BEHIND = 0.35; // opacity of a highlighted face behind other faces
 const GREATER_DEPTH = 6; // of three.js; the bundle does not export its name
 
-/** Faces in colours over those of the parts, and names of members. `level` is the order of colours on one face; none is above FRONT. */
+/** Faces in colours over the colours of the parts, and names of members. `level` is the order of colours on a face, at most FRONT. */
 class Highlights {
   constructor(viewer) {
     this.viewer = viewer;
@@ -28,7 +28,7 @@ class Highlights {
     this.entries.push({ part, drawn });
   }
 
-  /** Write a name in the middle of faces {runs, boundary}, or in the middle of what their boundaries leave. */
+  /** Write a name at the centre of faces {runs, boundary}, or at the centre of the part inside their boundaries. */
   name(part, faces, text) {
     const corners = part.mesh.geometry.getAttribute("position").array, all = faces.flatMap((face) => face.runs);
     const box = new THREE.Box3().setFromArray(sliced(corners, all)), middle = box.getCenter(new THREE.Vector3());
@@ -55,7 +55,7 @@ class Highlights {
   }
 }
 
-/** The corners of the triangles in runs [first, after the last, ...], from those of all triangles. */
+/** The corners of the triangles in runs [first, after the last, ...], from the corners of all triangles. */
 function sliced(corners, runs) {
   const pieces = [];
   for (let k = 0; k < runs.length; k += 2) pieces.push(corners.subarray(9 * runs[k], 9 * runs[k + 1]));
@@ -75,7 +75,7 @@ function runsOf(faces, number) {
   return runs;
 }
 
-/** The planes, in the assembly's frame, around the boxes of a face, which are in the frame of its part. */
+/** The planes around the boxes of a face in the assembly's frame; the boxes are in the frame of its part. */
 function boundaryOf(face, placement, margin) {
   return face.boxes.flatMap(([lower, upper]) => [0, 1, 2].flatMap((k) => {
     const axis = new THREE.Vector3(placement[k], placement[3 + k], placement[6 + k]);
@@ -92,7 +92,7 @@ function hasTriangle(runs, triangle) {
   return false;
 }
 
-/** The features of a page: which are chosen, in the list and in the scene. */
+/** The features of a page, and their selection in the list and in the scene. */
 class FeatureList {
   constructor(viewer) {
     const margin = 1e-6 * viewer.size;
@@ -126,7 +126,7 @@ class FeatureList {
     return button;
   }
 
-  /** The entries with a triangle of a part, at a point on it in the assembly's frame, and the members that it is of. */
+  /** The entries with a triangle of a part, at a point on it in the assembly's frame, and its members. */
   at(part, triangle, point) {
     return this.entries.filter((entry) => entry.part === part).flatMap((entry) => {
       const face = entry.faces.find(({ runs, boundary }) =>
@@ -159,13 +159,13 @@ class FeatureList {
   }
 }
 
-/** Show a text about what is chosen; without one, a hint at what can be chosen. */
+/** Show a text about the selection; without one, a hint at what can be selected. */
 const HINT = byId("message").textContent;
 function show(lines) {
   byId("message").textContent = lines ? lines.join("\n") : HINT;
 }
 
-/** Scroll a list so that an entry of it is seen, without scrolling the page. */
+/** Scroll a list so that an entry is visible, without scrolling the page. */
 function reveal(button) {
   const list = button.parentElement, top = button.offsetTop - list.offsetTop;
   if (top < list.scrollTop || top + button.offsetHeight > list.scrollTop + list.clientHeight)

@@ -1,4 +1,4 @@
-"""Faces with form in the scene of an archive: modes at the vertices that show a face, and gaps left at contact points."""
+"""Form deviation in the scene of an archive: modes at the vertices of drawn faces, and remaining gaps at contact points."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,19 +13,19 @@ from tolcontact import vocabulary as terms
 from tolcontact.features.associated_features import displacement_terms
 from tolcontact.features.covariances import COVARIANCES
 
-MAX_GAPS = 1_000_000  # that a page holds: of all contact points in both states of the single realizations
-FLATNESS = 1e-6  # of the size of a face: vertices and normals are those of a plane up to that
-NEAR = 1.0  # correlation lengths: a vertex of the plane that is farther from all stations belongs to another face
-HOLE = 3.0  # times the usual length of edges between neighbouring contact points: a triangle with a longer one is a hole
+MAX_GAPS = 1_000_000  # in a page: of all contact points in both states of the single realizations
+FLATNESS = 1e-6  # of the size of a face: tolerance for vertices and normals of a plane
+NEAR = 1.0  # correlation lengths: a vertex of the plane that is further from all stations belongs to another face
+HOLE = 3.0  # times the usual edge length between neighbouring contact points: a triangle with a longer edge is a hole
 
 
 @dataclass(frozen=True, eq=False)
 class ShownForm:
-    """The form of a face at vertices of the drawn surface of its part.
+    """The form deviation of a face at vertices of the drawn surface of its part.
 
-    vertices       (k,) their numbers
+    vertices       (k,) their indices
     normal         (3,) outward
-    modes          (k, mode) heights for coefficients of 1
+    modes          (k, mode) heights for unit coefficients
     coefficients   (realization, mode) [mm]
     """
 
@@ -36,14 +36,14 @@ class ShownForm:
 
 
 class SingleStates:
-    """Faces and contact points of an archive in some of its realizations, by the numbers of their rows (realization,)."""
+    """Faces and contact points of an archive in selected realizations, by their row indices (realization,)."""
 
     def __init__(self, results: xr.DataTree, rows: np.ndarray) -> None:
         self._contact = {str(name): np.asarray(array.values) for name, array in results["contact"].to_dataset().items()}
         self._results, self._rows = results, rows
 
     def _read(self, dataset: xr.Dataset, variable: terms.ArchiveVariable) -> np.ndarray:
-        """Return the rows of a variable; they are read in rising order."""
+        """Return the rows of a variable; they are read in ascending order."""
         rows, places = np.unique(self._rows, return_inverse=True)
         return np.asarray(dataset[variable.name].isel({terms.REALIZATION: rows}).values)[places]
 
@@ -74,7 +74,7 @@ class SingleStates:
                 yield from self._shown(face, vertices, faces)
 
     def _shown(self, face: int, vertices: np.ndarray, faces: np.ndarray) -> Iterator[ShownForm]:
-        """Yield a form at the vertices of the plane that its stations lie in, if triangles show it."""
+        """Yield a form at the vertices in the plane of its stations, if triangles show it."""
         stations = self._contact[terms.FORM_STATION_PLACE.name][self._contact[terms.FACE_OF_FORM_STATION.name] == face]
         centre, size = stations.mean(axis=0), np.ptp(vertices, axis=0).max()
         normal = np.linalg.svd(stations - centre)[2][2]
@@ -94,7 +94,7 @@ class SingleStates:
         return np.asarray(columns[columns >= 0])
 
     def _modes(self, face: int, places: np.ndarray) -> np.ndarray:
-        """Return heights (place, mode) of the form of a plane at places (place, 3) [mm], for coefficients of 1."""
+        """Return the form heights (point, mode) of a plane at points (point, 3) [mm], for unit coefficients."""
         is_own, removed = self._contact[terms.FACE_OF_FORM_STATION.name] == face, self._contact[terms.FORM_REMOVED.name][face]
         stations, weights = (
             self._contact[terms.FORM_STATION_PLACE.name][is_own],
@@ -154,7 +154,7 @@ class SingleStates:
         return np.asarray(triangles[edges.max(axis=1) <= HOLE * np.median(edges)])
 
     def _displaced(self, face: int, places: np.ndarray) -> np.ndarray:
-        """Return places (place, 3) as a face is displaced in its part, to first order: (realization, place, 3) [mm]."""
+        """Return points (point, 3) displaced with a face in its part, to first order: (realization, point, 3) [mm]."""
         if face < 0:
             return np.broadcast_to(places, (len(self._rows), *places.shape))
         tau, rho = np.split(self._deviations @ self._contact[terms.FACE_TWIST.name][face].T, 2, axis=1)
@@ -162,7 +162,7 @@ class SingleStates:
         return np.asarray(places + tau[:, None] + np.cross(rho[:, None], arms))
 
     def _height(self, face: int, places: np.ndarray) -> np.ndarray:
-        """Return how far a face stands out (realization, place) [mm] at places (place, 3), with its form."""
+        """Return the outward offset of a face (realization, point) [mm] at points (point, 3), including its form deviation."""
         if face < 0:
             return np.zeros((len(self._rows), len(places)))
         heights = np.repeat((self._deviations @ self._contact[terms.FACE_HEIGHT.name][face])[:, None], len(places), axis=1)

@@ -2,9 +2,9 @@
 // Names in the scene, each in a box that keeps its size; boxes that would cover each other are stacked.
 
 const LABEL_HEIGHT = 0.032; // of the distance 1 from the camera
-const LIFT = 0.4; // of its height, between a place and the box of its name
+const LIFT = 0.4; // of its height, between a point and the box of its name
 
-/** A name at a place. */
+/** A name at a point. */
 function labelOf(text, at) {
   const canvas = document.createElement("canvas"), context = canvas.getContext("2d");
   context.font = "28px sans-serif";

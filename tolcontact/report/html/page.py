@@ -1,4 +1,4 @@
-"""Pages from templates; each holds its styles, scripts, libraries and data."""
+"""Pages from templates; each contains its styles, scripts, libraries and data."""
 
 import base64
 import hashlib
@@ -88,7 +88,7 @@ def is_page(path: Path) -> bool:
 
 
 def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock | None = None) -> str:
-    """Return the report of a run with this summary; without a `title_block`, it has that of the archive."""
+    """Return the report of a run with this summary; the default `title_block` comes from the archive."""
     scene, titles = scene_of(results, summary), title_block or title_block_of(results.attrs)
     shares = contributor_shares(results, summary.attrs["realizations"])
     values = {
@@ -124,21 +124,21 @@ def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock |
 def view_page(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> str:
     """Return the view of a model before a run; `nominal` is None for a model with faults other than omissions."""
     omissions = [fault for fault in assembly.omissions() if fault in faults]
-    others = [fault for fault in faults if fault not in omissions]
+    remaining_faults = [fault for fault in faults if fault not in omissions]
     values = {
         "title": assembly.name,
-        "faults": others,
+        "faults": remaining_faults,
         "omissions": omissions,
         "has_features": any(part.toleranced for part in assembly.parts),
         "pairs": gap_rows(nominal),
         "file": _file(assembly, nominal, faults),
-        "stations": (scene := view_of(assembly, nominal, others))["stations"],
+        "stations": (scene := view_of(assembly, nominal, remaining_faults))["stations"],
     }
     return _page("view", values, {"scene": scene, "charts": []})
 
 
 def nominal_and_faults(assembly: Assembly) -> tuple[Nominal | None, tuple[str, ...]]:
-    """Return what the view of a model shows: its nominal model if its only faults are omissions, and its faults."""
+    """Return the nominal model for the view of a model, if its only faults are omissions, and its faults."""
     try:
         return discretize(assembly, incomplete=True), tuple(assembly.omissions())
     except ModelError as error:
@@ -146,7 +146,7 @@ def nominal_and_faults(assembly: Assembly) -> tuple[Nominal | None, tuple[str, .
 
 
 def _file(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> str:
-    """Return the name of the file of the parts, if nothing else is declared yet."""
+    """Return the file name of the parts, if nothing else is declared yet."""
     return "" if nominal or faults or not assembly.parts else Path(str(getattr(assembly.parts[0].geometry, "source", ""))).name
 
 
@@ -204,7 +204,7 @@ def _as_is(file: str) -> markupsafe.Markup:
 
 
 def _hash(script: markupsafe.Markup) -> str:
-    """Return the hash of a script as a content security policy states it."""
+    """Return the hash of a script for a content security policy."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
 
 
@@ -222,7 +222,7 @@ def _pairs(summary: xr.Dataset) -> dict[str, Any]:
 
 
 def _details(summary: xr.Dataset, shares: Sequence[ContributorShares]) -> list[dict[str, Any]]:
-    """Return what the page says of each measurement: limits, contributors, and all estimates as rows of texts."""
+    """Return the details of each measurement: limits, contributors, and all estimates as rows of texts."""
     details = []
     for name, contributors in zip(summary["measure"].values, shares, strict=True):
         measure = summary.sel(measure=name)

@@ -118,12 +118,12 @@ function contributors(measure, into) {
   const shown = layout("Contributors, with contact", "% of variance", "");
   Object.assign(shown, { showlegend: false, bargap: 0.3 });
   Object.assign(shown.margin, { l: 12, t: 36 });
-  Object.assign(shown.yaxis, { automargin: true, type: "category", dtick: 1 }); // each is named, on paper as well
+  Object.assign(shown.yaxis, { automargin: true, type: "category", dtick: 1 }); // all are labelled, on paper as well
   shown.xaxis.rangemode = "nonnegative";
   Plotly.newPlot(chart(`Contributors to the variance of ${measure.name}`, into), traces, shown, SETTINGS);
 }
 
-/** The place of a measurement on the assembly. */
+/** The position of a measurement on the assembly. */
 function portrait(viewer, measure, into) {
   const marks = data.scene.measures.find((mark) => mark.name === measure.name);
   if (!marks) return;
@@ -203,7 +203,7 @@ function relations() {
   draw();
 }
 
-// Pictures come first: charts take the room that these leave.
+// Pictures come first: charts use the remaining room.
 try {
   window.viewer = new Viewer(data.scene);
   data.charts.slice(0, MOST_PORTRAITS).forEach((measure, number) => portrait(window.viewer, measure, placeOf(number, "portrait")));

@@ -25,7 +25,7 @@ from tolcontact.statistics import touching
 Packed = dict[str, Any]
 MAX_TRIANGLES = 60_000  # of all bodies
 MIN_TRIANGLES = 500  # of a body
-MAX_EXCESS = 1.2  # over the number of triangles that the fast method should reach
+MAX_EXCESS = 1.2  # ratio of triangles to the target number, above which the fast method has failed
 EXTREMES = 5  # of each measure, on either side
 MAX_REALIZATIONS = 300
 
@@ -38,7 +38,7 @@ class SingleRealization(NamedTuple):
 
 
 def single_realizations(results: xr.DataTree) -> list[SingleRealization]:
-    """Return realizations in the order of the page, without duplicates; extremes are those of corrected measures."""
+    """Return realizations in the order of the page, without duplicates; extremes refer to corrected measures."""
     done = finished(results)
     rows = results.to_dataset().isel({terms.REALIZATION: slice(done)})
     reasons: dict[int, str] = {}
@@ -71,7 +71,7 @@ def _extremes(rows: xr.Dataset, measure: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def packed(values: Any, kind: str = "f4") -> Packed:
-    """Return an array packed as floats of single precision, "f4", or whole numbers, "i4"."""
+    """Return an array packed as single-precision floats, "f4", or as integers, "i4"."""
     array = np.ascontiguousarray(values, dtype=f"<{kind}")
     return {"shape": list(array.shape), "kind": kind, "data": base64.b64encode(array.tobytes()).decode()}
 
@@ -80,7 +80,7 @@ Scene = dict[str, Any]
 
 
 def scene_of(results: xr.DataTree, summary: xr.Dataset) -> Scene:
-    """Return the scene of an archive in the nominal assembly frame [mm], without what the archive does not have."""
+    """Return the scene of an archive in the nominal assembly frame [mm], without data that the archive lacks."""
     singles = single_realizations(results)
     states = SingleStates(results, np.array([single.row for single in singles], dtype=int))
     scene = {
@@ -106,7 +106,7 @@ def _add_contact(pairs: list[Scene], results: xr.DataTree, summary: xr.Dataset) 
 
 
 def _add_gaps(pairs: list[Scene], states: SingleStates, count: int) -> None:
-    """Add triangles between the contact points of each pair of planes, and the gaps left there in single realizations."""
+    """Add triangles between the contact points of each pair of planes, and their gaps in single realizations."""
     points = sum(pair["points"]["shape"][0] for pair in pairs)
     for number, pair in enumerate(pairs):
         pair["triangles"] = packed(states.triangles(number), "i4")
@@ -197,7 +197,7 @@ def _motions(R: np.ndarray, t: np.ndarray) -> Packed:
 
 
 def view_of(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> Scene:
-    """Return the scene. Without a `nominal` assembly, for a model with faults, it has only parts with sound shapes."""
+    """Return the scene. Without a `nominal` assembly, for a model with faults, it contains only parts with valid shapes."""
     marks = Marks([], [], [], [], []) if nominal is None else marks_of_nominal(nominal)
     previews = {part: image for part in assembly.parts if (image := preview(part)) is not None}
     faulty = _faulty(assembly, faults)
@@ -253,7 +253,7 @@ def coarser(vertices: np.ndarray, faces: np.ndarray, count: int) -> tuple[np.nda
     if len(faces) <= count:
         return vertices, faces, np.arange(len(vertices))
     coarse, corners = fast_simplification.simplify(vertices, faces, target_count=count)
-    if len(corners) > MAX_EXCESS * count:  # short edges stop the fast method, not this one
+    if len(corners) > MAX_EXCESS * count:  # short edges stop the fast method, but not this one
         coarse, corners, *_ = igl.decimate(
             np.asarray(vertices, dtype=np.float64, order="C"), np.asarray(faces, dtype=np.int64, order="C"), count
         )

@@ -1,4 +1,4 @@
-"""The scenes of stations: which parts and marks a station has, and where its parts stand in single realizations."""
+"""The scenes of stations: the parts and marks of a station, and the poses of its parts in single realizations."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -52,7 +52,7 @@ def stations_of_nominal(nominal: Nominal | None) -> list[Scene]:
 def station_poses(results: xr.DataTree, station: str, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Return R (row, state, part, 3, 3) and t (row, state, part, 3) [mm] of all parts in a station; None if not archived.
 
-    Parts that the station does not hold stand in their nominal place.
+    Parts that the station does not hold are in their nominal pose.
     """
     group = results[terms.station_group(station)].to_dataset()
     if terms.STATION_ROTATION.name not in group:
@@ -64,7 +64,7 @@ def station_poses(results: xr.DataTree, station: str, rows: np.ndarray) -> tuple
 def worst_poses(results: xr.DataTree, station: str, worst: xr.Dataset | None) -> tuple[np.ndarray, np.ndarray]:
     """Return R (case, state, part, 3, 3) and t (case, state, part, 3) [mm] of worst cases in a station; none without them.
 
-    They are NaN for worst cases of earlier versions, which state no poses of stations.
+    They are NaN for worst cases from earlier versions, which do not contain the poses of stations.
     """
     sizes = {
         str(group.attrs["station"]): group.sizes[terms.STATION_PART]
@@ -76,18 +76,18 @@ def worst_poses(results: xr.DataTree, station: str, worst: xr.Dataset | None) ->
         unknown = np.full((count, len(terms.STATES), parts, 3, 3), np.nan)
         return unknown, unknown[..., 0]
     start = sum(sizes[name] for name in names[: names.index(station)])
-    own = slice(start, start + sizes[station])
-    t_held, R_held = (worst[variable.name].values[:, :, own] for variable in terms.STATION_POSES)
+    station_columns = slice(start, start + sizes[station])
+    t_held, R_held = (worst[variable.name].values[:, :, station_columns] for variable in terms.STATION_POSES)
     return _of_all_parts(results, station, R_held, t_held)
 
 
 def _of_all_parts(results: xr.DataTree, station: str, R_held: np.ndarray, t_held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return R and t of all parts, nominal for those that the station does not hold."""
-    parts, held = (
+    """Return R and t of all parts, nominal for parts that the station does not hold."""
+    parts, held_parts = (
         results.to_dataset()[terms.PART].values,
         results[terms.station_group(station)].to_dataset()[terms.STATION_PART].values,
     )
-    positions = [parts.tolist().index(part) for part in held]
+    positions = [parts.tolist().index(part) for part in held_parts]
     R = np.tile(np.eye(3), (len(R_held), len(terms.STATES), len(parts), 1, 1))
     t = np.zeros((len(R_held), len(terms.STATES), len(parts), 3))
     R[:, :, positions], t[:, :, positions] = R_held, t_held

@@ -1,5 +1,5 @@
 "use strict";
-// Stations: the scene shows what the chosen one holds; a play of realizations goes through all of them.
+// Stations: the scene shows the parts that the selected one holds; playing realizations steps through all of them.
 
 class Stations {
   constructor(viewer, changed) {
@@ -13,7 +13,7 @@ class Stations {
     this.show();
   }
 
-  /** The number of the chosen station; -1 without stations. */
+  /** The index of the selected station; -1 without stations. */
   get chosen() {
     return this.all.length ? Number(this.select.value) : -1;
   }

@@ -1,5 +1,5 @@
 "use strict";
-// The view before a run: a click on a face shows its selector in a script, and the features that it belongs to.
+// The view before a run: a click on a face shows its selector in a script, and the features of this face.
 
 const GAP_TOLERANCE = 1e-6; // mm
 const SNAP_DISTANCE = 0.03; // of the size of the assembly, between a click and a corner
@@ -9,7 +9,7 @@ function pick(viewer, features) {
   let pressed = null;
   viewer.canvas.addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
   viewer.canvas.addEventListener("pointerup", (event) => {
-    if (!pressed || Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > 4) return; // it was turned
+    if (!pressed || Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > 4) return; // the view was rotated
     const box = viewer.canvas.getBoundingClientRect();
     place.set((2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height);
     ray.setFromCamera(place, viewer.camera);

@@ -1,9 +1,9 @@
 "use strict";
-// The assembly to turn, drawn with three.js.
+// The assembly in 3D, drawn with three.js.
 
 // --- colours ---------------------------------------------------------------------------------------------------------
 
-// Viridis, and a diverging map from blue over white to orange: both are read by the colour-blind.
+// Viridis, and a diverging map from blue over white to orange: both are safe for colour-blind readers.
 const VIRIDIS = ["#440154", "#482878", "#3e4a89", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b", "#fde725"];
 const DIVERGING = ["#2166ac", "#67a9cf", "#d1e5f0", "#f7f7f7", "#fee0b6", "#f1a340", "#b35806"];
 
@@ -33,7 +33,7 @@ class Viewer {
   constructor(scene) {
     this.data = scene;
     this.canvas = byId("scene");
-    // Smooth edges cost as much as all else where no graphics card draws.
+    // Without a graphics card, smooth edges cost as much as everything else.
     const antialias = scene.parts.reduce((sum, part) => sum + part.faces.shape[0], 0) < MANY;
     this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, antialias, alpha: true, preserveDrawingBuffer: true });
     this.renderer.localClippingEnabled = true;
@@ -125,7 +125,7 @@ class Viewer {
     return mesh;
   }
 
-  /** The axes of the assembly, beside it. */
+  /** The axes of the assembly, next to it. */
   axes() {
     const length = 0.12 * this.size, start = this.box.min.clone().addScalar(-0.04 * this.size);
     ["x", "y", "z"].forEach((name, k) => {
@@ -269,7 +269,7 @@ class Viewer {
     return known.length && high >= low ? { low, high, map } : null;
   }
 
-  /** Colour contact points, and the areas between them, by what is known of them, and return its range; without it in their own colour. */
+  /** Colour contact points, and the areas between them, by their values, and return the range; without values, in their own colour. */
   paintContacts(name, single, state) {
     const known = name ? this.data.contacts.map((pair) => this.ofPoints(pair, name, single, state)) : [];
     const every = known.flatMap((values) => Array.from(values || [])).filter(Number.isFinite);
@@ -291,7 +291,7 @@ class Viewer {
     return every.length ? { low: 0, high, map: VIRIDIS } : null;
   }
 
-  /** A value for each contact point of a pair; null if the archive does not tell. */
+  /** A value for each contact point of a pair; null if the archive does not contain it. */
   ofPoints(pair, name, single, state) {
     if (name === "gapsLeft") {
       if (!pair.gapsLeft || single < 0) return null;

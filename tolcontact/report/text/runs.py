@@ -31,7 +31,7 @@ CHANGES = ("", "shift of mean", "6 sigma", f"{OUT_OF_SPECIFICATION_COLUMN},\npoi
 _DRAWS = {
     SAME_DRAWS: "the same draws; changes are from the same realizations",
     SAME_SEED: "the same seed, but other draws; changes are realization by realization",
-    OTHER_DRAWS: "other draws; changes are those of independent runs",
+    OTHER_DRAWS: "other draws; the runs are compared as independent samples",
 }
 
 

@@ -103,14 +103,14 @@ def _measure_section(measure: Rows) -> Iterator[Text | FigureTable]:
 
 
 def notes(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return what marks in the cells of `measure_rows` mean."""
+    """Return the meaning of marks in the cells of `measure_rows`."""
     cells = [cell for row in rows for cell in row]
     marks = {APART: any(cell.startswith("*") for cell in cells), WITHOUT: any(NO_INTERVAL in cell for cell in cells)}
     return [note for note, is_there in marks.items() if is_there]
 
 
 def measure_rows(measure: Rows) -> list[list[str]]:
-    """Return rows of label, both states and change of a measurement; * marks an index apart from that by percentiles."""
+    """Return rows of label, both states and change of a measurement; * marks an index that differs from the percentile one."""
     rows = []
     estimates = dict(
         zip(measure["statistic"].values, measure["statistic_value"].transpose("statistic", ...).values, strict=True)
@@ -137,7 +137,7 @@ def measure_rows(measure: Rows) -> list[list[str]]:
 
 
 def _are_disjoint(a: np.ndarray, b: np.ndarray) -> bool:
-    """Return True for estimates whose intervals do not overlap."""
+    """Return True if the intervals of two estimates do not overlap."""
     return bool(a[1] > b[2] or b[1] > a[2])
 
 
@@ -163,7 +163,7 @@ def pair_columns(summary: Rows) -> list[str]:
 
 
 def pair_rows(summary: Rows) -> list[list[str]]:
-    """Return rows of each pair: the share of realizations in which it is in contact, and its reaction."""
+    """Return rows of each pair: the share of realizations with contact, and its reaction."""
     rows = []
     for pair in summary["pair"].values:
         mean, *_, high = summary["reaction"].sel(pair=pair).values
@@ -212,7 +212,7 @@ def _doubts(summary: Rows, doubtful: int, count: int) -> Iterator[str]:
 
 
 def _clashes(summary: Rows, count: int) -> Iterator[str]:
-    """Yield lines about bodies that lie in each other though no contact holds them apart, and about the test of all bodies."""
+    """Yield lines about bodies without contact that penetrate each other, and about the test of all bodies."""
     watched, share = int(summary["watched"]), summary["clash_share"].values
     if not watched:
         is_linear = summary.attrs["resolution"] == "linearized"
@@ -232,7 +232,7 @@ def _clashes(summary: Rows, count: int) -> Iterator[str]:
 
 
 def _clashes_of(summary: Rows, *, is_declared: bool) -> list[str]:
-    """Return the pairs of parts that lie in each other, with the number of realizations and the largest depth."""
+    """Return the pairs of parts that penetrate each other, with the number of realizations and the largest depth."""
     columns = [summary[name].values for name in ("clash", "clash_count", "clash_largest_depth", "clash_declared")]
     texts = []
     for name, count, depth, declared in zip(*columns, strict=True):
@@ -242,7 +242,7 @@ def _clashes_of(summary: Rows, *, is_declared: bool) -> list[str]:
 
 
 def _between(summary: Rows, count: int) -> Iterator[str]:
-    """Yield lines about what lies between contact points, and about contact where faces have ended."""
+    """Yield lines about penetration between contact points, and about contact beyond the ends of faces."""
     checked, depth, overhang = (float(summary[name]) for name in ("surfaces_checked", "surface_penetration", "beside"))
     limit = NOTICED_SHARE * summary.attrs["smallest_range"]
     if math.isfinite(depth):
@@ -253,7 +253,7 @@ def _between(summary: Rows, count: int) -> Iterator[str]:
         if depth > limit and depth > 2 * float(summary["penetration"].sel(state=CORRECTED)):
             yield f"advice: {_way_out(summary)}"
         if overhang > limit:
-            yield f"touching contact points lie up to {overhang:.3g} mm beside their reference face"
+            yield f"touching contact points lie up to {overhang:.3g} mm outside their reference face"
     contacts, ended = (float(summary[name]) for name in ("contacts", "contacts_ended"))
     if ended > 0:
         yield f"contact beyond the end of a face: {ended:.0f} of {contacts:.0f} touching contact points, where checked"
@@ -265,7 +265,7 @@ def _between(summary: Rows, count: int) -> Iterator[str]:
 
 
 def _way_out(summary: Rows) -> str:
-    """Return what to do about surfaces that penetrate each other, or were resolved though apart."""
+    """Return advice for surfaces that penetrate each other, or were resolved although they were apart."""
     if summary.attrs["resolution"] == "linearized":
         return "use --resolution exact"
     if summary.attrs["search"] == "bounded":
@@ -274,7 +274,7 @@ def _way_out(summary: Rows) -> str:
 
 
 def _advice(summary: Rows, penetration: float) -> Iterator[str]:
-    """Yield advice on penetration that a linear step, or the paper's set of active points, leaves."""
+    """Yield advice on penetration that remains after a linear step, or with the paper's set of active points."""
     limit = NOTICED_SHARE * summary.attrs["smallest_range"]
     if penetration > limit and summary.attrs["active_set"] == "initial":
         yield 'advice: points outside the initial set penetrate; use Method(active_set="closed")'

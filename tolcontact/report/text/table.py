@@ -12,12 +12,12 @@ from rich.text import Text
 
 NAME_WIDTH = 12  # longer names and labels may be wrapped
 FILE_WIDTH = 80  # of tables in files and pipes
-BETWEEN = "  "  # columns
+BETWEEN = "  "  # separator of columns
 
 
 @dataclass(frozen=True)
 class FigureTable:
-    """Columns as wide as their cells. If they do not fit, each interval stands below its estimate."""
+    """A table with columns as wide as their cells. If they do not fit, each interval is printed below its estimate."""
 
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -47,13 +47,13 @@ class FigureTable:
         return sum(self._widths(rows)) + len(BETWEEN) * (len(self.columns) - 1)
 
     def _headings(self) -> list[tuple[str, ...]]:
-        """Return the lines of the heading, whose columns end on the last one."""
+        """Return the lines of the heading, with each column aligned to the last line."""
         headings = [column.split("\n") for column in self.columns]
         height = max(map(len, headings))
         return list(zip(*([""] * (height - len(lines)) + lines for lines in headings), strict=True))
 
     def _lines(self, rows: Sequence[Sequence[Sequence[str]]]) -> Iterator[Text]:
-        """Yield what a rich table would show, which takes a hundred times as long for cells that it need not wrap."""
+        """Yield the lines of the equivalent rich table, which takes a hundred times as long for cells without wrapping."""
         widths = self._widths(rows)
         for cells in self._headings():
             yield Text(_line(cells, widths), style="table.header", no_wrap=True)

@@ -1,4 +1,4 @@
-"""The probability of a rare event, from two searches and importance sampling about what they found."""
+"""The probability of a rare event, from two searches and importance sampling around their results."""
 
 import math
 from collections.abc import Sequence
@@ -23,27 +23,27 @@ from tolcontact.statistics.rare.searches import (
     nested_levels,
 )
 
-PILOT, MIN_COUNTED = 0.05, 50  # of all realizations; hits among them from which on the event is counted
-FIRST_LOOK, MIN_LOOK = 0.25, 3500  # share of realizations, and their number
+PILOT, MIN_COUNTED = 0.05, 50  # share of all realizations; number of hits among them above which the event is counted
+FIRST_SHARE, MIN_FIRST = 0.25, 3500  # share of realizations, and their number
 NO_CONCERN = 1e-7  # upper bound that suffices
 SUFFICIENT, MIN_SUFFICIENT = 1.5, 4000  # upper over lower bound that suffices, with this many realizations
-SEARCHABLE, MIN_PILOT, MIN_FEW = 10_000, 500, 3  # with fewer realizations a count is narrower than searches from few hits on
+SEARCHABLE, MIN_PILOT, MIN_FEW = 10_000, 500, 3  # with fewer realizations, counting beats searches even with few hits
 SEARCHES = (0.25, 0.3)  # of all realizations: by levels, by inflation
-SCOUTING = 0.04  # of a search, for each inflation that is tried
-TRIAL, MIN_TRIAL = 0.01, 5  # of a search, at each level, to count its levels; and the least of each strand
-MIN_LOOKS = 50  # for each inflation that is tried
-MIN_GROUP = 8  # realizations of a search that centres are found from
-AROUND_ZERO = 0.1  # share of the mixture that is drawn as it is
-REFITS = 2  # to what the searches found
-ROUNDS, ROUND = 2, 0.15  # of importance sampling, before the last one, and their shares: to find centres that are missing
-MIN_REFIT, REFIT = 40, 500  # hits from which centres are found again, and how many are drawn of them
+SCOUTING = 0.04  # of a search, for each trial inflation
+TRIAL, MIN_TRIAL = 0.01, 5  # of a search, at each level, to count its levels; and the minimum for each strand
+MIN_TRIALS = 50  # for each trial inflation
+MIN_GROUP = 8  # realizations of a search needed to fit centres
+AROUND_ZERO = 0.1  # share of the mixture that is drawn without a shift
+REFITS = 2  # to the results of the searches
+ROUNDS, ROUND = 2, 0.15  # of importance sampling before the last one, and their shares, for finding missing centres
+MIN_REFIT, REFIT = 40, 500  # hits needed to refit centres, and the number drawn from them
 MAX_UNSEEN = 0.9  # of an event
-MIN_EFFECTIVE, MAX_WEIGHT = 200, 0.02  # hits that importance sampling needs, and the largest share of one of them
-SIGNIFICANT = 1.7  # times both half widths: a search that says more shows what importance sampling missed (0.25 % by chance)
+MIN_EFFECTIVE, MAX_WEIGHT = 200, 0.02  # effective hits that importance sampling needs, and the largest share of a single one
+SIGNIFICANT = 1.7  # times both half widths: a larger search result shows what importance sampling missed (0.25 % by chance)
 
 
 class Tail(NamedTuple):
-    """The probability of an event, and the factor by which the searches for it disagree: 1 if they agree."""
+    """The probability of an event, and the ratio of the searches' results where they disagree: 1 if they agree."""
 
     probability: Estimate
     disagreement: float
@@ -52,12 +52,12 @@ class Tail(NamedTuple):
 def sufficient_tail(score: Score, dimensions: int, *, samples: int, rng: np.random.Generator, leads: bool = True) -> Tail:
     """Return the `tail_probability` from at most about `samples` realizations.
 
-    A quarter of them suffices if the searches agree, and the upper bound is at most 1e-7, or 1.5 times the lower one: the
-    latter with many realizations alone, since few may miss ways into the event.
-    Otherwise the others answer alone.
+    A quarter of them suffices if the searches agree, and the upper bound is at most 1e-7, or 1.5 times the lower one. The
+    latter needs many realizations, since few may miss regions of the event. Otherwise the result comes from the remaining
+    realizations alone.
     """
-    look = int(FIRST_LOOK * samples)
-    if look >= MIN_LOOK:
+    look = int(FIRST_SHARE * samples)
+    if look >= MIN_FIRST:
         tail = tail_probability(score, dimensions, samples=look, rng=rng, leads=leads)
         sufficient = SUFFICIENT * tail.probability.lower if look >= MIN_SUFFICIENT else 0.0
         if tail.disagreement == 1.0 and tail.probability.upper <= max(sufficient, NO_CONCERN):
@@ -69,7 +69,7 @@ def sufficient_tail(score: Score, dimensions: int, *, samples: int, rng: np.rand
 def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.random.Generator, leads: bool = True) -> Tail:
     """Return the probability that a score is above 0, with its 95 % interval, from about `samples` realizations.
 
-    leads   whether scores outside of the event say how near it is; otherwise inflation alone is searched by
+    leads   whether scores outside the event state how near it is; otherwise only the search by inflation is used
     """
     is_small = samples < SEARCHABLE
     pilot = score(rng.standard_normal((max(int(PILOT * samples), MIN_PILOT), dimensions))) > 0
@@ -85,15 +85,15 @@ def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.ran
     if not groups:
         if all(estimate.upper == 1.0 for estimate in answers):
             return Tail(_counted(score, dimensions, budget_drawn, rng), 1.0)
-        return _agreed(answers)
+        return _combined(answers)
     u, weights = _importance(score, dimensions, groups, budget_drawn, rng)
-    if not _suffices(weights):
-        return _agreed(answers)
+    if not _has_spread_weights(weights):
+        return _combined(answers)
     mean = float(weights.mean())
     reach = math.exp(intervals.student(np.inf) * float(weights.std()) / mean / math.sqrt(len(weights)))
     hits = np.flatnonzero(weights)
     hits = rng.choice(hits, min(2 * REFIT, len(hits)), p=weights[hits] / weights.sum())
-    unseen = _unseen([found for search in searches for found in search.points], u[hits], rng)
+    unseen = _unseen([strand for search in searches for strand in search.points], u[hits], rng)
     estimate = Estimate(mean, mean / reach, min(mean * reach / (1 - unseen), 1.0))
     for alternative in answers:
         if alternative.value > 0 and math.log(alternative.value / mean) > SIGNIFICANT * math.hypot(
@@ -104,9 +104,9 @@ def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.ran
 
 
 def either(tails: Sequence[Tail]) -> Tail:
-    """Return the probability of one of several events that exclude each other, from independent estimates.
+    """Return the probability that one of several mutually exclusive events occurs, from independent estimates.
 
-    Distances of the bounds add up like errors (Zou and Donner, 2008).
+    Distances of the bounds from the estimates add up like errors (Zou and Donner, 2008).
     """
     estimates = np.array([tail.probability for tail in tails])
     total = float(estimates[:, 0].sum())
@@ -120,7 +120,7 @@ def _counted(score: Score, dimensions: int, count: int, rng: np.random.Generator
 
 
 def _searched(score: Score, dimensions: int, budget: int, rng: np.random.Generator, *, inflates: bool) -> SearchResult:
-    """Return what a search found with about `budget` realizations."""
+    """Return the result of a search with about `budget` realizations."""
     used, inflation = 0, 1.0
 
     def counting(u: np.ndarray) -> np.ndarray:
@@ -133,7 +133,7 @@ def _searched(score: Score, dimensions: int, budget: int, rng: np.random.Generat
         return by_inflation(walk, inflation, budget - used) if inflates else by_levels(walk)
 
     if inflates:
-        inflation, share = first_inflation(counting, dimensions, max(int(SCOUTING * budget), MIN_LOOKS), rng)
+        inflation, share = first_inflation(counting, dimensions, max(int(SCOUTING * budget), MIN_TRIALS), rng)
     if inflates and dimensions > MAX_WEIGHTED:
         levels = BEFORE_NESTED + nested_levels(inflation, share)
     else:
@@ -144,7 +144,7 @@ def _searched(score: Score, dimensions: int, budget: int, rng: np.random.Generat
 
 
 def _halves(points: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Return realizations of the even strands and of the odd ones, (n, d); nothing of those with few."""
+    """Return the realizations of the even and of the odd strands, (n, d), without halves that are too small."""
     halves = [np.concatenate(strands) for k in range(2) if (strands := points[k::2])]
     return [half for half in halves if len(half) >= MIN_GROUP]
 
@@ -152,7 +152,7 @@ def _halves(points: Sequence[np.ndarray]) -> list[np.ndarray]:
 def _importance(
     score: Score, dimensions: int, groups: Sequence[Sequence[np.ndarray]], count: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return realizations drawn about what each search found, groups of (n, d), and their weights: 0 outside of the event."""
+    """Return realizations drawn around the results of each search, groups of (n, d), and their weights: 0 outside the event."""
     around_zero = Mixture(np.zeros((1, dimensions)), np.ones(1))
     shares = [(1 - AROUND_ZERO) / len(groups)] * len(groups)
     mixtures = [fitted(group, rng).flattened() for group in groups]
@@ -169,19 +169,19 @@ def _importance(
 
 
 def _completed(mixture: Mixture, u: np.ndarray, w: np.ndarray, rng: np.random.Generator) -> Mixture:
-    """Return the mixture with more centres where realizations (n, d) in the event have large weights: there, some are missing.
+    """Return the mixture with more centres where realizations (n, d) in the event have large weights: some are missing there.
 
-    w   (n,): weights, or in proportion to them
+    w   (n,): weights, up to a common factor
     """
     groups = [u[rng.choice(len(u), REFIT, p=w / w.sum())] for _ in range(2)]
     return joined([mixture, fitted(groups, rng).flattened()], [0.5, 0.5])
 
 
 def _unseen(strands: Sequence[np.ndarray], hits: np.ndarray, rng: np.random.Generator) -> float:
-    """Return the share of an event that no strand may have come to, at most.
+    """Return an upper bound of the share of an event that no strand reached.
 
-    Ways into the event are clusters of realizations drawn in it, `hits` (n, d). What single strands alone came to is about as
-    probable as what none did (Good, 1953; its standard error counts what two came to as well).
+    The regions of the event are clusters of realizations drawn in it, `hits` (n, d). Regions that only one strand reached are
+    about as probable as regions that none reached (Good, 1953; the standard error also counts regions that two reached).
     """
     ways = fitted([hits[::2], hits[1::2]], rng)
     strands = [points for points in strands if len(points)]
@@ -193,17 +193,17 @@ def _unseen(strands: Sequence[np.ndarray], hits: np.ndarray, rng: np.random.Gene
     return min((singles + intervals.student(np.inf) * math.sqrt(singles + doubles)) / len(strands), MAX_UNSEEN)
 
 
-def _suffices(weights: np.ndarray) -> bool:
-    """Return whether many realizations carry the estimate, and none much of it."""
+def _has_spread_weights(weights: np.ndarray) -> bool:
+    """Return whether the weights are spread over many realizations, with no dominant one."""
     total = weights.sum()
     is_carried = total > 0 and total**2 / (weights**2).sum() >= MIN_EFFECTIVE
     return bool(is_carried and weights.max() <= MAX_WEIGHT * total)
 
 
-def _agreed(answers: Sequence[Estimate]) -> Tail:
-    """Return the mean of what the searches say if they agree, else the larger with an interval that covers both.
+def _combined(answers: Sequence[Estimate]) -> Tail:
+    """Return the mean of the searches' results if they agree, else the larger with an interval that covers both.
 
-    A search that misses a way into the event says too little. So the mean is at most what either of them says at most.
+    A search that misses a region of the event gives too small a value, so the upper bounds of both bound the mean.
     """
     best = max(answers, key=lambda estimate: estimate.value)
     if len(answers) == 1:

@@ -1,7 +1,7 @@
 """Two searches for a rare event: by levels of its score, and by inflation of all contributors.
 
-A search has several strands. They share its levels, and otherwise each goes its own way: from how they differ follows the
-interval of the product of shares that a search estimates. Realizations of all strands are simulated together.
+A search has several strands. They share its levels and are otherwise independent: their differences give the interval of the
+product of shares that a search estimates. Realizations of all strands are simulated in one batch.
 """
 
 import math
@@ -15,25 +15,25 @@ from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import Estimate
 
 STRANDS = 8
-SHARE = 0.2  # of each event, in the one before
+SHARE = 0.2  # of each event, in the previous one
 MIN_LEVEL = 10  # realizations of a strand at a level
-MIN_SEEDS = 2  # of a strand, from which it walks to the next level
-FIRST_STEP, ACCEPTANCE = 0.8, 0.4  # length of steps, and the share of them that should be accepted
+MIN_SEEDS = 2  # per strand: smallest number of starts of walks to the next level
+FIRST_STEP, ACCEPTANCE = 0.8, 0.4  # length of steps, and their target acceptance rate
 MIN_STEP, MAX_STEP = 0.02, 0.99
 MAX_LEVELS = 60
 INFLATIONS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0)
-COMMON, SEEN = 0.1, 0.01  # shares of realizations in the event: inflate no further; inflate so far if it is the best
-UNKNOWN_INFLATION = 3.0  # where no inflation leads to the event
+COMMON, MIN_COMMON = 0.1, 0.01  # shares of realizations in the event that end inflation: at once; if none gives more
+UNKNOWN_INFLATION = 3.0  # used where no inflation leads to the event
 MAX_WEIGHTED = 10  # contributors: with more, the weights of inflation spread too far
-MAX_VARIANCE = 1.0  # of weights, of the square of their mean
-GOAL, MIN_GOAL = 0.25, 0.05  # share of an inflated event in the one before: aimed at, and accepted
-NESTED_SEEDS = 1 / 3  # of all realizations: fewer and larger questions to the score than with the share of hits
-FIRST_PACE, MAX_CHANGE, TRIES = 0.05, 3.0, 6  # by which 1 / s^2 grows from one inflated event to the next, and how it adapts
-LOOKS_BACK = 0.25  # share of realizations that are looked at in the event before
+MAX_VARIANCE = 1.0  # of weights, relative to the square of their mean
+GOAL, MIN_GOAL = 0.25, 0.05  # share of an inflated event in the previous one: target, and smallest accepted
+NESTED_SEEDS = 1 / 3  # of all realizations: fewer and larger calls of the score than with the share of hits
+FIRST_PACE, MAX_CHANGE, TRIES = 0.05, 3.0, 6  # growth of 1 / s^2 from one inflated event to the next, and its adaptation
+CHECKED_SHARE = 0.25  # share of realizations that are checked in the previous event
 BISECTIONS = 30
 NEGLIGIBLE = 1e-9  # probability below which a search ends
-BEFORE_NESTED = 3.0  # realizations for each place at a level, before the first nested event
-MAX_REACH = 700.0  # of a logarithm
+BEFORE_NESTED = 3.0  # realizations per position at a level, before the first nested event
+MAX_REACH = 700.0  # largest logarithm
 
 Score = Callable[[np.ndarray], np.ndarray]  # u (n, d) -> (n,)
 
@@ -46,9 +46,9 @@ class SearchResult(NamedTuple):
 
     @classmethod
     def nothing(cls, product: "Product") -> "SearchResult":
-        """Return the result of a search that did not find the event, or that ended where it was negligible.
+        """Return the result of a search that did not find the event, or that ended because it was negligible.
 
-        A level contains the event. An inflated event is taken to be no less probable than the event itself.
+        A level contains the event. An inflated event is assumed to be no less probable than the event itself.
         """
         return cls(Estimate(0.0, 0.0, product.estimate.upper if product.is_negligible else 1.0), [])
 
@@ -57,7 +57,7 @@ class Product:
     """A product of means over strands, and its interval.
 
     The influence of a strand on the logarithm of the product is the sum of its relative deviations from the means. The sum is
-    nearly normal where estimates of single strands, products themselves, are skewed.
+    nearly normal even where the estimates of single strands, which are products themselves, are skewed.
     """
 
     def __init__(self) -> None:
@@ -71,7 +71,7 @@ class Product:
         self._influence += values / mean - 1
 
     def over(self, hits: np.ndarray) -> None:
-        """Divide by the share of hits (strand, n), which is taken for one of them if there is none."""
+        """Divide by the share of hits (strand, n); if there are none, one hit is assumed."""
         if hits.size:
             mean = max(float(hits.mean()), 1 / hits.size)
             self.log -= math.log(mean)
@@ -79,7 +79,7 @@ class Product:
 
     @property
     def is_negligible(self) -> bool:
-        """Whether the product so far, that of a level or of an inflated event, is negligible."""
+        """Whether the product so far, the probability of a level or of an inflated event, is negligible."""
         return self.log < math.log(NEGLIGIBLE)
 
     @property
@@ -92,7 +92,7 @@ class Product:
 
 
 class Walk:
-    """Realizations of all strands that walk within events, simulated by `score`: `count` of each strand at a level."""
+    """Realizations of all strands that walk within events, simulated by `score`: `count` per strand at a level."""
 
     def __init__(self, score: Score, dimensions: int, count: int, rng: np.random.Generator) -> None:
         self._score, self.dimensions, self.count, self.rng = score, dimensions, count, rng
@@ -100,11 +100,11 @@ class Walk:
 
     @property
     def seeds(self) -> int:
-        """The number of realizations of each strand from which it walks to the next level."""
+        """The number of realizations per strand that start walks to the next level."""
         return max(int((SHARE if self.dimensions <= MAX_WEIGHTED else NESTED_SEEDS) * self.count), MIN_SEEDS)
 
     def spread(self, budget: int, levels: float) -> None:
-        """Choose the number of realizations at a level so that levels to come use up what is left of a budget."""
+        """Choose the number of realizations at a level so that the remaining levels use up the rest of a budget."""
         self.count = max(int((budget - self._simulated) / STRANDS / levels), MIN_LEVEL)
 
     def scores(self, u: np.ndarray) -> np.ndarray:
@@ -117,10 +117,10 @@ class Walk:
         u = deviation * self.rng.standard_normal((STRANDS, self.count, self.dimensions))
         return u, self.scores(u)
 
-    def seed_places(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return where the seeds (strand, seed) of the next level lie among realizations with weights (strand, n).
+    def seed_positions(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the positions of the seeds (strand, seed) of the next level among realizations with weights (strand, n).
 
-        A strand of which nothing is left continues from the others.
+        A strand without any weight continues from the other strands.
         """
         strands, places = [], []
         for strand in range(STRANDS):
@@ -137,7 +137,7 @@ class Walk:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return realizations of N(0, deviation^2) with scores above a threshold, by walks from u (strand, seed, d), and g.
 
-        Scores are those of realizations times `stretch`.
+        Scores are evaluated at realizations times `stretch`.
         """
         walked, scores = [], []
         for _ in range(math.ceil(self.count / self.seeds)):
@@ -159,37 +159,37 @@ def by_levels(walk: Walk) -> SearchResult:
 
 
 def by_inflation(walk: Walk, inflation: float, budget: int) -> SearchResult:
-    """Search from an inflation back to none, where inflations are nested with about `budget` realizations in all."""
+    """Search from an inflation back to none; nested inflations use about `budget` realizations in all."""
     return _weighted(walk, inflation) if walk.dimensions <= MAX_WEIGHTED else _nested(walk, inflation, budget)
 
 
 def nested_levels(inflation: float, share: float) -> float:
-    """Return how many realizations a nested search has ahead, in those of one level.
+    """Return the approximate number of realizations of a nested search, in multiples of one level.
 
-    share   of an event in realizations with this inflation. It is taken for one beyond a plane, whose probability at the
-            inflation s is Q(distance / s).
+    share   of the event in realizations with this inflation. The event is approximated by a half-space, which has the
+            probability Q(distance / s) at the inflation s.
     """
     distance = -inflation * special.ndtri(share)
     ratio = math.log(share) - max(float(special.log_ndtr(-distance)), math.log(NEGLIGIBLE))
-    return (2 + LOOKS_BACK) * (1 + max(ratio, 0.0) / -math.log(GOAL))
+    return (2 + CHECKED_SHARE) * (1 + max(ratio, 0.0) / -math.log(GOAL))
 
 
 def first_inflation(score: Score, dimensions: int, count: int, rng: np.random.Generator) -> tuple[float, float]:
-    """Return the least inflation at which the event is common, or at which it is most common, from `count` looks at each.
+    """Return the least inflation at which the event is common, or else most common, from `count` realizations at each.
 
-    The second number is the share of the event at the inflation, at least that of a single look.
+    The second number is the share of the event at the inflation, at least one realization.
     """
     scores = score(np.concatenate([s * rng.standard_normal((count, dimensions)) for s in INFLATIONS]))
     shares = [float((g > 0).mean()) for g in np.split(scores, len(INFLATIONS))]
     common = [(s, share) for s, share in zip(INFLATIONS, shares, strict=True) if share >= COMMON]
     if common:
         return common[0]
-    most = int(np.argmax(shares))
-    return (INFLATIONS[most] if shares[most] > SEEN else UNKNOWN_INFLATION), max(shares[most], 1 / count)
+    best = int(np.argmax(shares))
+    return (INFLATIONS[best] if shares[best] > MIN_COMMON else UNKNOWN_INFLATION), max(shares[best], 1 / count)
 
 
 def _levels(walk: Walk, inflation: float, product: Product) -> list[np.ndarray] | None:
-    """Return realizations of N(0, inflation^2) of each strand in the event; none if it is not found, or negligible."""
+    """Return realizations of N(0, inflation^2) of each strand in the event; None if it is not found, or negligible."""
     u, g = walk.first_realizations(inflation)
     for _ in range(MAX_LEVELS):
         threshold = _threshold(g)
@@ -201,13 +201,13 @@ def _levels(walk: Walk, inflation: float, product: Product) -> list[np.ndarray] 
             return None
         if threshold == 0.0:
             return [points[hits] for points, hits in zip(u, inside, strict=True)]
-        seeds = walk.seed_places(inside)
+        seeds = walk.seed_positions(inside)
         u, g = walk.advance(u[seeds], g[seeds], threshold, inflation)
     return None
 
 
 def _inflated(walk: Walk, inflation: float, product: Product) -> np.ndarray | None:
-    """Return realizations of N(0, inflation^2) in the event (strand, n, d); none if it is not found, or negligible."""
+    """Return realizations of N(0, inflation^2) in the event (strand, n, d); None if it is not found, or negligible."""
     points = _levels(walk, inflation, product)
     if points is None:
         return None
@@ -218,7 +218,7 @@ def _inflated(walk: Walk, inflation: float, product: Product) -> np.ndarray | No
 
 
 def _weighted(walk: Walk, inflation: float) -> SearchResult:
-    """Bring an inflated event back by weights: P_t(F) = P_s(F) E_s[w | F], w the ratio of densities of N(0, t^2), N(0, s^2)."""
+    """Deflate an inflated event by weights: P_t(F) = P_s(F) E_s[w | F], w the ratio of densities of N(0, t^2), N(0, s^2)."""
     product, s = Product(), inflation
     u = _inflated(walk, inflation, product)
     if u is None:
@@ -236,14 +236,14 @@ def _weighted(walk: Walk, inflation: float) -> SearchResult:
         product.times(weights.mean(axis=1), log_scale=largest)
         if product.is_negligible:
             return SearchResult.nothing(product)
-        seeds = u[walk.seed_places(weights)]
+        seeds = u[walk.seed_positions(weights)]
         u, _ = walk.advance(seeds, np.ones(seeds.shape[:2]), 0.0, t)
         s = t
     return SearchResult(product.estimate, list(u))
 
 
 def _nested(walk: Walk, inflation: float, budget: int) -> SearchResult:
-    """Bring an inflated event back by nested ones, F_s = {z: g(s z) > 0} with z standard normal.
+    """Deflate an inflated event by nested events, F_s = {z: g(s z) > 0} with z standard normal.
 
     P(F_t) / P(F_s) = P(z in F_t | F_s) / P(z in F_s | F_t) holds for any event.
     """
@@ -251,16 +251,16 @@ def _nested(walk: Walk, inflation: float, budget: int) -> SearchResult:
     u = _inflated(walk, inflation, product)
     if u is None:
         return SearchResult.nothing(product)
-    z, looks = u / inflation, u[:, :0]  # u (strand, n, d) to be looked at, whether it is in the event before
+    z, checked_points = u / inflation, u[:, :0]  # u (strand, n, d) to be checked for membership in the previous event
     while s > 1.0:
         for _ in range(TRIES):
             t = max(1 / math.sqrt(1 / s**2 + pace), 1.0)
-            scores = walk.scores(np.concatenate([looks, t * z], axis=1))  # together: one question takes less time than two
-            hits_before, hits = np.split(scores > 0, [looks.shape[1]], axis=1)
+            scores = walk.scores(np.concatenate([checked_points, t * z], axis=1))  # one large call takes less time than two
+            hits_before, hits = np.split(scores > 0, [checked_points.shape[1]], axis=1)
             product.over(hits_before)
             if product.is_negligible:
                 return SearchResult.nothing(product)
-            looks = looks[:, :0]
+            checked_points = checked_points[:, :0]
             share = float(hits.mean())
             change = math.log(GOAL) / math.log(min(max(share, 1 / hits.size), 1 - 1 / hits.size))
             pace *= min(max(change, 1 / MAX_CHANGE), MAX_CHANGE)
@@ -270,16 +270,16 @@ def _nested(walk: Walk, inflation: float, budget: int) -> SearchResult:
             return SearchResult.nothing(product)
         product.times(hits.mean(axis=1))
         walk.spread(budget, nested_levels(t, math.exp(product.log)))
-        seeds = z[walk.seed_places(hits)]
+        seeds = z[walk.seed_positions(hits)]
         z, _ = walk.advance(seeds, np.ones(seeds.shape[:2]), 0.0, stretch=t)
-        looks = s * z[:, walk.rng.choice(z.shape[1], max(int(LOOKS_BACK * z.shape[1]), 1), replace=False)]
+        checked_points = s * z[:, walk.rng.choice(z.shape[1], max(int(CHECKED_SHARE * z.shape[1]), 1), replace=False)]
         s = t
-    product.over(walk.scores(looks) > 0)
+    product.over(walk.scores(checked_points) > 0)
     return SearchResult(product.estimate, list(z))
 
 
 def _least(is_enough: Callable[[float], bool], s: float) -> float:
-    """Return the least inflation from 1 to s that is enough, by bisection; if none is, one in between."""
+    """Return the least inflation from 1 to s that is enough, by bisection; if none is, an intermediate one."""
     if is_enough(1.0):
         return 1.0
     low, high = 1.0, s
@@ -295,14 +295,14 @@ def _variance(log_weights: np.ndarray) -> float:
 
 
 def _resampled(weights: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Return `count` numbers of realizations, each as often as its weight says (systematic resampling)."""
+    """Return the indices of `count` realizations in proportion to their weights (systematic resampling)."""
     cumulative = np.cumsum(weights)
     places = (rng.random() + np.arange(count)) / count
     return np.searchsorted(cumulative / cumulative[-1], places).clip(max=len(weights) - 1)
 
 
 def _threshold(g: np.ndarray) -> float:
-    """Return the threshold, at most 0, that a fifth of the scores exceed; a lower one if otherwise none would exceed it."""
+    """Return the threshold, at most 0, that a fifth of the scores exceed; a lower one if no score would exceed it."""
     g = g.ravel()
     threshold = float(np.sort(g)[-int(np.ceil(SHARE * len(g))) - 1])
     if threshold >= g.max() and threshold < 0:
