@@ -84,11 +84,6 @@ CASES = {
         lambda p: p.feature("f", p.face(BORE), tc.Position(0.1, "B|A", projected=10)), "a projected zone needs a plane"
     ),
     "unknown rule": (lambda p: p.feature("f", p.face("+z"), tc.Profile(0.1, "A", rule="wide")), "rule is 'wide'; expected one"),
-    "rules that do not go together": (
-        lambda p: p.feature("f", p.face("+z"), tc.Profile(0.3, "A", rule="uniform"), tc.Parallelism(0.1, "A")),
-        'the rule "uniform" is for features with one tolerance',
-    ),
-    "polar plane": (lambda p: p.feature("f", p.face("+z"), tc.Profile(0.1, "A", rule="polar")), 'the rule "polar" is for axes'),
     "translation of what only tilts": (
         lambda p: p.feature("f", p.face("+z"), tc.Parallelism(0.1, "A", rule="translation")), "leaves nothing"
     ),

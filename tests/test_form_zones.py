@@ -96,8 +96,8 @@ def test_form_and_displacements_share_the_zone_around_them(flatness, spread):
 def test_a_form_that_fills_the_zone_around_it_is_refused():
     with pytest.raises(tc.ModelError, match="the narrower tolerances within it leave 2 % of the"):
         tc.build(toleranced.block_with("top", tc.Profile(0.2, "A|B|C"), tc.Flatness(0.15)))
-    with pytest.raises(tc.ModelError, match='the rule "uniform" is for features that keep their shape'):
-        tc.build(toleranced.block_with("top", tc.Parallelism(0.2, "A", rule="uniform"), tc.Flatness(0.1)))
+    with pytest.raises(tc.ModelError, match='the rule "translation" is for features that keep their shape'):
+        tc.build(toleranced.block_with("top", tc.Profile(0.2, "A", rule="translation"), tc.Flatness(0.1)))
 
 
 def test_a_population_is_measured_with_its_form():

@@ -67,7 +67,9 @@ def test_every_field_of_a_declared_class_stands_in_the_document():
 
 def with_everything(folder):
     a = toleranced.block_with(
-        "top", tc.Profile(0.3, "A|B", rule="uniform", tangent=True), tc.Flatness(0.1, form=tc.Form("matern 3/2", 20))
+        "top",
+        tc.Profile(0.3, "A|B", rule="6 sigma at the extremes", tangent=True),
+        tc.Flatness(0.1, form=tc.Form("matern 3/2", 20)),
     )
     own = tc.Flatness(0.1, per=(25, 10), form=None)
     block = a.parts[0]

@@ -142,13 +142,6 @@ def test_a_bonus_goes_by_the_size_of_each_member():
     assert deviations[:, columns] == pytest.approx(plain[:, columns] * factor[:, None], rel=1e-12)
 
 
-def test_rules_that_draw_together_draw_each_member_by_itself():
-    drawn = Draws(discretize(plate(tc.Position(0.5, "A|B|C", rule="uniform"))))
-    assert [joint.columns.tolist() for joint in drawn.contributors.joint_draws] == [[0, 1, 2, 3], [4, 5, 6, 7]]
-    with pytest.raises(tc.ModelError, match=r'pattern "H".*members to deviate together; choose "99\.73 % inside"'):
-        tc.build(plate(tc.Position(0.5, "A", rule="uniform")))
-
-
 def test_the_worst_case_of_a_distance_is_the_zone_of_the_lower_frame():
     """The upper zone is largest, 0.45, with the largest holes."""
     a, part, faces = plate_with_holes(2)

@@ -77,27 +77,6 @@ def test_a_population_is_inside_its_zones_as_stated_in_any_frame(name):
     assert moved.needed_width.values == pytest.approx(found.needed_width.values, rel=1e-9)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("rule", ["truncated", "uniform"])
-@pytest.mark.parametrize("kind", ["top", "bore"])
-def test_features_outside_are_left_out(rule, kind):
-    tolerance = tc.Profile(0.2, "A", rule=rule) if kind == "top" else tc.Position(0.2, "A|B", rule=rule)
-    model = (toleranced.block_with if kind == "top" else toleranced.ring_with)(kind, tolerance)
-    assert float(tc.check_population(model, samples=SAMPLES).share_inside[0, 0]) == 1
-    drawn = Draws(discretize(model))(seed=1, start=0, stop=SAMPLES)
-    assert (Draws(discretize(model))(seed=1, start=5000, stop=5100) == drawn[5000:5100]).all()
-    if rule == "uniform":  # the T-Map reading: sd of a corner t / 3.65, of an axis' end t / 4.00
-        extreme, factor = (drawn.sum(axis=1), 3.65) if kind == "top" else (drawn[:, 0] + drawn[:, 2], 4.00)
-        assert 0.2 / extreme.std() == pytest.approx(factor, rel=0.02)
-
-
-def test_polar_draws_have_a_normal_radius_and_any_angle():
-    model = toleranced.ring_with("bore", tc.Position(0.2, "A|B", rule="polar"))
-    x, y = Draws(discretize(model))(seed=1, start=0, stop=SAMPLES).T
-    assert 0.2 / x.std() == pytest.approx(8.48, rel=0.02) and 0.2 / y.std() == pytest.approx(8.48, rel=0.02)
-    assert np.hypot(x, y).std() ** 2 + np.hypot(x, y).mean() ** 2 == pytest.approx((0.2 / 6) ** 2, rel=0.03)
-
-
 def test_the_bonus_fills_the_zone_of_each_part():
     """Hole 10 +0.1/0, position 0.2 M: the spread grows by 25 %, with the part's own size."""
     said = {"material": "M", "rule": "translation"}

@@ -11,8 +11,8 @@ from tolcontact.readable import Readable
 
 INSIDE = "99.73 % inside"
 EXTREMES = "6 sigma at the extremes"
-RULES = (INSIDE, EXTREMES, "truncated", "uniform", "translation", "polar")
-TRANSLATIONS = ("translation", "polar")  # rules without tilts
+TRANSLATION = "translation"  # a rule without tilts
+RULES = (INSIDE, EXTREMES, TRANSLATION)
 BONUSES = ("fills", "accepts", "none")
 MATERIALS = ("", "M", "L")
 SYMBOLS = {"M": "Ⓜ", "L": "Ⓛ"}
@@ -40,9 +40,7 @@ class GeometricTolerance(Readable):
                 feature keeps its shape
     rule        from the zone to the spread of all freedoms together. "99.73 % inside" (default): this share of features lies
                 inside, where components are equal, independent and normal. "6 sigma at the extremes": six standard deviations
-                at the worst extreme of the feature equal the width. "truncated": the same, without the features outside.
-                "uniform": uniform in the zone. "translation": no tilts. "polar": uniform angle and normal radius, 6 sigma of
-                which equal the width
+                at the worst extreme of the feature equal the width. "translation": the default without tilts
     cp, cpk     process capability: the spread is divided by `cp`, and the mean is shifted until `cpk` results
 
     A kind of tolerance is a subclass: `kind` is its name in messages, JSON and archives. `options` names the fields among
@@ -175,8 +173,6 @@ class GeometricTolerance(Readable):
             yield f"cp is {self.cp!r}; expected a number above 0"
         elif self.cpk is not None and not (is_length(self.cpk) and self.cpk <= self.cp):
             yield f"cpk is {self.cpk!r}; expected a number, at most cp"
-        elif (self.cp != 1 or self.cpk is not None) and self.rule in ("truncated", "uniform", "polar"):
-            yield f'cp is given with the rule "{self.rule}"; it goes with normal components'
 
     def __str__(self) -> str:
         """Return the tolerance with the symbols of a drawing."""

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from tolcontact.declaration import OUTSIDE, Feature, GeometricTolerance
-from tolcontact.declaration.feature_tolerance import TRANSLATIONS
+from tolcontact.declaration.feature_tolerance import TRANSLATION
 from tolcontact.declaration.toleranced import Toleranced
 from tolcontact.errors import GeometryFault
 from tolcontact.features.datum_planes import Lean, TangentPlane, free_directions
@@ -163,7 +163,7 @@ def tolerance_layers(
         _check_nesting(candidate, layers)
         is_outer = controlled_before.shape[1] > 0
         added = _named_basis(_difference(controlled, controlled_before), geometry, is_outer=is_outer)
-        if tolerance.rule in TRANSLATIONS:
+        if tolerance.rule == TRANSLATION:
             added = _translations(tolerance, geometry, added, is_outer=is_outer)
         if controlled.shape[1] and not added.shape[1]:
             raise GeometryFault(
