@@ -7,6 +7,7 @@ from scipy.stats import binom
 
 import tolcontact as tc
 from tests.cases import toleranced
+from tests.population_referee import measured_back
 from tolcontact import vocabulary
 from tolcontact.checksums import crc32
 from tolcontact.discretization import discretize
@@ -36,24 +37,24 @@ def test_features_are_drawn_inside_an_uneven_zone_by_every_rule(rule, kind):
     if rule == "99.73 % inside":
         low, high = binom.interval(0.9999, SAMPLES, 0.9973)
         assert low <= inside <= high
-    measured = tc.check_population(model, samples=SAMPLES, seed=4)
-    assert float(measured.share_inside[0, 0]) * SAMPLES == pytest.approx(inside, abs=0.5)
+    measured = measured_back(model, SAMPLES, seed=4)
+    assert measured.share[0] * SAMPLES == pytest.approx(inside, abs=0.5)
 
 
 def test_each_member_of_a_pattern_is_drawn_in_its_uneven_zone():
     """Their datum lets the members deviate each alone, so that the shares of features and of members are equal."""
-    share = tc.check_population(toleranced.rails_with(tc.Profile(0.3, "A", outside=UPPER)), samples=SAMPLES)
+    population = measured_back(toleranced.rails_with(tc.Profile(0.3, "A", outside=UPPER)), SAMPLES)
     low, high = binom.interval(0.9999, SAMPLES, 0.9973)
-    assert low <= float(share.share_inside[0, 0]) * SAMPLES <= high
+    assert low <= population.share[0] * SAMPLES <= high
 
 
 def test_the_middle_of_a_zone_has_no_effect_if_datums_leave_its_place_free():
     """Datum A leaves the end of the block free to shift: the zone then follows it."""
     shares = [
-        tc.check_population(toleranced.block_with("far", tc.Profile(0.3, "A", outside=outside)), samples=SAMPLES).share_inside
+        measured_back(toleranced.block_with("far", tc.Profile(0.3, "A", outside=outside)), SAMPLES).share
         for outside in (None, 0.3)
     ]
-    assert (shares[0].values == shares[1].values).all() and float(shares[0][0, 0]) > 0.99
+    assert (shares[0] == shares[1]).all() and shares[0][0] > 0.99
 
 
 def test_widened_zones_keep_their_middle():

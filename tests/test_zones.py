@@ -6,6 +6,7 @@ from scipy.stats import binom, norm
 
 import tolcontact as tc
 from tests.cases import Frame, toleranced
+from tests.population_referee import measured_back
 from tolcontact.discretization import discretize
 from tolcontact.variation import Draws
 from tolcontact.variation.zones import MemberZone, equal_spread, share_inside
@@ -66,15 +67,15 @@ def test_the_share_inside_is_that_of_draws():
 
 @pytest.mark.parametrize("name", toleranced.EVERY)
 def test_a_population_is_inside_its_zones_as_stated_in_any_frame(name):
-    found = tc.check_population(toleranced.EVERY[name](toleranced.STILL), samples=SAMPLES, seed=3)
-    assert found.sizes["zone"]
-    for zone in range(found.sizes["zone"]):
-        stated, inside = float(found.stated_share[zone]), float(found.share_inside[zone, 0]) * SAMPLES
+    found = measured_back(toleranced.EVERY[name](toleranced.STILL), SAMPLES, seed=3)
+    assert len(found.tolerances)
+    for zone, tolerance in enumerate(found.tolerances):
+        stated, inside = found.stated_share[zone], found.share[zone] * SAMPLES
         low, high = binom.interval(0.9999, SAMPLES, stated if np.isfinite(stated) else 0.9973)
-        assert low <= inside and (inside <= high or not np.isfinite(stated)), str(found.zone_tolerance[zone].values)
-    moved = tc.check_population(toleranced.EVERY[name](MOVED), samples=SAMPLES, seed=3)
-    assert (moved.share_inside.values == found.share_inside.values).all()
-    assert moved.needed_width.values == pytest.approx(found.needed_width.values, rel=1e-9)
+        assert low <= inside and (inside <= high or not np.isfinite(stated)), tolerance
+    moved = measured_back(toleranced.EVERY[name](MOVED), SAMPLES, seed=3)
+    assert (moved.share == found.share).all()
+    assert moved.needed_width == pytest.approx(found.needed_width, rel=1e-9)
 
 
 def test_the_bonus_fills_the_zone_of_each_part():
@@ -90,9 +91,9 @@ def test_the_bonus_fills_the_zone_of_each_part():
     assert spread["fills"] / spread["none"] == pytest.approx(1.25, rel=0.01) and spread["accepts"] == spread["none"]
     assert plain.std() == pytest.approx(spread["none"], rel=1e-12)
     shares = [
-        float(tc.check_population(
-            toleranced.ring_with("bore", tc.Size(10, 0.1, 0), tc.Position(0.2, "A|B", bonus=bonus, **said)), samples=SAMPLES
-        ).share_inside[1, 0])
+        measured_back(
+            toleranced.ring_with("bore", tc.Size(10, 0.1, 0), tc.Position(0.2, "A|B", bonus=bonus, **said)), SAMPLES
+        ).share[1]
         for bonus in ("accepts", "none")
     ]  # fmt: skip
     assert shares[0] > 0.9995 and shares[1] == pytest.approx(0.9973, abs=0.0015)
@@ -140,7 +141,7 @@ def test_one_rule_for_a_tail_is_enough_that_no_share_is_stated():
         block.feature("base", block.face("-z"), datum="A")
         top = block.feature("top", block.face("+z"), tc.Profile(0.4, "A"), tc.Parallelism(0.1, "A", **rule))
         a.measure("height", top.point(0, 0, 20), along="z")
-        return tc.check_population(a, samples=200).stated_share.values
+        return measured_back(a, 200).stated_share
 
     assert shares() == pytest.approx([0.9973, 0.9973], abs=1e-4)
     assert np.isnan(shares(cp=1.5)).all()

@@ -59,7 +59,7 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | choose faces | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
 | STEP files | `bodies_in`, `faces_in`, `parts_from`, `read_pmi` |
 | returned by declarations | `Part`, `Face`, `Point`, `ContactPair`, `Force`, `Measure`, `Station`, `Joint` |
-| run | `run`, `build`, `check`, `check_population`, `compare`, `simulate`, `study`, `simulate_blocks`; `Method`, `Program` |
+| run | `run`, `build`, `check`, `compare`, `simulate`, `study`, `simulate_blocks`; `Method`, `Program` |
 | commands | `main`, `command_line` |
 | draw pictures | `plot` |
 | write models as JSON | `write_model` |

@@ -89,7 +89,6 @@ from .vocabulary import Status as Status
 from .workflow import (
     build as build,
     check as check,
-    check_population as check_population,
     compare as compare,
     compare_runs as compare_runs,
     open_archive as open_archive,

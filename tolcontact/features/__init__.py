@@ -158,11 +158,9 @@ from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, F
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.form_field import FormField
 from tolcontact.features.nominal_features import Features, NominalFeature, NominalPattern, Placement
-from tolcontact.features.tolerance_kinds import zone_of
 from tolcontact.features.tolerance_layers import Datum, Layer
 
 __all__ = [
     "AxisFeature", "Datum", "FaceDeviation", "FeatureGeometry", "FeatureOfSize", "Features", "FormField", "Layer",
     "NominalFeature", "NominalPattern", "Placement", "PlaneFeature", "TangentPlane", "datum_order", "feature_geometry",
-    "zone_of",
 ]  # fmt: skip

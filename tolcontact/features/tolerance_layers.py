@@ -15,7 +15,7 @@ from tolcontact.features.datum_planes import Lean, TangentPlane, free_directions
 from tolcontact.features.feature_geometry import FeatureGeometry, PlaneFeature
 from tolcontact.features.form_field import FormField
 from tolcontact.features.pattern_geometry import MIN_LENGTH, PatternGeometry
-from tolcontact.features.tolerance_kinds import zone_of
+from tolcontact.features.tolerance_kinds import zone_rows
 
 MIN_NOTICED = 1e-4  # smallest singular value, relative to the largest, of a displacement that a datum notices
 MIN_LEAN = 1e-9  # mm of extremes of a plane, for deviations of 1
@@ -65,7 +65,7 @@ class DatumFrame(NamedTuple):
 class Layer:
     """The freedoms of a feature or pattern that one tolerance controls beyond the tolerances within it.
 
-    rows        for each member (point, component, coordinate of the member) of its zone (see tolerance_kinds.Zone)
+    rows        for each member (point, component, coordinate of the member) of its zone (see tolerance_kinds)
     controlled  (coordinate, n): orthonormal directions that its datums lock
     added       (coordinate, k): directions that no narrower tolerance controls and that its rule draws; each is a contributor
     frame       of its datum system
@@ -184,7 +184,7 @@ def _layer(
         raise GeometryFault(f"{tolerance.kind} refers to datum {absent[0]}, which could not be made; mend its feature first")
     system = [[datum for letter in compartment for datum in datums[letter]] for compartment in tolerance.system]
     primary = system[0][0].geometry if system else None
-    rows = tuple(zone_of(tolerance, member, primary).rows for member in geometry.members)
+    rows = tuple(zone_rows(tolerance, member, primary) for member in geometry.members)
     frame = datum_frame(system, geometry.centre, geometry.reach, columns, tolerance.orientation_only)
     nothing = np.zeros((geometry.count, 0))
     is_limited = system or len(geometry.members) > 1  # a common zone limits the members to each other

@@ -51,20 +51,10 @@ directions, not sampled.
 >>> [(freedom.label, round(0.3 / freedom.spread, 2)) for freedom in tc.build(block).draws.contributors]
 [('part.top.offset', 11.76), ('part.top.tilt x', 11.76), ('part.top.tilt y', 11.76)]
 
-`tc.check_population(model)`, or `tolcontact check MODEL --population 10000`, draws features and measures them as a coordinate
-measuring machine would: it fits datum systems to displaced points, and finds the narrowest zones. It prints the share inside
-each zone, with its 95 % interval, beside the share that the rule states. With bonuses and nested tolerances the share may be
-larger.
-
->>> population = tc.check_population(block, samples=2000)
->>> _, lower, upper = population.share_inside.sel(zone=0).values
->>> bool(lower < 0.9973 < upper)
-True
-
 Of a pattern, 99.73 % of the *members* lie inside. A pattern with one position whose datums lock its members has the spreads of
 features by themselves. Where its datums leave a motion of the whole pattern free, the place of the pattern counts as fitted by
 least squares, and a wider tolerance with more datums draws that motion. A bonus goes by the size of each member, and for what
-moves several of them by the smallest of theirs. A population judges one member of each drawn pattern, in turn.
+moves several of them by the smallest of theirs.
 
 The form of a feature, if it is drawn, lies within the zones of the surface around it: of a plane within all, of a round face
 within those of a profile and of run-out. Sizes do not limit form, nor form sizes. Not covered are the envelope of ASME's Rule

@@ -17,7 +17,7 @@ from tolcontact.plausibility import warn_of_nominal
 
 DEFAULT_SOLVER = "qpoases"
 COUNTS = {  # smallest and largest
-    "samples": (2, 10**12), "population": (2, 10**12), "seed": (0, 2**63 - 1), "surfaces": (0, 10**6),
+    "samples": (2, 10**12), "seed": (0, 2**63 - 1), "surfaces": (0, 10**6),
 }  # fmt: skip
 Model = Assembly | Callable[[], Assembly] | str | Path
 Choice = Method | Mapping[str, Any]  # a method, or some of its choices; the model's own method has the others
