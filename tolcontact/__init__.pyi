@@ -80,9 +80,10 @@ from .errors import (
     TolcontactError as TolcontactError,
     UnitsWarning as UnitsWarning,
 )
+from .fasteners import fasten as fasten
 from .geometry import bodies_in as bodies_in, faces_in as faces_in, parts_from as parts_from
 from .method import Method as Method
-from .pmi import read_pmi as read_pmi
+from .pmi import features_from_pmi as features_from_pmi, read_pmi as read_pmi
 from .simulation import simulate_blocks as simulate_blocks
 from .version import __version__ as __version__
 from .vocabulary import Status as Status

@@ -1,8 +1,7 @@
 """Base classes for objects that print as readable rows in a console, and show pictures in a notebook."""
 
 import html
-
-from tolcontact.later import HTML, LATER
+from importlib import import_module
 
 
 class Readable:
@@ -19,4 +18,9 @@ class Pictured(Readable):
     """An object that a notebook shows as a picture."""
 
     def _repr_html_(self) -> str:
-        return str(LATER[HTML](self))
+        return picture(self)
+
+
+def picture(thing: object) -> str:
+    """Return an object as the HTML that a notebook shows; the report, a later room, is imported when one first does."""
+    return str(import_module("tolcontact.report.notebook").html_of(thing))

@@ -95,7 +95,7 @@ def bolted(
             for part, tolerances, width in zip((base, cover), ([] if into else sizes, sizes), position, strict=True)
         )
         holes = {"through": [upper], "into": lower} if into else {"through": [upper, lower]}
-        a.fasten(f"bolt {k + 1}", shank, seat=cover.face("+z"), pushed=pushed, **holes)
+        tc.fasten(a, f"bolt {k + 1}", shank, seat=cover.face("+z"), pushed=pushed, **holes)
     for axis in "xy":
         along = frame.along(*np.eye(3)["xy".index(axis)])
         a.measure(axis, cover.point(0, 0, 0), along=along)

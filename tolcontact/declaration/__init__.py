@@ -162,8 +162,8 @@ force weight: (0, 0, -100) N at plate (30, 20, 4)
 
 ## Fasteners
 
-`fasten(name, 10, through=[hole, ...], into=hole)` declares a bolt, screw, pin or dowel in the holes of several parts: its part,
-its location and its contact pairs (see `tolcontact.fasteners`).
+`tc.fasten(assembly, name, 10, through=[hole, ...], into=hole)` declares a bolt, screw, pin or dowel in the holes of several
+parts: its part, its location and its contact pairs (see `tolcontact.fasteners`).
 
 ## Measures
 
@@ -212,10 +212,11 @@ derivatives, so `sensitivities` and `contributions` state none for them by a lin
 ## Stations and joints
 
 Products are located, joined, and located again before anybody measures them. `station(name)` declares the next step of such a
-sequence, and has the methods `locate`, `contact`, `fasten`, `force` and `measure` of an assembly, and `join`. Locators belong
-to a station and vary there ("weld.left.A1"); features belong to parts, and deviate alike in all stations. A joint keeps the
-poses of its parts relative to each other that they had in the station that joined them: raw states follow from raw states, and
-corrected states from corrected states. Later stations locate the joint by points, or by three faces, of any of its parts.
+sequence, and has the methods `locate`, `contact`, `force` and `measure` of an assembly, and `join`; `tc.fasten` takes a station
+as well. Locators belong to a station and vary there ("weld.left.A1"); features belong to parts, and deviate equally in all
+stations. A joint keeps the poses of its parts relative to each other that they had in the station that joined them: raw states
+follow from raw states, and corrected states from corrected states. Later stations locate the joint by points, or by three
+faces, of any of its parts.
 
 >>> line = tc.Assembly("line")
 >>> left, right = line.part("left", tc.Box(100, 50, 10)), line.part("right", tc.Box(100, 50, 10), at=(80, 0, 10))

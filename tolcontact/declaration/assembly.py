@@ -93,7 +93,7 @@ class Assembly(Declarations, Pictured):
         return thing
 
     @property
-    def _owner(self) -> "Assembly":
+    def assembly(self) -> "Assembly":
         return self
 
     @property

@@ -10,10 +10,8 @@ from tolcontact.declaration.locator import FIRST_ORDER, Location, Locator, Three
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
-from tolcontact.declaration.size import Size
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import direction, script_line, vector as _vector
-from tolcontact.later import FASTENER, LATER
 
 T = TypeVar("T")
 
@@ -28,7 +26,7 @@ class Declarations:
         raise NotImplementedError
 
     @property
-    def _owner(self) -> Any:
+    def assembly(self) -> Any:
         """The assembly that takes the declarations."""
         raise NotImplementedError
 
@@ -91,34 +89,6 @@ class Declarations:
         """Declare a force `vector` [N], in the assembly frame, at a point of a part (see Force)."""
         expect(f'force "{name}": at', at, Point, "part.point(x, y, z)")
         return self._add("forces", Force(name, at, _vector(vector), script_line(), self._station))
-
-    def fasten(
-        self,
-        name: str,
-        fastener: Part | Face | Feature | Size | float,
-        *,
-        through: Sequence[Face | Feature],
-        into: Face | Feature | None = None,
-        seat: Face | Feature | None = None,
-        pushed: Any = None,
-        drift: bool = False,
-    ) -> Part:
-        """Declare a fastener in the holes of several parts, and return its part (see `tolcontact.fasteners`).
-
-        fastener   its diameter or its tc.Size, and a part is made; or a part, or the face of its shank
-        through    the holes that it passes through, from its head on
-        into       a threaded or press-fit hole, which holds it; without one it floats in the clearance of its holes
-        seat       the plane under its head
-        pushed     a force (x, y, z) [N], in the assembly frame, on a fastener that floats
-        drift      whether it stands anywhere in the clearance of its tightest hole, where contact allows, all places alike
-
-        In a station its part is there alone; join it to the parts that it fastens if later stations need it.
-        Raises ModelError if the fastener does not fit into the nominal assembly.
-        """
-        part: Part = LATER[FASTENER](
-            self._owner, self, name, fastener, through=through, into=into, seat=seat, pushed=pushed, drift=drift
-        )
-        return part
 
     def measure(
         self,

@@ -3,13 +3,12 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
 from tolcontact.declaration.toleranced import Control, Toleranced, letter_faults
 from tolcontact.declaration.values import Vector, is_finite, script_line, vector
-from tolcontact.later import LATER, PMI
 from tolcontact.readable import Readable
 
 OUTSIDE, LEAST_SQUARES = ASSOCIATIONS = ("outside", "least squares")  # from a plane to a datum, ISO 5459
@@ -111,13 +110,6 @@ class Part(Readable):
         targets = DatumTargets(letter, points, script_line())
         self.add(targets)
         return targets
-
-    def features_from_pmi(self) -> Any:
-        """Declare the features that the STEP file of this part states as PMI, and return a `tolcontact.pmi.DeclaredPmi`.
-
-        It lists each annotation with its features, or the reason why it has none. Raises OptionError if the file states none.
-        """
-        return LATER[PMI](self)
 
     def point(self, x: float, y: float, z: float) -> "Point":
         """Return the point (x, y, z) [mm] of this part, in its own frame."""

@@ -42,10 +42,10 @@ class Station(Declarations, Readable):
         return self._add("joints", Joint(name, parts_of(bodies), self.name, script_line()))
 
     def _add(self, name: str, thing: T) -> T:
-        return self._owner._add(name, thing)  # type: ignore[no-any-return]
+        return self.assembly._add(name, thing)  # type: ignore[no-any-return]
 
     @property
-    def _owner(self) -> Any:
+    def assembly(self) -> Any:
         if self._assembly is None:
             raise TypeError(f'station "{self.name}" belongs to no assembly; declare it with assembly.station(name)')
         return self._assembly

@@ -9,7 +9,7 @@ from typing import Any
 from tolcontact.errors import nearest_name
 
 UNEXPECTED = re.compile(r"([\w.]+)\(\) got an unexpected keyword argument '(\w+)'")  # a TypeError of Python
-PACKAGES = ("tolcontact.declaration", "tolcontact.geometry")  # whose functions scripts call
+PACKAGES = ("tolcontact.declaration", "tolcontact.geometry", "tolcontact.fasteners")  # whose functions scripts call
 
 
 def unknown_argument(error: Exception) -> str:
