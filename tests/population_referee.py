@@ -168,7 +168,7 @@ def _measured_tolerance(
         width = np.ptp(of_member[..., 0], axis=1) if has_any_size else _needed_width(tolerance, member.geometry, of_member)
         needed.append(width)
         allowed.append(np.full(len(residuals), float(tolerance.width)))
-        if tolerance.bonus != "none" and member.size_column is not None:
+        if member.size_column is not None:
             allowed[-1] += bonus(member, tolerance, deviations[:, member.size_column])
         start = end
     stated = _stated_share(pattern, layer)
@@ -246,7 +246,7 @@ def _stated_share(pattern: NominalPattern, layer: Layer) -> float:
     """Return the share of features inside that the rules state; NaN if they state none."""
     tolerance, tolerances = layer.tolerance, pattern.declared.geometric
     is_shared = any(pattern.geometry.owner(direction) is None for direction in layer.added.T)
-    has_bonus_beside = tolerance.material and (tolerance.bonus == "accepts" or len(pattern.layers) > 1 or is_shared)
+    has_bonus_beside = tolerance.material and (len(pattern.layers) > 1 or is_shared)
     if all(nested.rule == INSIDE and nested.cp == 1 and nested.cpk is None for nested in tolerances) and not has_bonus_beside:
         return STATED_SHARE
     return np.nan

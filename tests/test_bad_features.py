@@ -128,8 +128,10 @@ CASES = {
         lambda p: p.feature("f", p.face("+z"), p.face("-z"), tc.Size(30, 0.1, moves="first"), tc.Symmetry(0.1, "B")),
         "has no middle that could have a place",
     ),
-    "bonus alone, accepted only": (
-        lambda p: p.feature("f", p.face(BORE), tc.Size(10, 0.1), tc.Position(0, "A|B", material="M", bonus="accepts")),
+    "bonus alone, around another tolerance": (
+        lambda p: p.feature(
+            "f", p.face(BORE), tc.Size(10, 0.1), tc.Position(0, "A|B", material="M"), tc.Perpendicularity(0.1, "A")
+        ),
         "a zone of width 0 is its bonus alone",
     ),
 }  # fmt: skip

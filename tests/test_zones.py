@@ -80,23 +80,17 @@ def test_a_population_is_inside_its_zones_as_stated_in_any_frame(name):
 
 def test_the_bonus_fills_the_zone_of_each_part():
     """Hole 10 +0.1/0, position 0.2 M: the spread grows by 25 %, with the part's own size."""
-    said = {"material": "M", "rule": "translation"}
-    spread = {}
-    for bonus in ("fills", "accepts", "none"):
-        model = toleranced.ring_with("bore", tc.Size(10, 0.1, 0), tc.Position(0.2, "A|B", bonus=bonus, **said))
-        x, _, size = Draws(discretize(model))(seed=1, start=0, stop=SAMPLES).T
-        spread[bonus] = x.std()
-        if bonus == "fills":
-            plain = x / (1 + np.maximum(size, 0) / 0.2)
-    assert spread["fills"] / spread["none"] == pytest.approx(1.25, rel=0.01) and spread["accepts"] == spread["none"]
-    assert plain.std() == pytest.approx(spread["none"], rel=1e-12)
-    shares = [
-        measured_back(
-            toleranced.ring_with("bore", tc.Size(10, 0.1, 0), tc.Position(0.2, "A|B", bonus=bonus, **said)), SAMPLES
-        ).share[1]
-        for bonus in ("accepts", "none")
-    ]  # fmt: skip
-    assert shares[0] > 0.9995 and shares[1] == pytest.approx(0.9973, abs=0.0015)
+    size, zone = tc.Size(10, 0.1, 0), {"rule": "translation"}
+    plain, filled = (
+        Draws(discretize(toleranced.ring_with("bore", size, tc.Position(0.2, "A|B", material=material, **zone))))
+        for material in ("", "M")
+    )
+    x, *_ = plain(seed=1, start=0, stop=SAMPLES).T
+    wide, _, sizes = filled(seed=1, start=0, stop=SAMPLES).T
+    assert wide.std() / x.std() == pytest.approx(1.25, rel=0.01)
+    assert wide / (1 + np.maximum(sizes, 0) / 0.2) == pytest.approx(x, abs=1e-15)
+    model = toleranced.ring_with("bore", size, tc.Position(0.2, "A|B", material="M", **zone))
+    assert measured_back(model, SAMPLES).share[1] == pytest.approx(0.9973, abs=0.0015)
 
 
 def test_capability_and_shifts():

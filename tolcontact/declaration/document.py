@@ -30,7 +30,7 @@ from tolcontact.declaration.face_entry import (
     indices_of,
     text_type,
 )
-from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, RULES, ZONES, GeometricTolerance
+from tolcontact.declaration.feature_tolerance import KINDS, MATERIALS, RULES, ZONES, GeometricTolerance
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.form import COVARIANCES, Form
 from tolcontact.declaration.geometry import UNITS, Box, Mesh, Pin
@@ -155,7 +155,7 @@ def _tolerance_record(cls: Any) -> DocumentRecord:
     return DocumentRecord(
         cls, " ".join(keys), kind=cls.kind, width=Plain(NOT_NEGATIVE),
         zone=Plain(text_type(ZONES) | None), along=Optional(FREE_DIRECTION),
-        material=Plain(text_type(MATERIALS)), bonus=Plain(text_type(BONUSES)), rule=Plain(text_type(RULES)),
+        material=Plain(text_type(MATERIALS)), rule=Plain(text_type(RULES)),
     )  # fmt: skip
 
 

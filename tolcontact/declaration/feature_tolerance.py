@@ -13,7 +13,6 @@ INSIDE = "99.73 % inside"
 EXTREMES = "6 sigma at the extremes"
 TRANSLATION = "translation"  # a rule without tilts
 RULES = (INSIDE, EXTREMES, TRANSLATION)
-BONUSES = ("fills", "accepts", "none")
 MATERIALS = ("", "M", "L")
 SYMBOLS = {"M": "Ⓜ", "L": "Ⓛ"}
 ZONES = ("round", "flat")
@@ -30,8 +29,7 @@ class GeometricTolerance(Readable):
     datums      the datum system, "A|B|C": primary, secondary, tertiary; "A-B" is a common datum, "B(M)" one with a modifier,
                 and "A><" one that locks directions alone, and no places, as in the lower segment of a composite frame
     zone        "round" or "flat", for axes; by default round. `along` is the direction across a flat zone's planes
-    material    "M" or "L": the zone grows as the feature's size departs from its maximum (least) material size
-    bonus       "fills": the process fills the larger zone; "accepts": only a check of parts uses it; or "none"
+    material    "M" or "L": the zone grows as the feature's size departs from its maximum (least) material size, and is filled
     projected   [mm] the zone lies beyond the material, from the face of the primary datum up to this height
     outside     [mm] of a profile: the part of the zone that lies outside the material; by default half
     per         [mm] of flatness or straightness: it applies to any part of the surface of this length, or of two such lengths
@@ -61,7 +59,6 @@ class GeometricTolerance(Readable):
     zone: str | None = None
     along: Any = None
     material: str = ""
-    bonus: str = "fills"
     projected: float | None = None
     outside: float | None = None
     per: float | tuple[float, float] | None = None
@@ -166,7 +163,7 @@ class GeometricTolerance(Readable):
             yield f'the rule is "{self.rule}"; form is drawn by the rule "{INSIDE}" alone'
 
     def _process_faults(self) -> Iterator[str]:
-        for option, choices in (("material", MATERIALS), ("bonus", BONUSES), ("rule", RULES)):
+        for option, choices in (("material", MATERIALS), ("rule", RULES)):
             if getattr(self, option) not in choices:
                 yield f"{option} is {getattr(self, option)!r}; expected one of: {', '.join(map(repr, choices))}"
         if not (is_length(self.cp) and self.cp > 0):

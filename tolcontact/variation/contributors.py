@@ -208,7 +208,7 @@ class Contributors:
     def _add_bonus(self, layer: Layer, group: MemberGroup, first_column: int, width: float) -> None:
         """Add the bonus of the components of a group that a layer adds; `first_column` is that of the layer's first one."""
         tolerance, member, columns = layer.tolerance, group.members[0], first_column + group.added
-        if tolerance.material and tolerance.bonus == "fills" and len(group.sizes):
+        if tolerance.material and len(group.sizes):
 
             def factor(sizes: np.ndarray) -> np.ndarray:
                 return np.asarray((tolerance.width + bonus(member, tolerance, sizes).min(axis=1)) / width)
@@ -238,10 +238,10 @@ class Contributors:
 
     def _unit_width(self, pattern: NominalPattern, tolerance: GeometricTolerance, *, is_innermost: bool) -> float:
         """Return the width [mm] for which spreads are computed if a zone has width 0: its bonus scales them."""
-        if tolerance.bonus != "fills" or not is_innermost:
+        if not is_innermost:
             raise self._error(
                 pattern,
-                f'{tolerance.kind}: a zone of width 0 is its bonus alone; it needs bonus="fills", and no tolerance within',
+                f"{tolerance.kind}: a zone of width 0 is its bonus alone; leave out the tolerances within it",
             )
         return 1.0
 
