@@ -67,7 +67,7 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | analyse | `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate`, `seating` |
 | read results | `summarize`, `compare_runs`, `open_archive`, `model_of`, `Status` |
 | catch | `TolcontactError` and its kinds `ModelError`, `OptionError`, `ArchiveError`, `ScriptError`, `ClusterError` |
-| warnings | `ContactWarning`, `FaceWarning`, `NominalWarning`, `UnitsWarning` |
+| warnings | `ContactWarning`, `NominalWarning` |
 
 `tolcontact.testing` has assertions for tests of your own models.
 """

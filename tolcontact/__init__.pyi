@@ -72,13 +72,11 @@ from .errors import (
     ArchiveError as ArchiveError,
     ClusterError as ClusterError,
     ContactWarning as ContactWarning,
-    FaceWarning as FaceWarning,
     ModelError as ModelError,
     NominalWarning as NominalWarning,
     OptionError as OptionError,
     ScriptError as ScriptError,
     TolcontactError as TolcontactError,
-    UnitsWarning as UnitsWarning,
 )
 from .fasteners import fasten as fasten
 from .geometry import bodies_in as bodies_in, faces_in as faces_in, parts_from as parts_from

@@ -42,6 +42,7 @@ class ContactPoints:
     moving_face, reference_face   in their nominal places
     coordinate_error   [mm] of both bodies, as their files store them: P_r lie below the reference face by it
     facets      [mm] largest distance between their triangles and the round faces that these approximate
+    sampling_error   [mm] that bodies may penetrate undetected between points of curved faces; None for other points
     round       the balls and shafts beside walls from which gaps follow at any pose; None if the contact points are fixed
     deviating   deviations of the moving and the reference face, if these belong to features; their heights at fixed points are
                 among the offsets
@@ -61,6 +62,7 @@ class ContactPoints:
     moving_face: Surface | None = None
     coordinate_error: float = 0.0
     facets: float = 0.0
+    sampling_error: float | None = None
     round: RoundPoints | None = None
     deviating: tuple[FaceDeviation | None, FaceDeviation | None] = (None, None)
     locators: np.ndarray | None = None
