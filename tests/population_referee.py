@@ -177,7 +177,7 @@ def _measured_tolerance(
 
 def _zone_probes(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: FeatureGeometry | None) -> Probes:
     """Return the places and directions in which a feature is measured for a tolerance."""
-    if ZONES[type(tolerance)][type(feature)] is surface_zone:
+    if ZONES[tolerance.of][type(feature)] is surface_zone:
         return feature.surface_probes
     places, directions = feature.extremes
     if tolerance.projected is None:
@@ -190,7 +190,7 @@ def _zone_probes(tolerance: GeometricTolerance, feature: FeatureGeometry, primar
 
 def _needed_width(tolerance: GeometricTolerance, feature: FeatureGeometry, residuals: np.ndarray) -> np.ndarray:
     """Return the width (n,) [mm] of the narrowest zone around what probes measured (n, point, entry) [mm]."""
-    return WIDTHS[ZONES[type(tolerance)][type(feature)]](tolerance, feature, residuals)
+    return WIDTHS[ZONES[tolerance.of][type(feature)]](tolerance, feature, residuals)
 
 
 def _width_about_surface(tolerance: GeometricTolerance, feature: FeatureGeometry, residuals: np.ndarray) -> np.ndarray:

@@ -172,7 +172,7 @@ def test_a_datum_that_locks_nothing_is_named():
 def test_every_tolerance_kind_has_a_zone_a_public_name_and_a_place_in_the_guide():
     assert set(ZONES) == set(KINDS.values())
     for kind in KINDS.values():
-        assert getattr(tc, kind.__name__) is kind and f"`tc.{kind.__name__}" in features.__doc__
+        assert getattr(tc, kind.name) is kind and f"`tc.{kind.name}" in features.__doc__
 
 
 def test_a_datum_that_could_not_be_made_is_named():

@@ -7,6 +7,7 @@ import trimesh
 
 import tolcontact as tc
 from tests.cases.frames import STILL, Frame
+from tolcontact.declaration import GeometricTolerance
 
 LENGTH, WIDTH, THICKNESS = 120.0, 60.0, 8.0
 Place = tuple[float, float]
@@ -37,7 +38,7 @@ def hole(part: tc.Part, name: str, place: Place, *tolerances) -> tc.Feature:
     return part.feature(name, part.face(tc.Cylinder(inner=True), box), *tolerances)
 
 
-def placed(width: float, rule: str = "translation") -> tc.Position:
+def placed(width: float, rule: str = "translation") -> GeometricTolerance:
     return tc.Position(width, "A|B|C", rule=rule)
 
 

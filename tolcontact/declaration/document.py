@@ -30,7 +30,7 @@ from tolcontact.declaration.face_entry import (
     indices_of,
     text_type,
 )
-from tolcontact.declaration.feature_tolerance import KINDS, MATERIALS, RULES, ZONES, GeometricTolerance
+from tolcontact.declaration.feature_tolerance import KINDS, MATERIALS, RULES, ZONES, GeometricTolerance, ToleranceKind
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.form import COVARIANCES, Form
 from tolcontact.declaration.geometry import UNITS, Box, Mesh, Pin
@@ -149,11 +149,18 @@ def _measured(entries: Mapping[str, Any], place: Place) -> Point | Measurement |
     return tape_of(entries["tape"], place["tape"])
 
 
-def _tolerance_record(cls: Any) -> DocumentRecord:
-    """Return the record of a geometric tolerance: its width, and all fields that differ from their defaults."""
-    keys = ["width", *(f"{member.name}?" for member in fields(cls) if member.name != "width")]
-    return DocumentRecord(
-        cls, " ".join(keys), kind=cls.kind, width=Plain(NOT_NEGATIVE),
+class ToleranceRecord(DocumentRecord):
+    """Geometric tolerances of one kind."""
+
+    def holds(self, value: Any) -> bool:
+        return isinstance(value, GeometricTolerance) and value.kind == self.kind
+
+
+def _tolerance_record(kind: ToleranceKind) -> ToleranceRecord:
+    """Return the record of a kind of tolerances: their width, and all fields that differ from their defaults."""
+    keys = ["width", *(f"{member.name}?" for member in fields(GeometricTolerance) if member.name not in ("of", "width"))]
+    return ToleranceRecord(
+        GeometricTolerance, " ".join(keys), kind=kind.kind, name=kind.name, build=kind, width=Plain(NOT_NEGATIVE),
         zone=Plain(text_type(ZONES) | None), along=Optional(FREE_DIRECTION),
         material=Plain(text_type(MATERIALS)), rule=Plain(text_type(RULES)),
     )  # fmt: skip

@@ -1,6 +1,6 @@
 """Tolerance kinds: the features that each kind of tolerance is for, and its zone.
 
-A new kind is a class in `declaration/feature_tolerance.py` and a row of ZONES. A zone limits displacements of a feature; what
+A new kind is a row in `declaration/feature_tolerance.py` and a row of ZONES. A zone limits displacements of a feature; what
 the datums of a tolerance leave free in it is found in `tolerance_layers`.
 
 A zone is a function of the tolerance, the feature, and the geometry of the first datum feature (None without datums). It
@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from tolcontact.declaration import feature_tolerance as tolerances
-from tolcontact.declaration.feature_tolerance import GeometricTolerance
+from tolcontact.declaration.feature_tolerance import GeometricTolerance, ToleranceKind
 from tolcontact.errors import GeometryFault
 from tolcontact.features.feature_geometry import (
     AxisFeature,
@@ -115,7 +115,7 @@ ORIENTATION: Zones = dict.fromkeys(FLAT, slope_zone) | dict.fromkeys(ROUND, dire
 RUNOUT: Zones = dict.fromkeys(FLAT, slope_zone) | dict.fromkeys(ROUND, axis_zone)
 PROFILE: Zones = dict.fromkeys((*FLAT, *ROUND, SphereFeature, GeneralFeature), surface_zone)
 
-ZONES: dict[type[GeometricTolerance], Zones] = {
+ZONES: dict[ToleranceKind, Zones] = {
     tolerances.Position: LOCATION,
     tolerances.Coaxiality: dict.fromkeys(ROUND, axis_zone) | {SphereFeature: surface_zone},
     tolerances.Symmetry: {SlabFeature: surface_zone} | dict.fromkeys(ROUND, flat_axis_zone),
@@ -135,7 +135,7 @@ ZONES: dict[type[GeometricTolerance], Zones] = {
 
 def zone_rows(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: FeatureGeometry | None) -> np.ndarray:
     """Return the rows of the zone of a tolerance. Raises GeometryFault if the feature cannot have the tolerance."""
-    zones = ZONES[type(tolerance)]
+    zones = ZONES[tolerance.of]
     if type(feature) not in zones:
         *plurals, last = (kind.plural for kind in zones)
         kinds = f"{', '.join(plurals)} and {last}" if plurals else last
