@@ -72,6 +72,18 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 `tolcontact.testing` has assertions for tests of your own models.
 """
 
+from importlib import import_module
+
 import lazy_loader
+
+from tolcontact.readable import Pictured
+
+
+def _picture(thing: object) -> str:
+    """Return an object as HTML. The formatter is imported when a notebook first asks for it."""
+    return str(import_module("tolcontact.report.notebook").html_of(thing))
+
+
+Pictured.picture = staticmethod(_picture)
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

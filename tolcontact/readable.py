@@ -1,7 +1,8 @@
 """Base classes for objects that print as readable rows in a console, and show pictures in a notebook."""
 
 import html
-from importlib import import_module
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 
 class Readable:
@@ -15,12 +16,12 @@ class Readable:
 
 
 class Pictured(Readable):
-    """An object that a notebook shows as a picture."""
+    """An object that a notebook shows as a picture: as the HTML of `picture`, which the front of the package sets.
+
+    The report makes the picture, in a later room that none of these objects may import.
+    """
+
+    picture: ClassVar[Callable[[Any], str]]
 
     def _repr_html_(self) -> str:
-        return picture(self)
-
-
-def picture(thing: object) -> str:
-    """Return an object as the HTML that a notebook shows; the report, a later room, is imported when one first does."""
-    return str(import_module("tolcontact.report.notebook").html_of(thing))
+        return type(self).picture(self)

@@ -32,8 +32,8 @@ from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError, OptionError, shown
 from tolcontact.geometry import parts_from
 from tolcontact.report import nominal_and_faults, write_page, write_view
+from tolcontact.workflow.accessor import summarize
 from tolcontact.workflow.models import DEFAULT_SOLVER, build
-from tolcontact.workflow.summaries import summarize
 
 STARTER = Path(__file__).with_name("starter.py")
 

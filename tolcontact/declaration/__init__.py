@@ -309,7 +309,7 @@ from tolcontact.declaration.feature_tolerance import (
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.form import Form
 from tolcontact.declaration.geometry import Box, Geometry, Mesh, Pin
-from tolcontact.declaration.joint import Joint
+from tolcontact.declaration.joint import Joint, Overlap
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import (
@@ -329,8 +329,6 @@ from tolcontact.declaration.measurement import (
     Sum,
     stations,
 )
-from tolcontact.declaration.mobility import has_supports, is_free, movers
-from tolcontact.declaration.overlap import Overlap
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.size import Size
@@ -346,6 +344,6 @@ __all__ = [
     "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean", "MeanGap", "Measure", "Measurement", "Mesh",
     "Minimum", "Near", "Overlap", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin", "Point", "Population",
     "Position", "Profile", "Roundness", "Size", "Station", "Straightness", "Sum", "Symmetry", "ThreeTwoOne", "TitleBlock",
-    "Tolerance", "TotalRunout", "Triangles", "Variable", "degrees", "has_supports", "is_free", "movers", "stations",
+    "Tolerance", "TotalRunout", "Triangles", "Variable", "degrees", "stations",
     "three_two_one",
 ]  # fmt: skip

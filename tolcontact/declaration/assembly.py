@@ -15,10 +15,9 @@ from tolcontact.declaration.dependence import (
 )
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Geometry
-from tolcontact.declaration.joint import Joint
+from tolcontact.declaration.joint import Joint, Overlap
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.overlap import Overlap
 from tolcontact.declaration.part import Feature, Part
 from tolcontact.declaration.sequence import in_order, joined_before, present_parts, sequence_faults, settings_of
 from tolcontact.declaration.size import Size

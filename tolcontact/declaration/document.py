@@ -19,6 +19,7 @@ from tolcontact.declaration.face_entry import (
     FLOAT,
     FREE_DIRECTION,
     INDEX,
+    MEASURED,
     NOT_NEGATIVE,
     POSITIVE,
     UNIT_VECTOR,
@@ -34,12 +35,10 @@ from tolcontact.declaration.feature_tolerance import KINDS, MATERIALS, RULES, ZO
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.form import COVARIANCES, Form
 from tolcontact.declaration.geometry import UNITS, Box, Mesh, Pin
-from tolcontact.declaration.joint import Joint
+from tolcontact.declaration.joint import Joint, Overlap
 from tolcontact.declaration.locator import PLACINGS, USUAL_STIFFNESS, Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, Tape, tape_of
 from tolcontact.declaration.measurement import Measurement
-from tolcontact.declaration.measurement_entry import MEASURED
-from tolcontact.declaration.overlap import Overlap
 from tolcontact.declaration.part import ASSOCIATIONS, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.place import EntryError, Place, Sources
 from tolcontact.declaration.size import MOVES, Size

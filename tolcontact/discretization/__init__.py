@@ -87,9 +87,8 @@ from tolcontact.discretization.coordinates_in_words import coordinates_in_words
 from tolcontact.discretization.counted_points import counted_points
 from tolcontact.discretization.discretizing import discretize
 from tolcontact.discretization.form_places import FIRST_POINT, raised_places, rim_points
-from tolcontact.discretization.locators import Locators
+from tolcontact.discretization.locators import Locators, NominalPart
 from tolcontact.discretization.nominal import ContactPoints, Nominal
-from tolcontact.discretization.nominal_part import NominalPart
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_points import RoundPoint, RoundPoints
 

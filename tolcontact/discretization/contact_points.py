@@ -19,8 +19,8 @@ from tolcontact.discretization.form_points import (
     form_spacing,
     with_rims,
 )
+from tolcontact.discretization.locators import NominalPart
 from tolcontact.discretization.nominal import ContactPoints
-from tolcontact.discretization.nominal_part import NominalPart
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints

@@ -10,11 +10,9 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.declaration import Assembly, Face, Measure, Part, Point
 from tolcontact.discretization.form_points import COVER_SHARE, form_lengths, form_spacing
-from tolcontact.discretization.locators import Locators
+from tolcontact.discretization.locators import Locators, NominalPart
 from tolcontact.discretization.measured_geometry import NominalMeasurement
-from tolcontact.discretization.nominal_part import NominalPart
-from tolcontact.discretization.offsets import Offsets
-from tolcontact.discretization.pair_form import PairForm
+from tolcontact.discretization.offsets import Offsets, PairForm
 from tolcontact.discretization.plane_minima import PlaneMinima
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints

@@ -5,9 +5,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from tolcontact.declaration import Part
-from tolcontact.discretization.locators import Locators
+from tolcontact.discretization.locators import Locators, NominalPart
 from tolcontact.discretization.nominal import ContactPoints
-from tolcontact.discretization.nominal_part import NominalPart
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.scenes import Scene
 

@@ -151,14 +151,13 @@ were declared before with tolerances of their own: `part.pattern("seats", seat, 
 member has by itself, without a common zone, are those of features: declare one for each.
 """
 
-from tolcontact.features.datum_order import datum_order
 from tolcontact.features.datum_planes import TangentPlane
 from tolcontact.features.face_deviation import FaceDeviation
 from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, PlaneFeature
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.form_field import FormField
 from tolcontact.features.nominal_features import Features, NominalFeature, NominalPattern, Placement
-from tolcontact.features.tolerance_layers import Datum, Layer
+from tolcontact.features.tolerance_layers import Datum, Layer, datum_order
 
 __all__ = [
     "AxisFeature", "Datum", "FaceDeviation", "FeatureGeometry", "FeatureOfSize", "Features", "FormField", "Layer",

@@ -27,7 +27,7 @@ class DeclaredPoint(NamedTuple):
     """A point of a part and the declaration that states it: as a message begins with it, and within a sentence."""
 
     owner: str
-    words: str
+    phrase: str
     position: np.ndarray
 
 
@@ -57,9 +57,9 @@ def _far_point(nominal: NominalPart, geometry: Mesh, declared: list[DeclaredPoin
     if unit := _probable_unit(nominal, declared):
         distances = _outside(np.array([point.position for point in declared]), nominal.mesh.bounds)
         if distances.max() > nominal.mesh.scale:
-            words = declared[int(distances.argmax())].words
+            point = declared[int(distances.argmax())].phrase
             advice = _advice(geometry, float(nominal.mesh.scale), unit)
-            yield f"but {words} lies {distances.max():.4g} mm away from it; {advice}"
+            yield f"but {point} lies {distances.max():.4g} mm away from it; {advice}"
 
 
 def _probable_unit(nominal: NominalPart, declared: list[DeclaredPoint]) -> str | None:
@@ -185,12 +185,12 @@ def _declared_points(draws: TrialDraws) -> "defaultdict[Part, list[DeclaredPoint
     for measure in assembly.measures:
         for point in measure.points:
             if point.position is not None:
-                owner, words = designation(measure.noun, measure), f'the point of measurement "{measure.name}"'
-                points[point.part].append(DeclaredPoint(owner, words, np.array(point.position)))
+                owner, phrase = designation(measure.noun, measure), f'the point of measurement "{measure.name}"'
+                points[point.part].append(DeclaredPoint(owner, phrase, np.array(point.position)))
     for force in assembly.forces:
         if force.at.position is not None:
-            owner, words = designation("force", force), f'the point of force "{force.name}"'
-            points[force.at.part].append(DeclaredPoint(owner, words, np.array(force.at.position)))
+            owner, phrase = designation("force", force), f'the point of force "{force.name}"'
+            points[force.at.part].append(DeclaredPoint(owner, phrase, np.array(force.at.position)))
     return points
 
 

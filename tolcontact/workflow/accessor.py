@@ -1,16 +1,33 @@
-"""The accessor `results.tolcontact` of results from `tc.run`, `tc.open_archive` or xarray itself."""
+"""Summaries of results, and their accessor `results.tolcontact`, of `tc.run`, `tc.open_archive` or xarray itself."""
 
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import plot, report, vocabulary as terms
+from tolcontact.archive import check_rows, open_archive
 from tolcontact.errors import OptionError
 from tolcontact.realizations import finished
-from tolcontact.statistics import Summary, touching
-from tolcontact.workflow.summaries import summarize
+from tolcontact.statistics import Summary, summarize as summary_of, touching
+
+
+def summarize(results: xr.DataTree | str | Path) -> Summary:
+    """Return the statistics of results, or of the archive at a path (see tolcontact.statistics.summarize).
+
+    Raises ArchiveError if realizations differ from what was written, or if fewer than two are finished.
+    """
+    if isinstance(results, str | Path):
+        with open_archive(results) as tree:
+            return summarize(tree)
+    if not isinstance(results, xr.DataTree):
+        raise OptionError(
+            f"results are a {type(results).__name__}; expected what tc.run or tc.open_archive returns, or an archive's path"
+        )
+    check_rows(results)
+    return summary_of(results)
 
 
 class Plots:
