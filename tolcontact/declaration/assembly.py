@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
+from tolcontact.declaration.checks import FRICTION, field_faults
 from tolcontact.declaration.contact_pair import ContactPair
 from tolcontact.declaration.declarations import Declarations, expect
 from tolcontact.declaration.dependence import (
@@ -25,7 +26,6 @@ from tolcontact.declaration.station import Station
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import (
-    friction_faults,
     group_faults,
     key_faults,
     repetitions,
@@ -213,7 +213,7 @@ class Assembly(Declarations, Pictured):
         if not self.parts:
             yield "it has no parts; declare at least one with assembly.part(name, geometry)"
         yield from self.omissions()
-        yield from (*text_faults("assembly", [self.name]), *friction_faults(self.mu))
+        yield from (*text_faults("assembly", [self.name]), *field_faults(self, {"mu": FRICTION}))
         yield from (f"title block: {fault}" for fault in (self.title_block.faults() if self.title_block else ()))
         for name, most in MAX_COUNTS.items():
             if (count := len(self._declared[name])) > most:

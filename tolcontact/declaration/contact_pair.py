@@ -1,16 +1,20 @@
 """Contact pairs: two surfaces that may touch and may not pass through each other."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
+from tolcontact.declaration.checks import FRICTION, LENGTH, STIFFNESS, Check, field_faults, whole_number
 from tolcontact.declaration.part import Face, Part
-from tolcontact.declaration.values import friction_faults, stiffness_faults
 from tolcontact.readable import Readable
 
 VERTICES = "vertices"
 MAX_POINTS = 100_000  # of a pair; more take minutes, and gigabytes
+COUNT = whole_number(1, MAX_POINTS)
+PAIR_CHECKS = {
+    "points": Check(lambda points: points == VERTICES or COUNT.holds(points), f'{COUNT.expected}, or "{VERTICES}"'),
+    "spacing": LENGTH, "within": LENGTH, "mu": FRICTION, "stiffness": STIFFNESS,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,14 +56,7 @@ class ContactPair(Readable):
         yield from self.reference.faults()
         if self.moving.part is self.reference.part:
             yield f'both faces belong to part "{self.moving.part.name}"; a pair needs two parts'
-        if self.points not in (None, VERTICES) and not (type(self.points) is int and 1 <= self.points <= MAX_POINTS):
-            yield f'points is {self.points!r}; expected a whole number from 1 to {MAX_POINTS}, or "{VERTICES}"'
-        for option in ("spacing", "within"):
-            length = getattr(self, option)
-            if length is not None and not (isinstance(length, int | float) and math.isfinite(length) and length > 0):
-                yield f"{option} is {length!r}; expected a length in mm above 0"
-        yield from friction_faults(self.mu)
-        yield from stiffness_faults(self.stiffness)
+        yield from field_faults(self, PAIR_CHECKS)
         if self.points is not None and self.spacing is not None:
             yield "both points and spacing are given; give one of them"
 

@@ -63,7 +63,10 @@ class Declarations:
         expect(f'locate "{part.name}": floating', floating, bool, "True or False")
         joint, part = (part.name, part.first) if isinstance(part, Joint) else ("", part)
         ground = on.first if isinstance(on, Joint) else on
-        location = Location(part, scheme, zone, ground, script_line(), floating, self._station, joint, placing)
+        location = Location(
+            part, scheme, tolerance=zone, on=ground, declared_at=script_line(), floating=floating, station=self._station,
+            joint=joint, placing=placing,
+        )  # fmt: skip
         return self._add("locations", location)
 
     def contact(
@@ -81,9 +84,11 @@ class Declarations:
         """Declare that points of the `moving` face stay outside the `reference` face (see ContactPair)."""
         for side, face in (("moving", moving), ("reference", reference)):
             expect(f'contact "{name}": {side}', face, Face | Feature, 'part.face("+z"), or a feature')
-        sides = face_of(moving), face_of(reference)
-        line, station = script_line(), self._station
-        return self._add("pairs", ContactPair(name, *sides, points, spacing, within, line, mu, station, stiffness))
+        pair = ContactPair(
+            name, face_of(moving), face_of(reference), points=points, spacing=spacing, within=within, mu=mu,
+            stiffness=stiffness, declared_at=script_line(), station=self._station,
+        )  # fmt: skip
+        return self._add("pairs", pair)
 
     def force(self, name: str, *, at: Point, vector: Any) -> Force:
         """Declare a force `vector` [N], in the assembly frame, at a point of a part (see Force)."""
@@ -110,7 +115,10 @@ class Declarations:
         if units is None:
             units = min(of.units_among(self._units), default="mm") if isinstance(of, Measurement) else "mm"
         bounds: Any = tuple(limits) if isinstance(limits, list | tuple) else limits
-        measure = Measure(name, of, to, axis, tolerance, units, script_line(), bounds, absolute, self._station)
+        measure = Measure(
+            name, of, to=to, along=axis, tolerance=tolerance, units=units, limits=bounds, absolute=absolute,
+            declared_at=script_line(), station=self._station,
+        )  # fmt: skip
         return self._add("measures", measure)
 
 

@@ -5,8 +5,9 @@ from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
+from tolcontact.declaration.checks import LENGTH, LENGTH_OR_0, TRUTH, Check, direction_faults, field_faults, one_of
 from tolcontact.declaration.form import Form
-from tolcontact.declaration.values import Vector, direction as _direction, is_finite, is_length
+from tolcontact.declaration.values import Vector, direction as _direction, is_length
 from tolcontact.readable import Readable
 
 INSIDE = "99.73 % inside"
@@ -19,6 +20,25 @@ ZONES = ("round", "flat")
 RUNOUTS = ("circular run-out", "total run-out")
 AROUND_ROUND = ("profile", "line profile", *RUNOUTS)  # kinds with zones for walls, not for axes
 USUAL_FORM = Form()
+
+
+def _lengths(per: Any) -> tuple[Any, ...]:
+    return tuple(per) if isinstance(per, list | tuple) else (per,)
+
+
+# Of the options of kinds, and what their values must be; a direction `along` has a sentence of its own.
+OPTIONS: dict[str, Check | None] = {
+    "zone": one_of(ZONES),
+    "along": None,
+    "material": one_of(MATERIALS),
+    "projected": LENGTH,
+    "outside": LENGTH_OR_0,
+    "per": Check(
+        lambda per: len(_lengths(per)) in (1, 2) and all(map(LENGTH.holds, _lengths(per))),
+        "a length in mm above 0, or two of them, as in per=(25, 25)",
+    ),
+    "tangent": TRUTH,
+}
 COMPARTMENT = re.compile(r"([A-Z]{1,2}(?:-[A-Z]{1,2})*)(?:\(([ML])\))?(><)?")
 
 
@@ -124,7 +144,7 @@ class GeometricTolerance(Readable):
     @property
     def _unit_lengths(self) -> tuple[float, ...]:
         """The lengths [mm] of the parts of a surface that it applies to; none for the surface as a whole."""
-        return () if self.per is None else tuple(self.per) if isinstance(self.per, list | tuple) else (self.per,)
+        return () if self.per is None else _lengths(self.per)
 
     @property
     def limits_form_alone(self) -> bool:
@@ -157,29 +177,18 @@ class GeometricTolerance(Readable):
             yield f"datums {self.datums!r} names a datum twice"
 
     def _zone_faults(self) -> Iterator[str]:
-        for option in ("zone", "along", "material", "projected", "outside", "per", "tangent"):
+        for option in OPTIONS:
             value = getattr(self, option)
             is_given = value not in ("", False) if isinstance(value, str | bool) else value is not None
             if is_given and option not in self.of.options:
                 yield f"{option} is given, which {self.kind} does not have; leave it out"
         yield from self._form_faults()
-        if self.zone not in (None, *ZONES):
-            yield f"zone is {self.zone!r}; expected one of {', '.join(ZONES)}"
+        yield from field_faults(self, {option: check for option, check in OPTIONS.items() if check is not None})
         if self.zone == "flat" and self.along is None:
             yield 'a flat zone needs a direction across it; give along="x", or a vector'
-        if self.across is not None and not is_finite(self.across):
-            yield 'along is neither "+x" to "-z" nor a nonzero vector of three finite numbers'
-        if self.projected is not None and not (is_length(self.projected) and self.projected > 0):
-            yield f"projected is {self.projected!r}; expected a length in mm above 0"
-        if self.outside is not None and not (
-            is_length(self.outside) and is_length(self.width) and 0 <= self.outside <= self.width
-        ):
+        yield from direction_faults("along", self.across)
+        if is_length(self.outside) and is_length(self.width) and self.outside > self.width:
             yield f"outside is {self.outside!r}; expected a length in mm from 0 to the width"
-        lengths = self._unit_lengths
-        if self.per is not None and not (len(lengths) in (1, 2) and all(is_length(unit) and unit > 0 for unit in lengths)):
-            yield f"per is {self.per!r}; expected a length in mm above 0, or two of them, as in per=(25, 25)"
-        if not isinstance(self.tangent, bool):
-            yield f"tangent is {self.tangent!r}; expected True or False"
 
     def _form_faults(self) -> Iterator[str]:
         if not self.limits_form_alone and self.form != USUAL_FORM:
@@ -194,9 +203,7 @@ class GeometricTolerance(Readable):
             yield f'the rule is "{self.rule}"; form is drawn by the rule "{INSIDE}" alone'
 
     def _process_faults(self) -> Iterator[str]:
-        for option, choices in (("material", MATERIALS), ("rule", RULES)):
-            if getattr(self, option) not in choices:
-                yield f"{option} is {getattr(self, option)!r}; expected one of: {', '.join(map(repr, choices))}"
+        yield from field_faults(self, {"rule": one_of(RULES)})
         if not (is_length(self.cp) and self.cp > 0):
             yield f"cp is {self.cp!r}; expected a number above 0"
         elif self.cpk is not None and not (is_length(self.cpk) and self.cpk <= self.cp):

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
 
+from tolcontact.declaration.checks import field_faults, one_of
 from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
 from tolcontact.declaration.toleranced import Control, Toleranced, letter_faults
@@ -219,8 +220,7 @@ class Feature(Toleranced, Readable):
     def faults(self) -> Iterator[str]:
         yield from self.face_faults()
         yield from letter_faults(self.datum)
-        if self.association not in ASSOCIATIONS:
-            yield f"its association is {self.association!r}; expected one of: {', '.join(ASSOCIATIONS)}"
+        yield from field_faults(self, {"association": one_of(ASSOCIATIONS)}, "its ")
         yield from self.tolerance_faults(len(self.faces))
 
     def face_faults(self) -> Iterator[str]:
