@@ -14,8 +14,7 @@ from tests import cases
 from tests.cases import floating, toleranced
 from tests.helpers import nightly, run
 from tolcontact.declaration.codec import DocumentRecord, Named
-from tolcontact.declaration.json_model import json_schema
-from tolcontact.declaration.script import load_model
+from tolcontact.declaration.script import json_schema, load_model
 from tolcontact.errors import ScriptError
 from tolcontact.testing import assert_same_run
 

@@ -10,7 +10,7 @@ import scipy.stats
 import tolcontact as tc
 from tests.helpers import ROOT, call
 from tests.test_json_models import PLAIN
-from tolcontact.declaration.json_model import MAX_BYTES
+from tolcontact.declaration.script import MAX_BYTES
 from tolcontact.workflow.forecast import announce
 
 RA1 = "models/ra1.py"

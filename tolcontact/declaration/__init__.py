@@ -271,7 +271,7 @@ under a main guard it runs by itself, with the options of `tolcontact run`; the 
 The same declarations as JSON are accepted wherever a script is: `tolcontact run model.json`. `tc.write_model(model,
 "model.json")` writes them. What a script would leave out may be left out, tolerances may be written as texts, files of shapes
 are named from the folder of the JSON file, and errors state the place: `parts[2].features[0].tolerances[1].width`. The JSON
-schema follows from the classes of this chapter: `python -m tolcontact.declaration.json_model > model.schema.json` writes it.
+schema follows from the classes of this chapter: `python -m tolcontact.declaration.script > model.schema.json` writes it.
 
 A model of a stranger is data, and cannot ask for everything: files have at most 64 MiB, assemblies 1000 parts and 2000
 measures, pairs 100 000 contact points, names 500 characters (of parts and stations 255 bytes in UTF-8), expressions 100 000
@@ -287,7 +287,7 @@ contact seat: plate -z (moving) against base +z (reference), spacing 5 mm
 """
 
 from tolcontact.declaration.assembly import Assembly
-from tolcontact.declaration.contact_pair import ContactPair
+from tolcontact.declaration.contact_pair import ContactPair, Force
 from tolcontact.declaration.dependence import Correlation, Population, Variable
 from tolcontact.declaration.feature_tolerance import (
     Angularity,
@@ -306,7 +306,6 @@ from tolcontact.declaration.feature_tolerance import (
     Symmetry,
     TotalRunout,
 )
-from tolcontact.declaration.force import Force
 from tolcontact.declaration.form import Form
 from tolcontact.declaration.geometry import Box, Geometry, Mesh, Pin
 from tolcontact.declaration.joint import Joint, Overlap

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
 from tolcontact.declaration.checks import FRICTION, field_faults
-from tolcontact.declaration.contact_pair import ContactPair
+from tolcontact.declaration.contact_pair import ContactPair, Force
 from tolcontact.declaration.declarations import Declarations, expect
 from tolcontact.declaration.dependence import (
     Correlation,
@@ -14,7 +14,6 @@ from tolcontact.declaration.dependence import (
     correlation as _correlation,
     population as _population,
 )
-from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.joint import Joint, Overlap
 from tolcontact.declaration.locator import Location

@@ -1,11 +1,12 @@
-"""Contact pairs: two surfaces that may touch and may not pass through each other."""
+"""Contact pairs: surfaces that may touch and may not pass through each other; and forces that press parts together."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
 from tolcontact.declaration.checks import FRICTION, LENGTH, STIFFNESS, Check, field_faults, whole_number
-from tolcontact.declaration.part import Face, Part
+from tolcontact.declaration.part import Face, Part, Point
+from tolcontact.declaration.values import Vector, is_finite
 from tolcontact.readable import Readable
 
 VERTICES = "vertices"
@@ -68,3 +69,28 @@ class ContactPair(Readable):
             points = "points by geometry" if self.points is None else count
         stiffness = "" if self.stiffness is None else f", {self.stiffness:g} N/mm"
         return f"contact {self.name}: {self.moving} (moving) against {self.reference} (reference), {points}{stiffness}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Force(Readable):
+    """A force `vector` [N] at a point of a part, constant in the assembly frame. The objective "seating" uses it."""
+
+    name: str
+    at: Point
+    vector: Vector
+    declared_at: str = ""
+    station: str = ""
+    noun: ClassVar[str] = "force"
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The part that it acts on."""
+        return (self.at.part,)
+
+    def faults(self) -> Iterator[str]:
+        yield from self.at.faults()
+        if not (is_finite(self.vector) and any(self.vector)):
+            yield "vector is not a nonzero vector of three finite numbers [N]"
+
+    def __str__(self) -> str:
+        return f"force {self.name}: ({', '.join(f'{c:g}' for c in self.vector)}) N at {self.at}"

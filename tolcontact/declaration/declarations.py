@@ -3,8 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-from tolcontact.declaration.contact_pair import ContactPair
-from tolcontact.declaration.force import Force
+from tolcontact.declaration.contact_pair import ContactPair, Force
 from tolcontact.declaration.joint import Joint
 from tolcontact.declaration.locator import FIRST_ORDER, Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure

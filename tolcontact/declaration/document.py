@@ -13,7 +13,7 @@ from msgspec import UNSET, Meta, UnsetType
 
 from tolcontact.declaration.assembly import MAX_COUNTS, Assembly
 from tolcontact.declaration.codec import CODECS, Choice, DocumentRecord, Inline, Items, Optional, Plain
-from tolcontact.declaration.contact_pair import VERTICES, ContactPair
+from tolcontact.declaration.contact_pair import VERTICES, ContactPair, Force
 from tolcontact.declaration.dependence import Correlation, Population, Variable
 from tolcontact.declaration.face_entry import (
     FLOAT,
@@ -32,7 +32,6 @@ from tolcontact.declaration.face_entry import (
     text_type,
 )
 from tolcontact.declaration.feature_tolerance import KINDS, MATERIALS, RULES, ZONES, GeometricTolerance, ToleranceKind
-from tolcontact.declaration.force import Force
 from tolcontact.declaration.form import COVARIANCES, Form
 from tolcontact.declaration.geometry import UNITS, Box, Mesh, Pin
 from tolcontact.declaration.joint import Joint, Overlap

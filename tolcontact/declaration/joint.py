@@ -7,6 +7,7 @@ from typing import ClassVar
 from tolcontact.declaration.part import Part
 from tolcontact.readable import Readable
 
+MIN_PARTS = 2
 MIN_MEMBERS = 2
 
 
@@ -45,9 +46,6 @@ class Joint(Readable):
 def parts_of(bodies: Sequence[Part | Joint]) -> tuple[Part, ...]:
     """Return the parts of which bodies consist, in their order."""
     return tuple(part for body in bodies for part in (body.members if isinstance(body, Joint) else (body,)))
-
-
-MIN_PARTS = 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -21,12 +21,11 @@ from tolcontact.declaration import (
     Tolerance,
 )
 from tolcontact.declaration.locator import FIRST_ORDER, USUAL_STIFFNESS
-from tolcontact.discretization.contact_points import contact_points
+from tolcontact.discretization.contact_points import contact_points, support_pairs, supports_name
 from tolcontact.discretization.locators import FACES_OF_SCHEME, Locators, NominalPart, scheme_locators
 from tolcontact.discretization.measurements import nominal_measurements
 from tolcontact.discretization.nominal import ContactPoints, Nominal
 from tolcontact.discretization.scenes import Scene, carried, has_supports, is_free, scenes_of
-from tolcontact.discretization.support_pairs import support_pairs, supports_name
 from tolcontact.errors import GeometryFault, ModelError, designation
 from tolcontact.features import Features, Placement, datum_order
 from tolcontact.geometry.faces import Meshes

@@ -8,6 +8,8 @@ import numpy as np
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.features import FaceDeviation
 
+MARGIN_SHARE = 0.05  # of the range of heights at many places: what others may stand higher
+
 
 @dataclass(frozen=True, eq=False)
 class Offsets:
@@ -44,9 +46,6 @@ class Offsets:
         for column, row in zip(self.columns, self.matrix, strict=True):
             heights += deviations[:, column, None] * row[points]
         return heights
-
-
-MARGIN_SHARE = 0.05  # of the range of heights at many places: what others may stand higher
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from tolcontact.features.form_field import FormField
 from tolcontact.features.pattern_geometry import MIN_LENGTH, PatternGeometry
 from tolcontact.features.tolerance_kinds import zone_rows
 
+Declared = Feature | Pattern | DatumTargets
 MIN_NOTICED = 1e-4  # smallest singular value, relative to the largest, of a displacement that a datum notices
 MIN_LEAN = 1e-9  # mm of extremes of a plane, for deviations of 1
 MIN_PART = 1e-12  # of a unit vector: smaller entries are rounding
@@ -265,9 +266,6 @@ def _named_basis(directions: np.ndarray, geometry: PatternGeometry, *, is_outer:
         if rank == count:
             break
     return basis[:, :rank]
-
-
-Declared = Feature | Pattern | DatumTargets
 
 
 def datum_order(part: Part) -> tuple[list[Declared], list[Declared]]:

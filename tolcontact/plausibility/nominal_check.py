@@ -5,8 +5,7 @@ from collections.abc import Callable, Iterator
 
 from tolcontact.compilation import Program
 from tolcontact.errors import NominalWarning, shown
-from tolcontact.plausibility.body_overlaps import body_overlaps
-from tolcontact.plausibility.clashes import clashes, clashes_beyond_faces
+from tolcontact.plausibility.bodies import body_overlaps, clashes, clashes_beyond_faces
 from tolcontact.plausibility.declared_points import doubtful_units, far_points, unfit_directions
 from tolcontact.plausibility.faces import measured_forms, partial_surfaces
 from tolcontact.plausibility.magnitudes import rotations, wide_tolerances

@@ -8,8 +8,7 @@ from typing import Any
 from tolcontact import archive
 from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly
-from tolcontact.declaration.json_model import write_json
-from tolcontact.declaration.script import load_model
+from tolcontact.declaration.script import load_model, write_json
 from tolcontact.discretization import discretize
 from tolcontact.errors import ArchiveError, ModelError, OptionError, TolcontactError
 from tolcontact.method import Method
