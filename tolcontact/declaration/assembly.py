@@ -85,18 +85,9 @@ class Assembly(Declarations, Pictured):
         self.mu = mu
         self._declared: dict[str, list[Any]] = {name: [] for name in MAX_COUNTS}
 
-    def _add(self, name: str, thing: T) -> T:
-        """Append a declaration to a list and return it."""
-        self._declared[name].append(thing)
-        return thing
-
     @property
     def assembly(self) -> "Assembly":
         return self
-
-    @property
-    def _units(self) -> dict[str, str]:
-        return {measure.name: measure.units for measure in self.measures}
 
     def replaced(self, **lists: Iterable[Any]) -> "Assembly":
         """Return a copy in which `lists` (parts=..., pairs=...) replace its lists. Raises TypeError for other names."""

@@ -20,19 +20,15 @@ class Declarations:
 
     _station = ""  # the name of the station; empty for an assembly by itself
 
-    def _add(self, name: str, thing: T) -> T:
-        """Append a declaration to a list of the assembly and return it."""
-        raise NotImplementedError
-
     @property
     def assembly(self) -> Any:
         """The assembly that takes the declarations."""
         raise NotImplementedError
 
-    @property
-    def _units(self) -> dict[str, str]:
-        """The units of the measures declared so far, by name."""
-        raise NotImplementedError
+    def _add(self, name: str, thing: T) -> T:
+        """Append a declaration to a list of the assembly and return it."""
+        self.assembly._declared[name].append(thing)
+        return thing
 
     def locate(
         self,
@@ -112,7 +108,8 @@ class Declarations:
         """
         axis = None if along is None else direction(along)
         if units is None:
-            units = min(of.units_among(self._units), default="mm") if isinstance(of, Measurement) else "mm"
+            earlier = {measure.name: measure.units for measure in self.assembly.measures}
+            units = min(of.units_among(earlier), default="mm") if isinstance(of, Measurement) else "mm"
         bounds: Any = tuple(limits) if isinstance(limits, list | tuple) else limits
         measure = Measure(
             name, of, to=to, along=axis, tolerance=tolerance, units=units, limits=bounds, absolute=absolute,
