@@ -62,5 +62,5 @@ def test_a_joint_keeps_its_bolts_where_they_stood():
 def test_a_fastener_belongs_to_a_station():
     model = bolted_plates("bench")
     base, cover = model.parts[:2]
-    with pytest.raises(ModelError, match=r'fastener "late" .*: it belongs to no station; declare it in one: bench\.fasten'):
+    with pytest.raises(ModelError, match=r'fastener "late" .*: it belongs to no station; declare it in one: tc\.fasten\(bench'):
         tc.fasten(model, "late", 5, through=[cover.features[3], base.features[3]])
