@@ -187,7 +187,7 @@ class GeometricTolerance(Readable):
         if self.zone == "flat" and self.along is None:
             yield 'a flat zone needs a direction across it; give along="x", or a vector'
         yield from direction_faults("along", self.across)
-        if is_length(self.outside) and is_length(self.width) and self.outside > self.width:
+        if self.outside is not None and is_length(self.outside) and is_length(self.width) and self.outside > self.width:
             yield f"outside is {self.outside!r}; expected a length in mm from 0 to the width"
 
     def _form_faults(self) -> Iterator[str]:
