@@ -43,7 +43,7 @@ def assembly() -> tc.Assembly:
     for number, (hole, hole_of_wall) in enumerate(zip(holes, holes_of_wall, strict=True), start=1):
         x = XS[number - 1]
         seat = bracket.face("+z", tc.Inside((x - 15, -15, 0), (x + 15, 15, SHEET + 1)))
-        model.fasten(f"bolt {number}", SHANK, through=[hole, hole_of_wall], seat=seat)
+        tc.fasten(model, f"bolt {number}", SHANK, through=[hole, hole_of_wall], seat=seat)
     model.force("weight", at=bracket.point(10, 0, SHEET), vector=(0, -50, 0))
     for name, x in (("left end", XS[0]), ("right end", XS[1])):
         model.measure(name, bracket.point(x, 0, SHEET), along="y", limits=(-1.6, 0))

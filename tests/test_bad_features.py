@@ -84,11 +84,6 @@ CASES = {
         lambda p: p.feature("f", p.face(BORE), tc.Position(0.1, "B|A", projected=10)), "a projected zone needs a plane"
     ),
     "unknown rule": (lambda p: p.feature("f", p.face("+z"), tc.Profile(0.1, "A", rule="wide")), "rule is 'wide'; expected one"),
-    "rules that do not go together": (
-        lambda p: p.feature("f", p.face("+z"), tc.Profile(0.3, "A", rule="uniform"), tc.Parallelism(0.1, "A")),
-        'the rule "uniform" is for features with one tolerance',
-    ),
-    "polar plane": (lambda p: p.feature("f", p.face("+z"), tc.Profile(0.1, "A", rule="polar")), 'the rule "polar" is for axes'),
     "translation of what only tilts": (
         lambda p: p.feature("f", p.face("+z"), tc.Parallelism(0.1, "A", rule="translation")), "leaves nothing"
     ),
@@ -133,8 +128,10 @@ CASES = {
         lambda p: p.feature("f", p.face("+z"), p.face("-z"), tc.Size(30, 0.1, moves="first"), tc.Symmetry(0.1, "B")),
         "has no middle that could have a place",
     ),
-    "bonus alone, accepted only": (
-        lambda p: p.feature("f", p.face(BORE), tc.Size(10, 0.1), tc.Position(0, "A|B", material="M", bonus="accepts")),
+    "bonus alone, around another tolerance": (
+        lambda p: p.feature(
+            "f", p.face(BORE), tc.Size(10, 0.1), tc.Position(0, "A|B", material="M"), tc.Perpendicularity(0.1, "A")
+        ),
         "a zone of width 0 is its bonus alone",
     ),
 }  # fmt: skip
@@ -175,7 +172,7 @@ def test_a_datum_that_locks_nothing_is_named():
 def test_every_tolerance_kind_has_a_zone_a_public_name_and_a_place_in_the_guide():
     assert set(ZONES) == set(KINDS.values())
     for kind in KINDS.values():
-        assert getattr(tc, kind.__name__) is kind and f"`tc.{kind.__name__}" in features.__doc__
+        assert getattr(tc, kind.name) is kind and f"`tc.{kind.name}" in features.__doc__
 
 
 def test_a_datum_that_could_not_be_made_is_named():

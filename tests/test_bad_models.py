@@ -174,7 +174,11 @@ def test_a_doubtful_size_is_a_warning_on_stderr(tmp_path):
     )
     done = call(tmp_path, "check", write_model(tmp_path, {"measure": lid + GOOD["measure"]}))
     assert done.returncode == 0
-    assert done.stderr.startswith('warning: part "lid"') and "4.49 mm across" in done.stderr and 'units="in"' in done.stderr
+    assert (
+        done.stderr.startswith('warning: [units] part "lid"')
+        and "4.49 mm across" in done.stderr
+        and 'units="in"' in done.stderr
+    )
     assert done.stdout.endswith("no faults found, 1 warning\n")
 
 

@@ -129,7 +129,7 @@ def test_faces_are_chosen_by_number_kind_and_size():
     for wrong in (tc.Brep(16), tc.Brep(0), tc.Cylinder(radius=4.06), tc.Largest("sphere")):
         with pytest.raises(GeometryFault, match=r"face cover .*(faces 1 to 15|no such face)"):
             triangles(wrong)
-    assert "expected one of plane" in next(tc.Largest("round").faults())
+    assert "expected one of: plane" in next(tc.Largest("round").faults())
 
 
 @pytest.fixture

@@ -13,8 +13,7 @@ from scipy.stats import norm
 
 import tolcontact as tc
 from tests.helpers import call
-from tolcontact.declaration.json_model import write_json
-from tolcontact.declaration.script import load_model
+from tolcontact.declaration.script import load_model, write_json
 from tolcontact.plausibility.trial_draws import TrialDraws
 from tolcontact.report.results_table import result_rows, verdict_lines
 from tolcontact.report.text.summary import contact_lines

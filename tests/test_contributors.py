@@ -57,7 +57,7 @@ def test_marginals_of_other_shapes_stay():
 
 
 def with_everything():
-    a = toleranced.block_with("top", tc.Profile(0.3, "A", rule="uniform"))
+    a = toleranced.block_with("top", tc.Profile(0.3, "A"))
     block = a.parts[0]
     block.feature("far", block.face("+x"), tc.Position(0.2, "A|B|C"))
     a.variable("warmth", tc.Tolerance(20, "uniform"), drives={"block.top.offset": 0.002, "block.far.offset": -0.001}, units="K")
@@ -77,7 +77,7 @@ def test_draws_do_not_depend_on_blocks():
 
 @pytest.mark.slow
 def test_a_shared_cause_drives_all_that_it_names():
-    drawn, alone = draws_of(with_everything()), draws_of(toleranced.block_with("top", tc.Profile(0.3, "A", rule="uniform")))
+    drawn, alone = draws_of(with_everything()), draws_of(toleranced.block_with("top", tc.Profile(0.3, "A")))
     assert drawn["block.top.offset"] == pytest.approx(alone["block.top.offset"] + 0.002 * drawn["warmth"], abs=1e-15)
     assert np.ptp(drawn["warmth"]) == pytest.approx(20, rel=1e-3)
     results = tc.run(with_everything(), samples=300)
@@ -187,10 +187,3 @@ def test_a_bonus_is_of_the_size_that_shared_causes_leave():
     off, room = np.hypot(drawn["ring.bore.shift x"], drawn["ring.bore.shift y"]), 0.1 + np.maximum(drawn["ring.bore.size"], 0)
     low, high = stats.binom.interval(0.9999, SAMPLES, 0.9973)
     assert low <= (off <= room / 2).sum() <= high
-
-
-def test_what_is_drawn_together_is_not_correlated():
-    a = toleranced.ring_with("bore", tc.Position(0.2, "A|B", rule="uniform"))
-    a.correlate(["ring.bore.shift x", "ring.bore.shift y"], np.float32(0.5))
-    (fault,) = tc.check(a)
-    assert 'is drawn with others by the rule "uniform"; choose a rule of normal components' in fault

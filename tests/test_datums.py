@@ -7,6 +7,7 @@ from scipy.optimize import linprog
 
 import tolcontact as tc
 from tests import cases
+from tests.population_referee import measured_back
 from tolcontact.declaration.script import load_model
 from tolcontact.discretization import discretize
 from tolcontact.testing import assert_same_run
@@ -72,7 +73,7 @@ def test_the_shift_of_the_datum_follows_from_the_tilt_and_is_measured_back():
     assert shift == pytest.approx(np.abs(deviations[:, labels.index("plate.side.tilt z")]))
     assert not [label for label in labels if "datum" in label and "far" not in label]  # others do not follow it
     for association in ("outside", "least squares"):
-        inside = tc.check_population(plate(association), samples=2000)["share_inside"].sel(interval="estimate")
+        inside = measured_back(plate(association), 2000).share
         assert float(inside[-1]) > 0.99
     assert [tolerance for tolerance in program.draws.varying if "datum" in tolerance] == []
 
@@ -127,8 +128,8 @@ def test_the_lower_segment_of_a_composite_frame_limits_tilts_as_an_orientation_t
     oriented = block_with_top(tc.Profile(0.5, "A|B|C"), tc.Parallelism(0.1, "A"))
     spreads = [[contributor.spread for contributor in tc.build(model).draws.contributors] for model in (lower, oriented)]
     assert spreads[0] == pytest.approx(spreads[1], rel=1e-9)
-    zones = tc.check_population(lower, samples=20_000).share_inside
-    assert (zones.sel(interval="lower") < 0.9973).all() and (zones.sel(interval="upper") > 0.9973).all()
+    zones = measured_back(lower, 20_000)
+    assert (zones.lower < 0.9973).all() and (zones.upper > 0.9973).all()
 
 
 @pytest.mark.parametrize(("system", "follows"), [("A|D|C", True), ("A><|D><|C><", False)])
@@ -197,8 +198,8 @@ def test_targets_give_the_plane_through_them():
     for x, y in ((0, 0), (60, 20)):
         z = motions[:, 2] + np.cross(motions[:, 3:], np.array([x, y, 20]) - top.geometry.centre)[:, 2]
         assert z == pytest.approx(plane[0] * x + plane[1] * y + plane[2], abs=1e-7)
-    shares = tc.check_population(with_pads(), samples=1000)
-    assert float(shares.share_inside.sel(interval="upper").min()) > 0.9973
+    shares = measured_back(with_pads(), 1000)
+    assert shares.upper.min() > 0.9973
 
 
 @pytest.mark.parametrize(

@@ -85,7 +85,7 @@ def test_a_leaning_thread_needs_the_clearance_of_its_projected_zone():
     thread = hole(base, "H0", (0, 0), tc.Position(second, "A|B|C"))
     bore = hole(cover, "H0", (0, 0), tc.Position(first, "A|B|C", rule="translation"))
     a.locate(cover, held())
-    a.fasten("screw", 10, through=[bore], into=thread, seat=cover.face("+z"))
+    tc.fasten(a, "screw", 10, through=[bore], into=thread, seat=cover.face("+z"))
     a.measure("x", cover.point(0, 0, 0), along="x")
     rows = [{"base.H0.tilt x": by * second / 2, "cover.H0.shift x": -by * first / 2} for by in (0.99, 1.0, 1.02)]
     gaps = block_of(a, *rows)[1][:, RAW, 0]
@@ -241,7 +241,7 @@ def test_a_part_that_stands_in_its_holes_can_be_a_fastener(head):
         if k:
             dowel.feature("shank", dowel.face(tc.Cylinder(radius=5)), tc.Size(10, 0.01))
         shank = dowel if k else dowel.face(tc.Cylinder(radius=5))
-        assert a.fasten(f"dowel {k}", shank, through=[hole(cover, f"H{k}", (x, 0))], into=pressed) is dowel
+        assert tc.fasten(a, f"dowel {k}", shank, through=[hole(cover, f"H{k}", (x, 0))], into=pressed) is dowel
         for axis in "xy":
             a.measure(f"{axis}{k}", pressed.axis(1), to=dowel.point(0, 0, -8), along=axis)
     results = run(a, samples=50)
@@ -266,61 +266,18 @@ def test_halves_of_holes_in_a_step_file_are_one_hole():
     a.locate(base, [*corner, *turns])
     a.locate(bracket, [*corner, *turns], tolerance=0)
     whole = {"through": [bracket.face(tc.Brep(13, whole=True))], "into": base.face(tc.Brep(14, whole=True))}
-    bolt = a.fasten("bolt", parts["bolt_1"], **whole)
+    bolt = tc.fasten(a, "bolt", parts["bolt_1"], **whole)
     assert "10 mm" not in str(bolt)
-    a.fasten("other bolt", 9, through=[bracket.face(tc.Brep(9))], into=base.face(tc.Brep(6, 7)))
+    tc.fasten(a, "other bolt", 9, through=[bracket.face(tc.Brep(9))], into=base.face(tc.Brep(6, 7)))
     a.measure("x", bracket.point(0, 0, 0), along="x")
     with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", tc.FaceWarning)
+        warnings.simplefilter("always", tc.NominalWarning)
         program = tc.build(a, solver="daqp")
-    message, *others = [str(item.message) for item in caught if item.category is tc.FaceWarning]
+    message, *others = [str(item.message) for item in caught if str(item.message).startswith("[face]")]
     assert "other bolt in l-bracket_1" in message and "tc.Brep(9, whole=True)" in message and not others
     assert len(program.nominal.pairs[0].P_m) == 12
     gaps = simulate_block(program, np.zeros((1, len(program.nominal.contributors)))).gap_min[0, RAW]
     assert np.abs(gaps - [0.0, 0.5]).max() < 1e-6
-
-
-def drifting(position: float = 0.0, cover_hole: float = 11.0) -> tc.Assembly:
-    """A bolt that stands anywhere in the holes of a base and of a cover, both fixed."""
-    a = tc.Assembly("drifting")
-    base = plate(a, "base", 0, {(0, 0): 11}, fixed=True)
-    cover = plate(a, "cover", 1, {(0, 0): cover_hole}, fixed=True)
-    holes = [hole(part, "H0", (0, 0), *([placed(position)] if position else [])) for part in (cover, base)]
-    bolt = a.fasten("bolt", 10, through=holes, drift=True)
-    for axis in "xy":
-        a.measure(axis, bolt.point(0, 0, -8), along=axis)
-    return a
-
-
-def places(results, state: str) -> np.ndarray:
-    """Where the bolt stands (realization, 2) [mm]."""
-    return results["measured"].sel(state=state, measure=["x", "y"]).values
-
-
-def test_a_bolt_stands_anywhere_in_its_clearance():
-    """Uniform in a disc of radius r: the variance is r2 / 4 in each direction, and a quarter lies within r / 2."""
-    results = run(drifting(), samples=4000)
-    stands = places(results, "raw")
-    radius = np.hypot(*stands.T)
-    assert radius.max() < 0.5 and np.abs(stands.mean(axis=0)).max() < 4 * 0.25 / np.sqrt(4000)
-    assert np.abs(np.cov(stands.T) / (0.5**2 / 4) - np.eye(2)).max() < 4 / np.sqrt(4000)
-    assert abs((radius < 0.25).mean() - 0.25) < 4 * np.sqrt(0.25 * 0.75 / 4000)
-    np.testing.assert_allclose(places(results, "corrected"), stands, atol=1e-6)
-
-
-def test_a_bolt_that_stands_in_the_wall_of_a_hole_moves_to_its_side():
-    """The bolt is drawn in the tightest hole, that of the base; contact moves it the shortest way into that of the cover."""
-    results = run(drifting(0.8, cover_hole=11.2), samples=400)
-    base, cover = (shifts(results, part, 1)[:, 0] for part in ("base", "cover"))
-    raw, corrected = places(results, "raw"), places(results, "corrected")
-    assert np.hypot(*(raw - base).T).max() < 0.5
-    away = raw - cover
-    distance = np.hypot(*away.T)
-    nearest = cover + away * np.minimum(1, 0.6 / distance)[:, None]
-    is_simple = np.hypot(*(nearest - base).T) < 0.499  # it does not meet the hole of the base on its way
-    assert (distance > 0.61)[is_simple].sum() > 10 and is_simple.mean() > 0.9
-    assert np.abs(corrected - nearest)[is_simple].max() < 2e-3
-    assert results.gap_min.sel(state="corrected").min() > -1e-6
 
 
 def nominal_warnings(a: tc.Assembly) -> list[str]:
@@ -343,23 +300,16 @@ def test_a_screw_may_be_thicker_than_its_thread_and_nowhere_else(frame):
 def test_locators_of_a_fastener_are_not_taken_for_mistakes(turn):
     """Nor do they depend on rounding in the axis of its hole."""
     frame = Frame(turn=turn, shift=(300, -50, 20))
-    a = tc.Assembly("drifting")
+    a = tc.Assembly("floating")
     parts = {
         "base": plate(a, "base", 0, {(0, 0): 11.0}, frame, fixed=True),
         "cover": plate(a, "cover", 1, {(0, 0): 11.2}, frame),
     }
     a.locate(parts["cover"], held())
     holes = [hole(parts[name], "H", (0, 0), placed(0.4)) for name in ("cover", "base")]
-    bolt = a.fasten("bolt", 10, through=holes, seat=parts["cover"].face("+z"), drift=True)
+    bolt = tc.fasten(a, "bolt", 10, through=holes, seat=parts["cover"].face("+z"))
     a.measure("x", bolt.point(0, 0, 0), along=frame.along(1, 0, 0))
     assert nominal_warnings(a) == []
-
-
-def test_a_drifting_bolt_keeps_in_archives_and_json(tmp_path):
-    results = run(drifting(), samples=20, out=tmp_path / "run.nc")
-    assert_same_run(run(tc.model_of(results), samples=20), results)
-    declared = list(results["sample"].contributor.values)
-    assert {"bolt drift x", "bolt drift y"} <= set(declared)
 
 
 FAULTS = {
@@ -387,13 +337,8 @@ FAULTS = {
         {"into": None, "through": ["upper", "lower"], "pushed": "down"},
         "pushed is 'down'; expected a force",
     ),
-    "a drift without effect": ({"drift": True}, "drift has no effect on a fastener that the hole in into holds"),
-    "a drift without clearance": (
-        {"into": None, "through": ["upper", "lower"], "drift": True, "fastener": 8.5},
-        "drift: the tightest hole is as wide",
-    ),
-    "a drift of a part with a seat": (
-        {"into": None, "through": ["upper", "lower"], "drift": True, "fastener": "rod part", "seat": "upper seat"},
+    "a seat of a part that a hole holds": (
+        {"fastener": "rod part", "seat": "upper seat"},
         "seat has no effect on a part that stands in a hole",
     ),
 }
@@ -412,12 +357,12 @@ def test_a_fastener_that_does_not_fit_is_refused_in_one_sentence(mistake):
         "upper seat": cover.face("+z"), "side": cover.face("+y"),
         "rod": rod.face(tc.Cylinder()), "rod part": rod, "alien": other.part("alien", tc.Pin(1, 1)).face(tc.Cylinder()),
     }  # fmt: skip
-    arguments = {"fastener": 10, "through": ["upper"], "into": "lower", "seat": None, "pushed": None, "drift": False} | options
+    arguments = {"fastener": 10, "through": ["upper"], "into": "lower", "seat": None, "pushed": None} | options
     through = [faces[name] for name in arguments.pop("through")]
     fastener, into, seat = (faces.get(arguments[key], arguments[key]) for key in ("fastener", "into", "seat"))
     before = [len(things) for things in (a.parts, a.pairs, a.locations, a.features)]
     with pytest.raises(tc.ModelError) as error:
-        a.fasten("bolt", fastener, through=through, into=into, seat=seat, pushed=arguments["pushed"], drift=arguments["drift"])
+        tc.fasten(a, "bolt", fastener, through=through, into=into, seat=seat, pushed=arguments["pushed"])
     (fault,) = error.value.faults
     assert fault.startswith('fastener "bolt" (test_fasteners.py:') and expected in fault
     assert [len(things) for things in (a.parts, a.pairs, a.locations, a.features)] == before
@@ -432,9 +377,13 @@ def test_a_fastener_that_does_not_fit_is_refused_in_one_sentence(mistake):
         ({"through": [5]}, r"through\[0\] is a int; expected the wall of a hole"),
         ({"into": "base"}, "into is a str"),
         ({"seat": 1}, "seat is a int; expected the plane under the head"),
-        ({"drift": 1}, "drift is a int; expected True or False"),
     ],
 )
 def test_arguments_of_a_wrong_type_are_refused(options, expected):
     with pytest.raises(TypeError, match=f'fasten "bolt": {expected}'):
-        tc.Assembly("model").fasten("bolt", **({"fastener": 10, "through": []} | options))
+        tc.fasten(tc.Assembly("model"), "bolt", **({"fastener": 10, "through": []} | options))
+
+
+def test_a_fastener_belongs_to_an_assembly_or_a_station():
+    with pytest.raises(TypeError, match='fasten "bolt": the first argument is a str; expected an assembly, or one of its'):
+        tc.fasten("model", "bolt", 10, through=[])

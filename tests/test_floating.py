@@ -95,7 +95,7 @@ def room_left(q, holes, studs, room):
 @pytest.mark.parametrize("material", [*nightly(""), "M"])
 def test_the_share_that_cannot_be_assembled_is_that_of_an_independent_computation(material):
     """Two hole patterns, position at maximum material or without: the least of the largest misfits, by shifting and turning."""
-    words = {"material": "M", "bonus": "fills"} if material else {}
+    words = {"material": "M"} if material else {}
     model = floating.lid_on_studs(position=0.35, sizes=0.15, clearance=0.25, seating=False, **words)
     results = tc.run(model, samples=120, solver="daqp", surfaces=0, fields="none")
     status = results.status.values

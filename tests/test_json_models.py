@@ -14,8 +14,7 @@ from tests import cases
 from tests.cases import floating, toleranced
 from tests.helpers import nightly, run
 from tolcontact.declaration.codec import DocumentRecord, Named
-from tolcontact.declaration.json_model import json_schema
-from tolcontact.declaration.script import load_model
+from tolcontact.declaration.script import json_schema, load_model
 from tolcontact.errors import ScriptError
 from tolcontact.testing import assert_same_run
 
@@ -67,7 +66,9 @@ def test_every_field_of_a_declared_class_stands_in_the_document():
 
 def with_everything(folder):
     a = toleranced.block_with(
-        "top", tc.Profile(0.3, "A|B", rule="uniform", tangent=True), tc.Flatness(0.1, form=tc.Form("matern 3/2", 20))
+        "top",
+        tc.Profile(0.3, "A|B", rule="6 sigma at the extremes", tangent=True),
+        tc.Flatness(0.1, form=tc.Form("matern 3/2", 20)),
     )
     own = tc.Flatness(0.1, per=(25, 10), form=None)
     block = a.parts[0]

@@ -10,7 +10,7 @@ import scipy.stats
 import tolcontact as tc
 from tests.helpers import ROOT, call
 from tests.test_json_models import PLAIN
-from tolcontact.declaration.json_model import MAX_BYTES
+from tolcontact.declaration.script import MAX_BYTES
 from tolcontact.workflow.forecast import announce
 
 RA1 = "models/ra1.py"
@@ -104,8 +104,6 @@ def test_usual_distributions_are_quick_enough():
         (["sensitivities", RA1, "--samples", 10**12], "realizations need .* of memory"),
         (["worst", RA1, "--samples", 10**12], "realizations need .* of memory"),
         (["compare", RA1, "--samples", 10**12], "realizations need .* of memory"),
-        (["check", RA1, "--population", 0], "population is 0; expected a whole number from 2 to"),
-        (["check", RA1, "--population", 10**12], "realizations need .* of memory"),
     ],
 )
 def test_what_cannot_end_is_refused(command, message):

@@ -1,4 +1,4 @@
-"""Measured forms with known waves: what stands on them, their zones, and what scans show too little of or scatter about."""
+"""Measured forms with known waves: what stands on them, their zones, and what scans show too little of."""
 
 import re
 import warnings
@@ -65,7 +65,7 @@ def test_a_plate_stands_on_the_crests_of_measured_waves(count, tmp_path):
     model = plate(write_scans(tmp_path, waves_of(count, x), x, y), trough=LENGTH / 2 / count)
     form, sentences = form_warnings(model)
     assert not sentences and form.left_out < 1e-5
-    assert [scan.width for scan in form.scans.values()] == pytest.approx([0.0594, 0.06, 0.0606], rel=5e-3)
+    assert list(form.scans.values()) == pytest.approx([0.0594, 0.06, 0.0606], rel=5e-3)
     assert min(form.scales) == pytest.approx(LENGTH / (2 * np.pi * count), rel=0.1)
     run = tc.run(model, samples=10, seed=1, solver="daqp", method=SEATED)
     lift, gap = run["measured"].sel(state="corrected").mean("realization").values
@@ -93,18 +93,11 @@ def bowl(x, y):
     return AMPLITUDE * ((x / 50 - 1) ** 2 - 0.5 * (2 * y / WIDTH - 1) * (x / 50 - 1))
 
 
-def test_scatter_widens_no_zone_and_outliers_are_a_warning(tmp_path):
+def test_scatter_widens_no_zone(tmp_path):
     x, y = np.random.default_rng(3).uniform(0, 1, (2, 1000)) * [[LENGTH], [WIDTH]]
-    exact = [scan.width for scan in form_warnings(plate(write_scans(tmp_path, bowl(x, y), x, y)))[0].scans.values()]
+    exact = list(form_warnings(plate(write_scans(tmp_path, bowl(x, y), x, y)))[0].scans.values())
     form, sentences = form_warnings(plate(write_scans(tmp_path, bowl(x, y), x, y, noise=0.002)))
-    assert [scan.width for scan in form.scans.values()] == pytest.approx(exact, abs=0.0015) and not sentences
-    assert [scan.scatter for scan in form.scans.values()] == pytest.approx([0.002] * 3, rel=0.15)
-    heights = bowl(x, y)
-    heights[17] += 0.2
-    form, sentences = form_warnings(plate(write_scans(tmp_path, heights, x, y, noise=0.002), flatness=0.2))
-    assert len(sentences) == 1 and "mm away from the form that its neighbours show; check the file for outliers" in sentences[0]
-    form, (sentence,) = form_warnings(plate(write_scans(tmp_path, 0 * x, x, y, noise=0.002)))
-    assert "neighbours do not agree, so this is not drawn" in sentence
+    assert list(form.scans.values()) == pytest.approx(exact, abs=0.0015) and not sentences
 
 
 def test_few_points_show_a_smooth_form(tmp_path):
@@ -133,7 +126,7 @@ def test_lobes_of_measured_cylinders_are_kept(tmp_path):
     bore = ring.feature("bore", ring.face(tc.Cylinder(inner=True)), tc.Cylindricity(0.05, form=form))
     a.measure("wall", bore.point(10, 0, 0), along="x")
     field, sentences = form_warnings(a)
-    assert not sentences and [scan.width for scan in field.scans.values()] == pytest.approx([0.036, 0.04, 0.044], rel=0.01)
+    assert not sentences and list(field.scans.values()) == pytest.approx([0.036, 0.04, 0.044], rel=0.01)
     assert field.scales == pytest.approx((10 / 6, 10 / (2 * np.pi)), rel=0.08)
     points = np.column_stack([10 * np.cos(azimuths), 10 * np.sin(azimuths), z - 15])
     np.testing.assert_allclose(field.means @ field.heights(points).T, lobes, atol=4e-4)

@@ -9,6 +9,7 @@ from scipy.stats import binom
 import tolcontact as tc
 from tests.cases import Frame
 from tests.cases.toleranced import HOLES, plate_with_holes
+from tests.population_referee import measured_back
 from tolcontact.declaration.script import load_model
 from tolcontact.discretization import discretize
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
@@ -93,16 +94,16 @@ def test_patterns_are_the_same_in_any_frame():
     assert list(still) == list(moved) and list(still.values()) == pytest.approx(list(moved.values()), rel=1e-9)
     turned = list(spreads(plate(*tolerances, count=4, turn=TURN)).values())
     assert turned == pytest.approx(list(still.values()), rel=1e-4)  # of another direction of the axes: shapes are fitted
-    population = tc.check_population(plate(*tolerances, count=4, turn=TURN), samples=5000)
-    assert (population.share_inside.sel(interval="upper") > 0.9973).all()
-    assert (population.share_inside.sel(interval="lower") < 0.9973).all()
+    population = measured_back(plate(*tolerances, count=4, turn=TURN), 5000)
+    assert (population.upper > 0.9973).all()
+    assert (population.lower < 0.9973).all()
 
 
 def test_a_population_is_measured_back():
     model = plate(tc.Size(8, 0.1), tc.Position(0.5, "A|B|C"), tc.Position(0.1, "A"), count=2)
-    population = tc.check_population(model, samples=10_000, seed=4)
-    assert population.feature.values.tolist() == ["plate.H"] * 3
-    inside = (population.share_inside.sel(interval="estimate").values * 10_000).round()
+    population = measured_back(model, 10_000, seed=4)
+    assert population.features == ["plate.H"] * 3
+    inside = (population.share * 10_000).round()
     low, high = binom.interval(0.9999, 10_000, 0.9973)
     assert (low <= inside).all() and (inside <= high).all() and (population.stated_share == 0.9973).all()
 
@@ -140,13 +141,6 @@ def test_a_bonus_goes_by_the_size_of_each_member():
     factor = 1 + np.maximum(deviations[:, -2:], 0).min(axis=1) / 0.4  # what moves both has the bonus of the smaller one
     columns = slice(first, last + 1)
     assert deviations[:, columns] == pytest.approx(plain[:, columns] * factor[:, None], rel=1e-12)
-
-
-def test_rules_that_draw_together_draw_each_member_by_itself():
-    drawn = Draws(discretize(plate(tc.Position(0.5, "A|B|C", rule="uniform"))))
-    assert [joint.columns.tolist() for joint in drawn.contributors.joint_draws] == [[0, 1, 2, 3], [4, 5, 6, 7]]
-    with pytest.raises(tc.ModelError, match=r'pattern "H".*members to deviate together; choose "99\.73 % inside"'):
-        tc.build(plate(tc.Position(0.5, "A", rule="uniform")))
 
 
 def test_the_worst_case_of_a_distance_is_the_zone_of_the_lower_frame():

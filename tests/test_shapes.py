@@ -8,8 +8,7 @@ import trimesh
 
 import tolcontact as tc
 from tests.shapes import BLOCK, HOUSING, face_of
-from tolcontact.discretization import discretize
-from tolcontact.errors import GeometryFault, UnitsWarning
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.shapes import shape
 
 
@@ -131,13 +130,15 @@ def lid_on(path, units=None):
 def test_a_mesh_in_inches_taken_as_mm_is_warned_of_by_its_size(tmp_path):
     path = tmp_path / "lid.stl"
     trimesh.creation.box(bounds=[[0, 0, 0], [8, 6, 1]]).export(path)  # inches
-    with pytest.warns(UnitsWarning, match='part "lid".*10.05 mm across, but "table", which it touches, is 424.4 mm.*255.3 mm'):
-        discretize(lid_on(path))
+    expected = r'\[units\] part "lid".*10.05 mm across, but "table", which it touches, is 424.4 mm.*255.3 mm'
+    with pytest.warns(tc.NominalWarning, match=expected):
+        tc.build(lid_on(path))
     wrongly = lid_on(path, "mm")
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        discretize(wrongly)
-        assert discretize(lid_on(path, "in")).parts[0].mesh.extents[0] == pytest.approx(203.2)
+        warnings.filterwarnings("error", r"\[units\]")
+        tc.build(wrongly)
+        assert tc.build(lid_on(path, "in")).nominal.parts[0].mesh.extents[0] == pytest.approx(203.2)
     wrongly.measure("far end", wrongly.parts[0].point(203.2, 0, 0), along="z")
-    with pytest.warns(UnitsWarning, match='10.05 mm across, but the point of measurement "far end" lies 195.2 mm away from it'):
-        discretize(wrongly)
+    expected = r'\[units\] .*10.05 mm across, but the point of measurement "far end" lies 195.2 mm away from it'
+    with pytest.warns(tc.NominalWarning, match=expected):
+        tc.build(wrongly)

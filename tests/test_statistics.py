@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from tests import cases
 from tolcontact import poses as pose, vocabulary as terms
-from tolcontact.declaration import movers
 from tolcontact.discretization import discretize
+from tolcontact.discretization.scenes import movers
 from tolcontact.statistics import DisplacementFields, intervals
 from tolcontact.statistics.sample import Sample
 

@@ -201,16 +201,6 @@ def test_what_has_no_rare_event_is_refused():
         tc.tails(still)
 
 
-def test_what_is_drawn_anew_cannot_be_followed():
-    a = tc.Assembly("anew")
-    plate = a.part("plate", tc.Box(100, 50, 10), fixed=True)
-    plate.feature("under", plate.face("-z"), datum="A")
-    top = plate.feature("top", plate.face("+z"), tc.Profile(0.3, "A", rule="uniform"))
-    a.measure("corner", top.point(100, 50, 10), along="z", tolerance=0.3)
-    with pytest.raises(tc.OptionError, match="is redrawn until it lies in its zone"):
-        tc.tails(a)
-
-
 @pytest.mark.slow
 def test_measured_parts_and_correlations_are_drawn_as_in_a_run():
     a = limited(2.5)

@@ -5,7 +5,7 @@ import pytest
 import tolcontact as tc
 from tests import cases
 from tests.helpers import call
-from tolcontact.declaration.json_model import read_json
+from tolcontact.declaration.script import read_json
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.errors import OptionError
 from tolcontact.report.html import page_of

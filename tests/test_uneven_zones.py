@@ -7,6 +7,7 @@ from scipy.stats import binom
 
 import tolcontact as tc
 from tests.cases import toleranced
+from tests.population_referee import measured_back
 from tolcontact import vocabulary
 from tolcontact.checksums import crc32
 from tolcontact.discretization import discretize
@@ -14,7 +15,7 @@ from tolcontact.variation import Draws
 
 SAMPLES = 4000
 LOWER, UPPER = -0.05, 0.25  # of a zone of 0.3, 0.25 of which is outside
-RULES = ("99.73 % inside", "6 sigma at the extremes", "truncated", "uniform", "translation")
+RULES = ("99.73 % inside", "6 sigma at the extremes", "translation")
 
 
 def corner_heights(model, samples=SAMPLES):
@@ -33,30 +34,27 @@ def test_features_are_drawn_inside_an_uneven_zone_by_every_rule(rule, kind):
     deviation = heights.mean(axis=1).std() / np.sqrt(SAMPLES)
     assert heights.mean() == pytest.approx(0.1, abs=5 * deviation)
     inside = ((heights >= LOWER - 1e-12) & (heights <= UPPER + 1e-12)).all(axis=1).sum()
-    if rule in ("truncated", "uniform"):
-        assert inside == SAMPLES
-        assert heights.min() < LOWER + 0.02 and heights.max() > UPPER - 0.02
-    elif rule == "99.73 % inside":
+    if rule == "99.73 % inside":
         low, high = binom.interval(0.9999, SAMPLES, 0.9973)
         assert low <= inside <= high
-    measured = tc.check_population(model, samples=SAMPLES, seed=4)
-    assert float(measured.share_inside[0, 0]) * SAMPLES == pytest.approx(inside, abs=0.5)
+    measured = measured_back(model, SAMPLES, seed=4)
+    assert measured.share[0] * SAMPLES == pytest.approx(inside, abs=0.5)
 
 
 def test_each_member_of_a_pattern_is_drawn_in_its_uneven_zone():
-    """A face by itself and members of a pattern, whose zones are the same."""
-    for rule in ("truncated", "uniform"):
-        share = tc.check_population(toleranced.rails_with(tc.Profile(0.3, "A", outside=UPPER, rule=rule)), samples=SAMPLES)
-        assert float(share.share_inside[0, 0]) == 1.0
+    """Their datum lets the members deviate each alone, so that the shares of features and of members are equal."""
+    population = measured_back(toleranced.rails_with(tc.Profile(0.3, "A", outside=UPPER)), SAMPLES)
+    low, high = binom.interval(0.9999, SAMPLES, 0.9973)
+    assert low <= population.share[0] * SAMPLES <= high
 
 
 def test_the_middle_of_a_zone_has_no_effect_if_datums_leave_its_place_free():
     """Datum A leaves the end of the block free to shift: the zone then follows it."""
     shares = [
-        tc.check_population(toleranced.block_with("far", tc.Profile(0.3, "A", outside=outside)), samples=SAMPLES).share_inside
+        measured_back(toleranced.block_with("far", tc.Profile(0.3, "A", outside=outside)), SAMPLES).share
         for outside in (None, 0.3)
     ]
-    assert (shares[0].values == shares[1].values).all() and float(shares[0][0, 0]) > 0.99
+    assert (shares[0] == shares[1]).all() and shares[0][0] > 0.99
 
 
 def test_widened_zones_keep_their_middle():
@@ -67,7 +65,7 @@ def test_widened_zones_keep_their_middle():
 
 
 def test_the_worst_case_is_an_end_of_an_uneven_zone():
-    worst = tc.worst_case(toleranced.block_with("top", tc.Profile(0.3, "A", outside=UPPER, rule="truncated")))
+    worst = tc.worst_case(toleranced.block_with("top", tc.Profile(0.3, "A", outside=UPPER)))
     assert worst.worst.sel(state="raw").values == pytest.approx(np.tile([LOWER, UPPER], (3, 1)), abs=1e-6)
 
 
@@ -87,13 +85,15 @@ def test_a_worst_case_lies_in_an_uneven_zone_and_in_the_narrower_one_within_it()
 
 def test_an_archive_says_how_much_of_a_zone_is_outside(tmp_path):
     """So a run that was begun when such zones were drawn about the nominal surface is not resumed."""
-    model, path = toleranced.block_with("top", tc.Profile(0.3, "A", outside=UPPER, rule="truncated")), tmp_path / "block.nc"
+    model, path = toleranced.block_with("top", tc.Profile(0.3, "A", outside=UPPER)), tmp_path / "block.nc"
     tc.run(model, samples=20, seed=1, surfaces=0, out=path).close()
     with netCDF4.Dataset(path, "r+") as file:
         texts = file["sample"]["distribution"]
-        assert "profile 0.3 mm, 0.25 mm of it outside, to A; truncated" in list(texts[:])
+        assert "profile 0.3 mm, 0.25 mm of it outside, to A; 99.73 % inside" in list(texts[:])
         for number, text in enumerate(texts[:]):
             texts[number] = text.replace(", 0.25 mm of it outside,", "")
         texts.crc32 = crc32(vocabulary.DISTRIBUTION, texts[:])
-    with pytest.raises(tc.TolcontactError, match=r'was drawn as "profile 0.3 mm to A; truncated", now as "profile 0.3 mm, 0'):
+    with pytest.raises(
+        tc.TolcontactError, match=r'was drawn as "profile 0.3 mm to A; 99.73 % inside", now as "profile 0.3 mm, 0'
+    ):
         tc.run(model, samples=30, seed=1, surfaces=0, out=path, resume=True)

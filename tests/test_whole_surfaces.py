@@ -60,13 +60,15 @@ def test_halves_of_a_hole_are_one_surface_by_each_of_their_numbers():
 
 
 def test_a_feature_on_half_a_hole_is_doubted_and_a_whole_one_has_its_axis():
-    with pytest.warns(tc.FaceWarning, match=r'"hole".*1 of the 2 faces of one cylinder.*tc.Brep\(6, whole=True\)'):
-        discretize(plate_with(tc.Brep(6))[0])
+    with pytest.warns(
+        tc.NominalWarning, match=r'\[face\] .*"hole".*1 of the 2 faces of one cylinder.*tc.Brep\(6, whole=True\)'
+    ):
+        tc.build(plate_with(tc.Brep(6))[0])
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        whole = discretize(plate_with(tc.Brep(7, whole=True))[0])
-        discretize(plate_with(tc.Brep(6, 7))[0])
-        discretize(plate_with(tc.Brep(6), tc.Inside((0, 0, 2), (200, 200, 18)))[0])  # a part of the hole is what was asked for
+        warnings.filterwarnings("error", r"\[face\]")
+        whole = tc.build(plate_with(tc.Brep(7, whole=True))[0]).nominal
+        tc.build(plate_with(tc.Brep(6, 7))[0])
+        tc.build(plate_with(tc.Brep(6), tc.Inside((0, 0, 2), (200, 200, 18)))[0])  # a part of the hole is what was asked for
     hole = next(nominal for nominal in whole.features if nominal.feature.name == "hole")
     assert np.allclose(hole.geometry.centre[:2], [47.5, 75 + 7.5 * 3**0.5], atol=1e-5)
     with pytest.raises(tc.ModelError, match="spans more than one surface"):
@@ -179,9 +181,9 @@ def test_faces_of_one_cylinder_are_whole_and_others_are_not(name, tmp_path):
         part.feature("round", part.face(tc.Brep(whole[0])), tc.Size(2 * radius[whole[0]], 0.1))
         model.measure("nothing", part.point(0, 0, 0), along="z")
         with warnings.catch_warnings(record=True) as records:
-            warnings.simplefilter("always", tc.FaceWarning)
-            discretize(model)
-        texts = [str(record.message) for record in records if record.category is tc.FaceWarning]
+            warnings.simplefilter("always", tc.NominalWarning)
+            tc.build(model)
+        texts = [text for record in records if (text := str(record.message)).startswith("[face]")]
         assert len(texts) == (len(whole) > 1)
         assert all(f"1 of the {len(whole)} faces of one cylinder" in text for text in texts)
 

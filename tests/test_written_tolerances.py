@@ -9,8 +9,7 @@ from jsonschema import Draft202012Validator
 import tolcontact as tc
 from tests.cases import toleranced
 from tests.helpers import simulate
-from tolcontact.declaration.json_model import json_schema
-from tolcontact.declaration.script import load_model
+from tolcontact.declaration.script import json_schema, load_model
 from tolcontact.declaration.written_tolerance import text_fault, written
 
 LIMITS = {

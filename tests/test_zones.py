@@ -6,6 +6,7 @@ from scipy.stats import binom, norm
 
 import tolcontact as tc
 from tests.cases import Frame, toleranced
+from tests.population_referee import measured_back
 from tolcontact.discretization import discretize
 from tolcontact.variation import Draws
 from tolcontact.variation.zones import MemberZone, equal_spread, share_inside
@@ -66,57 +67,30 @@ def test_the_share_inside_is_that_of_draws():
 
 @pytest.mark.parametrize("name", toleranced.EVERY)
 def test_a_population_is_inside_its_zones_as_stated_in_any_frame(name):
-    found = tc.check_population(toleranced.EVERY[name](toleranced.STILL), samples=SAMPLES, seed=3)
-    assert found.sizes["zone"]
-    for zone in range(found.sizes["zone"]):
-        stated, inside = float(found.stated_share[zone]), float(found.share_inside[zone, 0]) * SAMPLES
+    found = measured_back(toleranced.EVERY[name](toleranced.STILL), SAMPLES, seed=3)
+    assert len(found.tolerances)
+    for zone, tolerance in enumerate(found.tolerances):
+        stated, inside = found.stated_share[zone], found.share[zone] * SAMPLES
         low, high = binom.interval(0.9999, SAMPLES, stated if np.isfinite(stated) else 0.9973)
-        assert low <= inside and (inside <= high or not np.isfinite(stated)), str(found.zone_tolerance[zone].values)
-    moved = tc.check_population(toleranced.EVERY[name](MOVED), samples=SAMPLES, seed=3)
-    assert (moved.share_inside.values == found.share_inside.values).all()
-    assert moved.needed_width.values == pytest.approx(found.needed_width.values, rel=1e-9)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("rule", ["truncated", "uniform"])
-@pytest.mark.parametrize("kind", ["top", "bore"])
-def test_features_outside_are_left_out(rule, kind):
-    tolerance = tc.Profile(0.2, "A", rule=rule) if kind == "top" else tc.Position(0.2, "A|B", rule=rule)
-    model = (toleranced.block_with if kind == "top" else toleranced.ring_with)(kind, tolerance)
-    assert float(tc.check_population(model, samples=SAMPLES).share_inside[0, 0]) == 1
-    drawn = Draws(discretize(model))(seed=1, start=0, stop=SAMPLES)
-    assert (Draws(discretize(model))(seed=1, start=5000, stop=5100) == drawn[5000:5100]).all()
-    if rule == "uniform":  # the T-Map reading: sd of a corner t / 3.65, of an axis' end t / 4.00
-        extreme, factor = (drawn.sum(axis=1), 3.65) if kind == "top" else (drawn[:, 0] + drawn[:, 2], 4.00)
-        assert 0.2 / extreme.std() == pytest.approx(factor, rel=0.02)
-
-
-def test_polar_draws_have_a_normal_radius_and_any_angle():
-    model = toleranced.ring_with("bore", tc.Position(0.2, "A|B", rule="polar"))
-    x, y = Draws(discretize(model))(seed=1, start=0, stop=SAMPLES).T
-    assert 0.2 / x.std() == pytest.approx(8.48, rel=0.02) and 0.2 / y.std() == pytest.approx(8.48, rel=0.02)
-    assert np.hypot(x, y).std() ** 2 + np.hypot(x, y).mean() ** 2 == pytest.approx((0.2 / 6) ** 2, rel=0.03)
+        assert low <= inside and (inside <= high or not np.isfinite(stated)), tolerance
+    moved = measured_back(toleranced.EVERY[name](MOVED), SAMPLES, seed=3)
+    assert (moved.share == found.share).all()
+    assert moved.needed_width == pytest.approx(found.needed_width, rel=1e-9)
 
 
 def test_the_bonus_fills_the_zone_of_each_part():
     """Hole 10 +0.1/0, position 0.2 M: the spread grows by 25 %, with the part's own size."""
-    said = {"material": "M", "rule": "translation"}
-    spread = {}
-    for bonus in ("fills", "accepts", "none"):
-        model = toleranced.ring_with("bore", tc.Size(10, 0.1, 0), tc.Position(0.2, "A|B", bonus=bonus, **said))
-        x, _, size = Draws(discretize(model))(seed=1, start=0, stop=SAMPLES).T
-        spread[bonus] = x.std()
-        if bonus == "fills":
-            plain = x / (1 + np.maximum(size, 0) / 0.2)
-    assert spread["fills"] / spread["none"] == pytest.approx(1.25, rel=0.01) and spread["accepts"] == spread["none"]
-    assert plain.std() == pytest.approx(spread["none"], rel=1e-12)
-    shares = [
-        float(tc.check_population(
-            toleranced.ring_with("bore", tc.Size(10, 0.1, 0), tc.Position(0.2, "A|B", bonus=bonus, **said)), samples=SAMPLES
-        ).share_inside[1, 0])
-        for bonus in ("accepts", "none")
-    ]  # fmt: skip
-    assert shares[0] > 0.9995 and shares[1] == pytest.approx(0.9973, abs=0.0015)
+    size, zone = tc.Size(10, 0.1, 0), {"rule": "translation"}
+    plain, filled = (
+        Draws(discretize(toleranced.ring_with("bore", size, tc.Position(0.2, "A|B", material=material, **zone))))
+        for material in ("", "M")
+    )
+    x, *_ = plain(seed=1, start=0, stop=SAMPLES).T
+    wide, _, sizes = filled(seed=1, start=0, stop=SAMPLES).T
+    assert wide.std() / x.std() == pytest.approx(1.25, rel=0.01)
+    assert wide / (1 + np.maximum(sizes, 0) / 0.2) == pytest.approx(x, abs=1e-15)
+    model = toleranced.ring_with("bore", size, tc.Position(0.2, "A|B", material="M", **zone))
+    assert measured_back(model, SAMPLES).share[1] == pytest.approx(0.9973, abs=0.0015)
 
 
 def test_capability_and_shifts():
@@ -161,7 +135,7 @@ def test_one_rule_for_a_tail_is_enough_that_no_share_is_stated():
         block.feature("base", block.face("-z"), datum="A")
         top = block.feature("top", block.face("+z"), tc.Profile(0.4, "A"), tc.Parallelism(0.1, "A", **rule))
         a.measure("height", top.point(0, 0, 20), along="z")
-        return tc.check_population(a, samples=200).stated_share.values
+        return measured_back(a, 200).stated_share
 
     assert shares() == pytest.approx([0.9973, 0.9973], abs=1e-4)
     assert np.isnan(shares(cp=1.5)).all()

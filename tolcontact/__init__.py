@@ -57,16 +57,17 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | | `Minimum`, `Maximum`, `Mean`, `Sum`, `Difference`; |
 | | `stations`, `Measurement` |
 | choose faces | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
-| STEP files | `bodies_in`, `faces_in`, `parts_from`, `read_pmi` |
+| fasten | `fasten` |
+| STEP files | `bodies_in`, `faces_in`, `parts_from`, `read_pmi`, `features_from_pmi` |
 | returned by declarations | `Part`, `Face`, `Point`, `ContactPair`, `Force`, `Measure`, `Station`, `Joint` |
-| run | `run`, `build`, `check`, `check_population`, `compare`, `simulate`, `study`, `simulate_blocks`; `Method`, `Program` |
+| run | `run`, `build`, `check`, `compare`, `simulate`, `study`, `simulate_blocks`; `Method`, `Program` |
 | commands | `main`, `command_line` |
 | draw pictures | `plot` |
 | write models as JSON | `write_model` |
 | analyse | `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate`, `seating` |
 | read results | `summarize`, `compare_runs`, `open_archive`, `model_of`, `Status` |
 | catch | `TolcontactError` and its kinds `ModelError`, `OptionError`, `ArchiveError`, `ScriptError`, `ClusterError` |
-| warnings | `ContactWarning`, `FaceWarning`, `NominalWarning`, `UnitsWarning` |
+| warnings | `ContactWarning`, `NominalWarning` |
 
 `tolcontact.testing` has assertions for tests of your own models.
 """
@@ -75,24 +76,14 @@ from importlib import import_module
 
 import lazy_loader
 
-from tolcontact.later import FASTENER, HTML, LATER, PMI
+from tolcontact.readable import Pictured
 
 
-def _notebook_html(thing: object) -> str:
+def _picture(thing: object) -> str:
     """Return an object as HTML. The formatter is imported when a notebook first asks for it."""
     return str(import_module("tolcontact.report.notebook").html_of(thing))
 
 
-def _features_from_pmi(part: object) -> object:
-    """Return what `Part.features_from_pmi` declares. Reading is imported when a script first asks for it."""
-    return import_module("tolcontact.pmi").features_from_pmi(part)
-
-
-def _fasten(*arguments: object, **options: object) -> object:
-    """Return what `Assembly.fasten` declares. Shapes are read when a script first asks for it."""
-    return import_module("tolcontact.fasteners").fasten(*arguments, **options)
-
-
-LATER[HTML], LATER[PMI], LATER[FASTENER] = _notebook_html, _features_from_pmi, _fasten
+Pictured.picture = staticmethod(_picture)
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -72,24 +72,22 @@ from .errors import (
     ArchiveError as ArchiveError,
     ClusterError as ClusterError,
     ContactWarning as ContactWarning,
-    FaceWarning as FaceWarning,
     ModelError as ModelError,
     NominalWarning as NominalWarning,
     OptionError as OptionError,
     ScriptError as ScriptError,
     TolcontactError as TolcontactError,
-    UnitsWarning as UnitsWarning,
 )
+from .fasteners import fasten as fasten
 from .geometry import bodies_in as bodies_in, faces_in as faces_in, parts_from as parts_from
 from .method import Method as Method
-from .pmi import read_pmi as read_pmi
+from .pmi import features_from_pmi as features_from_pmi, read_pmi as read_pmi
 from .simulation import simulate_blocks as simulate_blocks
 from .version import __version__ as __version__
 from .vocabulary import Status as Status
 from .workflow import (
     build as build,
     check as check,
-    check_population as check_population,
     compare as compare,
     compare_runs as compare_runs,
     open_archive as open_archive,

@@ -93,16 +93,8 @@ class ClusterError(TolcontactError):
 
 
 class ContactWarning(UserWarning):
-    """The contact points or the triangles of a pair of curved faces are coarse compared with the tolerances."""
-
-
-class FaceWarning(UserWarning):
-    """A face is a part of a curved surface that a STEP file splits."""
+    """Contact of a pair cannot be found where its faces end, or lies deeper between its points than tolerances allow."""
 
 
 class NominalWarning(UserWarning):
     """Something in the nominal assembly is probably a mistake; the message begins with its kind, such as "[overlap]"."""
-
-
-class UnitsWarning(UserWarning):
-    """A part has an implausible size, and no units were given for its file."""

@@ -1,8 +1,8 @@
 """Base classes for objects that print as readable rows in a console, and show pictures in a notebook."""
 
 import html
-
-from tolcontact.later import HTML, LATER
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 
 class Readable:
@@ -16,7 +16,12 @@ class Readable:
 
 
 class Pictured(Readable):
-    """An object that a notebook shows as a picture."""
+    """An object that a notebook shows as a picture: as the HTML of `picture`, which the front of the package sets.
+
+    The report makes the picture, in a later room that none of these objects may import.
+    """
+
+    picture: ClassVar[Callable[[Any], str]]
 
     def _repr_html_(self) -> str:
-        return str(LATER[HTML](self))
+        return type(self).picture(self)

@@ -128,7 +128,7 @@ def assembly(case: Case, folder: Path, name: str) -> tuple[tc.Assembly, Declared
     """Return the model of a case, what became of its PMI, and standard deviations by hand."""
     model = tc.Assembly(name, method=tc.Method(objective="seating"))
     part = model.part(name, tc.Mesh(folder / case.file, body=case.body, chord=0.05))
-    declared = part.features_from_pmi()
+    declared = tc.features_from_pmi(part)
     letters = {feature.datum: feature for feature in part.features}
     opposite = case.face.translate(str.maketrans("+-", "-+"))
     locators = [tc.Locator(label, point, along, on=letters[letter]) for label, letter, point, along in case.locators]

@@ -161,12 +161,12 @@ class Tally:
 def quick_builds() -> Iterator[None]:
     """Leave out what takes most of a build and does not change it.
 
-    That is a warning about too few contact points, and to keep machine code that no other scene will need.
+    That is the error between contact points, which warnings state, and to keep machine code that no other scene will need.
     """
     sample = contact_points._with_curvature
 
-    def unchecked(pair, moving_face, reference_face, P_m, *limits):
-        return P_m if isinstance(pair.points, int) else sample(pair, moving_face, reference_face, P_m, *limits)
+    def unchecked(moving_face, reference_face, P_m, *limits, is_open):
+        return sample(moving_face, reference_face, P_m, *limits, is_open=True) if is_open else (P_m, None)
 
     forgetful = types.SimpleNamespace(load=code_cache.load, store=lambda *entry: None)
     with (

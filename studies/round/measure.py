@@ -72,7 +72,7 @@ def sampled(model: tc.Assembly, points: int | None) -> tc.Assembly:
 def measured(make: Callable[[], tc.Assembly], errors: Errors, points: int | None, samples: int) -> str:
     """Return a row of the table."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", tc.ContactWarning)
+        warnings.filterwarnings("ignore", r"\[coarse\]")
         program = tc.build(sampled(make(), points), solver="daqp", method=SEATED)
     seconds = []
     for _ in range(REPEATS):

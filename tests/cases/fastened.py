@@ -7,6 +7,7 @@ import trimesh
 
 import tolcontact as tc
 from tests.cases.frames import STILL, Frame
+from tolcontact.declaration import GeometricTolerance
 
 LENGTH, WIDTH, THICKNESS = 120.0, 60.0, 8.0
 Place = tuple[float, float]
@@ -37,7 +38,7 @@ def hole(part: tc.Part, name: str, place: Place, *tolerances) -> tc.Feature:
     return part.feature(name, part.face(tc.Cylinder(inner=True), box), *tolerances)
 
 
-def placed(width: float, rule: str = "translation") -> tc.Position:
+def placed(width: float, rule: str = "translation") -> GeometricTolerance:
     return tc.Position(width, "A|B|C", rule=rule)
 
 
@@ -95,7 +96,7 @@ def bolted(
             for part, tolerances, width in zip((base, cover), ([] if into else sizes, sizes), position, strict=True)
         )
         holes = {"through": [upper], "into": lower} if into else {"through": [upper, lower]}
-        a.fasten(f"bolt {k + 1}", shank, seat=cover.face("+z"), pushed=pushed, **holes)
+        tc.fasten(a, f"bolt {k + 1}", shank, seat=cover.face("+z"), pushed=pushed, **holes)
     for axis in "xy":
         along = frame.along(*np.eye(3)["xy".index(axis)])
         a.measure(axis, cover.point(0, 0, 0), along=along)

@@ -6,6 +6,7 @@ import trimesh
 import tolcontact as tc
 from tests.cases.frames import STILL, Frame
 from tests.cases.round_contact import BARREL
+from tolcontact.declaration import GeometricTolerance
 
 BORE = tc.Cylinder(inner=True)
 
@@ -78,7 +79,7 @@ def plate_with_holes(count: int, *side: tc.Perpendicularity, frame: Frame = STIL
 
 
 def pattern_with(
-    *tolerances, count: int = 4, follower: tc.Position | None = None, side=(), frame: Frame = STILL
+    *tolerances, count: int = 4, follower: GeometricTolerance | None = None, side=(), frame: Frame = STILL
 ) -> tc.Assembly:
     """A plate with a pattern of holes, datum H; the last one is toleranced to the others if there is a `follower`."""
     a, part, faces = plate_with_holes(count, *side, frame=frame)

@@ -96,11 +96,6 @@ def simulated_scores(engine: Engine, u: np.ndarray) -> tuple[np.ndarray, np.ndar
     def numbers(label: str) -> np.ndarray:
         if label in place:
             return np.asarray(ndtr(u[:, place[label]]).clip(MIN_UNIFORM, 1 - MIN_UNIFORM))
-        if "#" in label:
-            raise OptionError(
-                f'"{label.partition(" #")[0]}" is redrawn until it lies in its zone, and rare events need one draw of each; '
-                'choose another rule, such as "99.73 % inside"'
-            )
         return np.full(len(u), 0.5)
 
     return engine.simulate_deviations(draws.from_numbers(numbers, len(u)))

@@ -3,7 +3,6 @@
     tolcontact new NAME                                        write a small model with comments as a starting point
     tolcontact check MODEL.py                                  list every fault of a model, without a run
     tolcontact check MODEL.py --view                           also open the page of `view`, with marked faults
-    tolcontact check MODEL.py --population 1000                draw features, and print the share inside their zones
     tolcontact run MODEL.py --samples 1000 --seed 1            simulate, and print the summary
     tolcontact run MODEL.py --out FILE.nc                      simulate into an archive
     tolcontact summary FILE.nc [--json | --csv]                print the summary of an archive

@@ -15,7 +15,6 @@ from tolcontact.cli.app import (
     Objective,
     Overwrite,
     Resolution,
-    Seed,
     Solver,
     app,
     examples,
@@ -23,7 +22,7 @@ from tolcontact.cli.app import (
     method_choices,
     show_warnings,
 )
-from tolcontact.cli.output import check_page, console
+from tolcontact.cli.output import check_page
 from tolcontact.cli.progress import waiting
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.geometry import STEP
@@ -32,10 +31,9 @@ from tolcontact.declaration.values import key_faults
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError, OptionError, shown
 from tolcontact.geometry import parts_from
-from tolcontact.report import nominal_and_faults, population_text, write_page, write_view
+from tolcontact.report import nominal_and_faults, write_page, write_view
 from tolcontact.workflow.accessor import summarize
-from tolcontact.workflow.models import DEFAULT_SOLVER, build, check_counts
-from tolcontact.workflow.population import check_population
+from tolcontact.workflow.models import DEFAULT_SOLVER, build
 
 STARTER = Path(__file__).with_name("starter.py")
 
@@ -64,21 +62,15 @@ def new(name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the mo
     typer.echo(f"model: {shown(str(path))}\nnext: tolcontact check {shown(str(path))}")
 
 
-@app.command(epilog=examples("check model.py", "check model.py --view", "check model.py --population 1000"))
+@app.command(epilog=examples("check model.py", "check model.py --view"))
 def check(
     model: Model,
     solver: Solver = DEFAULT_SOLVER,
     resolution: Resolution = None,
     objective: Objective = None,
-    population: Annotated[
-        int | None, typer.Option(metavar="N", help="Also draw every feature N times, and print the share inside its zones.")
-    ] = None,
-    seed: Seed = 1,
     view: Annotated[bool, flag("--view", "Also open the page of `tolcontact view`, with marked faults.")] = False,
 ) -> None:
     """Check a model and its options without a run; list all faults and probable mistakes."""
-    if population is not None:
-        check_counts(population=population)
     assembly, doubts = None, list[warnings.WarningMessage]()
     try:
         with waiting(f"checking {model}"), warnings.catch_warnings(record=True) as doubts:
@@ -102,8 +94,6 @@ def check(
     show_warnings(doubts)
     count = {0: "", 1: ", 1 warning"}.get(len(doubts), f", {len(doubts)} warnings")
     typer.echo(f"no faults found{count}")
-    if population is not None:
-        console().print(population_text(check_population(assembly, samples=population, seed=seed)))
 
 
 def _open_view(model: Assembly, nominal: Nominal | None, faults: Sequence[str], path: Path) -> None:

@@ -162,8 +162,8 @@ force weight: (0, 0, -100) N at plate (30, 20, 4)
 
 ## Fasteners
 
-`fasten(name, 10, through=[hole, ...], into=hole)` declares a bolt, screw, pin or dowel in the holes of several parts: its part,
-its location and its contact pairs (see `tolcontact.fasteners`).
+`tc.fasten(assembly, name, 10, through=[hole, ...], into=hole)` declares a bolt, screw, pin or dowel in the holes of several
+parts: its part, its location and its contact pairs (see `tolcontact.fasteners`).
 
 ## Measures
 
@@ -212,10 +212,11 @@ derivatives, so `sensitivities` and `contributions` state none for them by a lin
 ## Stations and joints
 
 Products are located, joined, and located again before anybody measures them. `station(name)` declares the next step of such a
-sequence, and has the methods `locate`, `contact`, `fasten`, `force` and `measure` of an assembly, and `join`. Locators belong
-to a station and vary there ("weld.left.A1"); features belong to parts, and deviate alike in all stations. A joint keeps the
-poses of its parts relative to each other that they had in the station that joined them: raw states follow from raw states, and
-corrected states from corrected states. Later stations locate the joint by points, or by three faces, of any of its parts.
+sequence, and has the methods `locate`, `contact`, `force` and `measure` of an assembly, and `join`; `tc.fasten` takes a station
+as well. Locators belong to a station and vary there ("weld.left.A1"); features belong to parts, and deviate equally in all
+stations. A joint keeps the poses of its parts relative to each other that they had in the station that joined them: raw states
+follow from raw states, and corrected states from corrected states. Later stations locate the joint by points, or by three
+faces, of any of its parts.
 
 >>> line = tc.Assembly("line")
 >>> left, right = line.part("left", tc.Box(100, 50, 10)), line.part("right", tc.Box(100, 50, 10), at=(80, 0, 10))
@@ -270,7 +271,7 @@ under a main guard it runs by itself, with the options of `tolcontact run`; the 
 The same declarations as JSON are accepted wherever a script is: `tolcontact run model.json`. `tc.write_model(model,
 "model.json")` writes them. What a script would leave out may be left out, tolerances may be written as texts, files of shapes
 are named from the folder of the JSON file, and errors state the place: `parts[2].features[0].tolerances[1].width`. The JSON
-schema follows from the classes of this chapter: `python -m tolcontact.declaration.json_model > model.schema.json` writes it.
+schema follows from the classes of this chapter: `python -m tolcontact.declaration.script > model.schema.json` writes it.
 
 A model of a stranger is data, and cannot ask for everything: files have at most 64 MiB, assemblies 1000 parts and 2000
 measures, pairs 100 000 contact points, names 500 characters (of parts and stations 255 bytes in UTF-8), expressions 100 000
@@ -286,7 +287,7 @@ contact seat: plate -z (moving) against base +z (reference), spacing 5 mm
 """
 
 from tolcontact.declaration.assembly import Assembly
-from tolcontact.declaration.contact_pair import ContactPair
+from tolcontact.declaration.contact_pair import ContactPair, Force
 from tolcontact.declaration.dependence import Correlation, Population, Variable
 from tolcontact.declaration.feature_tolerance import (
     Angularity,
@@ -305,10 +306,9 @@ from tolcontact.declaration.feature_tolerance import (
     Symmetry,
     TotalRunout,
 )
-from tolcontact.declaration.force import Force
 from tolcontact.declaration.form import Form
 from tolcontact.declaration.geometry import Box, Geometry, Mesh, Pin
-from tolcontact.declaration.joint import Joint
+from tolcontact.declaration.joint import Joint, Overlap
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import (
@@ -328,8 +328,6 @@ from tolcontact.declaration.measurement import (
     Sum,
     stations,
 )
-from tolcontact.declaration.mobility import has_supports, is_free, movers
-from tolcontact.declaration.overlap import Overlap
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.size import Size
@@ -345,6 +343,6 @@ __all__ = [
     "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean", "MeanGap", "Measure", "Measurement", "Mesh",
     "Minimum", "Near", "Overlap", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin", "Point", "Population",
     "Position", "Profile", "Roundness", "Size", "Station", "Straightness", "Sum", "Symmetry", "ThreeTwoOne", "TitleBlock",
-    "Tolerance", "TotalRunout", "Triangles", "Variable", "degrees", "has_supports", "is_free", "movers", "stations",
+    "Tolerance", "TotalRunout", "Triangles", "Variable", "degrees", "stations",
     "three_two_one",
 ]  # fmt: skip

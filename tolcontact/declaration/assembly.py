@@ -4,7 +4,8 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
-from tolcontact.declaration.contact_pair import ContactPair
+from tolcontact.declaration.checks import FRICTION, field_faults
+from tolcontact.declaration.contact_pair import ContactPair, Force
 from tolcontact.declaration.declarations import Declarations, expect
 from tolcontact.declaration.dependence import (
     Correlation,
@@ -13,12 +14,10 @@ from tolcontact.declaration.dependence import (
     correlation as _correlation,
     population as _population,
 )
-from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Geometry
-from tolcontact.declaration.joint import Joint
+from tolcontact.declaration.joint import Joint, Overlap
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.overlap import Overlap
 from tolcontact.declaration.part import Feature, Part
 from tolcontact.declaration.sequence import in_order, joined_before, present_parts, sequence_faults, settings_of
 from tolcontact.declaration.size import Size
@@ -26,7 +25,6 @@ from tolcontact.declaration.station import Station
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import (
-    friction_faults,
     group_faults,
     key_faults,
     repetitions,
@@ -87,18 +85,9 @@ class Assembly(Declarations, Pictured):
         self.mu = mu
         self._declared: dict[str, list[Any]] = {name: [] for name in MAX_COUNTS}
 
-    def _add(self, name: str, thing: T) -> T:
-        """Append a declaration to a list and return it."""
-        self._declared[name].append(thing)
-        return thing
-
     @property
-    def _owner(self) -> "Assembly":
+    def assembly(self) -> "Assembly":
         return self
-
-    @property
-    def _units(self) -> dict[str, str]:
-        return {measure.name: measure.units for measure in self.measures}
 
     def replaced(self, **lists: Iterable[Any]) -> "Assembly":
         """Return a copy in which `lists` (parts=..., pairs=...) replace its lists. Raises TypeError for other names."""
@@ -214,7 +203,7 @@ class Assembly(Declarations, Pictured):
         if not self.parts:
             yield "it has no parts; declare at least one with assembly.part(name, geometry)"
         yield from self.omissions()
-        yield from (*text_faults("assembly", [self.name]), *friction_faults(self.mu))
+        yield from (*text_faults("assembly", [self.name]), *field_faults(self, {"mu": FRICTION}))
         yield from (f"title block: {fault}" for fault in (self.title_block.faults() if self.title_block else ()))
         for name, most in MAX_COUNTS.items():
             if (count := len(self._declared[name])) > most:

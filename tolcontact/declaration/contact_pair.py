@@ -1,16 +1,21 @@
-"""Contact pairs: two surfaces that may touch and may not pass through each other."""
+"""Contact pairs: surfaces that may touch and may not pass through each other; and forces that press parts together."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
-from tolcontact.declaration.part import Face, Part
-from tolcontact.declaration.values import friction_faults, stiffness_faults
+from tolcontact.declaration.checks import FRICTION, LENGTH, STIFFNESS, Check, field_faults, whole_number
+from tolcontact.declaration.part import Face, Part, Point
+from tolcontact.declaration.values import Vector, is_finite
 from tolcontact.readable import Readable
 
 VERTICES = "vertices"
 MAX_POINTS = 100_000  # of a pair; more take minutes, and gigabytes
+COUNT = whole_number(1, MAX_POINTS)
+PAIR_CHECKS = {
+    "points": Check(lambda points: points == VERTICES or COUNT.holds(points), f'{COUNT.expected}, or "{VERTICES}"'),
+    "spacing": LENGTH, "within": LENGTH, "mu": FRICTION, "stiffness": STIFFNESS,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,14 +57,7 @@ class ContactPair(Readable):
         yield from self.reference.faults()
         if self.moving.part is self.reference.part:
             yield f'both faces belong to part "{self.moving.part.name}"; a pair needs two parts'
-        if self.points not in (None, VERTICES) and not (type(self.points) is int and 1 <= self.points <= MAX_POINTS):
-            yield f'points is {self.points!r}; expected a whole number from 1 to {MAX_POINTS}, or "{VERTICES}"'
-        for option in ("spacing", "within"):
-            length = getattr(self, option)
-            if length is not None and not (isinstance(length, int | float) and math.isfinite(length) and length > 0):
-                yield f"{option} is {length!r}; expected a length in mm above 0"
-        yield from friction_faults(self.mu)
-        yield from stiffness_faults(self.stiffness)
+        yield from field_faults(self, PAIR_CHECKS)
         if self.points is not None and self.spacing is not None:
             yield "both points and spacing are given; give one of them"
 
@@ -71,3 +69,28 @@ class ContactPair(Readable):
             points = "points by geometry" if self.points is None else count
         stiffness = "" if self.stiffness is None else f", {self.stiffness:g} N/mm"
         return f"contact {self.name}: {self.moving} (moving) against {self.reference} (reference), {points}{stiffness}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Force(Readable):
+    """A force `vector` [N] at a point of a part, constant in the assembly frame. The objective "seating" uses it."""
+
+    name: str
+    at: Point
+    vector: Vector
+    declared_at: str = ""
+    station: str = ""
+    noun: ClassVar[str] = "force"
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The part that it acts on."""
+        return (self.at.part,)
+
+    def faults(self) -> Iterator[str]:
+        yield from self.at.faults()
+        if not (is_finite(self.vector) and any(self.vector)):
+            yield "vector is not a nonzero vector of three finite numbers [N]"
+
+    def __str__(self) -> str:
+        return f"force {self.name}: ({', '.join(f'{c:g}' for c in self.vector)}) N at {self.at}"

@@ -3,17 +3,14 @@
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-from tolcontact.declaration.contact_pair import ContactPair
-from tolcontact.declaration.force import Force
+from tolcontact.declaration.contact_pair import ContactPair, Force
 from tolcontact.declaration.joint import Joint
 from tolcontact.declaration.locator import FIRST_ORDER, Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
-from tolcontact.declaration.size import Size
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import direction, script_line, vector as _vector
-from tolcontact.later import FASTENER, LATER
 
 T = TypeVar("T")
 
@@ -23,19 +20,15 @@ class Declarations:
 
     _station = ""  # the name of the station; empty for an assembly by itself
 
-    def _add(self, name: str, thing: T) -> T:
-        """Append a declaration to a list of the assembly and return it."""
-        raise NotImplementedError
-
     @property
-    def _owner(self) -> Any:
+    def assembly(self) -> Any:
         """The assembly that takes the declarations."""
         raise NotImplementedError
 
-    @property
-    def _units(self) -> dict[str, str]:
-        """The units of the measures declared so far, by name."""
-        raise NotImplementedError
+    def _add(self, name: str, thing: T) -> T:
+        """Append a declaration to a list of the assembly and return it."""
+        self.assembly._declared[name].append(thing)
+        return thing
 
     def locate(
         self,
@@ -65,7 +58,10 @@ class Declarations:
         expect(f'locate "{part.name}": floating', floating, bool, "True or False")
         joint, part = (part.name, part.first) if isinstance(part, Joint) else ("", part)
         ground = on.first if isinstance(on, Joint) else on
-        location = Location(part, scheme, zone, ground, script_line(), floating, self._station, joint, placing)
+        location = Location(
+            part, scheme, tolerance=zone, on=ground, declared_at=script_line(), floating=floating, station=self._station,
+            joint=joint, placing=placing,
+        )  # fmt: skip
         return self._add("locations", location)
 
     def contact(
@@ -83,42 +79,16 @@ class Declarations:
         """Declare that points of the `moving` face stay outside the `reference` face (see ContactPair)."""
         for side, face in (("moving", moving), ("reference", reference)):
             expect(f'contact "{name}": {side}', face, Face | Feature, 'part.face("+z"), or a feature')
-        sides = face_of(moving), face_of(reference)
-        line, station = script_line(), self._station
-        return self._add("pairs", ContactPair(name, *sides, points, spacing, within, line, mu, station, stiffness))
+        pair = ContactPair(
+            name, face_of(moving), face_of(reference), points=points, spacing=spacing, within=within, mu=mu,
+            stiffness=stiffness, declared_at=script_line(), station=self._station,
+        )  # fmt: skip
+        return self._add("pairs", pair)
 
     def force(self, name: str, *, at: Point, vector: Any) -> Force:
         """Declare a force `vector` [N], in the assembly frame, at a point of a part (see Force)."""
         expect(f'force "{name}": at', at, Point, "part.point(x, y, z)")
         return self._add("forces", Force(name, at, _vector(vector), script_line(), self._station))
-
-    def fasten(
-        self,
-        name: str,
-        fastener: Part | Face | Feature | Size | float,
-        *,
-        through: Sequence[Face | Feature],
-        into: Face | Feature | None = None,
-        seat: Face | Feature | None = None,
-        pushed: Any = None,
-        drift: bool = False,
-    ) -> Part:
-        """Declare a fastener in the holes of several parts, and return its part (see `tolcontact.fasteners`).
-
-        fastener   its diameter or its tc.Size, and a part is made; or a part, or the face of its shank
-        through    the holes that it passes through, from its head on
-        into       a threaded or press-fit hole, which holds it; without one it floats in the clearance of its holes
-        seat       the plane under its head
-        pushed     a force (x, y, z) [N], in the assembly frame, on a fastener that floats
-        drift      whether it stands anywhere in the clearance of its tightest hole, where contact allows, all places alike
-
-        In a station its part is there alone; join it to the parts that it fastens if later stations need it.
-        Raises ModelError if the fastener does not fit into the nominal assembly.
-        """
-        part: Part = LATER[FASTENER](
-            self._owner, self, name, fastener, through=through, into=into, seat=seat, pushed=pushed, drift=drift
-        )
-        return part
 
     def measure(
         self,
@@ -138,9 +108,13 @@ class Declarations:
         """
         axis = None if along is None else direction(along)
         if units is None:
-            units = min(of.units_among(self._units), default="mm") if isinstance(of, Measurement) else "mm"
+            earlier = {measure.name: measure.units for measure in self.assembly.measures}
+            units = min(of.units_among(earlier), default="mm") if isinstance(of, Measurement) else "mm"
         bounds: Any = tuple(limits) if isinstance(limits, list | tuple) else limits
-        measure = Measure(name, of, to, axis, tolerance, units, script_line(), bounds, absolute, self._station)
+        measure = Measure(
+            name, of, to=to, along=axis, tolerance=tolerance, units=units, limits=bounds, absolute=absolute,
+            declared_at=script_line(), station=self._station,
+        )  # fmt: skip
         return self._add("measures", measure)
 
 

@@ -13,12 +13,13 @@ from msgspec import UNSET, Meta, UnsetType
 
 from tolcontact.declaration.assembly import MAX_COUNTS, Assembly
 from tolcontact.declaration.codec import CODECS, Choice, DocumentRecord, Inline, Items, Optional, Plain
-from tolcontact.declaration.contact_pair import VERTICES, ContactPair
+from tolcontact.declaration.contact_pair import VERTICES, ContactPair, Force
 from tolcontact.declaration.dependence import Correlation, Population, Variable
 from tolcontact.declaration.face_entry import (
     FLOAT,
     FREE_DIRECTION,
     INDEX,
+    MEASURED,
     NOT_NEGATIVE,
     POSITIVE,
     UNIT_VECTOR,
@@ -30,16 +31,13 @@ from tolcontact.declaration.face_entry import (
     indices_of,
     text_type,
 )
-from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, RULES, ZONES, GeometricTolerance
-from tolcontact.declaration.force import Force
+from tolcontact.declaration.feature_tolerance import KINDS, MATERIALS, RULES, ZONES, GeometricTolerance, ToleranceKind
 from tolcontact.declaration.form import COVARIANCES, Form
 from tolcontact.declaration.geometry import UNITS, Box, Mesh, Pin
-from tolcontact.declaration.joint import Joint
+from tolcontact.declaration.joint import Joint, Overlap
 from tolcontact.declaration.locator import PLACINGS, USUAL_STIFFNESS, Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, Tape, tape_of
 from tolcontact.declaration.measurement import Measurement
-from tolcontact.declaration.measurement_entry import MEASURED
-from tolcontact.declaration.overlap import Overlap
 from tolcontact.declaration.part import ASSOCIATIONS, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.place import EntryError, Place, Sources
 from tolcontact.declaration.size import MOVES, Size
@@ -149,13 +147,20 @@ def _measured(entries: Mapping[str, Any], place: Place) -> Point | Measurement |
     return tape_of(entries["tape"], place["tape"])
 
 
-def _tolerance_record(cls: Any) -> DocumentRecord:
-    """Return the record of a geometric tolerance: its width, and all fields that differ from their defaults."""
-    keys = ["width", *(f"{member.name}?" for member in fields(cls) if member.name != "width")]
-    return DocumentRecord(
-        cls, " ".join(keys), kind=cls.kind, width=Plain(NOT_NEGATIVE),
+class ToleranceRecord(DocumentRecord):
+    """Geometric tolerances of one kind."""
+
+    def holds(self, value: Any) -> bool:
+        return isinstance(value, GeometricTolerance) and value.kind == self.kind
+
+
+def _tolerance_record(kind: ToleranceKind) -> ToleranceRecord:
+    """Return the record of a kind of tolerances: their width, and all fields that differ from their defaults."""
+    keys = ["width", *(f"{member.name}?" for member in fields(GeometricTolerance) if member.name not in ("of", "width"))]
+    return ToleranceRecord(
+        GeometricTolerance, " ".join(keys), kind=kind.kind, name=kind.name, build=kind, width=Plain(NOT_NEGATIVE),
         zone=Plain(text_type(ZONES) | None), along=Optional(FREE_DIRECTION),
-        material=Plain(text_type(MATERIALS)), bonus=Plain(text_type(BONUSES)), rule=Plain(text_type(RULES)),
+        material=Plain(text_type(MATERIALS)), rule=Plain(text_type(RULES)),
     )  # fmt: skip
 
 

@@ -1,8 +1,8 @@
-"""Entries of faces and their criteria, and of the values in all entries: directions, numbers, references."""
+"""Entries of faces and their criteria, of points and measurements, and of the values in all entries."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,9 +10,10 @@ import msgspec
 import numpy as np
 from msgspec import UNSET, Meta, UnsetType
 
-from tolcontact.declaration.codec import CODECS, Choice, Codec, DocumentRecord, Named, Optional, Plain
+from tolcontact.declaration.codec import CODECS, Choice, Codec, DocumentRecord, Items, Named, Optional, Plain
 from tolcontact.declaration.measure import Tape
-from tolcontact.declaration.part import Face, Feature, Part
+from tolcontact.declaration.measurement import MAX_DEPTH, MEASUREMENTS, Combination
+from tolcontact.declaration.part import Face, Feature, Part, Point
 from tolcontact.declaration.place import Place
 from tolcontact.declaration.selection import (
     FACE_GROUPS,
@@ -233,3 +234,31 @@ CRITERION = Choice(
     DocumentRecord(Triangles, "triangles=indices", mark="triangles", triangles=TRIANGLES),
 )
 CODECS[Face] = Faces()
+
+
+class Operands(Items):
+    """The measurements of a combination."""
+
+    def decode(self, entry: Any, place: Place, **arguments: Any) -> Any:
+        if place.path.count(".measurements") > MAX_DEPTH:
+            raise place.error(f"its measurements are nested too deeply; expected at most {MAX_DEPTH} combinations")
+        return super().decode(entry, place, **arguments)
+
+
+def _record(cls: Any) -> DocumentRecord:
+    """Return the record of a kind of measurement: its faces and points, and directions if it has some."""
+    if issubclass(cls, Combination):
+        return DocumentRecord(
+            cls, "measurements", kind=cls.kind, measurements=Operands(OPERAND), build=lambda measurements: cls(*measurements)
+        )
+    keys = " ".join(f"{member.name}?" if member.default is None else member.name for member in fields(cls))
+    vector = Optional(UNIT_VECTOR)
+    return DocumentRecord(cls, keys, kind=cls.kind, across=vector, along=vector, about=vector)
+
+
+CODECS[Point] = DocumentRecord(Point, "part on? end? position?", mark="part")
+KIND = f"a measurement whose kind is one of {', '.join(MEASUREMENTS)}"
+OPERAND = Choice("Operand", f"the name of a measurement, or {KIND}")
+KINDS = tuple(map(_record, MEASUREMENTS.values()))
+OPERAND.codecs = (*KINDS, Plain(str))
+MEASURED = Choice("Measured", f"a point, or {KIND}", *KINDS, CODECS[Point])

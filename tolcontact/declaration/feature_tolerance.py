@@ -3,35 +3,84 @@
 import re
 from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, ClassVar
+from typing import Any
 
+from tolcontact.declaration.checks import LENGTH, LENGTH_OR_0, TRUTH, Check, direction_faults, field_faults, one_of
 from tolcontact.declaration.form import Form
-from tolcontact.declaration.values import Vector, direction as _direction, is_finite, is_length
+from tolcontact.declaration.values import Vector, direction as _direction, is_length
 from tolcontact.readable import Readable
 
 INSIDE = "99.73 % inside"
 EXTREMES = "6 sigma at the extremes"
-RULES = (INSIDE, EXTREMES, "truncated", "uniform", "translation", "polar")
-TRANSLATIONS = ("translation", "polar")  # rules without tilts
-BONUSES = ("fills", "accepts", "none")
+TRANSLATION = "translation"  # a rule without tilts
+RULES = (INSIDE, EXTREMES, TRANSLATION)
 MATERIALS = ("", "M", "L")
 SYMBOLS = {"M": "Ⓜ", "L": "Ⓛ"}
 ZONES = ("round", "flat")
 RUNOUTS = ("circular run-out", "total run-out")
 AROUND_ROUND = ("profile", "line profile", *RUNOUTS)  # kinds with zones for walls, not for axes
 USUAL_FORM = Form()
+
+
+def _lengths(per: Any) -> tuple[Any, ...]:
+    return tuple(per) if isinstance(per, list | tuple) else (per,)
+
+
+# Of the options of kinds, and what their values must be; a direction `along` has a sentence of its own.
+OPTIONS: dict[str, Check | None] = {
+    "zone": one_of(ZONES),
+    "along": None,
+    "material": one_of(MATERIALS),
+    "projected": LENGTH,
+    "outside": LENGTH_OR_0,
+    "per": Check(
+        lambda per: len(_lengths(per)) in (1, 2) and all(map(LENGTH.holds, _lengths(per))),
+        "a length in mm above 0, or two of them, as in per=(25, 25)",
+    ),
+    "tangent": TRUTH,
+}
 COMPARTMENT = re.compile(r"([A-Z]{1,2}(?:-[A-Z]{1,2})*)(?:\(([ML])\))?(><)?")
+
+
+@dataclass(frozen=True, repr=False)
+class ToleranceKind(Readable):
+    """A kind of geometric tolerance; to call it with a width and datums makes a tolerance (see GeometricTolerance).
+
+    kind         its name in messages, JSON and archives
+    meaning      what it limits, with its clause of ISO 1101
+    options      the fields among zone, along, material, projected, outside, per and tangent that it accepts
+    is_form      whether it limits form alone, and draws it by its `form`
+    around       kinds whose zones contain the zone of a form; all others if there are none
+    """
+
+    kind: str
+    meaning: str
+    options: tuple[str, ...] = ()
+    needs_datums: bool = True
+    is_form: bool = False
+    around: tuple[str, ...] = ()
+
+    def __call__(self, width: float, datums: str = "", **options: Any) -> "GeometricTolerance":
+        return GeometricTolerance(self, width, datums, **options)
+
+    @property
+    def name(self) -> str:
+        """Its name in scripts."""
+        return "".join(word.capitalize() for word in self.kind.replace("-", "").split())
+
+    def __str__(self) -> str:
+        return f"tc.{self.name}: {self.meaning}"
 
 
 @dataclass(frozen=True, repr=False)
 class GeometricTolerance(Readable):
     """A zone of full width `width` [mm] (of a round zone the diameter) for a feature.
 
+    of          its kind, with the options that it accepts; `features/tolerance_kinds.py` defines the zones
     datums      the datum system, "A|B|C": primary, secondary, tertiary; "A-B" is a common datum, "B(M)" one with a modifier,
                 and "A><" one that locks directions alone, and no places, as in the lower segment of a composite frame
     zone        "round" or "flat", for axes; by default round. `along` is the direction across a flat zone's planes
-    material    "M" or "L": the zone grows as the feature's size departs from its maximum (least) material size
-    bonus       "fills": the process fills the larger zone; "accepts": only a check of parts uses it; or "none"
+    material    "M" or "L": the zone grows as the feature's size departs from its maximum (least) material size, and is filled
     projected   [mm] the zone lies beyond the material, from the face of the primary datum up to this height
     outside     [mm] of a profile: the part of the zone that lies outside the material; by default half
     per         [mm] of flatness or straightness: it applies to any part of the surface of this length, or of two such lengths
@@ -40,30 +89,17 @@ class GeometricTolerance(Readable):
                 feature keeps its shape
     rule        from the zone to the spread of all freedoms together. "99.73 % inside" (default): this share of features lies
                 inside, where components are equal, independent and normal. "6 sigma at the extremes": six standard deviations
-                at the worst extreme of the feature equal the width. "truncated": the same, without the features outside.
-                "uniform": uniform in the zone. "translation": no tilts. "polar": uniform angle and normal radius, 6 sigma of
-                which equal the width
+                at the worst extreme of the feature equal the width. "translation": the default without tilts
     cp, cpk     process capability: the spread is divided by `cp`, and the mean is shifted until `cpk` results
-
-    A kind of tolerance is a subclass: `kind` is its name in messages, JSON and archives. `options` names the fields among
-    zone, along, material, projected, outside, per and tangent that it accepts. `is_form` is True for a kind that limits form
-    alone, and draws it by its `form`; the zones of the kinds `around` it contain it, or those of all others if there are none.
-    `features/tolerance_kinds.py` defines the zones.
     """
 
-    kind: ClassVar[str] = ""
-    needs_datums: ClassVar[bool] = True
-    is_form: ClassVar[bool] = False
-    around: ClassVar[tuple[str, ...]] = ()
-    options: ClassVar[tuple[str, ...]] = ()
-
+    of: ToleranceKind
     width: float
     datums: str = ""
     _: KW_ONLY
     zone: str | None = None
     along: Any = None
     material: str = ""
-    bonus: str = "fills"
     projected: float | None = None
     outside: float | None = None
     per: float | tuple[float, float] | None = None
@@ -72,6 +108,16 @@ class GeometricTolerance(Readable):
     rule: str = INSIDE
     cp: float = 1.0
     cpk: float | None = None
+
+    @property
+    def kind(self) -> str:
+        """The name of its kind in messages, JSON and archives."""
+        return self.of.kind
+
+    @property
+    def is_form(self) -> bool:
+        """Whether it limits form alone."""
+        return self.of.is_form
 
     @property
     def system(self) -> tuple[tuple[str, ...], ...]:
@@ -98,12 +144,12 @@ class GeometricTolerance(Readable):
     @property
     def _unit_lengths(self) -> tuple[float, ...]:
         """The lengths [mm] of the parts of a surface that it applies to; none for the surface as a whole."""
-        return () if self.per is None else tuple(self.per) if isinstance(self.per, list | tuple) else (self.per,)
+        return () if self.per is None else _lengths(self.per)
 
     @property
     def limits_form_alone(self) -> bool:
         """Whether it limits no displacement of a feature by itself: a tolerance of form, or a profile without datums."""
-        return self.is_form or not (self.needs_datums or self.datums)
+        return self.is_form or not (self.of.needs_datums or self.datums)
 
     @property
     def uneven_shift(self) -> float:
@@ -131,29 +177,18 @@ class GeometricTolerance(Readable):
             yield f"datums {self.datums!r} names a datum twice"
 
     def _zone_faults(self) -> Iterator[str]:
-        for option in ("zone", "along", "material", "projected", "outside", "per", "tangent"):
+        for option in OPTIONS:
             value = getattr(self, option)
             is_given = value not in ("", False) if isinstance(value, str | bool) else value is not None
-            if is_given and option not in self.options:
+            if is_given and option not in self.of.options:
                 yield f"{option} is given, which {self.kind} does not have; leave it out"
         yield from self._form_faults()
-        if self.zone not in (None, *ZONES):
-            yield f"zone is {self.zone!r}; expected one of {', '.join(ZONES)}"
+        yield from field_faults(self, {option: check for option, check in OPTIONS.items() if check is not None})
         if self.zone == "flat" and self.along is None:
             yield 'a flat zone needs a direction across it; give along="x", or a vector'
-        if self.across is not None and not is_finite(self.across):
-            yield 'along is neither "+x" to "-z" nor a nonzero vector of three finite numbers'
-        if self.projected is not None and not (is_length(self.projected) and self.projected > 0):
-            yield f"projected is {self.projected!r}; expected a length in mm above 0"
-        if self.outside is not None and not (
-            is_length(self.outside) and is_length(self.width) and 0 <= self.outside <= self.width
-        ):
+        yield from direction_faults("along", self.across)
+        if self.outside is not None and is_length(self.outside) and is_length(self.width) and self.outside > self.width:
             yield f"outside is {self.outside!r}; expected a length in mm from 0 to the width"
-        lengths = self._unit_lengths
-        if self.per is not None and not (len(lengths) in (1, 2) and all(is_length(unit) and unit > 0 for unit in lengths)):
-            yield f"per is {self.per!r}; expected a length in mm above 0, or two of them, as in per=(25, 25)"
-        if not isinstance(self.tangent, bool):
-            yield f"tangent is {self.tangent!r}; expected True or False"
 
     def _form_faults(self) -> Iterator[str]:
         if not self.limits_form_alone and self.form != USUAL_FORM:
@@ -168,15 +203,11 @@ class GeometricTolerance(Readable):
             yield f'the rule is "{self.rule}"; form is drawn by the rule "{INSIDE}" alone'
 
     def _process_faults(self) -> Iterator[str]:
-        for option, choices in (("material", MATERIALS), ("bonus", BONUSES), ("rule", RULES)):
-            if getattr(self, option) not in choices:
-                yield f"{option} is {getattr(self, option)!r}; expected one of: {', '.join(map(repr, choices))}"
+        yield from field_faults(self, {"rule": one_of(RULES)})
         if not (is_length(self.cp) and self.cp > 0):
             yield f"cp is {self.cp!r}; expected a number above 0"
         elif self.cpk is not None and not (is_length(self.cpk) and self.cpk <= self.cp):
             yield f"cpk is {self.cpk!r}; expected a number, at most cp"
-        elif (self.cp != 1 or self.cpk is not None) and self.rule in ("truncated", "uniform", "polar"):
-            yield f'cp is given with the rule "{self.rule}"; it goes with normal components'
 
     def __str__(self) -> str:
         """Return the tolerance with the symbols of a drawing."""
@@ -197,97 +228,55 @@ class GeometricTolerance(Readable):
         return f"{self.kind} {round_}{self.width:g}{self.material} mm{unit}{uneven}{tangent}{datums}"
 
 
-class Position(GeometricTolerance):
-    """Position of an axis, a centre, or a plane (ISO 1101, 17.12); in a pattern also without datums, as a common zone."""
-
-    kind, options = "position", ("zone", "along", "material", "projected", "tangent")
-
-
-class Coaxiality(GeometricTolerance):
-    """Coaxiality of an axis with the axis of its datums: a round zone (ISO 1101, 17.13)."""
-
-    kind, options = "coaxiality", ("material",)
-
-
-class Symmetry(GeometricTolerance):
-    """Symmetry of the middle of two opposed planes, or of an axis between planes, to its datums (ISO 1101, 17.14)."""
-
-    kind, options = "symmetry", ("zone", "along", "material")
-
-
-class Profile(GeometricTolerance):
-    """Profile of a surface (ISO 1101, 17.8): its location, as far as its datums lock it. Without datums it is form alone."""
-
-    kind, options, needs_datums = "profile", ("outside", "tangent"), False
-
-
-class LineProfile(GeometricTolerance):
-    """Profile of any line of a surface (ISO 1101, 17.7); the zones of all lines are taken as one zone of the surface.
-
-    Without form deviations the two are equal where the datums lock the location of the surface.
-    """
-
-    kind, options, needs_datums = "line profile", ("outside",), False
-
-
-class Parallelism(GeometricTolerance):
-    """Parallelism of a plane or an axis to its datums (ISO 1101, 17.9)."""
-
-    kind, options = "parallelism", ("zone", "along", "material", "tangent")
-
-
-class Perpendicularity(GeometricTolerance):
-    """Perpendicularity of a plane or an axis to its datums (ISO 1101, 17.10)."""
-
-    kind, options = "perpendicularity", ("zone", "along", "material", "projected", "tangent")
-
-
-class Angularity(GeometricTolerance):
-    """Angularity of a plane or an axis: its angle to its datums (ISO 1101, 17.11)."""
-
-    kind, options = "angularity", ("zone", "along", "material", "tangent")
-
-
-class CircularRunout(GeometricTolerance):
-    """Circular run-out to the axis of its datums: radial of a cylinder, in each section, or axial of a plane (ISO 1101, 17.15).
-
-    Without form deviations it equals total run-out.
-    """
-
-    kind = "circular run-out"
-
-
-class TotalRunout(GeometricTolerance):
-    """Total run-out to the axis of its datums: radial of a whole cylinder, or axial of a plane (ISO 1101, 17.16)."""
-
-    kind = "total run-out"
-
-
-class Straightness(GeometricTolerance):
-    """Straightness of lines of a surface, or of an axis (ISO 1101, 17.3). It limits form, and does not move the feature.
-
-    The lines of a cylinder or cone are drawn; for the straightness of its axis, or of lines of a plane, give form=None.
-    """
-
-    kind, options, needs_datums, is_form = "straightness", ("per",), False, True
-
-
-class Flatness(GeometricTolerance):
-    """Flatness of a plane (ISO 1101, 17.4), or of any part of it. It limits form, and does not move the plane as a whole."""
-
-    kind, options, needs_datums, is_form = "flatness", ("per",), False, True
-
-
-class Roundness(GeometricTolerance):
-    """Roundness of sections of a cylinder, cone or sphere (ISO 1101, 17.5). It limits form, and does not move the feature."""
-
-    kind, needs_datums, is_form, around = "roundness", False, True, AROUND_ROUND
-
-
-class Cylindricity(GeometricTolerance):
-    """Cylindricity (ISO 1101, 17.6). It limits form, and does not move the cylinder as a whole."""
-
-    kind, needs_datums, is_form, around = "cylindricity", False, True, AROUND_ROUND
-
-
-KINDS = {tolerance.kind: tolerance for tolerance in GeometricTolerance.__subclasses__()}
+AXIS_OPTIONS = ("zone", "along", "material", "tangent")
+Position = ToleranceKind(
+    "position", "position of an axis, a centre, or a plane (ISO 1101, 17.12); in a pattern without datums it is a common zone",
+    (*AXIS_OPTIONS, "projected"),
+)  # fmt: skip
+Coaxiality = ToleranceKind(
+    "coaxiality", "coaxiality of an axis with the axis of its datums: a round zone (ISO 1101, 17.13)", ("material",)
+)
+Symmetry = ToleranceKind(
+    "symmetry", "symmetry of the middle of two opposed planes, or of an axis between planes, to its datums (ISO 1101, 17.14)",
+    ("zone", "along", "material"),
+)  # fmt: skip
+Profile = ToleranceKind(
+    "profile", "profile of a surface (ISO 1101, 17.8): its location, if its datums lock it; without datums it is form alone",
+    ("outside", "tangent"), needs_datums=False,
+)  # fmt: skip
+LineProfile = ToleranceKind(  # the zones of all lines are taken as one zone of the surface
+    "line profile", "profile of any line of a surface (ISO 1101, 17.7)", ("outside",), needs_datums=False
+)
+Parallelism = ToleranceKind("parallelism", "parallelism of a plane or an axis to its datums (ISO 1101, 17.9)", AXIS_OPTIONS)
+Perpendicularity = ToleranceKind(
+    "perpendicularity", "perpendicularity of a plane or an axis to its datums (ISO 1101, 17.10)", (*AXIS_OPTIONS, "projected")
+)
+Angularity = ToleranceKind(
+    "angularity", "angularity of a plane or an axis: its angle to its datums (ISO 1101, 17.11)", AXIS_OPTIONS
+)
+CircularRunout = ToleranceKind(  # without form deviations it equals total run-out
+    "circular run-out",
+    "run-out of each section of a cylinder, or of each circle of a plane, to the axis of its datums (ISO 1101, 17.15)",
+)
+TotalRunout = ToleranceKind("total run-out", "run-out of a cylinder or a plane to the axis of its datums (ISO 1101, 17.16)")
+Straightness = ToleranceKind(  # the lines of a cylinder or cone are drawn; an axis, or lines of a plane, need form=None
+    "straightness", "straightness of lines of a surface, or of an axis (ISO 1101, 17.3)", ("per",), needs_datums=False,
+    is_form=True,
+)  # fmt: skip
+Flatness = ToleranceKind(
+    "flatness", "flatness of a plane, or of any part of it (ISO 1101, 17.4)", ("per",), needs_datums=False, is_form=True
+)
+Roundness = ToleranceKind(
+    "roundness", "roundness of sections of a cylinder, cone or sphere (ISO 1101, 17.5)", needs_datums=False, is_form=True,
+    around=AROUND_ROUND,
+)  # fmt: skip
+Cylindricity = ToleranceKind(
+    "cylindricity", "cylindricity (ISO 1101, 17.6)", needs_datums=False, is_form=True, around=AROUND_ROUND
+)
+KINDS = {
+    row.kind: row
+    for row in (
+        Position, Coaxiality, Symmetry, Profile, LineProfile, Parallelism, Perpendicularity, Angularity, CircularRunout,
+        TotalRunout, Straightness, Flatness, Roundness, Cylindricity,
+    )
+}  # fmt: skip

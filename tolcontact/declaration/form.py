@@ -3,12 +3,16 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from tolcontact.declaration.values import is_length
+from tolcontact.declaration.checks import LENGTH, field_faults, one_of, whole_number
 from tolcontact.readable import Readable
 
 COVARIANCES = ("squared exponential", "matern 5/2", "matern 3/2")
 MAX_MODES = 200
 MIN_LOBES, MAX_LOBES = 2, 12  # one lobe displaces a section
+FORM_CHECKS = {
+    "covariance": one_of(COVARIANCES), "length": LENGTH, "modes": whole_number(1, MAX_MODES),
+    "lobes": whole_number(MIN_LOBES, MAX_LOBES),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, repr=False)
@@ -34,15 +38,7 @@ class Form(Readable):
     measured: str | None = None
 
     def faults(self) -> Iterator[str]:
-        if self.covariance not in COVARIANCES:
-            yield f"covariance is {self.covariance!r}; expected one of: {', '.join(map(repr, COVARIANCES))}"
-        if self.length is not None and not (is_length(self.length) and self.length > 0):
-            yield f"length is {self.length!r}; expected a correlation length in mm above 0"
-        if not _is_number(self.modes, 1, MAX_MODES):
-            yield f"modes is {self.modes!r}; expected a whole number from 1 to {MAX_MODES}"
-        if self.lobes is not None and not _is_number(self.lobes, MIN_LOBES, MAX_LOBES):
-            yield f"lobes is {self.lobes!r}; expected a whole number from {MIN_LOBES} to {MAX_LOBES}, or none"
-
+        yield from field_faults(self, FORM_CHECKS)
         if self.measured is not None and not (isinstance(self.measured, str) and self.measured):
             yield f'measured is {self.measured!r}; expected the path of CSV or PLY files, as in "scans/*.csv"'
         elif self.measured is not None and (self.covariance, self.length, self.lobes) != (COVARIANCES[0], None, None):
@@ -54,8 +50,3 @@ class Form(Readable):
         length = "a third of the face" if self.length is None else f"{self.length:g} mm"
         lobes = "" if self.lobes is None else f", {self.lobes} lobes"
         return f"form of {self.modes} modes, {self.covariance}, length {length}{lobes}"
-
-
-def _is_number(value: object, least: int, most: int) -> bool:
-    """Return whether a value is a whole number in a range."""
-    return isinstance(value, int) and not isinstance(value, bool) and least <= value <= most

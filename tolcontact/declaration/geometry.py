@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tolcontact.declaration.values import is_length
+from tolcontact.declaration.checks import LENGTH, TRUTH, field_faults, one_of
 from tolcontact.errors import shown
 from tolcontact.readable import Readable
 
@@ -19,10 +19,7 @@ class Box(Readable):
     z: float
 
     def faults(self) -> Iterator[str]:
-        for axis in "xyz":
-            size = getattr(self, axis)
-            if not (is_length(size) and size > 0):
-                yield f"box size along {axis} is {size!r}; expected a length in mm above 0"
+        yield from field_faults(self, dict.fromkeys("xyz", LENGTH), "box size along ")
 
     def __str__(self) -> str:
         return f"box {self.x:g} x {self.y:g} x {self.z:g} mm"
@@ -37,12 +34,7 @@ class Pin(Readable):
     head: bool = False
 
     def faults(self) -> Iterator[str]:
-        for name in ("diameter", "length"):
-            size = getattr(self, name)
-            if not (is_length(size) and size > 0):
-                yield f"pin {name} is {size!r}; expected a length in mm above 0"
-        if not isinstance(self.head, bool):
-            yield f"pin head is {self.head!r}; expected True or False"
+        yield from field_faults(self, {"diameter": LENGTH, "length": LENGTH, "head": TRUTH}, "pin ")
 
     def __str__(self) -> str:
         return f"pin {self.diameter:g} x {self.length:g} mm{' with a head' if self.head else ''}"
@@ -69,16 +61,13 @@ class Mesh(Readable):
     chord: float | None = None
 
     def faults(self) -> Iterator[str]:
-        if self.chord is not None and not (is_length(self.chord) and self.chord > 0):
-            yield f"mesh chord is {self.chord!r}; expected a length in mm above 0"
-        elif self.chord is not None and not self.is_step:
+        yield from field_faults(self, {"chord": LENGTH, "units": one_of([*UNITS])}, "mesh ")
+        if self.chord is not None and not self.is_step:
             yield "mesh chord is given, but only STEP files are triangulated; leave it out"
         if self.body is not None and not self.is_step:
             yield f"mesh body is {self.body!r}; only STEP files hold bodies that have names and numbers; leave it out"
         if isinstance(self.body, bool) or not isinstance(self.body, str | int | None):
             yield f"mesh body is {self.body!r}; expected the name of a body, or its number from 1"
-        if self.units is not None and self.units not in UNITS:
-            yield f"mesh units is {self.units!r}; expected one of {', '.join(UNITS)}"
         if self.units is not None and self.is_step:
             yield f'"{self.source}" is a STEP file, which states its own units; leave units out'
         if isinstance(self.source, str | Path):

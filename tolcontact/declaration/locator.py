@@ -6,15 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from tolcontact.declaration.checks import LENGTH_OR_0, STIFFNESS, TRUTH, direction_faults, field_faults
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
 from tolcontact.declaration.tolerance import Tolerance, tolerance as _tolerance
 from tolcontact.declaration.values import (
     Vector,
     direction as _direction,
     is_finite,
-    is_length,
     repetitions,
-    stiffness_faults,
     text_faults,
     vector as _vector,
 )
@@ -71,13 +70,12 @@ class Locator(Readable):
     def faults(self) -> Iterator[str]:
         if not is_finite(self.point):
             yield "point is not three finite numbers"
-        if not is_finite(self.direction):
-            yield 'direction is neither "+x" to "-z" nor a nonzero vector of three finite numbers'
+        yield from direction_faults("direction", self.direction)
         if self.tolerance is not None:
             yield from self.tolerance.faults()
-        if not isinstance(self.one_sided, bool):
-            yield f"one_sided is {self.one_sided!r}; expected True or False"
-        yield from stiffness_faults(self.stiffness)
+        if self.stiffness is not None:
+            yield from field_faults(self, {"stiffness": STIFFNESS})
+        yield from field_faults(self, {"one_sided": TRUTH})
         if not isinstance(self.on, Feature | None):
             yield f"on is a {type(self.on).__name__}; expected a feature of the part, or None"
         if not isinstance(self.part, Part | None):
@@ -112,8 +110,7 @@ class ThreeTwoOne(Readable):
     def faults(self) -> Iterator[str]:
         for face in self.faces:
             yield from face.faults()
-        if not (is_length(self.inset) and self.inset >= 0):
-            yield f"inset is {self.inset!r}; expected a length in mm, 0 or above"
+        yield from field_faults(self, {"inset": LENGTH_OR_0})
 
     def __str__(self) -> str:
         return f"3-2-1 on {', '.join(str(face) for face in self.faces)}, {self.inset:g} mm inside the edges"

@@ -11,10 +11,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from tolcontact.declaration.checks import TRUTH, direction_faults, field_faults
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Part, Point
 from tolcontact.declaration.place import MAX_NUMBER, Place
-from tolcontact.declaration.values import Vector, is_finite, is_length, is_line
+from tolcontact.declaration.values import Vector, is_length, is_line
 from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
 from tolcontact.readable import Readable
 
@@ -107,17 +108,15 @@ class Measure(Readable):
         if self.to is not None and not isinstance(self.to, Point):
             yield f"to is a {type(self.to).__name__}; expected part.point(x, y, z)"
         yield from self._limits_faults()
-        if not isinstance(self.absolute, bool | None):
-            yield f"absolute is {self.absolute!r}; expected True or False"
-        elif self.absolute is not None and not isinstance(self.of, Point):
+        yield from field_faults(self, {"absolute": TRUTH})
+        if self.absolute is not None and not isinstance(self.of, Point):
             yield f"absolute is for measurements of points; a {self._noun} has its own value, so leave it out"
 
     def _subject_faults(self) -> Iterator[str]:
         if isinstance(self.of, Point):
             if self.along is None:
                 yield 'a measured point needs a direction; give along="z", or a vector'
-            elif not is_finite(self.along):
-                yield 'along is neither "+x" to "-z" nor a nonzero vector of three finite numbers'
+            yield from direction_faults("along", self.along)
         elif not (isinstance(self.of, Measurement | tuple) or callable(self.of)):
             yield (
                 f"it measures a {type(self.of).__name__}; expected part.point(x, y, z), a measurement such as tc.Gap(...), "

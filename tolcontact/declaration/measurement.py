@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from tolcontact.declaration.checks import direction_faults
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
-from tolcontact.declaration.values import Vector, direction, is_finite
+from tolcontact.declaration.values import Vector, direction
 from tolcontact.readable import Readable
 
 MAX_DEPTH = 8  # of nested measurements
@@ -200,7 +201,7 @@ class AxisDistance(_OfTwoFaces):
     def faults(self) -> Iterator[str]:
         yield from super().faults()
         for name in ("across", "along"):
-            yield from _direction_faults(name, getattr(self, name))
+            yield from direction_faults(name, getattr(self, name))
         if self.across is not None and self.along is not None:
             yield "across and along are both given; give one of them"
 
@@ -231,7 +232,7 @@ class Angle(_OfTwoFaces):
 
     def faults(self) -> Iterator[str]:
         yield from super().faults()
-        yield from _direction_faults("about", self.about)
+        yield from direction_faults("about", self.about)
 
     def __str__(self) -> str:
         return super().__str__() + _direction_text("about", self.about)
@@ -331,11 +332,6 @@ def stations(start: Point, end: Point, count: int) -> tuple[Point, ...]:
     return tuple(
         point(*((1 - share) * a + share * b for a, b in zip(start.position, end.position, strict=True))) for share in shares
     )
-
-
-def _direction_faults(name: str, value: Vector | None) -> Iterator[str]:
-    if value is not None and not is_finite(value):
-        yield f'{name} is neither "+x" to "-z" nor a nonzero vector of three finite numbers'
 
 
 def _direction_text(name: str, value: Vector | None) -> str:

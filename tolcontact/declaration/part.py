@@ -3,13 +3,13 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
+from tolcontact.declaration.checks import field_faults, one_of
 from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
 from tolcontact.declaration.toleranced import Control, Toleranced, letter_faults
 from tolcontact.declaration.values import Vector, is_finite, script_line, vector
-from tolcontact.later import LATER, PMI
 from tolcontact.readable import Readable
 
 OUTSIDE, LEAST_SQUARES = ASSOCIATIONS = ("outside", "least squares")  # from a plane to a datum, ISO 5459
@@ -111,13 +111,6 @@ class Part(Readable):
         targets = DatumTargets(letter, points, script_line())
         self.add(targets)
         return targets
-
-    def features_from_pmi(self) -> Any:
-        """Declare the features that the STEP file of this part states as PMI, and return a `tolcontact.pmi.DeclaredPmi`.
-
-        It lists each annotation with its features, or the reason why it has none. Raises OptionError if the file states none.
-        """
-        return LATER[PMI](self)
 
     def point(self, x: float, y: float, z: float) -> "Point":
         """Return the point (x, y, z) [mm] of this part, in its own frame."""
@@ -227,8 +220,7 @@ class Feature(Toleranced, Readable):
     def faults(self) -> Iterator[str]:
         yield from self.face_faults()
         yield from letter_faults(self.datum)
-        if self.association not in ASSOCIATIONS:
-            yield f"its association is {self.association!r}; expected one of: {', '.join(ASSOCIATIONS)}"
+        yield from field_faults(self, {"association": one_of(ASSOCIATIONS)}, "its ")
         yield from self.tolerance_faults(len(self.faces))
 
     def face_faults(self) -> Iterator[str]:

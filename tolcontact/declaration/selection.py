@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from tolcontact.declaration.checks import LENGTH, TRUTH, field_faults, one_of
 from tolcontact.declaration.values import DIRECTIONS, Vector, direction as _direction, is_finite, is_length, vector
 from tolcontact.errors import shown
 from tolcontact.readable import Readable
@@ -111,8 +112,7 @@ class Near(Readable):
     within: float
 
     def faults(self) -> Iterator[str]:
-        if not (is_length(self.within) and self.within > 0):
-            yield f"within is {self.within!r}; expected a length in mm above 0"
+        yield from field_faults(self, {"within": LENGTH})
 
     def __str__(self) -> str:
         return f"within {self.within:g} mm of {self.part.name}"
@@ -180,10 +180,7 @@ class Cylinder(Readable):
     inner: bool | None = None
 
     def faults(self) -> Iterator[str]:
-        if self.radius is not None and not (is_length(self.radius) and self.radius > 0):
-            yield f"radius is {self.radius!r}; expected a length in mm above 0"
-        if not (self.inner is None or isinstance(self.inner, bool)):
-            yield f"inner is {self.inner!r}; expected True, False or None"
+        yield from field_faults(self, {"radius": LENGTH, "inner": TRUTH})
 
     def __str__(self) -> str:
         noun = {None: "cylinders", True: "inner cylinders", False: "outer cylinders"}[self.inner]
@@ -207,8 +204,7 @@ class Largest(Readable):
         return None if self.direction is None else _direction(self.direction)
 
     def faults(self) -> Iterator[str]:
-        if self.kind not in KINDS:
-            yield f"kind is {self.kind!r}; expected one of {', '.join(KINDS)}"
+        yield from field_faults(self, {"kind": one_of(KINDS)})
         if self.axis is not None and not is_finite(self.axis):
             yield f'unknown direction "{self.direction}"; expected one of {", ".join(DIRECTIONS)}, or a vector'
 

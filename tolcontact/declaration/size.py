@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
 from typing import Any, ClassVar
 
+from tolcontact.declaration.checks import field_faults, one_of
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.tolerance_class import tolerance_class
 from tolcontact.declaration.values import is_length
@@ -72,8 +73,7 @@ class Size(Readable):
             yield f"{name} is {getattr(self, name)!r}; expected a number in mm"
         else:
             yield from self._limit_faults()
-        if self.moves not in MOVES:
-            yield f"moves is {self.moves!r}; expected one of {', '.join(MOVES)}"
+        yield from field_faults(self, {"moves": one_of(MOVES)})
 
     def _limit_faults(self) -> Iterator[str]:
         if not self.nominal > 0:

@@ -1,15 +1,13 @@
 """Stations: an assembly that is built in steps has one set of locations, contact pairs, measures and joints for each."""
 
 from collections.abc import Iterator
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar
 
 from tolcontact.declaration.declarations import Declarations, expect
 from tolcontact.declaration.joint import Joint, parts_of
 from tolcontact.declaration.part import Part
 from tolcontact.declaration.values import script_line
 from tolcontact.readable import Readable
-
-T = TypeVar("T")
 
 
 class Station(Declarations, Readable):
@@ -41,27 +39,15 @@ class Station(Declarations, Readable):
             expect(f'join "{name}": a body', body, Part | Joint, "parts and joints, as in weld.join(name, left, right)")
         return self._add("joints", Joint(name, parts_of(bodies), self.name, script_line()))
 
-    def _add(self, name: str, thing: T) -> T:
-        return self._owner._add(name, thing)  # type: ignore[no-any-return]
-
     @property
-    def _owner(self) -> Any:
+    def assembly(self) -> Any:
         if self._assembly is None:
             raise TypeError(f'station "{self.name}" belongs to no assembly; declare it with assembly.station(name)')
         return self._assembly
 
-    @property
-    def _units(self) -> dict[str, str]:
-        return {} if self._assembly is None else self._assembly._units
-
     def faults(self) -> Iterator[str]:
         if not isinstance(self.name, str):
             yield f"name is {self.name!r}; expected a text"
-
-    def __eq__(self, other: Any) -> bool:
-        return self is other
-
-    __hash__ = object.__hash__
 
     def __str__(self) -> str:
         return f"station {self.name}"

@@ -44,9 +44,9 @@ class Toleranced:
 
     def _datum_faults(self) -> Iterator[str]:
         for tolerance in self.geometric:
-            is_common = self.has_common_zone and isinstance(tolerance, Position)
-            if tolerance.needs_datums and not tolerance.datums and not is_common:
-                example = f'tc.{type(tolerance).__name__}({tolerance.width!r}, "A|B|C")'
+            is_common = self.has_common_zone and tolerance.of is Position
+            if tolerance.of.needs_datums and not tolerance.datums and not is_common:
+                example = f'tc.{tolerance.of.name}({tolerance.width!r}, "A|B|C")'
                 yield f"{tolerance.kind}: it needs datums; give them as in {example}"
 
     def _size_faults(self, faces: int) -> Iterator[str]:
@@ -71,7 +71,7 @@ class Toleranced:
         for form in (tolerance for tolerance in tolerances if tolerance.is_form):
             for tolerance in tolerances:
                 is_around = not tolerance.is_form and not tolerance.tangent  # form is not that of a tangent plane
-                contains = is_around and (not form.around or tolerance.kind in form.around)
+                contains = is_around and (not form.of.around or tolerance.kind in form.of.around)
                 if contains and tolerance.width < form.width:
                     yield (
                         f"{form.kind} {form.width:g} is wider than {tolerance.kind} {tolerance.width:g}, which contains it; "

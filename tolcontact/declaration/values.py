@@ -14,7 +14,6 @@ from tolcontact.errors import CONTROL_CHARACTERS, shown
 
 MAX_NAME = 500  # characters
 MAX_GROUP_NAME = 255  # bytes in UTF-8: the netCDF library's NC_MAX_NAME is 256, with which some groups cannot be written
-MAX_FRICTION = 10  # more does not exist
 _KEY = re.compile(r"\w(?:[^/]*[^/\s])?")
 
 
@@ -128,18 +127,6 @@ def is_finite(value: Vector) -> bool:
 def is_length(value: Any) -> bool:
     """Return True for a finite number; a truth value is not a number."""
     return isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def friction_faults(mu: Any) -> Iterator[str]:
-    """Yield the fault of a coefficient of friction; None states none."""
-    if mu is not None and not (is_length(mu) and 0 <= mu <= MAX_FRICTION):
-        yield f"mu is {mu!r}; expected a coefficient of friction from 0 to {MAX_FRICTION}, or None"
-
-
-def stiffness_faults(stiffness: Any) -> Iterator[str]:
-    """Yield the fault of a stiffness; None states none."""
-    if stiffness is not None and not (is_length(stiffness) and stiffness > 0):
-        yield f"stiffness is {stiffness!r}; expected a number in N/mm above 0"
 
 
 def script_line() -> str:

@@ -37,8 +37,8 @@ points find no deeper contact. Round faces with form are not followed beyond the
 
 ## Warnings
 
-A `tc.ContactWarning` states the error in mm if your points, or the triangles of a round face, allow more penetration than
-that.
+A `tc.NominalWarning` states the error in mm if your points, or the triangles of a round face, allow more penetration than
+that. `tc.build` checks the nominal assembly for other mistakes as well (see `tolcontact.plausibility`).
 
 >>> import trimesh, warnings
 >>> ball = tc.Assembly("ball")
@@ -53,15 +53,7 @@ that.
 >>> with warnings.catch_warnings(record=True) as caught:
 ...     program = tc.build(ball)
 >>> print(caught[0].message)
-contact pair "foot" (...): parts may be off by up to 0.0092 mm between flat triangles and the round faces ...
-
-A `tc.FaceWarning` names a feature or contact pair whose B-rep faces are only a part of a cylinder, or of another curved
-surface: files split holes into halves. `tc.Brep(number, whole=True)` chooses all of them.
-
-A `tc.UnitsWarning` names a mesh without stated units whose size is implausible in mm, either in itself (below 1 mm or above 10
-m) or compared with a part that it touches. It also names a mesh if all declared points would lie on it in another unit.
-
-`tc.build` looks at the nominal assembly as well (see `tolcontact.plausibility`).
+[coarse] contact pair "foot" (...): parts may be off by up to 0.0092 mm between flat triangles and the round faces ...
 
 ## Balls and shafts
 
@@ -95,9 +87,8 @@ from tolcontact.discretization.coordinates_in_words import coordinates_in_words
 from tolcontact.discretization.counted_points import counted_points
 from tolcontact.discretization.discretizing import discretize
 from tolcontact.discretization.form_places import FIRST_POINT, raised_places, rim_points
-from tolcontact.discretization.locators import Locators
+from tolcontact.discretization.locators import Locators, NominalPart
 from tolcontact.discretization.nominal import ContactPoints, Nominal
-from tolcontact.discretization.nominal_part import NominalPart
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_points import RoundPoint, RoundPoints
 

@@ -1,8 +1,7 @@
-"""Contact points of a pair of faces: points of the moving face, and their feet on the reference face."""
+"""Contact points: of the moving face of a pair with their feet on the reference face, and locators as pairs of their own."""
 
 import math
-import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,13 +19,13 @@ from tolcontact.discretization.form_points import (
     form_spacing,
     with_rims,
 )
+from tolcontact.discretization.locators import Locators, NominalPart
 from tolcontact.discretization.nominal import ContactPoints
-from tolcontact.discretization.nominal_part import NominalPart
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.scenes import Scene
-from tolcontact.errors import ContactWarning, GeometryFault, designation
+from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation, Features
 from tolcontact.geometry.coordinate_error import coordinate_error
 from tolcontact.geometry.curvature import CHORD_SHARE, curvature_points, distinct, facet_error, is_flat, sampling_error
@@ -65,13 +64,14 @@ def contact_points(
     # A hollow wall is fitted to many vertices: rounding hardly moves it.
     is_rounded = not any(point.is_hollow for point in balls_and_shafts)
     rounding = coordinate_error(moving.mesh) + coordinate_error(reference.mesh) if is_rounded else 0.0
+    undetected = None
     if balls_and_shafts:
         P_m, P_r, n_r = (np.array(rows) for rows in zip(*(point.nominal() for point in balls_and_shafts), strict=True))
     else:
         candidates = coaxial_points(moving_face, reference_face, deviating) if _is_open(pair) and lengths else None
         if candidates is None:
             faces = moving_face, reference_face
-            candidates = _candidates(scene.assembly, pair, moving, unplaced.mesh, faces, reach, lengths, rounding)
+            candidates, undetected = _candidates(scene.assembly, pair, moving, unplaced.mesh, faces, reach, lengths)
         P_m, P_r, n_r = _touching(pair, candidates, moving_face, reference_face, reach)
     points = ContactPoints(
         name=pair.name,
@@ -85,6 +85,7 @@ def contact_points(
         moving_face=moving_face,
         coordinate_error=rounding,
         facets=facet_error(moving_face, reference_face, reach),
+        sampling_error=undetected,
         round=RoundPoints.of(balls_and_shafts) if balls_and_shafts else None,
         deviating=deviating,
     )
@@ -121,14 +122,14 @@ def _candidates(
     faces: tuple[Surface, Surface],
     reach: float,
     lengths: Sequence[float],
-    rounding: float,
-) -> np.ndarray:
+) -> tuple[np.ndarray, float | None]:
     """Return points (point, 3) of the moving face that become contact points if they lie over the reference face.
 
-    `mesh` is the moving face in its part's own frame, `faces` are both faces in their nominal places, `lengths` are those of
-    their forms, and `rounding` [mm] is the error of coordinates in files.
+    With them comes the penetration [mm] that they may leave undetected on curved faces; None for flat ones. `mesh` is the
+    moving face in its part's own frame, `faces` are both faces in their nominal places, `lengths` are those of their forms.
     """
     moving_face, reference_face = faces
+    undetected = None
     if isinstance(pair.points, str):
         points = distinct_vertices(mesh)
     else:
@@ -148,11 +149,11 @@ def _candidates(
             if lengths:
                 P_m = with_rims(P_m, moving_face, reference_face, form_spacing(lengths), reach)
     elif math.isfinite(finest):
-        P_m = _with_curvature(pair, moving_face, reference_face, P_m, finest, reach, rounding)
+        P_m, undetected = _with_curvature(moving_face, reference_face, P_m, finest, reach, is_open=_is_open(pair))
     P_m = distinct(P_m, POINT_TOLERANCE * moving.mesh.scale)
     if moving_face.surfaces:
         P_m, _, _ = moving_face.project(P_m)
-    return P_m
+    return P_m, undetected
 
 
 def _touching(
@@ -204,36 +205,64 @@ def _check_number(points: float, subject: str) -> None:
 
 
 def _with_curvature(
-    pair: ContactPair,
-    moving_face: Surface,
-    reference_face: Surface,
-    P_m: np.ndarray,
-    finest: float,
-    reach: float,
-    rounding: float,
-) -> np.ndarray:
-    """Return points P_m (point, 3) of curved faces; if the choice is open, with the points that follow curvature added.
+    moving_face: Surface, reference_face: Surface, P_m: np.ndarray, finest: float, reach: float, *, is_open: bool
+) -> tuple[np.ndarray, float]:
+    """Return points P_m (point, 3) of curved faces, and the penetration [mm] that may lie undetected between them.
 
-    Warns if the points, or the triangles, leave more than CHORD_SHARE times `finest` undetected, the smallest tolerance range,
-    and more than the `rounding` [mm] of coordinates in files, which bends flat faces.
+    If their choice `is_open`, points are added that follow curvature, by CHORD_SHARE of the `finest` tolerance range.
     """
     dense = curvature_points(moving_face, reference_face, chord=CHORD_SHARE * finest, within=reach)
     if is_flat(reference_face) and moving_face.curvature > 0:
         step = math.sqrt(8 * CHORD_SHARE * finest / moving_face.curvature)
         dense = np.concatenate([dense, rim_points(moving_face, reference_face, step, reach)])
-    if _is_open(pair):
+    if is_open:
         P_m = np.concatenate([P_m, dense])
-    between_points = sampling_error(P_m, dense, reference_face, unit=finest, within=reach)
-    under_facets = facet_error(moving_face, reference_face, reach)
-    for error, place, advice in (
-        (between_points, "between its contact points", "give it more points, or leave points and spacing out"),
-        (under_facets, "between flat triangles and the round faces that they approximate", "use a finer mesh"),
-    ):
-        if error > max(CHORD_SHARE * finest, rounding):
-            warnings.warn(
-                f"{designation('contact pair', pair)}: parts may be off by up to {error:.2g} mm {place}, "
-                f"{error / finest:.2g} of the smallest tolerance ({finest:.4g} mm); {advice}",
-                ContactWarning,
-                stacklevel=7,
-            )
-    return P_m
+    return P_m, sampling_error(P_m, dense, reference_face, unit=finest, within=reach)
+
+
+def supports_name(scene: Scene, part: Part) -> str:
+    """Return the name of the pair of the one-sided locators of a part."""
+    return f"supports of {part.name}" + (f" in {scene.station}" if scene.station else "")
+
+
+def support_pairs(parts: tuple[NominalPart, ...], scenes: Sequence[Scene]) -> Iterator[ContactPoints]:
+    """Yield the one-sided locators of each free part, or of each part of a free joint, as a contact pair; then its springs."""
+    start = 0
+    for index, part in enumerate(parts):
+        owners = np.array(part.owners or (index,) * len(part.locators), dtype=int)
+        for owner in np.unique(owners[part.locators.one_sided]) if part.free else ():
+            supports = np.flatnonzero(part.locators.one_sided & (owners == owner))
+            P, n = part.locators.points[supports], part.locators.directions[supports]
+            offsets = _support_offsets(part.locators, start, supports)
+            scene = next(scene for scene in scenes if scene.station == part.station)
+            name = supports_name(scene, parts[owner].part)
+            stiffness = np.where(part.locators.springy, part.locators.stiffness, np.inf)[supports]
+            numbers = start + supports
+            yield ContactPoints(name, int(owner), part.parent, P, P, n, offsets, locators=numbers, stiffness=stiffness)
+        for number in np.flatnonzero(part.locators.springy & ~part.locators.one_sided) if part.free else ():
+            yield _spring_pair(part, int(owners[number]), start, int(number))
+        start += len(part.locators)
+
+
+def _spring_pair(part: NominalPart, owner: int, start: int, number: int) -> ContactPoints:
+    """Return a two-sided locator that gives way, as the pair of a spring that pushes and one that pulls, at the same point."""
+    locators, twice = part.locators, np.array([number, number])
+    P, signs = locators.points[twice], np.array([1.0, -1.0])
+    heights = _support_offsets(locators, start, twice[:1])
+    offsets = Offsets(heights.columns, heights.matrix * signs)
+    return ContactPoints(
+        locators.labels[number], owner, part.parent, P, P, signs[:, None] * locators.directions[twice], offsets,
+        locators=start + twice, stiffness=locators.stiffness[twice], pulls=signs < 0,
+    )  # fmt: skip
+
+
+def _support_offsets(locators: Locators, start: int, supports: np.ndarray) -> Offsets:
+    """Return the heights of supports: their own deviations, columns `start` on, and those of the faces they stand against."""
+    offsets = [Offsets(start + supports, np.eye(len(supports)))]
+    for place, number in enumerate(supports):
+        columns, factors = locators.pushes(number)
+        if columns.size:
+            matrix = np.zeros((len(columns), len(supports)))
+            matrix[:, place] = factors
+            offsets.append(Offsets(columns, matrix))
+    return Offsets.joined(offsets, len(supports)) if len(offsets) > 1 else offsets[0]

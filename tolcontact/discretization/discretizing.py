@@ -19,19 +19,13 @@ from tolcontact.declaration import (
     Part,
     ThreeTwoOne,
     Tolerance,
-    has_supports,
-    is_free,
 )
 from tolcontact.declaration.locator import FIRST_ORDER, USUAL_STIFFNESS
-from tolcontact.discretization.contact_points import contact_points
-from tolcontact.discretization.locators import FACES_OF_SCHEME, Locators, scheme_locators
+from tolcontact.discretization.contact_points import contact_points, support_pairs, supports_name
+from tolcontact.discretization.locators import FACES_OF_SCHEME, Locators, NominalPart, scheme_locators
 from tolcontact.discretization.measurements import nominal_measurements
 from tolcontact.discretization.nominal import ContactPoints, Nominal
-from tolcontact.discretization.nominal_part import NominalPart
-from tolcontact.discretization.partial_surfaces import warn_of_partial_surfaces
-from tolcontact.discretization.scenes import Scene, carried, scenes_of
-from tolcontact.discretization.support_pairs import support_pairs, supports_name
-from tolcontact.discretization.unit_check import warn_of_units
+from tolcontact.discretization.scenes import Scene, carried, has_supports, is_free, scenes_of
 from tolcontact.errors import GeometryFault, ModelError, designation
 from tolcontact.features import Features, Placement, datum_order
 from tolcontact.geometry.faces import Meshes
@@ -108,8 +102,6 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
     faults.extend(fault for scene in scenes for fault in _reserved_names(scene))
     if faults:
         raise ModelError(assembly.name, list(dict.fromkeys(faults)))
-    warn_of_units(assembly, shapes)
-    warn_of_partial_surfaces(assembly, meshes)
     return _nominal(assembly, scenes, nominal_parts, (*pairs, *support_pairs(nominal_parts, scenes)), features)
 
 

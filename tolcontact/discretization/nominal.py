@@ -10,11 +10,9 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.declaration import Assembly, Face, Measure, Part, Point
 from tolcontact.discretization.form_points import COVER_SHARE, form_lengths, form_spacing
-from tolcontact.discretization.locators import Locators
+from tolcontact.discretization.locators import Locators, NominalPart
 from tolcontact.discretization.measured_geometry import NominalMeasurement
-from tolcontact.discretization.nominal_part import NominalPart
-from tolcontact.discretization.offsets import Offsets
-from tolcontact.discretization.pair_form import PairForm
+from tolcontact.discretization.offsets import Offsets, PairForm
 from tolcontact.discretization.plane_minima import PlaneMinima
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
@@ -42,6 +40,7 @@ class ContactPoints:
     moving_face, reference_face   in their nominal places
     coordinate_error   [mm] of both bodies, as their files store them: P_r lie below the reference face by it
     facets      [mm] largest distance between their triangles and the round faces that these approximate
+    sampling_error   [mm] that bodies may penetrate undetected between points of curved faces; None for other points
     round       the balls and shafts beside walls from which gaps follow at any pose; None if the contact points are fixed
     deviating   deviations of the moving and the reference face, if these belong to features; their heights at fixed points are
                 among the offsets
@@ -61,6 +60,7 @@ class ContactPoints:
     moving_face: Surface | None = None
     coordinate_error: float = 0.0
     facets: float = 0.0
+    sampling_error: float | None = None
     round: RoundPoints | None = None
     deviating: tuple[FaceDeviation | None, FaceDeviation | None] = (None, None)
     locators: np.ndarray | None = None

@@ -1,6 +1,6 @@
 """Fasten: bolts, screws, pins and dowels in the holes of several parts. A chapter of the guide.
 
-`Assembly.fasten` declares a fastener from its diameter, or from a part that stands in its holes, and from the holes that it
+`tc.fasten` declares a fastener from its diameter, or from a part that stands in its holes, and from the holes that it
 passes `through`, from its head on.
 
 >>> import tolcontact as tc
@@ -16,7 +16,7 @@ passes `through`, from its head on.
 >>> scheme = [tc.Locator(f"Z{k}", (x, y, -4), "z", 0) for k, (x, y) in enumerate([(20, 0), (-20, 0), (0, 20)])]
 >>> scheme += [tc.Locator("X", (0, 0, 0), "x", 0), tc.Locator("Y", (0, 0, 0), "y", 0), tc.Locator("turn", (20, 0, 0), "y", 0)]
 >>> location = model.locate(cover, scheme)
->>> screw = model.fasten("screw", 10, through=[bore], into=thread, seat=cover.face("+z"))
+>>> screw = tc.fasten(model, "screw", 10, through=[bore], into=thread, seat=cover.face("+z"))
 
 It expands into plain declarations, which can be inspected, are archived as such, and may be followed by others, such as
 measures of `screw.point(0, 0, 0)`:
@@ -34,7 +34,6 @@ contact screw in cover: cover inner cylinders (moving) against screw outer cylin
 | fixed: a screw, a stud, a dowel | `into=` a threaded or press-fit hole | that of the hole: it shifts and leans with it |
 | floating, with a nut | `seat=` the plane under its head | its head slides on the seat, and neither lifts off nor leans |
 | floating, without a seat | neither | what contact leaves; along its axis it stays |
-| floating, at a random place | `drift=True` | drawn in its clearance, until contact moves it |
 
 In each hole of `through` there is a contact pair, which is exact for tilted axes and follows the sizes of holes and shanks that
 vary. Declare the holes and their tolerances first; a hole or a seat that belongs to no feature becomes one, without
@@ -49,11 +48,6 @@ outer cylinder in the first hole; the face of a shank may be given instead.
 In the raw state a floating fastener is in its nominal place. Contact then moves it, and the parts, as the objective of the
 model requires: "all points" no farther than needed, and "seating" to where forces press. A force of its own is
 `pushed=(0, 0, -3)`, in N.
-
-With `drift=True` it stands anywhere in the clearance of its tightest hole in the raw state, all places alike, and contact moves
-it from there only as far as holes require: bolts that choose their side. It is parallel to that hole, and follows it. The
-places are 1000 in the nominal clearance; each realization draws one of them, in the variables "screw drift x" and "screw drift
-y".
 
 Two formulas of drawings follow. Floating fasteners of diameter F pass holes of diameter H with positions T if H - F = T;
 fixed ones if H - F = T1 + T2, or T1 + T2 (1 + 2P / D) where a thread of depth D leans, and the cover has the thickness P. An

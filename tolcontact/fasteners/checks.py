@@ -8,12 +8,13 @@ from tolcontact.declaration.values import is_finite, is_length, vector
 from tolcontact.fasteners.fit import INTO, SEAT
 
 
-def check_types(name: str, fastener: Any, through: Any, into: Any, seat: Any, drift: Any) -> None:
+def check_types(scene: Any, name: str, fastener: Any, through: Any, into: Any, seat: Any) -> None:
     """Raise TypeError for an argument of a wrong type."""
     kinds: Any = Part | Face | Feature | Size | int | float
     face: Any = Face | Feature
     hole = "the wall of a hole: part.face(tc.Cylinder(...)), or a feature"
     arguments = [
+        ("the first argument", scene, Assembly | Station, "an assembly, or one of its stations"),
         ("fastener", fastener, kinds, "a diameter in mm, a tc.Size, a part, or the face of its shank"),
         ("through", through, list | tuple, "a list of holes, from the head on"),
         *((f"through[{k}]", item, face, hole) for k, item in enumerate(through if isinstance(through, list | tuple) else ())),
@@ -23,18 +24,16 @@ def check_types(name: str, fastener: Any, through: Any, into: Any, seat: Any, dr
     for label, value, kind, expected in arguments:
         if not isinstance(value, kind) or isinstance(value, bool):
             raise TypeError(f'fasten "{name}": {label} is a {type(value).__name__}; expected {expected}')
-    if not isinstance(drift, bool):
-        raise TypeError(f'fasten "{name}": drift is a {type(drift).__name__}; expected True or False')
 
 
 def station_faults(assembly: Assembly, scene: Assembly | Station) -> Iterator[str]:
     """Yield the fault of a fastener that an assembly with stations declares by itself."""
     if assembly.stations and scene is assembly:
-        yield f"it belongs to no station; declare it in one: {assembly.stations[0].name}.fasten(...)"
+        yield f"it belongs to no station; declare it in one: tc.fasten({assembly.stations[0].name}, ...)"
 
 
 def reference_faults(
-    assembly: Assembly, fastener: Part | Size | float, holes: Mapping[str, Face], seat: Face | None, pushed: Any, *, drift: bool
+    assembly: Assembly, fastener: Part | Size | float, holes: Mapping[str, Face], seat: Face | None, pushed: Any
 ) -> Iterator[str]:
     """Yield the faults that show before any shape is read."""
     passed = [label for label in holes if label != INTO]
@@ -52,14 +51,10 @@ def reference_faults(
     yield from _owner_faults(assembly, owners | ({SEAT: seat.part} if seat else {}))
     if seat is not None and not any(seat.part is owners[label] for label in passed):
         yield f'seat is on part "{seat.part.name}", which it does not pass through; choose the face under its head'
-    if seat is not None and isinstance(fastener, Part) and (drift or INTO in holes):
-        yield "seat has no effect on a part that stands in a hole, pressed or anywhere in its clearance; leave it out"
+    if seat is not None and isinstance(fastener, Part) and INTO in holes:
+        yield "seat has no effect on a part that stands in a hole, which holds it; leave it out"
     if pushed is not None:
         yield from _push_faults(assembly, holes, pushed)
-    if drift and INTO in holes:
-        yield f"drift has no effect on a fastener that the hole in {INTO} holds; leave it out"
-    elif drift and pushed is not None:
-        yield "drift and pushed are both given; a fastener stands anywhere, or where a force presses it"
 
 
 def _owner_faults(assembly: Assembly, owners: Mapping[str, Part]) -> Iterator[str]:

@@ -12,7 +12,7 @@ from tolcontact.declaration.values import script_line
 from tolcontact.errors import GeometryFault, ModelError
 from tolcontact.fasteners.checks import check_types, reference_faults, station_faults
 from tolcontact.fasteners.fit import INTO, SEAT, Fit, made_fit, part_fit
-from tolcontact.fasteners.location import DIGITS, declare_drift, in_part, locate
+from tolcontact.fasteners.location import DIGITS, in_part, locate
 from tolcontact.fasteners.placed_faces import PlacedCylinder, placed_cylinder, placed_plane
 
 
@@ -41,29 +41,36 @@ class Faults:
 
 
 def fasten(
-    assembly: Assembly,
     scene: Assembly | Station,
     name: str,
     fastener: Part | Face | Feature | Size | float,
     *,
     through: Sequence[Face | Feature],
-    into: Face | Feature | None,
-    seat: Face | Feature | None,
-    pushed: Any,
-    drift: bool,
+    into: Face | Feature | None = None,
+    seat: Face | Feature | None = None,
+    pushed: Any = None,
 ) -> Part:
-    """Declare what a fastener consists of, and return its part (see Assembly.fasten). Raises ModelError with all its faults.
+    """Declare a fastener in the holes of several parts of a scene, and return its part.
 
-    Its part belongs to the assembly, and its location, contacts and force to the `scene`: the assembly, or one of its stations.
+    scene      the assembly, or the station in which its location, contacts and force are declared
+    fastener   its diameter or its tc.Size, and a part is made; or a part, or the face of its shank
+    through    the holes that it passes through, from its head on
+    into       a threaded or press-fit hole, which holds it; without one it floats in the clearance of its holes
+    seat       the plane under its head
+    pushed     a force (x, y, z) [N], in the assembly frame, on a fastener that floats
+
+    In a station its part is there alone; join it to the parts that it fastens if later stations need it.
+    Raises ModelError with all its faults, also if the fastener does not fit into the nominal assembly.
     """
-    check_types(name, fastener, through, into, seat, drift)
+    check_types(scene, name, fastener, through, into, seat)
+    assembly = scene.assembly
     shank = face_of(fastener) if isinstance(fastener, Face | Feature) else None
     subject: Part | Size | float = fastener.part if isinstance(fastener, Face | Feature) else fastener
     faces = {f"through[{k}]": face_of(hole) for k, hole in enumerate(through)} | ({INTO: face_of(into)} if into else {})
     plane_face = face_of(seat) if seat else None
     faults = Faults(assembly, name)
     faults.add(station_faults(assembly, scene))
-    faults.add(reference_faults(assembly, subject, faces, plane_face, pushed, drift=drift))
+    faults.add(reference_faults(assembly, subject, faces, plane_face, pushed))
     faults.refuse()
     holes = {label: faults.attempt(label, _hole, face) for label, face in faces.items()}
     plane = faults.attempt(SEAT, placed_plane, plane_face) if plane_face else None
@@ -74,15 +81,10 @@ def fasten(
         fit = made_fit(subject.nominal if isinstance(subject, Size) else float(subject), holes, plane)
     faults.refuse()
     faults.add(fit.faults())
-    if drift and not fit.clearance > 0:
-        faults.add([f"drift: the tightest hole is as wide as the fastener, {2 * fit.radius:.6g} mm; leave drift out"])
     faults.refuse()
     part = subject if isinstance(subject, Part) else _made_part(assembly, name, subject, fit)
     _declare_contacts(scene, name, fit.shank or _shank_face(part, fit), fit)
-    if drift:
-        declare_drift(assembly, scene, name, part, fit)
-    else:
-        locate(scene, name, part, fit)
+    locate(scene, name, part, fit)
     if pushed is not None:
         middle = fit.axis.at(sum(fit.reach) / 2)
         scene.force(f"{name} push", at=part.point(*in_part(part, middle)), vector=pushed)

@@ -1,11 +1,11 @@
-"""Locations of fasteners: in a hole that holds them, at a random place in their clearance, or floating."""
+"""Locations of fasteners: in a hole that holds them, or floating."""
 
 import math
 from collections.abc import Iterator
 
 import numpy as np
 
-from tolcontact.declaration import Assembly, Face, Feature, Locator, Part, Station, Tolerance
+from tolcontact.declaration import Assembly, Face, Feature, Locator, Part, Station
 from tolcontact.fasteners.fit import INTO, Fit
 from tolcontact.fasteners.placed_faces import PlacedCylinder, PlacedPlane, meshes_of, placement
 from tolcontact.geometry.faces import face_area
@@ -13,7 +13,6 @@ from tolcontact.geometry.pin_shape import HEAD_WIDTH
 
 DIGITS = 12  # of places [mm]: what is beyond is rounding
 SAME_FACE = 1 - 1e-6  # share of its area that a face has in common with that of its feature
-PLACES = 1000  # in a clearance
 
 
 def locate(scene: Assembly | Station, name: str, part: Part, fit: Fit) -> None:
@@ -28,32 +27,6 @@ def locate(scene: Assembly | Station, name: str, part: Part, fit: Fit) -> None:
         first = next(iter(fit.holes.values()))
         end = _locator(part, "end", fit.axis.at(fit.reach[1]), fit.axis.head)
         scene.locate(part, [end], on=first.face.part, floating=True)
-
-
-def declare_drift(assembly: Assembly, scene: Assembly | Station, name: str, part: Part, fit: Fit) -> None:
-    """Locate a fastener at a random place in the clearance of its tightest hole, parallel to the axis of the hole.
-
-    The places are rows of a population: they fill the disc evenly, and one is drawn for each realization.
-    """
-    hole, (x, y) = fit.tightest, fit.axis.across
-    location = scene.locate(part, list(_hole_locators(part, fit, hole)), on=_feature_of(hole.face, f"{name} hole"))
-    offset = fit.axis.at(fit.axis.station(hole.middle)) - hole.middle
-    columns, place = {}, f"{location.station}.{part.name}" if location.station else part.name
-    drivers = {"x": (x, ("x1", "x2")), "y": (y, ("y1", "y2", "turn"))}
-    for (letter, (direction, names)), places in zip(drivers.items(), fit.clearance * even_disc(PLACES).T, strict=True):
-        label = f"{name} drift {letter}"
-        drives = {f"{place}.{locator}": 1.0 for locator in names}
-        assembly.variable(label, Tolerance(2 * fit.clearance, "uniform"), drives=drives)
-        columns[label] = np.round(places - offset @ direction, DIGITS)
-    assembly.population(columns)
-
-
-def even_disc(count: int) -> np.ndarray:
-    """Return places (count, 2) that fill the unit disc evenly, by the golden angle, each with the one opposite to it."""
-    number = np.arange(count // 2) + 0.5
-    radius, angle = np.sqrt(2 * number / count), np.pi * (3 - np.sqrt(5)) * number
-    places = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
-    return np.concatenate([places, -places])
 
 
 def _hole_locators(part: Part, fit: Fit, hole: PlacedCylinder) -> Iterator[Locator]:

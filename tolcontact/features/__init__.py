@@ -39,9 +39,9 @@ It deviates as a whole by small displacements in mm, each of them a contributor:
 `tc.Flatness(0.1, per=(25, 25))`, or `per=25` for lines, limits the form of any part of this size. `tangent=True` states the
 orientation or place of the plane that touches a plane from outside, and does not limit its form. `zone="flat", along="x"` puts
 an axis between planes; with `projected=20` the zone stands 20 mm out of the primary datum. `material="M"` (or "L") enlarges
-the zone as the size departs from its maximum (least) material limit: `bonus="fills"` (the process uses the bonus), "accepts"
-(only the inspection does) or "none". `rule=`, `cp=` and `cpk=` are explained in `tolcontact.variation`. All this follows ISO
-1101, 5459 and 2692. Sizes do not limit form (independency, ISO 8015), unlike under ASME's Rule #1.
+the zone as the size departs from its maximum (least) material limit, and the process fills the larger zone. `rule=`, `cp=` and
+`cpk=` are explained in `tolcontact.variation`. All this follows ISO 1101, 5459 and 2692. Sizes do not limit form (independency,
+ISO 8015), unlike under ASME's Rule #1.
 
 ## Form
 
@@ -78,8 +78,8 @@ modes and stations leave out, and the mean width of the zones.
 A measured face is a smooth field at 160 stations, or at up to 1280 if these predict points that are left out better, and as
 smooth as predicts them best: scatter that neighbouring points do not share is no form. Of very many points some thousands are
 taken at random. A form that changes over too short lengths for the stations, or of which the field is far higher between the
-points than at them, is refused or warned of, as are outliers. Contact points are as close as its slopes require: waves that are
-12 mm long need points 1 mm apart, and many.
+points than at them, is refused. Check points for outliers before: they change the form around them. Contact points are as close
+as its slopes require: waves that are 12 mm long need points 1 mm apart, and many.
 
 The field is orthogonal to displacements of the face as a whole, so that it moves no datum that is
 fitted by least squares. The tolerances around a form limit form and displacement together: displacements have what the form
@@ -151,18 +151,15 @@ were declared before with tolerances of their own: `part.pattern("seats", seat, 
 member has by itself, without a common zone, are those of features: declare one for each.
 """
 
-from tolcontact.features.datum_order import datum_order
 from tolcontact.features.datum_planes import TangentPlane
 from tolcontact.features.face_deviation import FaceDeviation
 from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, PlaneFeature
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.form_field import FormField
 from tolcontact.features.nominal_features import Features, NominalFeature, NominalPattern, Placement
-from tolcontact.features.tolerance_kinds import zone_of
-from tolcontact.features.tolerance_layers import Datum, Layer
+from tolcontact.features.tolerance_layers import Datum, Layer, datum_order
 
 __all__ = [
     "AxisFeature", "Datum", "FaceDeviation", "FeatureGeometry", "FeatureOfSize", "Features", "FormField", "Layer",
     "NominalFeature", "NominalPattern", "Placement", "PlaneFeature", "TangentPlane", "datum_order", "feature_geometry",
-    "zone_of",
 ]  # fmt: skip

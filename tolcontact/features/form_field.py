@@ -8,7 +8,6 @@ a pivoted Cholesky factor of the covariance, so that they are known at any place
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -27,25 +26,6 @@ REST = 1e-5  # of the variance: what the stations leave out at no place
 MIN_VARIANCE = 1e-10  # of the largest: a mode with less is rounding
 
 
-class ScanFit(NamedTuple):
-    """A measured face, and how the field agrees with its points.
-
-    width     [mm] of its least zone, without scatter
-    height    [mm] of its form, root mean square
-    lost      [mm] of what the field leaves out of it, root mean square
-    scatter   [mm] of the points about the field, root mean square without outliers
-    farthest  [mm] of the points from the field, largest
-    excess    largest height between or beside the points, relative to that at the points
-    """
-
-    width: float
-    height: float
-    lost: float
-    scatter: float
-    farthest: float
-    excess: float
-
-
 @dataclass(frozen=True, eq=False)
 class FormField:
     """Modes of a face, as functions of place; each has the standard deviation that it has in a field of variance 1.
@@ -62,7 +42,7 @@ class FormField:
     left_out    share of the variance of the field that the modes leave out, of measured faces also what the field leaves out
     spreads     (mode,) [mm] standard deviations of the coefficients, as measured; None if these follow from a tolerance
     means       (mode,) [mm] of the coefficients; None: 0
-    scans       measured faces by file; empty if the form follows from a tolerance
+    scans       widths [mm] of the minimum zones of measured faces by file; empty if the form follows from a tolerance
     """
 
     form: Form
@@ -76,7 +56,7 @@ class FormField:
     left_out: float
     spreads: np.ndarray | None
     means: np.ndarray | None
-    scans: Mapping[str, ScanFit]
+    scans: Mapping[str, float]
 
     @property
     def modes(self) -> int:

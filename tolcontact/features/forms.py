@@ -16,6 +16,7 @@ from tolcontact.declaration import (
     Roundness,
     Straightness,
 )
+from tolcontact.declaration.feature_tolerance import ToleranceKind
 from tolcontact.declaration.toleranced import Toleranced
 from tolcontact.errors import GeometryFault
 from tolcontact.features.associated_features import (
@@ -40,7 +41,7 @@ Associated = Mapping[type[FeatureGeometry], type[AssociatedFeature]]
 WITH_AXIS = (CylinderFeature, ConeFeature)
 WHOLE: Associated = dict.fromkeys((PlaneFeature, *WITH_AXIS, SphereFeature), AssociatedSurface)
 
-DRAWN: dict[type[GeometricTolerance], Associated] = {
+DRAWN: dict[ToleranceKind, Associated] = {
     Flatness: {PlaneFeature: AssociatedSurface},
     Cylindricity: {CylinderFeature: AssociatedSurface},
     Roundness: dict.fromkeys(WITH_AXIS, AssociatedCircles),
@@ -54,7 +55,7 @@ DRAWN: dict[type[GeometricTolerance], Associated] = {
 DRAWN_ALWAYS = (Flatness, Cylindricity)
 
 
-def is_drawn(kind: type[GeometricTolerance], per: object) -> bool:
+def is_drawn(kind: ToleranceKind, per: object) -> bool:
     """Return whether the form that a kind of tolerance limits, of any surface or `per` a length, can surely be drawn."""
     return kind in DRAWN_ALWAYS and per is None
 
@@ -84,7 +85,7 @@ def _drawn_form(declared: Toleranced, geometry: FeatureGeometry) -> GeometricTol
         and (tolerance.is_form or (tolerance.limits_form_alone and isinstance(declared, Feature)))
     ]  # fmt: skip
     for tolerance in tolerances:
-        if tolerance.per is not None or type(geometry) not in DRAWN.get(type(tolerance), {}):
+        if tolerance.per is not None or type(geometry) not in DRAWN.get(tolerance.of, {}):
             unit = " per unit" if tolerance.per is not None else ""
             raise GeometryFault(
                 f"the form of {tolerance.kind}{unit} of {geometry.in_words} cannot be drawn; give the {tolerance.kind} "
@@ -102,7 +103,7 @@ def _drawn_field(tolerance: GeometricTolerance, geometry: FeatureGeometry, face:
     surface = analytic_surface(face)
     if tolerance.form is None or surface is None:
         return None
-    associated = DRAWN[type(tolerance)][type(geometry)].of(surface, face)
+    associated = DRAWN[tolerance.of][type(geometry)].of(surface, face)
     if tolerance.form.measured is not None:
         return measured_field(tolerance.form, tolerance.form.measured, face, associated)
     return form_field(tolerance.form, face, associated)

@@ -14,7 +14,7 @@ from tolcontact.declaration.form import Form
 from tolcontact.errors import GeometryFault
 from tolcontact.features.associated_features import AssociatedFeature, displacement_terms
 from tolcontact.features.covariances import Lengths
-from tolcontact.features.form_field import FormField, ScanFit, associated_covariance, beside_displacements, scales_within
+from tolcontact.features.form_field import FormField, associated_covariance, beside_displacements, scales_within
 from tolcontact.features.height_regression import STATIONS, HeightRegression, Scan
 from tolcontact.features.least_zone import ZoneMember, least_widths
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder
@@ -31,7 +31,6 @@ MAX_LOST_SHARE = 0.25  # of the form: what the field may leave out
 MAX_EXCESS = 3.0  # times the largest height at the points: what the field may reach between them
 NEIGHBOURS = 8  # of a point, whose deviations from the field are compared with its own
 SIGNIFICANT = 5.0  # standard deviations of a mean, by which deviations from the field are more than scatter
-MEDIAN_SHARE = 0.6745  # of the standard deviation of normal numbers: the median of their sizes
 STEP_SHARE = 1e-4  # of the correlation length: steps of slopes
 
 
@@ -43,7 +42,9 @@ def measured_field(form: Form, pattern: str, face: Surface, associated: Associat
     regression = HeightRegression.of(form, face, associated, scans)
     scans = regression.samples(scans)
     weights = regression.weights(scans)
-    fits = [_fit(scan, of_part, regression) for scan, of_part in zip(scans, weights.T, strict=True)]
+    widths, losses = zip(
+        *(_fit(scan, of_part, regression) for scan, of_part in zip(scans, weights.T, strict=True)), strict=True
+    )
     lengths = _lengths(regression, weights)
     places, areas = associated.places(face, lengths)
     functions = associated_covariance(form, regression.lengths, associated, places, regression.stations) @ weights
@@ -57,7 +58,7 @@ def measured_field(form: Form, pattern: str, face: Surface, associated: Associat
     mixes[:, 1:] -= mixes[:, 1:].mean(axis=0)
     size = max(float(np.linalg.norm(mean)), 1e-300)
     mixes[:, 0] /= size
-    lost = float(np.mean([fit.lost**2 for fit in fits]))
+    lost = float(np.mean([loss**2 for loss in losses]))
     field = FormField(
         form=form,
         associated=associated,
@@ -73,9 +74,8 @@ def measured_field(form: Form, pattern: str, face: Surface, associated: Associat
         scans={},
     )
     if not associated.is_whole:  # each section or line has a zone of its own, at places
-        widths = least_widths(field.zone, (remainder / np.sqrt(shares)[:, None]).T)
-        fits = [fit._replace(width=float(width)) for fit, width in zip(fits, widths, strict=True)]
-    return replace(field, scans={scan.path: fit for scan, fit in zip(scans, fits, strict=True)})
+        widths = tuple(map(float, least_widths(field.zone, (remainder / np.sqrt(shares)[:, None]).T)))
+    return replace(field, scans={scan.path: width for scan, width in zip(scans, widths, strict=True)})
 
 
 def _scan(cloud: np.ndarray, path: str, face: Surface, everywhere: np.ndarray, associated: AssociatedFeature) -> Scan:
@@ -107,37 +107,34 @@ def _scan(cloud: np.ndarray, path: str, face: Surface, everywhere: np.ndarray, a
     return Scan(path, feet, heights - terms @ displacement)
 
 
-def _fit(scan: Scan, weights: np.ndarray, regression: HeightRegression) -> ScanFit:
-    """Return how a field of weights (station,) agrees with the points of a scan. Raises GeometryFault if it does not.
+def _fit(scan: Scan, weights: np.ndarray, regression: HeightRegression) -> tuple[float, float]:
+    """Return the minimum zone of a scan, and the root mean square of the form that a field of weights (station,) leaves out.
 
-    What neighbours deviate by alike is form that the field leaves out; the rest is scatter.
+    Both are in mm. What neighbours deviate by equally is form that the field leaves out; the rest is scatter.
+    Raises GeometryFault if the field does not agree with the points.
     """
     feet, values = scan.feet, regression.values(scan.feet) @ weights
     deviations = scan.heights - values
-    # Alike or opposite: waves of a few points are opposite at the second neighbour or the third.
+    # Equal or opposite: waves of a few points are opposite at the second neighbour or the third.
     products = deviations[:, None] * deviations[scipy.spatial.KDTree(feet).query(feet, NEIGHBOURS + 1)[1][:, 1:]]
-    alike = float((np.abs(products.mean(axis=0)) - SIGNIFICANT * products.std(axis=0) / np.sqrt(len(feet))).max())
-    lost, elsewhere = float(np.sqrt(max(alike, 0.0))), regression.values(regression.stations) @ weights
-    fit = ScanFit(
-        width=float(least_widths([ZoneMember(np.arange(len(feet)), regression.associated.rows(feet))], values[None])[0]),
-        height=float(np.hypot(values.std(), lost)),
-        lost=lost,
-        scatter=float(np.median(np.abs(deviations))) / MEDIAN_SHARE,
-        farthest=float(np.abs(deviations).max()),
-        excess=float(np.abs(elsewhere).max() / max(np.abs(values).max(), 1e-300)),
-    )
-    if fit.lost > MAX_LOST_SHARE * fit.height:
+    shared = float((np.abs(products.mean(axis=0)) - SIGNIFICANT * products.std(axis=0) / np.sqrt(len(feet))).max())
+    lost = float(np.sqrt(max(shared, 0.0)))
+    height = float(np.hypot(values.std(), lost))
+    if lost > MAX_LOST_SHARE * height:
         raise GeometryFault(
             f'"{scan.path}": its form changes over too short lengths: the field of {len(weights)} stations leaves out '
-            f"{fit.lost:.2g} mm of its {fit.height:.2g} mm (root mean square), and up to {fit.farthest:.2g} mm; filter short "
-            "waves out of the points, or divide the face into several features"
+            f"{lost:.2g} mm of its {height:.2g} mm (root mean square), and up to {np.abs(deviations).max():.2g} mm; filter "
+            "short waves out of the points, or divide the face into several features"
         )
-    if fit.excess > MAX_EXCESS:
+    elsewhere = regression.values(regression.stations) @ weights
+    excess = float(np.abs(elsewhere).max() / max(np.abs(values).max(), 1e-300))
+    if excess > MAX_EXCESS:
         raise GeometryFault(
-            f'"{scan.path}": its points are too far apart for its form: the field is up to {fit.excess:.2g} times as high '
+            f'"{scan.path}": its points are too far apart for its form: the field is up to {excess:.2g} times as high '
             "between or beside them; measure more points, also along the rim, or filter short waves out of the points"
         )
-    return fit
+    rows = regression.associated.rows(feet)
+    return float(least_widths([ZoneMember(np.arange(len(feet)), rows)], values[None])[0]), lost
 
 
 def _lengths(regression: HeightRegression, weights: np.ndarray) -> Lengths:

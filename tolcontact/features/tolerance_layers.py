@@ -7,16 +7,17 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from tolcontact.declaration import OUTSIDE, Feature, GeometricTolerance
-from tolcontact.declaration.feature_tolerance import TRANSLATIONS
+from tolcontact.declaration import OUTSIDE, DatumTargets, Feature, GeometricTolerance, Part, Pattern
+from tolcontact.declaration.feature_tolerance import TRANSLATION
 from tolcontact.declaration.toleranced import Toleranced
 from tolcontact.errors import GeometryFault
 from tolcontact.features.datum_planes import Lean, TangentPlane, free_directions
 from tolcontact.features.feature_geometry import FeatureGeometry, PlaneFeature
 from tolcontact.features.form_field import FormField
 from tolcontact.features.pattern_geometry import MIN_LENGTH, PatternGeometry
-from tolcontact.features.tolerance_kinds import zone_of
+from tolcontact.features.tolerance_kinds import zone_rows
 
+Declared = Feature | Pattern | DatumTargets
 MIN_NOTICED = 1e-4  # smallest singular value, relative to the largest, of a displacement that a datum notices
 MIN_LEAN = 1e-9  # mm of extremes of a plane, for deviations of 1
 MIN_PART = 1e-12  # of a unit vector: smaller entries are rounding
@@ -65,7 +66,7 @@ class DatumFrame(NamedTuple):
 class Layer:
     """The freedoms of a feature or pattern that one tolerance controls beyond the tolerances within it.
 
-    rows        for each member (point, component, coordinate of the member) of its zone (see tolerance_kinds.Zone)
+    rows        for each member (point, component, coordinate of the member) of its zone (see tolerance_kinds)
     controlled  (coordinate, n): orthonormal directions that its datums lock
     added       (coordinate, k): directions that no narrower tolerance controls and that its rule draws; each is a contributor
     frame       of its datum system
@@ -163,7 +164,7 @@ def tolerance_layers(
         _check_nesting(candidate, layers)
         is_outer = controlled_before.shape[1] > 0
         added = _named_basis(_difference(controlled, controlled_before), geometry, is_outer=is_outer)
-        if tolerance.rule in TRANSLATIONS:
+        if tolerance.rule == TRANSLATION:
             added = _translations(tolerance, geometry, added, is_outer=is_outer)
         if controlled.shape[1] and not added.shape[1]:
             raise GeometryFault(
@@ -184,7 +185,7 @@ def _layer(
         raise GeometryFault(f"{tolerance.kind} refers to datum {absent[0]}, which could not be made; mend its feature first")
     system = [[datum for letter in compartment for datum in datums[letter]] for compartment in tolerance.system]
     primary = system[0][0].geometry if system else None
-    rows = tuple(zone_of(tolerance, member, primary).rows for member in geometry.members)
+    rows = tuple(zone_rows(tolerance, member, primary) for member in geometry.members)
     frame = datum_frame(system, geometry.centre, geometry.reach, columns, tolerance.orientation_only)
     nothing = np.zeros((geometry.count, 0))
     is_limited = system or len(geometry.members) > 1  # a common zone limits the members to each other
@@ -265,3 +266,36 @@ def _named_basis(directions: np.ndarray, geometry: PatternGeometry, *, is_outer:
         if rank == count:
             break
     return basis[:, :rank]
+
+
+def datum_order(part: Part) -> tuple[list[Declared], list[Declared]]:
+    """Return what is declared of a part, each after its datums, and those whose datums refer to each other in a circle."""
+    remaining: list[Declared] = [*part.toleranced, *part.targets]
+    letters, present, ordered = set[str](), set[Feature](), list[Declared]()
+    while remaining:
+        ready = [declared for declared in remaining if _letters(declared) <= letters and _features(declared) <= present]
+        if not ready:
+            return ordered, remaining
+        for declared in ready:
+            ordered.append(declared)
+            present |= set() if isinstance(declared, DatumTargets) else set(declared.members)
+            letters |= {letter for letter in [_letter(declared)] if letter}
+        remaining = [declared for declared in remaining if declared not in ready]
+    return ordered, []
+
+
+def _letter(declared: Declared) -> str | None:
+    return declared.letter if isinstance(declared, DatumTargets) else declared.datum
+
+
+def _letters(declared: Declared) -> set[str]:
+    """Return the datums that tolerances refer to."""
+    tolerances = () if isinstance(declared, DatumTargets) else declared.geometric
+    return {letter for tolerance in tolerances for compartment in tolerance.system for letter in compartment}
+
+
+def _features(declared: Declared) -> set[Feature]:
+    """Return the features that members or targets are."""
+    if isinstance(declared, DatumTargets):
+        return set(declared.features)
+    return set(declared.borrowed) if isinstance(declared, Pattern) else set()

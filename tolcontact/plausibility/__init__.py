@@ -23,6 +23,10 @@ displacement from the nominal place; absolute=True measures the coordinate
 
 | kind | what is looked at |
 |---|---|
+| `[units]` | mesh files without stated units: of an implausible size (below 1 mm, above 10 m, ten times that of a part that |
+| | they touch), or on which all declared points would lie in another unit |
+| `[face]` | faces of a file that are a part of a cylinder, or of another curved surface: files split holes into halves |
+| `[coarse]` | contact points or triangles of curved faces that are coarse beside the smallest tolerance |
 | `[angle]` | rotations beyond a full turn, or beyond half a turn in whole numbers: these are probably degrees |
 | `[point]` | points of locators, measurements and forces that lie off their part by more than a quarter of its size |
 | `[direction]` | locators whose directions all fit in the assembly frame alone; one-sided ones that point out of their part |

@@ -1,28 +1,114 @@
-"""Points that lie off their part, and directions of locators that do not fit the surface there."""
+"""Points that lie off their part, units in which they would not, and directions that do not fit the surface there."""
 
 from collections import defaultdict
 from collections.abc import Iterator
+from itertools import chain, islice
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.declaration import Mesh, Part
-from tolcontact.discretization import NominalPart
-from tolcontact.discretization.unit_check import probable_unit
+from tolcontact.declaration import Assembly, Mesh, Part
+from tolcontact.declaration.geometry import STEP, UNITS
+from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.errors import designation
-from tolcontact.plausibility.designations import location_designation
 from tolcontact.plausibility.trial_draws import TrialDraws
 
 FAR_SHARE = 0.25  # of a part's size: how far off its box a point may lie
 ON_SURFACE = 1e-4  # of a part's size
+PLAUSIBLE_SIZES = (1.0, 10_000.0)  # of a part [mm]
+MAX_SIZE_RATIO = 10.0  # of parts that touch
+MESH_MARGIN = 0.1  # of a mesh's size: distance up to which points count as on the mesh
+MIN_POINT_REACH = 0.25  # of a mesh in a probable unit: the least reach of points, since a mesh large enough holds any points
 OUTWARD, ALONG = 0.5, 0.2  # cosines of the angle between a direction and the normal into the part
 
 
 class DeclaredPoint(NamedTuple):
-    """A point of a part and the declaration that states it."""
+    """A point of a part and the declaration that states it: as a message begins with it, and within a sentence."""
 
     owner: str
+    phrase: str
     position: np.ndarray
+
+
+def location_designation(assembly: Assembly, part: Part, station: str = "") -> str:
+    """Return how a warning names the location of a part: the part, and the line of the script that locates it in a station."""
+    location = next((entry for entry in assembly.locations if entry.part is part and entry.station == station), None)
+    return f'part "{part.name}" ({location.declared_at if location else part.declared_at})'
+
+
+def doubtful_units(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each mesh that is probably in other units, since its file states none, or the model wrong ones.
+
+    All declared points would lie on it in another unit, or its size is implausible: alone, or compared with a part that it
+    touches.
+    """
+    points, nominal = _declared_points(draws), draws.program.nominal
+    for part in nominal.last_parts:
+        geometry = part.part.geometry
+        if isinstance(geometry, Mesh):
+            doubts = chain(_far_point(part, geometry, points[part.part]), _implausible_size(nominal, part, geometry))
+            for doubt in islice(doubts, 1):
+                yield f"{designation('part', part.part)}: {geometry} is {float(part.mesh.scale):.4g} mm across, {doubt}"
+
+
+def _far_point(nominal: NominalPart, geometry: Mesh, declared: list[DeclaredPoint]) -> Iterator[str]:
+    """Yield the point that lies farthest off the mesh, if all points would lie on it in another unit."""
+    if unit := _probable_unit(nominal, declared):
+        distances = _outside(np.array([point.position for point in declared]), nominal.mesh.bounds)
+        if distances.max() > nominal.mesh.scale:
+            point = declared[int(distances.argmax())].phrase
+            advice = _advice(geometry, float(nominal.mesh.scale), unit)
+            yield f"but {point} lies {distances.max():.4g} mm away from it; {advice}"
+
+
+def _probable_unit(nominal: NominalPart, declared: list[DeclaredPoint]) -> str | None:
+    """Return the unit with which all declared points lie on the mesh of a part, if most of them are off it."""
+    geometry, bounds, size = nominal.part.geometry, nominal.mesh.bounds, float(nominal.mesh.scale)
+    if not declared or not isinstance(geometry, Mesh) or _states_units(geometry):
+        return None
+    points = np.array([point.position for point in declared])
+    distances = _outside(points, bounds)
+    if np.median(distances) <= MESH_MARGIN * size:
+        return None
+    for unit in sorted(UNITS, key=UNITS.__getitem__):
+        factor = UNITS[unit] / _assumed_unit(geometry)
+        is_on_mesh = (_outside(points, factor * bounds) <= MESH_MARGIN * factor * size).all()
+        if is_on_mesh and distances.max() >= MIN_POINT_REACH * factor * size:
+            return unit
+    return None
+
+
+def _states_units(geometry: Mesh) -> bool:
+    """Return whether the source states its own units."""
+    source = geometry.source
+    is_file = isinstance(source, str | Path)
+    return Path(source).suffix.lower() in STEP if is_file else getattr(source, "units", None) is not None
+
+
+def _assumed_unit(geometry: Mesh) -> float:
+    """Return the unit [mm] that is assumed for a mesh that does not state one."""
+    by_custom = "m" if str(geometry.source).lower().endswith((".glb", ".gltf")) else "mm"
+    return UNITS[geometry.units or by_custom]
+
+
+def _advice(geometry: Mesh, size: float, unit: str) -> str:
+    length = size * UNITS[unit] / _assumed_unit(geometry)
+    return f'if the file is in other units, state them: with tc.Mesh(..., units="{unit}") it would be {length:.4g} mm'
+
+
+def _implausible_size(nominal: Nominal, part: NominalPart, geometry: Mesh) -> Iterator[str]:
+    """Yield why the size of a mesh file without any stated units is implausible: alone, or beside a part that it touches."""
+    if geometry.units or not isinstance(geometry.source, str | Path) or _states_units(geometry):
+        return
+    size, advice = float(part.mesh.scale), _advice(geometry, float(part.mesh.scale), "in")
+    if not PLAUSIBLE_SIZES[0] <= size <= PLAUSIBLE_SIZES[1]:
+        yield f"which is unusual for a part; {advice}"
+    sides = [(pair.moving.part, pair.reference.part) for pair in nominal.assembly.pairs]
+    for neighbour in [b if a is part.part else a for a, b in sides if part.part in (a, b)]:
+        neighbour_size = float(nominal.meshes[neighbour].scale)
+        if max(size, neighbour_size) > MAX_SIZE_RATIO * min(size, neighbour_size):
+            yield f'but "{neighbour.name}", which it touches, is {neighbour_size:.4g} mm across; {advice}'
 
 
 def far_points(draws: TrialDraws) -> Iterator[str]:
@@ -30,7 +116,7 @@ def far_points(draws: TrialDraws) -> Iterator[str]:
     points = _declared_points(draws)
     for nominal in draws.program.nominal.last_parts:
         declared = points[nominal.part]
-        if not declared or _is_in_other_units(nominal, declared):
+        if not declared or _probable_unit(nominal, declared):
             continue
         positions = np.array([point.position for point in declared])
         size = float(nominal.mesh.scale)
@@ -81,14 +167,9 @@ def unfit_directions(draws: TrialDraws) -> Iterator[str]:
 
 
 def parts_in_other_units(draws: TrialDraws) -> list[Part]:
-    """Return the parts of which a UnitsWarning says that their file is probably in other units."""
-    points, parts = _declared_points(draws), draws.program.nominal.last_parts
-    return [nominal.part for nominal in parts if _is_in_other_units(nominal, points[nominal.part])]
-
-
-def _is_in_other_units(nominal: NominalPart, declared: list[DeclaredPoint]) -> bool:
-    geometry, positions = nominal.part.geometry, np.array([point.position for point in declared])
-    return isinstance(geometry, Mesh) and bool(declared) and probable_unit(positions, geometry, nominal.mesh) is not None
+    """Return the parts whose file is probably in other units, of which a warning of its own says so."""
+    points = _declared_points(draws)
+    return [nominal.part for nominal in draws.program.nominal.last_parts if _probable_unit(nominal, points[nominal.part])]
 
 
 def _declared_points(draws: TrialDraws) -> "defaultdict[Part, list[DeclaredPoint]]":
@@ -99,15 +180,17 @@ def _declared_points(draws: TrialDraws) -> "defaultdict[Part, list[DeclaredPoint
         for locator in nominal.scheme if isinstance(nominal.scheme, tuple) else ():
             place = location_designation(assembly, nominal.part, nominal.station)
             points[locator.part or nominal.part].append(
-                DeclaredPoint(f'{place}: locator "{locator.name}"', np.array(locator.point))
+                DeclaredPoint(f'{place}: locator "{locator.name}"', f'its locator "{locator.name}"', np.array(locator.point))
             )
     for measure in assembly.measures:
         for point in measure.points:
             if point.position is not None:
-                points[point.part].append(DeclaredPoint(designation(measure.noun, measure), np.array(point.position)))
+                owner, phrase = designation(measure.noun, measure), f'the point of measurement "{measure.name}"'
+                points[point.part].append(DeclaredPoint(owner, phrase, np.array(point.position)))
     for force in assembly.forces:
         if force.at.position is not None:
-            points[force.at.part].append(DeclaredPoint(designation("force", force), np.array(force.at.position)))
+            owner, phrase = designation("force", force), f'the point of force "{force.name}"'
+            points[force.at.part].append(DeclaredPoint(owner, phrase, np.array(force.at.position)))
     return points
 
 

@@ -9,8 +9,7 @@ from tolcontact.declaration import Size
 from tolcontact.declaration.values import is_length
 from tolcontact.discretization import NominalPart
 from tolcontact.errors import designation
-from tolcontact.plausibility.declared_points import parts_in_other_units
-from tolcontact.plausibility.designations import location_designation
+from tolcontact.plausibility.declared_points import location_designation, parts_in_other_units
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws
 
 WIDE_SHARE = 0.5  # of a part's largest extent: the width of a zone

@@ -5,18 +5,18 @@ from collections.abc import Callable, Iterator
 
 from tolcontact.compilation import Program
 from tolcontact.errors import NominalWarning, shown
-from tolcontact.plausibility.body_overlaps import body_overlaps
-from tolcontact.plausibility.clashes import clashes, clashes_beyond_faces
-from tolcontact.plausibility.declared_points import far_points, unfit_directions
+from tolcontact.plausibility.bodies import body_overlaps, clashes, clashes_beyond_faces
+from tolcontact.plausibility.declared_points import doubtful_units, far_points, unfit_directions
+from tolcontact.plausibility.faces import measured_forms, partial_surfaces
 from tolcontact.plausibility.magnitudes import rotations, wide_tolerances
-from tolcontact.plausibility.measure_limits import measure_limits
-from tolcontact.plausibility.measured_forms import measured_forms
-from tolcontact.plausibility.measured_reach import measured_reach
-from tolcontact.plausibility.pair_gaps import pair_clearances, pair_overlaps
-from tolcontact.plausibility.seats import unsure_seats
+from tolcontact.plausibility.measures import measure_limits, measured_reach
+from tolcontact.plausibility.pairs import coarse_pairs, pair_clearances, pair_overlaps, unsure_seats
 from tolcontact.plausibility.trial_draws import TrialDraws
 
 KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
+    "units": (doubtful_units,),
+    "face": (partial_surfaces,),
+    "coarse": (coarse_pairs,),
     "angle": (rotations,),
     "point": (far_points,),
     "direction": (unfit_directions,),

@@ -13,7 +13,6 @@ from tolcontact.interference import Clash
 from tolcontact.simulation import Block, simulate_block
 
 DRAWS = 128
-POINTS_AT_ONCE = 100_000
 SIGMAS = 3.0  # of a gap or a measure: as far as it varies in nearly all realizations
 
 

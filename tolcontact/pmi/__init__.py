@@ -48,7 +48,7 @@ have no faces, because the file states none. `tolcontact pmi FILE.stp` gives the
 
 ## Features
 
-`part.features_from_pmi()` declares what features can state (see `tolcontact.features`), and returns every annotation with its
+`tc.features_from_pmi(part)` declares what features can state (see `tolcontact.features`), and returns every annotation with its
 features, or with the reason why it has none. `tolcontact pmi FILE.stp` lists the same, and `--script` writes a model script
 with these features, as a starting point.
 

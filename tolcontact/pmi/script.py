@@ -108,12 +108,13 @@ def _brep(selection: Any) -> str:
 def _source(tolerance: Size | GeometricTolerance) -> str:
     """Return the call that makes a tolerance. Options that have their default value are left out."""
     arguments = []
-    for option in fields(tolerance):
+    for option in (member for member in fields(tolerance) if member.name != "of"):
         value = getattr(tolerance, option.name)
         if value != option.default:
             text = f"{value:.{_DIGITS}g}" if isinstance(value, float) else _text(value)
             arguments.append(f"{option.name}={text}" if option.kw_only else text)
-    return f"tc.{type(tolerance).__name__}({', '.join(arguments)})"
+    name = tolerance.of.name if isinstance(tolerance, GeometricTolerance) else type(tolerance).__name__
+    return f"tc.{name}({', '.join(arguments)})"
 
 
 def _text(value: Any) -> str:

@@ -1,8 +1,7 @@
 """Report: tables for a terminal, pages for a browser, and views for notebooks. A chapter of the guide.
 
-`summary_text`, `comparison_text`, `runs_text` and `population_text` turn the datasets of `tc.summarize`, `tc.compare`,
-`tc.compare_runs` and `tc.check_population` into text that rich prints. Tables fit into 80 columns, or use the width of a wider
-terminal; output to a file or a pipe is never cut.
+`summary_text`, `comparison_text` and `runs_text` turn the datasets of `tc.summarize`, `tc.compare` and `tc.compare_runs` into
+text that rich prints. Tables fit into 80 columns, or use the width of a wider terminal; output to files is never cut.
 
 >>> import tolcontact as tc
 >>> from rich.console import Console

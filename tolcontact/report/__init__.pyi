@@ -12,7 +12,6 @@ from .text import (
     analysis_text as analysis_text,
     capability_text as capability_text,
     comparison_text as comparison_text,
-    population_text as population_text,
     runs_text as runs_text,
     summary_text as summary_text,
 )

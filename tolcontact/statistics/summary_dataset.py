@@ -3,7 +3,7 @@
 import xarray as xr
 
 from tolcontact.labelled import Column, Results, Table
-from tolcontact.later import HTML, LATER
+from tolcontact.readable import Pictured
 from tolcontact.statistics.summary import summary_table
 
 
@@ -13,7 +13,7 @@ class Summary(xr.Dataset):  # type: ignore[no-untyped-call]
     __slots__ = ()
 
     def _repr_html_(self) -> str:
-        return str(LATER[HTML](self))
+        return Pictured.picture(self)
 
 
 def summarize(results: Results) -> Summary:

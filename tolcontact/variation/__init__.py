@@ -35,10 +35,7 @@ depend on the origin. `rule` states how they fill the zone of a tolerance:
 |---|---|
 | "99.73 % inside" (default) | normal, independent, with equal spreads for which 99.73 % of the *features* lie inside |
 | "6 sigma at the extremes" | the same, with six standard deviations at the worst point equal to the width; fewer lie inside |
-| "truncated" | as "6 sigma at the extremes", without the features that lie outside |
-| "uniform" | uniform in the zone |
 | "translation" | as "99.73 % inside", without tilts |
-| "polar" | of an axis: uniform angle, normal radius with 6 sigma equal to the width; no tilts |
 
 Only the default has the same meaning for sizes, planes and axes. For a width t the spread of a component is t/6 for a size or
 an offset alone, t/9.07 for a plane's two tilts, t/11.8 for a rectangle's place and tilts, t/6.88 for an axis that only shifts,
@@ -54,21 +51,10 @@ directions, not sampled.
 >>> [(freedom.label, round(0.3 / freedom.spread, 2)) for freedom in tc.build(block).draws.contributors]
 [('part.top.offset', 11.76), ('part.top.tilt x', 11.76), ('part.top.tilt y', 11.76)]
 
-`tc.check_population(model)`, or `tolcontact check MODEL --population 10000`, draws features and measures them as a coordinate
-measuring machine would: it fits datum systems to displaced points, and finds the narrowest zones. It prints the share inside
-each zone, with its 95 % interval, beside the share that the rule states. With bonuses and nested tolerances the share may be
-larger.
-
->>> population = tc.check_population(block, samples=2000)
->>> _, lower, upper = population.share_inside.sel(zone=0).values
->>> bool(lower < 0.9973 < upper)
-True
-
 Of a pattern, 99.73 % of the *members* lie inside. A pattern with one position whose datums lock its members has the spreads of
 features by themselves. Where its datums leave a motion of the whole pattern free, the place of the pattern counts as fitted by
-least squares, and a wider tolerance with more datums draws that motion. "truncated", "uniform" and "polar" are for members that
-deviate by themselves. A bonus goes by the size of each member, and for what moves several of them by the smallest of theirs.
-A population judges one member of each drawn pattern, in turn.
+least squares, and a wider tolerance with more datums draws that motion. A bonus goes by the size of each member, and for what
+moves several of them by the smallest of theirs.
 
 The form of a feature, if it is drawn, lies within the zones of the surface around it: of a plane within all, of a round face
 within those of a profile and of run-out. Sizes do not limit form, nor form sizes. Not covered are the envelope of ASME's Rule

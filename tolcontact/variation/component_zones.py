@@ -125,7 +125,7 @@ def component_zone(pattern: NominalPattern, layer: Layer, group: MemberGroup, mi
     """
     tolerance, size, middle = layer.tolerance, pattern.declared.size, middle[group.components]
     columns, rows = pattern.first_column + group.components, np.concatenate(group.rows)
-    if size is None or not tolerance.material or tolerance.bonus == "none":
+    if size is None or not tolerance.material:
         return ComponentZone(columns, rows, middle, tolerance.width)
     counts_up = _counts_from_lower(group.members[0], tolerance)
     limit, growth = (size.lower, 1.0) if counts_up else (size.upper, -1.0)

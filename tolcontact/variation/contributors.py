@@ -11,7 +11,7 @@ from tolcontact.declaration import GeometricTolerance, Tolerance
 from tolcontact.declaration.feature_tolerance import EXTREMES, INSIDE
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError, designation
-from tolcontact.features import AxisFeature, Layer, NominalPattern
+from tolcontact.features import Layer, NominalPattern
 from tolcontact.variation import zones
 from tolcontact.variation.component_zones import (
     ComponentZone,
@@ -27,7 +27,6 @@ from tolcontact.variation.form_spreads import FormSpread
 from tolcontact.variation.zones import MemberZone
 
 INNER_SHARE_TOLERANCE = 1e-3  # share of features that narrower tolerances may leave outside of a wider one, beyond 0.27 %
-JOINT_RULES = ("truncated", "uniform", "polar")  # rules that draw the components of a feature together
 LOCATOR, FEATURE, FORM, DATUM, VARIABLE = "locator", "feature", "form", "datum", "variable"  # sources
 MAX_SCORE, SCORES = 8.0, 4001  # normal scores that a variance is summed over
 TAIL = float(ndtr(-3))
@@ -38,8 +37,6 @@ QUANTILES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "triangular": lambda u: np.where(u < 0.5, np.sqrt(u / 2) - 0.5, 0.5 - np.sqrt((1 - u) / 2)),
     "truncated normal": lambda u: ndtri(TAIL + u * (1 - 2 * TAIL)) / 6,
 }
-
-Uniforms = Callable[[int], np.ndarray]  # numbers (n, component) between 0 and 1, other ones for each number of an attempt
 
 
 class Contributor(NamedTuple):
@@ -117,19 +114,6 @@ def quantile(tolerance: Tolerance, u: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class JointDraw:
-    """Components of a feature that are drawn together, by a rule.
-
-    columns   of the deviations
-    draw      returns components (n, component) for uniform numbers
-    """
-
-    rule: str
-    columns: np.ndarray
-    draw: Callable[[Uniforms], np.ndarray]
-
-
-@dataclass(frozen=True, eq=False)
 class Bonus:
     """Components that fill the zone enlarged by the size of their feature: those of the nominal zone times its growth.
 
@@ -149,7 +133,6 @@ class Contributors:
     """
 
     def __init__(self, nominal: Nominal) -> None:
-        self.joint_draws: list[JointDraw] = []
         self.bonuses: list[Bonus] = []
         self.zones: list[ComponentZone] = []
         self.mean_zones: dict[str, float] = {}  # mm, of the forms of features
@@ -182,18 +165,17 @@ class Contributors:
             basis = np.hstack([basis, layer.added])
             members = member_zones(pattern, layer, basis, form_spreads)
             width = float(tolerance.width) or self._unit_width(pattern, tolerance, is_innermost=not len(spreads))
-            spread_rule = zones.extreme_spread if tolerance.rule in (EXTREMES, "truncated", "polar") else zones.equal_spread
+            spread_rule = zones.extreme_spread if tolerance.rule == EXTREMES else zones.equal_spread
             spread = spread_rule(members, spreads, count, width)
             self._check_inner_share(pattern, layer, [member.take(len(spreads)) for member in members], spreads, width)
-            is_innermost = not len(spreads)
             spreads = np.concatenate([spreads, np.full(count, spread / tolerance.cp)])
             middles = uneven_shifts(pattern, layer, basis)
             middle = middles[-count:]
             mean = middle.copy()
             for group in member_groups(pattern, layer, members):
-                self._check_rule(pattern, layer, group, is_innermost=is_innermost)
+                self._check_rule(pattern, layer, group)
                 self.zones.append(component_zone(pattern, layer, group, middles))
-                self._add_joint_draws(layer, group, column, middle, spread, width)
+                self._add_bonus(layer, group, column, width)
                 if tolerance.cpk is not None:
                     mean[group.added[:1]] += 3 * spread * (1 - tolerance.cpk / tolerance.cp)
             for k in range(count):
@@ -223,48 +205,24 @@ class Contributors:
                 self.mean_zones[member.label] = form.mean_width(spreads[-1])
         return spreads
 
-    def _add_joint_draws(
-        self, layer: Layer, group: MemberGroup, first_column: int, middle: np.ndarray, spread: float, width: float
-    ) -> None:
-        """Add how the components of a group that a layer adds are drawn together, about the `middle` (added,) of its zone.
-
-        `first_column` of the deviations is that of the first component that the layer adds.
-        """
+    def _add_bonus(self, layer: Layer, group: MemberGroup, first_column: int, width: float) -> None:
+        """Add the bonus of the components of a group that a layer adds; `first_column` is that of the layer's first one."""
         tolerance, member, columns = layer.tolerance, group.members[0], first_column + group.added
-        if tolerance.rule in JOINT_RULES:
-            draw = _joint_draw(tolerance.rule, np.concatenate(group.rows), middle[group.added], spread, width)
-            self.joint_draws.append(JointDraw(tolerance.rule, columns, draw))
-        if tolerance.material and tolerance.bonus == "fills" and len(group.sizes):
+        if tolerance.material and len(group.sizes):
 
             def factor(sizes: np.ndarray) -> np.ndarray:
                 return np.asarray((tolerance.width + bonus(member, tolerance, sizes).min(axis=1)) / width)
 
             self.bonuses.append(Bonus(columns, group.sizes, factor))
 
-    def _check_rule(self, pattern: NominalPattern, layer: Layer, group: MemberGroup, *, is_innermost: bool) -> None:
-        rule, layers = layer.tolerance.rule, sum(layer.added.shape[1] > 0 for layer in pattern.layers)
-        if rule in JOINT_RULES and (not is_innermost or layers > 1):
-            raise self._error(
-                pattern,
-                f'{layer.tolerance.kind}: the rule "{rule}" is for features with one tolerance of place or orientation; choose '
-                f'"{INSIDE}" or "{EXTREMES}"',
-            )
-        if rule in JOINT_RULES and len(group.members) > 1:
-            raise self._error(
-                pattern,
-                f'{layer.tolerance.kind}: the rule "{rule}" is for members that deviate by themselves, and the datums leave '
-                f'members to deviate together; choose "{INSIDE}" or "{EXTREMES}", or add the datum that locks them',
-            )
+    def _check_rule(self, pattern: NominalPattern, layer: Layer, group: MemberGroup) -> None:
+        rule = layer.tolerance.rule
         if pattern.form is not None and rule != INSIDE and includes_form(layer.tolerance, group.members[0].geometry):
             raise self._error(
                 pattern,
                 f'{layer.tolerance.kind}: the rule "{rule}" is for features that keep their shape, and the form of this one is '
                 f'drawn; choose "{INSIDE}", or give its {pattern.form.kind} form=None',
             )
-        is_axis = isinstance(group.members[0].geometry, AxisFeature)
-        if rule == "polar" and not (is_axis and group.rows[0].shape[1] == len(group.added) == 2):
-            fault = f'{layer.tolerance.kind}: the rule "polar" is for axes in round zones; choose "{INSIDE}"'
-            raise self._error(pattern, fault)
 
     def _check_inner_share(
         self, pattern: NominalPattern, layer: Layer, members: Sequence[MemberZone], spreads: np.ndarray, width: float
@@ -280,10 +238,10 @@ class Contributors:
 
     def _unit_width(self, pattern: NominalPattern, tolerance: GeometricTolerance, *, is_innermost: bool) -> float:
         """Return the width [mm] for which spreads are computed if a zone has width 0: its bonus scales them."""
-        if tolerance.bonus != "fills" or not is_innermost:
+        if not is_innermost:
             raise self._error(
                 pattern,
-                f'{tolerance.kind}: a zone of width 0 is its bonus alone; it needs bonus="fills", and no tolerance within',
+                f"{tolerance.kind}: a zone of width 0 is its bonus alone; leave out the tolerances within it",
             )
         return 1.0
 
@@ -291,33 +249,3 @@ class Contributors:
         declared = pattern.declared
         place = f'part "{declared.part.name}": {designation(declared.noun, declared)}'
         return ModelError(self._assembly.name, [f"{place}: {fault}"])
-
-
-def _joint_draw(
-    rule: str, rows: np.ndarray, middle: np.ndarray, spread: float, width: float
-) -> Callable[[Uniforms], np.ndarray]:
-    """Return the function that draws components (n, component) together by a rule, about the middle (component,) of a zone."""
-    if rule == "polar":
-        return lambda uniforms: middle + _polar(uniforms(0), spread)
-    bounds = zones.component_bounds(rows, width)
-
-    def attempt(u: np.ndarray) -> np.ndarray:
-        return spread * ndtri(u) if rule == "truncated" else bounds * (2 * u - 1)
-
-    def draw(uniforms: Uniforms) -> np.ndarray:
-        components = attempt(uniforms(0))
-        outside = np.flatnonzero(~zones.is_inside(rows, components, width))
-        number = 0
-        while outside.size:
-            number += 1
-            components[outside] = attempt(uniforms(number)[outside])
-            outside = outside[~zones.is_inside(rows, components[outside], width)]
-        return middle + components
-
-    return draw
-
-
-def _polar(u: np.ndarray, spread: float) -> np.ndarray:
-    """Return two components with a uniform angle and a normal radius."""
-    angle, radius = np.pi * u[:, 1], spread * ndtri(u[:, 0])
-    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])

@@ -10,7 +10,6 @@ from collections.abc import Callable
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from tolcontact.declaration.feature_tolerance import INSIDE
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
 from tolcontact.features.datum_planes import Shifts
@@ -30,26 +29,12 @@ class Draws:
         self._assembly = nominal.assembly
         self.leans = {column: lean for pattern in nominal.patterns for column, lean in pattern.leans.items()}
         self._column = {contributor.label: k for k, contributor in enumerate(self.contributors)}
-        self._check_correlations()
         self._plan = Plan(MONTE_CARLO, [])
         self._scale = np.ones(len(self.contributors))
         self._middle = np.array([
             contributor.tolerance.shift if contributor.tolerance else contributor.middle for contributor in self.contributors
         ])  # fmt: skip
         self._factors = [np.linalg.cholesky(np.array(correlation.matrix)) for correlation in self._assembly.correlations]
-
-    def _check_correlations(self) -> None:
-        rules = {self.labels[column]: joint.rule for joint in self.contributors.joint_draws for column in joint.columns}
-        faults = []
-        for correlation in self._assembly.correlations:
-            if conflicts := [name for name in correlation.labels if name in rules]:
-                label = conflicts[0]
-                faults.append(
-                    f'correlation "{correlation.name}" ({correlation.declared_at}): "{label}" is drawn with others by the rule '
-                    f'"{rules[label]}"; choose a rule of normal components, such as "{INSIDE}"'
-                )
-        if faults:
-            raise ModelError(self._assembly.name, faults)
 
     def planned(self, name: str) -> "Draws":
         """Return draws of the same contributors by a sampling plan (see plans)."""
@@ -101,14 +86,6 @@ class Draws:
     def from_numbers(self, numbers: Numbers, count: int) -> np.ndarray:
         """Return deviations (count, contributor) for numbers between 0 and 1 of each label."""
         deviations = self._single_draws(numbers, count)
-        for joint in self.contributors.joint_draws:
-            labels = [self.labels[column] for column in joint.columns]
-
-            def uniforms(attempt: int, labels: list[str] = labels) -> np.ndarray:
-                keys = [f"{label} #{attempt}" if attempt else label for label in labels]
-                return np.stack([numbers(key) for key in keys], axis=1)
-
-            deviations[:, joint.columns] = joint.draw(uniforms)
         if not (self._scale == 1.0).all():
             deviations = self._middle + self._scale * (deviations - self._middle)
         for label, (columns, values) in zip(self.population_labels, self.populations, strict=True):
@@ -154,7 +131,6 @@ class Draws:
         assembly = self._assembly
         sets = [[self._column[label] for label in labels] for labels, _ in self.correlated if correlated]
         sets += [[self._column[label] for label in population.columns] for population in assembly.populations]
-        sets += [[int(column) for column in joint.columns] for joint in self.contributors.joint_draws]
         together = [
             [*range(column, column + len(lean.coordinates)), *map(int, lean.sources)] for column, lean in self.leans.items()
         ]

@@ -135,11 +135,6 @@ def extreme_spread(members: Sequence[MemberZone], inner_spreads: np.ndarray, cou
     return float(np.sqrt(max((variance[moved] / factors[moved]).min(initial=np.inf), 0.0))) if moved.any() else 0.0
 
 
-def is_inside(rows: np.ndarray, components: np.ndarray, width: float | np.ndarray) -> np.ndarray:
-    """Return whether features (n,) with components (n, component) lie inside."""
-    return _longest(rows, components) <= np.asarray(width) / 2
-
-
 def _longest(rows: np.ndarray, components: np.ndarray) -> np.ndarray:
     """Return the longest (n,) of the rows (point, entry, component) at components (n, component)."""
     longest = np.zeros(len(components))
@@ -154,13 +149,6 @@ def _longest(rows: np.ndarray, components: np.ndarray) -> np.ndarray:
 def _unit_longest(rows: bytes, shape: tuple[int, ...], count: int) -> np.ndarray:
     """Return `_longest` (count,) of rows of a shape (point, entry, component) in all directions evenly."""
     return _longest(np.frombuffer(rows).reshape(shape), directions(shape[2])[:count])
-
-
-def component_bounds(rows: np.ndarray, width: float) -> np.ndarray:
-    """Return bounds (component,) of the absolute components of features inside, with a margin of 5 %."""
-    u = directions(rows.shape[-1])
-    longest = _longest(rows, u)
-    return 1.05 * np.abs(u / longest[:, None] * width / 2).max(axis=0)
 
 
 @functools.lru_cache

@@ -2,7 +2,6 @@
 
 import unicodedata
 
-from tolcontact.vocabulary.clashes import CLASH_DEPTH, CLASH_OTHER, CLASH_PART, CLASHES
 from tolcontact.vocabulary.labels import (
     AXIS,
     BLOCK,
@@ -26,6 +25,7 @@ from tolcontact.vocabulary.labels import (
     ArchiveVariable,
     label,
 )
+from tolcontact.vocabulary.surface import CLASH_DEPTH, CLASH_OTHER, CLASH_PART, CLASHES
 from tolcontact.vocabulary.variation import DEVIATION
 
 BREP_FACE, ROUND_POINT = "brep_face", "round_point"

@@ -1,4 +1,4 @@
-"""Variables of summaries, of comparisons of runs and of solvers, and of populations: what is computed from realizations."""
+"""Variables of summaries, and of comparisons of runs and of solvers: what is computed from realizations."""
 
 from dataclasses import replace
 
@@ -159,14 +159,3 @@ COMPARED_RUNS = (
     replace(PENETRATION, dims=(RUN, STATE)),
     ArchiveVariable("draws", (RUN,), str, "draws: same as the first run's, of the same seed, or other ones"),
 )
-
-ZONE = "zone"
-ZONE_FEATURE = ArchiveVariable("feature", (ZONE,), str, "feature, as part.feature")
-ZONE_TOLERANCE = ArchiveVariable("zone_tolerance", (ZONE,), str, "tolerance, and the rule from its zone to the spread")
-STATED_SHARE = ArchiveVariable(
-    "stated_share", (ZONE,), "f8", "share of features inside that the rule states; NaN if it states none", "1"
-)
-SHARE_INSIDE = ArchiveVariable(
-    "share_inside", (ZONE, INTERVAL), "f8", "share of drawn features that were measured to be inside", "1"
-)
-NEEDED_WIDTH = ArchiveVariable("needed_width", (ZONE,), "f8", "width of the zone that 99.73 % of the drawn features need", "mm")

@@ -76,9 +76,6 @@ narrow; other runs are compared as independent samples.
 >>> str(comparison.draws.sel(run="linearized").values), change.dims
 ('same', ('state', 'measure', 'interval'))
 
-`tc.check_population` draws the features of a model and measures them as a coordinate measuring machine would. It returns the
-share inside every zone, with its interval, and the stated share (see `tolcontact.variation`).
-
 `tolcontact.analyses` has further analyses of a model.
 
 Methods of results are under `results.tolcontact`, also for archives that were opened with xarray itself:

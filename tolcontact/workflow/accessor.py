@@ -1,4 +1,4 @@
-"""The accessor `results.tolcontact` of results from `tc.run`, `tc.open_archive` or xarray itself."""
+"""Summaries of results, and their accessor `results.tolcontact`, of `tc.run`, `tc.open_archive` or xarray itself."""
 
 from functools import cached_property
 from pathlib import Path

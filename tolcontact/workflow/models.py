@@ -8,8 +8,7 @@ from typing import Any
 from tolcontact import archive
 from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly
-from tolcontact.declaration.json_model import write_json
-from tolcontact.declaration.script import load_model
+from tolcontact.declaration.script import load_model, write_json
 from tolcontact.discretization import discretize
 from tolcontact.errors import ArchiveError, ModelError, OptionError, TolcontactError
 from tolcontact.method import Method
@@ -17,7 +16,7 @@ from tolcontact.plausibility import warn_of_nominal
 
 DEFAULT_SOLVER = "qpoases"
 COUNTS = {  # smallest and largest
-    "samples": (2, 10**12), "population": (2, 10**12), "seed": (0, 2**63 - 1), "surfaces": (0, 10**6),
+    "samples": (2, 10**12), "seed": (0, 2**63 - 1), "surfaces": (0, 10**6),
 }  # fmt: skip
 Model = Assembly | Callable[[], Assembly] | str | Path
 Choice = Method | Mapping[str, Any]  # a method, or some of its choices; the model's own method has the others

@@ -47,7 +47,7 @@ def step_file():
 def assembly():
     model = tc.Assembly("CTC 01")
     part = model.part("part", tc.Mesh(step_file()), fixed=True)
-    part.features_from_pmi()
+    tc.features_from_pmi(part)
     model.measure("place", part.point(0, 0, 0), along="z")
     return model
 

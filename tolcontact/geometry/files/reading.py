@@ -37,10 +37,9 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Shape:
-    """The surface of a part in mm. It is `unsure` if no units were stated, and usual ones are assumed."""
+    """The surface of a part in mm."""
 
     mesh: trimesh.Trimesh
-    unsure: bool = False
 
 
 @dataclass(frozen=True)
@@ -170,7 +169,7 @@ def read(geometry: Mesh, contents: Contents) -> Shape:
     check_numbers(mesh.vertices, str(geometry))
     merged = _merge_vertices(mesh, content.arrays["piece"])
     _state_spacing(merged, scale * content.arrays["spacing"])
-    return Shape(merged, unsure=not geometry.units)
+    return Shape(merged)
 
 
 def _in_memory(geometry: Mesh) -> trimesh.Trimesh:

@@ -1,16 +1,14 @@
-"""Results of runs and of analyses as text: comparisons of runs and of solvers, checked populations, analyses."""
+"""Results of runs and of analyses as text: comparisons of runs and of solvers, analyses."""
 
 import math
 from collections.abc import Iterator, Sequence
 
-import numpy as np
 import xarray as xr
 from rich import box
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from tolcontact import vocabulary as terms
 from tolcontact.report.analysis_tables import analysis_report
 from tolcontact.report.figures import grouped, number, percent, settled
 from tolcontact.report.text.table import FigureTable
@@ -120,24 +118,6 @@ def comparison_text(comparison: xr.Dataset) -> Group:
     reference = comparison.attrs["reference_solver"]
     note = f"In mm (measurements in their own units): residuals, differences from {reference}."
     return Group(Text(heading, style="bold"), Text(note), Text(), table)
-
-
-def population_text(population: xr.Dataset) -> Group:
-    """Return a population (see check_population) for rich to print in 80 columns."""
-    table = _table(["feature", "tolerance"], ["stated", "inside, %", "zone of\n99.73 %"])
-    for zone in range(population.sizes[terms.ZONE]):
-        row = population.isel({terms.ZONE: zone})
-        estimate, lower, upper = 100 * row[terms.SHARE_INSIDE.name].values
-        stated = float(row[terms.STATED_SHARE.name])
-        table.add_row(
-            str(row[terms.ZONE_FEATURE.name].values),
-            str(row[terms.ZONE_TOLERANCE.name].values),
-            "" if np.isnan(stated) else f"{100 * stated:.5g}",
-            f"{estimate:.2f} [{lower:.2f}, {upper:.2f}]",
-            f"{float(row[terms.NEEDED_WIDTH.name]):.3g} mm",
-        )
-    heading = f"{population.attrs['title']}: {population.attrs['realizations']} of each feature, measured"
-    return Group(Text(heading, style="bold"), Text(), table)
 
 
 def _table(labels: Sequence[str], figures: Sequence[str]) -> Table:

@@ -1,4 +1,4 @@
-"""Nominal gaps and overlaps of contact pairs, beside what varies."""
+"""Contact pairs: gaps and overlaps that do not vary enough, coarse contact points, seats that friction may keep parts off."""
 
 from collections.abc import Iterator
 
@@ -6,7 +6,9 @@ import numpy as np
 
 from tolcontact.discretization import ContactPoints
 from tolcontact.errors import designation
+from tolcontact.geometry.curvature import CHORD_SHARE
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws, spread
+from tolcontact.statics import balances, drawn_contacts
 
 FAR_SIGMAS = 30.0  # of a gap: contact beyond does not act
 MIN_SHARE = 1e-5  # of a face's size: overlaps and gaps below are rounding of coordinates
@@ -47,6 +49,30 @@ def pair_clearances(draws: TrialDraws) -> Iterator[str]:
             )
 
 
+def coarse_pairs(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence if the contact points of a pair of curved faces, or its triangles, are coarse beside the tolerances.
+
+    Errors below the rounding of coordinates in files, which bends flat faces, do not count.
+    """
+    nominal = draws.program.nominal
+    for k, pair in enumerate(nominal.pairs):
+        if pair.sampling_error is None:
+            continue
+        scene = next(
+            scene for scene in nominal.scenes or (nominal,) if any(pair.name == other.name for other in scene.assembly.pairs)
+        )
+        finest = scene.assembly.smallest_zone()
+        for error, place, advice in (
+            (pair.sampling_error, "between its contact points", "give it more points, or leave points and spacing out"),
+            (pair.facets, "between flat triangles and the round faces that they approximate", "use a finer mesh"),
+        ):
+            if error > max(CHORD_SHARE * finest, pair.coordinate_error):
+                yield (
+                    f"{_place(draws, k)}: parts may be off by up to {error:.2g} mm {place}, "
+                    f"{error / finest:.2g} of the smallest tolerance ({finest:.4g} mm); {advice}"
+                )
+
+
 def _face_pairs(draws: TrialDraws) -> Iterator[tuple[int, ContactPoints, float]]:
     """Yield the pairs of faces with their numbers, and the gaps [mm] that are rounding or error of triangles."""
     smallest = draws.program.nominal.assembly.smallest_zone()
@@ -64,3 +90,20 @@ def _place(draws: TrialDraws, k: int) -> str:
 
 def _name(draws: TrialDraws, part: int | None) -> str:
     return draws.program.nominal.parts[part or 0].name
+
+
+def unsure_seats(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each seat short of which the stated friction can hold its part."""
+    assembly = draws.program.nominal.assembly
+    if not assembly.forces or all(mu is None for mu in (assembly.mu, *(pair.mu for pair in assembly.pairs))):
+        return
+    touching = drawn_contacts(draws.program.nominal)
+    for balance in balances(touching):
+        for seat in balance.seats() if balance.is_pressed and balance.is_held else ():
+            if seat.critical > 0 and seat.reserve <= 1:
+                holders = ", ".join(f'"{touching.contacts[k].label}"' for k in (-seat.shares).argsort() if seat.shares[k] > 0)
+                yield (
+                    f'seat "{seat.contact.label}": the forces may not push the part onto it, since friction can hold it short '
+                    f"of it: {seat.reserve:.3g} of the stated coefficients suffice, at {holders}; push harder along the seat, "
+                    "let less friction carry, or state the coefficients that are there"
+                )

@@ -1,26 +1,31 @@
-"""Doubts about faces that are a part of a surface: a file may split a hole into two halves."""
+"""Faces of features and contact pairs: a part of a surface that continues, or measured ones beyond their tolerance of form."""
 
-import itertools
-import warnings
 from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
 
 import numpy as np
 
 from tolcontact.declaration import Assembly, Brep, Face
-from tolcontact.errors import FaceWarning, designation
+from tolcontact.errors import designation
 from tolcontact.geometry.brep_face import describe_faces
 from tolcontact.geometry.faces import Meshes, triangles
 from tolcontact.geometry.files import BREP
+from tolcontact.plausibility.trial_draws import TrialDraws
+
+ROUNDING = 1e-6  # of the width of a zone
 
 
-def warn_of_partial_surfaces(assembly: Assembly, meshes: Meshes) -> None:
-    """Warn of features and contact pairs on some faces of a curved surface that continues in faces not chosen.
+def partial_surfaces(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each face on some B-rep faces of a curved surface that continues in faces not chosen.
 
     Only B-rep faces that are chosen one by one are looked at: other criteria are meant to leave out the rest.
     """
-    for owner, face in _faces(assembly):
-        for doubt in itertools.islice(_doubts(face, meshes), 1):
-            warnings.warn(f"{owner}: its face {face} is {doubt}", FaceWarning, stacklevel=4)
+    nominal = draws.program.nominal
+    meshes = nominal.meshes
+    for owner, face in _faces(nominal.assembly):
+        for doubt in islice(_doubts(face, meshes), 1):
+            yield f"{owner}: its face {face} is {doubt}"
 
 
 def _faces(assembly: Assembly) -> Iterator[tuple[str, Face]]:
@@ -49,3 +54,21 @@ def _doubts(face: Face, meshes: Meshes) -> Iterator[str]:
                 f"{count} of the {len(description.whole)} faces of one {kind}; for all of them: "
                 f"tc.Brep({description.number}, whole=True)"
             )
+
+
+def measured_forms(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each feature with measured faces that lie in no zone of the stated width."""
+    for pattern in draws.program.nominal.patterns:
+        for member in pattern.members:
+            if member.form is None or pattern.form is None:
+                continue
+            stated, widths = float(pattern.form.width), member.form.scans
+            beyond = [path for path, width in widths.items() if width > (1 + ROUNDING) * stated]
+            if beyond:
+                worst = max(beyond, key=lambda path: widths[path])
+                yield (
+                    f'part "{member.feature.part.name}": {designation(member.feature.noun, member.feature)}: '
+                    f"{len(beyond)} of {len(widths)} measured faces are beyond the {pattern.form.kind} of {stated:.4g} mm that "
+                    f'is stated; "{Path(worst).name}" has {widths[worst]:.3g} mm; forms are drawn as they were measured, so '
+                    "check the tolerance, and the files for outliers"
+                )

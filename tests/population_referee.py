@@ -1,23 +1,36 @@
-"""A population measured back, as a coordinate measuring machine would: the share of drawn features that lies in its zones.
+"""Populations measured back, as a coordinate measuring machine would: the share of drawn features that lies in its zones.
 
 Points of every feature are displaced as drawn. The datum system of each tolerance is fitted to points of its datum features.
 The width of the zone that the feature's own points then need is compared with the allowed one. Spreads are not used.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import scipy
 
-from tolcontact.declaration import OUTSIDE
+import tolcontact as tc
+from tolcontact.declaration import OUTSIDE, GeometricTolerance
 from tolcontact.declaration.feature_tolerance import INSIDE
-from tolcontact.discretization import Nominal
-from tolcontact.features import Datum, Layer, NominalFeature, NominalPattern, PlaneFeature, zone_of
+from tolcontact.discretization import Nominal, discretize
+from tolcontact.features import AxisFeature, Datum, FeatureGeometry, Layer, NominalFeature, NominalPattern, PlaneFeature
 from tolcontact.features.feature_geometry import Probes
 from tolcontact.features.least_zone import least_widths, middles
+from tolcontact.features.tolerance_kinds import (
+    ZONES,
+    axis_zone,
+    direction_zone,
+    flat_axis_zone,
+    form_zone,
+    slope_zone,
+    surface_zone,
+    zone_rows,
+)
+from tolcontact.statistics.intervals import proportion_of
+from tolcontact.variation import Draws
 from tolcontact.variation.component_zones import bonus, floats, includes_form
-from tolcontact.variation.draws import Draws
 
 MIN_NOTICED = 1e-4  # smallest singular value, relative to the largest, of a motion that datums notice
 STATED_SHARE = 0.9973
@@ -42,6 +55,41 @@ class MeasuredZone(NamedTuple):
     needed: float
 
 
+@dataclass(frozen=True)
+class Population:
+    """Drawn features, measured: an entry for each size and each tolerance of a model.
+
+    stated_share  (zone,) share that the rule from zone to spread states; NaN if it states none
+    share, lower, upper  (zone,) estimate of the share inside, and its exact 95 % interval
+    needed_width  (zone,) [mm] width of the zone that 99.73 % of the features need
+    """
+
+    features: list[str]
+    tolerances: list[str]
+    stated_share: np.ndarray
+    share: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    needed_width: np.ndarray
+
+
+def measured_back(model: tc.Assembly, samples: int, seed: int = 1) -> Population:
+    """Draw `samples` of every feature of a model, and measure them.
+
+    Nested tolerances, and tolerances with a bonus, may have a larger share inside than stated.
+    """
+    nominal = discretize(model)
+    zones = list(_measured_zones(nominal, Draws(nominal), seed=seed, count=samples))
+    shares = np.array([proportion_of(zone.inside, zone.drawn) for zone in zones]).reshape(-1, 3)
+    return Population(
+        [zone.feature for zone in zones],
+        [zone.tolerance for zone in zones],
+        np.array([zone.stated for zone in zones]),
+        *shares.T,
+        np.array([zone.needed for zone in zones]),
+    )
+
+
 class _Measurement(NamedTuple):
     """What probes of a feature measure: `rows` (value, 6) of a motion about a centre, and `values` (n, value) [mm] as drawn."""
 
@@ -49,7 +97,7 @@ class _Measurement(NamedTuple):
     values: np.ndarray
 
 
-def measured_population(nominal: Nominal, draws: Draws, *, seed: int, count: int) -> Iterator[MeasuredZone]:
+def _measured_zones(nominal: Nominal, draws: Draws, *, seed: int, count: int) -> Iterator[MeasuredZone]:
     """Measure every tolerance of every feature or pattern on `count` drawn ones.
 
     Of each drawn pattern one member is judged, in turn: the results are then independent of each other.
@@ -93,9 +141,10 @@ def _measured_tolerance(
     """Measure one tolerance of a feature or pattern in the system of its datum features."""
     tolerance, centre = layer.tolerance, pattern.geometry.centre
     primary = system[0][0].geometry if system else None
-    zones = [zone_of(tolerance, member.geometry, primary) for member in pattern.members]
     has_form = pattern.form is not None and includes_form(tolerance, pattern.members[0].geometry)
-    probes = [_form_probes(member) if has_form else zone.probes for member, zone in zip(pattern.members, zones, strict=True)]
+    probes = [
+        _form_probes(member) if has_form else _zone_probes(tolerance, member.geometry, primary) for member in pattern.members
+    ]
     measurements = [
         _measurement(member, *places, deviations, centre) for member, places in zip(pattern.members, probes, strict=True)
     ]
@@ -112,17 +161,61 @@ def _measured_tolerance(
     following = U[:, MIN_NOTICED < S]
     residuals = residuals - residuals @ following @ following.T
     needed, allowed, start = [], [], 0
-    for member, zone, measurement, (_, directions) in zip(pattern.members, zones, measurements, probes, strict=True):
+    for member, measurement, (_, directions) in zip(pattern.members, measurements, probes, strict=True):
         end = start + len(measurement.rows)
         of_member = residuals[:, start:end].reshape(len(residuals), *directions.shape[:2])
-        has_any_size = has_form and floats(tolerance, member.geometry, zone.rows)
-        needed.append(np.ptp(of_member[..., 0], axis=1) if has_any_size else zone.needed_width(of_member))
+        has_any_size = has_form and floats(tolerance, member.geometry, zone_rows(tolerance, member.geometry, primary))
+        width = np.ptp(of_member[..., 0], axis=1) if has_any_size else _needed_width(tolerance, member.geometry, of_member)
+        needed.append(width)
         allowed.append(np.full(len(residuals), float(tolerance.width)))
-        if tolerance.bonus != "none" and member.size_column is not None:
+        if member.size_column is not None:
             allowed[-1] += bonus(member, tolerance, deviations[:, member.size_column])
         start = end
     stated = _stated_share(pattern, layer)
     return _measured_zone(pattern, f"{tolerance}; {tolerance.rule}", stated, _in_turn(needed), _in_turn(allowed))
+
+
+def _zone_probes(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: FeatureGeometry | None) -> Probes:
+    """Return the places and directions in which a feature is measured for a tolerance."""
+    if ZONES[tolerance.of][type(feature)] is surface_zone:
+        return feature.surface_probes
+    places, directions = feature.extremes
+    if tolerance.projected is None:
+        return places, directions
+    assert isinstance(feature, AxisFeature) and isinstance(primary, PlaneFeature)
+    outward = feature.axis * np.sign(primary.normal @ feature.axis)
+    start = feature.centre + feature.half * outward
+    return np.array([start, start + tolerance.projected * outward]), directions
+
+
+def _needed_width(tolerance: GeometricTolerance, feature: FeatureGeometry, residuals: np.ndarray) -> np.ndarray:
+    """Return the width (n,) [mm] of the narrowest zone around what probes measured (n, point, entry) [mm]."""
+    return WIDTHS[ZONES[tolerance.of][type(feature)]](tolerance, feature, residuals)
+
+
+def _width_about_surface(tolerance: GeometricTolerance, feature: FeatureGeometry, residuals: np.ndarray) -> np.ndarray:
+    return 2 * np.max([np.linalg.norm(residuals[:, k], axis=1) for k in range(residuals.shape[1])], axis=0)
+
+
+def _width_about_axis(tolerance: GeometricTolerance, feature: FeatureGeometry, residuals: np.ndarray) -> np.ndarray:
+    return 2 * np.max([_lengths(tolerance, feature, residuals[:, k]) for k in range(residuals.shape[1])], axis=0)
+
+
+def _lengths(tolerance: GeometricTolerance, feature: FeatureGeometry, vectors: np.ndarray) -> np.ndarray:
+    """Return the lengths (n,) [mm] of vectors (n, entry) across an axis; in a flat zone those across its planes."""
+    if tolerance.zone == "flat" and tolerance.across is not None:
+        return np.abs(vectors @ (feature.extremes[1][0] @ np.array(tolerance.across)))
+    return np.linalg.norm(vectors, axis=1)
+
+
+WIDTHS: dict[Callable, Callable[[GeometricTolerance, FeatureGeometry, np.ndarray], np.ndarray]] = {
+    surface_zone: _width_about_surface,
+    slope_zone: lambda tolerance, feature, residuals: np.ptp(residuals[..., 0], axis=1),
+    axis_zone: _width_about_axis,
+    flat_axis_zone: _width_about_axis,
+    direction_zone: lambda tolerance, feature, residuals: _lengths(tolerance, feature, residuals[:, 1] - residuals[:, 0]),
+    form_zone: lambda tolerance, feature, residuals: np.zeros(len(residuals)),
+}
 
 
 def _measured_form(pattern: NominalPattern, layer: Layer, deviations: np.ndarray) -> MeasuredZone:
@@ -153,10 +246,10 @@ def _stated_share(pattern: NominalPattern, layer: Layer) -> float:
     """Return the share of features inside that the rules state; NaN if they state none."""
     tolerance, tolerances = layer.tolerance, pattern.declared.geometric
     is_shared = any(pattern.geometry.owner(direction) is None for direction in layer.added.T)
-    has_bonus_beside = tolerance.material and (tolerance.bonus == "accepts" or len(pattern.layers) > 1 or is_shared)
+    has_bonus_beside = tolerance.material and (len(pattern.layers) > 1 or is_shared)
     if all(nested.rule == INSIDE and nested.cp == 1 and nested.cpk is None for nested in tolerances) and not has_bonus_beside:
         return STATED_SHARE
-    return 1.0 if tolerance.rule in ("truncated", "uniform") else np.nan
+    return np.nan
 
 
 def _measurement(
