@@ -1,6 +1,6 @@
-"""Tolerances and dimensions of a STEP file as the CAD kernel reads them by itself, for a comparison. Lengths in mm.
+"""Tolerances and dimensions of a STEP file as the CAD kernel reads them, to compare with `tc.read_pmi`. Lengths in mm.
 
-The kernel reads less than the file states, and may crash, so that it runs in a process of its own.
+The kernel reads less than the file states, and may crash, so it runs in a process of its own.
 """
 
 import json
@@ -15,7 +15,7 @@ from tolcontact.geometry.files import screening
 from tolcontact.geometry.files.reader import DEFAULT_LIMITS
 from tolcontact.geometry.files.step_text import record_numbers
 
-PROGRAM = Path(__file__).parents[1] / "kernel" / "step_annotations.py"
+PROGRAM = Path(__file__).parent / "scripts" / "step_annotations.py"
 
 
 @dataclass(frozen=True)
