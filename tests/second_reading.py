@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tolcontact.errors import GeometryFault, shown
 from tests.kernel_annotations import (
     KernelAnnotations,
     KernelDimension,
@@ -16,6 +15,7 @@ from tests.kernel_annotations import (
     KernelTolerance,
     kernel_annotations,
 )
+from tolcontact.errors import GeometryFault, shown
 from tolcontact.geometry.step_listing import FacesOfRecords
 from tolcontact.pmi.annotations import Dimension, Pmi, Tolerance
 from tolcontact.readable import Readable

@@ -1,13 +1,15 @@
 """Files of shapes are read by another process: none ends or stalls this one."""
 
 import contextlib
-import json
+import io
 import os
+import pickle
 import re
 import signal
 import subprocess
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -91,11 +93,16 @@ def test_a_file_that_takes_too_much_memory_is_a_fault(tmp_path):
 def test_each_file_is_read_once_and_one_process_reads_them_all(tmp_path, monkeypatch):
     started, popen = [], subprocess.Popen
 
-    def noting(command, **keywords):
-        started.append(json.loads((Path(command[-1]) / "jobs.json").read_text())["files"])
-        return popen(command, **keywords)
+    class Noting(popen):
+        """A process that notes what is written to it."""
 
-    monkeypatch.setattr(subprocess, "Popen", noting)
+        def __init__(self, *arguments, **keywords):
+            super().__init__(*arguments, **keywords)
+            started.append(io.BytesIO())
+            stream, self.stdin = self.stdin, SimpleNamespace(flush=lambda: stream.flush(), close=lambda: stream.close())
+            self.stdin.write = lambda content: [file.write(content) for file in (started[-1], stream)]
+
+    monkeypatch.setattr(subprocess, "Popen", Noting)
     a = tc.Assembly("many")
     for k, name in enumerate(("a.stl", "b.ply", "a.stl", "c.step")):
         if name == "c.step":
@@ -106,8 +113,10 @@ def test_each_file_is_read_once_and_one_process_reads_them_all(tmp_path, monkeyp
     a.measure("height", a.parts[0].point(0, 0, 30), along="z")
     with contextlib.suppress(tc.TolcontactError):
         discretize(a)
-    ((*files,),) = started
-    assert [Path(file["path"]).name for file in files] == ["a.stl", "b.ply", "c.step"]
+    (jobs,) = started
+    end = jobs.seek(0, io.SEEK_END)
+    jobs.seek(0)
+    assert [Path(pickle.load(jobs).path).name for _ in range(3)] == ["a.stl", "b.ply", "c.step"] and jobs.tell() == end
 
 
 @pytest.mark.slow
@@ -132,10 +141,10 @@ def test_the_reader_ends_with_an_interrupted_process(tmp_path):
 def early_process(tmp_path):
     """A process that was started before its files are known, by a model that names one of them."""
     (tmp_path / "model.py").write_text('part = tc.Mesh("block.step")')
-    process = shape_worker.start_early(["--samples", "20", str(tmp_path / "model.py")])
-    yield process
+    worker = shape_worker.start_early(["--samples", "20", str(tmp_path / "model.py")])
+    yield worker.process
     shape_worker.end_unused()
-    process.wait()
+    worker.process.wait()
 
 
 def test_the_process_that_was_started_early_reads_the_files(tmp_path, early_process, monkeypatch):
@@ -143,7 +152,7 @@ def test_the_process_that_was_started_early_reads_the_files(tmp_path, early_proc
     (tmp_path / "block.step").write_text(step_block())
     (tmp_path / "rotten.step").write_text(step_block().replace("VERTEX_POINT", "VERTEX_PINT"))
     block, rotten = read_files([tc.Mesh(tmp_path / name) for name in ("block.step", "rotten.step")]).values()
-    assert len(block.arrays["faces"]) == 12 and "rotten.step" in str(rotten)
+    assert len(block.shapes[0].triangles) == 12 and "rotten.step" in str(rotten)
     assert early_process.poll() is not None
 
 

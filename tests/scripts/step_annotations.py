@@ -36,7 +36,7 @@ from OCP.XCAFDoc import (
 )
 
 from tolcontact.child import limit_resources
-from tolcontact.kernel.releases import LabelSequence
+from tolcontact.kernel.step_document import LabelSequence
 
 ANNOTATIONS = (StepDimTol_GeometricTolerance, StepShape_DimensionalLocation, StepShape_DimensionalSize)
 # Words of the kernel where standards have others.

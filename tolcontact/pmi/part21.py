@@ -4,33 +4,18 @@ Time and memory are linear in the size of any text: the patterns are possessive 
 """
 
 import re
-import sys
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple, TypeAlias
 
 from tolcontact.errors import OptionError
-from tolcontact.geometry.files.step_text import decoded
+from tolcontact.geometry.files.step_text import STATEMENT, StepText, decoded, entity_name
 
 MAX_NESTING = 64  # lists in lists; files have three or four
-# Up to a semicolon outside strings: number, entity, parameters, semicolon. A longer number is no number.
-_STATEMENT = re.compile(rb"\s*+(?:#(\d{1,18}+)\s*+=\s*+)?+([A-Za-z_]\w*+)?+((?:[^';]++|'[^']*+'?)*+)(;?)")
-_COMMENT = re.compile(rb"('[^']*+'?)|/\*(?:[^*]++|\*(?!/))*+(?:\*/)?")
-_STRING = re.compile(rb"'[^']*+'?")
-_ENTITY = re.compile(rb"([A-Za-z_]\w*+)\s*+\(")
-_SCHEMA = re.compile(rb"'((?:[^']|'')*+)'")
 _TOKEN = re.compile(
     rb"""\s*+(?:(?P<open>(?:!?[A-Za-z_]\w*+\s*+)?+\()|(?P<close>\))|(?P<comma>,)|(?P<reference>\#\d{1,18}+)|(?P<unset>[$*])
     |(?P<string>'(?:[^']|'')*+')|(?P<word>\.\w++\.)|(?P<number>[-+]?\d++(?:\.\d*+)?+(?:[eE][-+]?\d++)?+)|(?P<binary>"\w*+"))""",
     re.VERBOSE,
 )
-# Shapes are most of a file, and the walk does not enter them.
-_SHAPES = frozenset(
-    (b"CARTESIAN_POINT", b"DIRECTION", b"VECTOR", b"LINE", b"VERTEX_POINT", b"EDGE_CURVE", b"ORIENTED_EDGE", b"EDGE_LOOP",
-     b"FACE_BOUND", b"FACE_OUTER_BOUND", b"AXIS2_PLACEMENT_3D", b"CIRCLE", b"PCURVE", b"SURFACE_CURVE", b"SEAM_CURVE", b"PLANE",
-     b"CYLINDRICAL_SURFACE", b"B_SPLINE_CURVE_WITH_KNOTS", b"B_SPLINE_SURFACE_WITH_KNOTS", b"COORDINATES_LIST", b"POLYLINE",
-     b"TESSELLATED_CURVE_SET", b"DEFINITIONAL_REPRESENTATION", b"STYLED_ITEM", b"COMPOSITE_CURVE_SEGMENT")
-)  # fmt: skip
 
 
 class Reference(int):
@@ -99,34 +84,31 @@ class Records:
     """
 
     def __init__(self, content: bytes, title: str) -> None:
-        self.schema = ""
+        self._text = StepText(content)
+        self.schema = self._text.schema
         self._title = title
-        self._bodies: dict[int, bytes] = {}
-        self._entities: dict[int, str] = {}  # of simple instances, so that most records are never parsed
         self._parsed: dict[int, Mapping[str, Parameters]] = {}
-        self._numbers: dict[str, list[int]] = defaultdict(list)
-        self._content = _COMMENT.sub(rb"\1", content) if b"/*" in content else content
-        if not self._scan(self._content):
+        if not self._text.is_complete:
             raise OptionError(
                 f'"{title}" is cut off, or a text in it is not closed: it does not end with END-ISO-10303-21; export it again'
             )
 
     def __len__(self) -> int:
-        return len(self._bodies)
+        return len(self._text.bodies)
 
     def names(self) -> Iterable[str]:
         """Return the names of all entities in the file, but those of most shapes."""
-        return self._numbers.keys()
+        return self._text.numbers.keys()
 
     def numbers(self, *entities: str) -> list[int]:
         """Return the numbers of all records of these entities, in ascending order."""
-        numbers = {number for entity in entities for number in self._numbers.get(entity, ())}
+        numbers = {number for entity in entities for number in self._text.numbers.get(entity, ())}
         return sorted(number for number in numbers if self.has(number, *entities))
 
     def has(self, number: int, *entities: str) -> bool:
         """Return whether a record is of one of these entities."""
-        if number in self._entities:
-            return self._entities[number] in entities
+        if number in self._text.entities:
+            return self._text.entities[number] in entities
         return not self.entities(number).keys().isdisjoint(entities)
 
     def entities(self, number: int) -> Mapping[str, Parameters]:
@@ -135,7 +117,7 @@ class Records:
         Raises OptionError if it is damaged.
         """
         if number not in self._parsed:
-            body = self._bodies.get(number, b"")
+            body = self._text.bodies.get(number, b"")
             values = _parse(body)
             if values is None:
                 raise OptionError(
@@ -154,41 +136,12 @@ class Records:
     def shapes(self, *numbers: int) -> dict[int, Parameters]:
         """Return the parameters of records of shapes, by their numbers. All of the file is searched, once for each call."""
         found, wanted = dict[int, Parameters](), frozenset(numbers)
-        for match in _STATEMENT.finditer(self._content) if numbers else ():
+        for match in STATEMENT.finditer(self._text.content) if numbers else ():
             number, entity, body, _ = match.groups()
             if number is not None and entity is not None and int(number) in wanted:
                 values = _parse(body)
                 found[int(number)] = next((value for value in values or () if isinstance(value, Parameters)), Parameters())
         return found
-
-    def _scan(self, content: bytes) -> bool:
-        """Take the records of a file, and return whether it is complete."""
-        for match in _STATEMENT.finditer(content):
-            number, entity, body, end = match.groups()
-            if number is not None:
-                self._take(int(number), entity, body)
-            elif entity == b"FILE_SCHEMA" and (schema := _SCHEMA.search(body)):
-                self.schema = decoded(schema[1])
-            elif entity == b"END" and body.startswith(b"-ISO-10303-21"):
-                return bool(end)
-        return False
-
-    def _take(self, number: int, entity: bytes | None, body: bytes) -> None:
-        if entity in _SHAPES or number in self._bodies:
-            return
-        if entity is None:
-            self._bodies[number] = body
-            for name in dict.fromkeys(_ENTITY.findall(_STRING.sub(b"", body))):
-                self._numbers[_name(name)].append(number)
-            return
-        name = sys.intern(_name(entity))
-        self._bodies[number] = entity + body
-        self._entities[number] = name
-        self._numbers[name].append(number)
-
-
-def _name(entity: bytes) -> str:
-    return entity.decode("latin-1").upper()
 
 
 def _parse(text: bytes) -> Parameters | None:
@@ -202,7 +155,7 @@ def _parse(text: bytes) -> Parameters | None:
         position = token.end()
         match token.lastgroup:
             case "open":
-                stack.append((_name(token["open"][:-1].strip()), []))
+                stack.append((entity_name(token["open"][:-1].strip()), []))
             case "close":
                 name, values = stack.pop()
                 if not stack:

@@ -2,19 +2,20 @@
 
 import logging
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
 
 from tolcontact.declaration import Geometry, Mesh
 from tolcontact.declaration.geometry import UNITS
-from tolcontact.errors import GeometryFault
+from tolcontact.errors import GeometryFault, clipped
 from tolcontact.geometry.coordinate_error import COORDINATE_SPACING
 from tolcontact.geometry.edges import rim
-from tolcontact.geometry.files import reader, screening
+from tolcontact.geometry.files import screening
 from tolcontact.geometry.files.product import (
     BREP,
     FACE_NAMES,
@@ -26,7 +27,8 @@ from tolcontact.geometry.files.product import (
     product,
     usual_chord,
 )
-from tolcontact.geometry.files.step_text import StepText
+from tolcontact.geometry.files.step_text import SOLIDS, USAGES, StepText
+from tolcontact.shape_worker import Job, WorkerEnd, started
 
 MAX_ANGLE = 0.5  # [rad] between triangles of round faces
 COARSENINGS = (1, 30)  # times the usual chord, tried one after the other
@@ -43,21 +45,33 @@ class Shape:
     unsure: bool = False
 
 
+class UnfinishedRead(GeometryFault):
+    """Reading a file took too long, or crashed: the file is damaged, or its triangles are too fine for the CAD kernel."""
+
+
 @dataclass(frozen=True)
-class Content:
-    """The content of a file: the arrays that `worker` reads and, for a STEP file, their product."""
+class ReadingLimits:
+    """The limits for reading a file: processor time, memory [byte] and number of triangles.
 
-    arrays: Mapping[str, np.ndarray]
-    product: Product | None
+    On an idle core a STEP file of 1 MB takes some 2 s, one of 20 MB 41 s. A million triangles take some 0.5 GiB to read, and
+    some 3 GiB on the way through a simulation with contact on all of them.
+    """
+
+    seconds: float = 30.0
+    seconds_per_mb: float = 20.0
+    memory: int = 6 * 2**30
+    triangles: int = 1_000_000
 
 
+DEFAULT_LIMITS = ReadingLimits()
 Key = tuple[Path, float | None]  # a file and its required chord
+Content = Product | Mapping[str, np.ndarray]  # of a STEP file, and of a mesh file as `worker` reads it
 Contents = Mapping[Key, Content | GeometryFault]
-State = tuple[str, int, int, int, float | None, reader.ReadingLimits]
-_cache: dict[State | None, Content] = {}
+State = tuple[str, int, int, int, float | None, ReadingLimits]
+_cache: dict[State | None, Product] = {}
 
 
-def read_files(geometries: Iterable[Geometry], limits: reader.ReadingLimits = reader.DEFAULT_LIMITS) -> Contents:
+def read_files(geometries: Iterable[Geometry], limits: ReadingLimits = DEFAULT_LIMITS) -> Contents:
     """Return the content or the fault of each file that the geometries name. Each file is read once."""
     files = [geometry for geometry in geometries if isinstance(geometry, Mesh) and isinstance(geometry.source, str | Path)]
     contents: dict[Key, Content | GeometryFault] = {}
@@ -72,15 +86,9 @@ def read_files(geometries: Iterable[Geometry], limits: reader.ReadingLimits = re
             texts[key] = screening.screen(key[0], limits.triangles)
         except GeometryFault as fault:
             contents[key] = fault
-    for key, result in _load(texts, limits).items():
-        path, _ = key
-        if isinstance(result, GeometryFault):
-            contents[key] = result
-        elif "count" in result:
-            contents[key] = GeometryFault(screening.too_many(path, int(result["count"]), limits.triangles))
-        else:
-            contents[key] = _content(path, result, texts[key])
-            _remember(states[key], contents[key])
+    contents |= _load(texts, limits)
+    for key in texts:
+        _remember(states[key], contents[key])
     return contents
 
 
@@ -89,7 +97,7 @@ def key_of(geometry: Mesh) -> Key:
     return Path(geometry.source), geometry.chord
 
 
-def _state(path: Path, chord: float | None, limits: reader.ReadingLimits) -> State | None:
+def _state(path: Path, chord: float | None, limits: ReadingLimits) -> State | None:
     """Return a value that changes when the file does; None if there is no file."""
     try:
         status = path.stat()
@@ -100,52 +108,83 @@ def _state(path: Path, chord: float | None, limits: reader.ReadingLimits) -> Sta
 
 def _remember(state: State | None, content: Content | GeometryFault) -> None:
     """Keep the content of a STEP file, since listing, declaring and discretizing its bodies each ask for it."""
-    if isinstance(content, Content) and content.product is not None and state is not None:
+    if isinstance(content, Product) and state is not None:
         while len(_cache) >= CACHE_SIZE:
             _cache.pop(next(iter(_cache)), None)
         _cache[state] = content
 
 
-def _load(
-    texts: Mapping[Key, StepText | None], limits: reader.ReadingLimits
-) -> dict[Key, dict[str, np.ndarray] | GeometryFault]:
-    """Return the arrays or the fault of each file.
+def _load(texts: Mapping[Key, StepText | None], limits: ReadingLimits) -> dict[Key, Content | GeometryFault]:
+    """Return the content or the fault of each file.
 
     A STEP file without a required chord gets coarser triangles if there would be too many, or if they cannot be made.
     """
-    results: dict[Key, dict[str, np.ndarray] | GeometryFault] = {}
+    contents: dict[Key, Content | GeometryFault] = {}
     keys = list(texts)
     for coarsening in COARSENINGS:
-        jobs = [_job(key, texts[key], coarsening) for key in keys]
-        results |= dict(zip(keys, reader.load(jobs, limits), strict=True)) if keys else {}
-        if coarsening > 1:
-            for key, job in zip(keys, jobs, strict=True):
-                if not _is_too_fine(results[key]):
-                    log.warning(
-                        '"%s": triangles within %.2g mm, since finer ones are too many or cannot be made', job.path, job.chord
-                    )
-        keys = [
-            (path, chord) for path, chord in keys if chord is None and texts[path, chord] and _is_too_fine(results[path, chord])
-        ]
-    return results
+        jobs = [_job(key, texts[key], coarsening, limits) for key in keys]
+        too_fine = []
+        for key, job, result in zip(keys, jobs, _results(jobs), strict=True):
+            path, chord = key
+            is_too_fine = isinstance(result, UnfinishedRead | int)
+            if coarsening > 1 and not is_too_fine:
+                log.warning('"%s": triangles within %.2g mm, since finer ones are too many or cannot be made', path, job.chord)
+            contents[key] = _content(path, result, texts[key], job)
+            if is_too_fine and chord is None and texts[key]:
+                too_fine.append(key)
+        keys = too_fine
+    return contents
 
 
-def _job(key: Key, text: StepText | None, coarsening: float) -> reader.Job:
+def _job(key: Key, text: StepText | None, coarsening: float, limits: ReadingLimits) -> Job:
     path, chord = key
     if chord is None:
         chord = coarsening * (usual_chord(text) if text else STEP_CHORD)
     else:
         coarsening = chord / STEP_CHORD
-    return reader.Job(path, screening.kind(path), chord, min(math.sqrt(coarsening) * STEP_ANGLE, MAX_ANGLE))
+    return Job(
+        path=str(path.absolute()),
+        kind=screening.kind(path),
+        chord=chord,
+        angle=min(math.sqrt(coarsening) * STEP_ANGLE, MAX_ANGLE),
+        seconds=limits.seconds + limits.seconds_per_mb * path.stat().st_size / 1e6,
+        memory=limits.memory,
+        triangles=limits.triangles,
+        has_face_names=text is not None and text.has_face_names,
+        has_solids=text is not None and text.has_any(SOLIDS),
+        has_pmi=text is not None and text.has_any(USAGES),
+    )
 
 
-def _is_too_fine(result: dict[str, np.ndarray] | GeometryFault) -> bool:
-    return isinstance(result, reader.UnfinishedRead) if isinstance(result, GeometryFault) else "count" in result
+def _results(jobs: Sequence[Job]) -> Iterator[Any]:
+    """Yield the result of each job, as `worker` describes it, or a fault that continues the name of its file.
+
+    If the process ends, the file that it was reading is at fault, and another process reads the remaining ones.
+    """
+    remaining = list(jobs)
+    while remaining:
+        try:
+            with started() as worker:
+                while remaining:
+                    job = remaining.pop(0)
+                    yield worker.read(job)
+        except WorkerEnd as end:
+            yield (UnfinishedRead if end.is_unfinished else GeometryFault)(f" {end}")
+        except OSError as error:
+            yield from (GeometryFault(f": its reader process cannot be started ({error})") for _ in remaining)
+            return
 
 
-def _content(path: Path, arrays: Mapping[str, np.ndarray], text: StepText | None) -> Content | GeometryFault:
+def _content(path: Path, result: Any, text: StepText | None, job: Job) -> Content | GeometryFault:
+    match result:
+        case GeometryFault():
+            return type(result)(f'"{path}"{result}')
+        case str():
+            return GeometryFault(f'"{path}" {clipped(result)}')
+        case int():
+            return GeometryFault(screening.too_many(path, result, job.triangles))
     try:
-        return Content(arrays, None if text is None else product(path, arrays, text))
+        return result if text is None else product(path, result, text, job.chord)
     except GeometryFault as fault:
         return fault
 
@@ -162,14 +201,14 @@ def read(geometry: Mesh, contents: Contents) -> Shape:
     content = contents[key_of(geometry)]
     if isinstance(content, GeometryFault):
         raise content
-    if content.product is not None:
-        return Shape(content.product.part(geometry.body))
-    mesh = trimesh.Trimesh(content.arrays["vertices"], content.arrays["faces"], process=False)
-    scale = _scale(geometry, str(content.arrays["units"]) or None)
+    if isinstance(content, Product):
+        return Shape(content.part(geometry.body))
+    mesh = trimesh.Trimesh(content["vertices"], content["faces"], process=False)
+    scale = _scale(geometry, str(content["units"]) or None)
     mesh.apply_scale(scale)
     check_numbers(mesh.vertices, str(geometry))
-    merged = _merge_vertices(mesh, content.arrays["piece"])
-    _state_spacing(merged, scale * content.arrays["spacing"])
+    merged = _merge_vertices(mesh, content["piece"])
+    _state_spacing(merged, scale * content["spacing"])
     return Shape(merged, unsure=not geometry.units)
 
 
@@ -178,8 +217,8 @@ def _in_memory(geometry: Mesh) -> trimesh.Trimesh:
     mesh = trimesh.Trimesh(source.vertices, source.faces, process=False)
     if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
         raise GeometryFault(f"{geometry}: its triangles refer to vertices beyond the {len(mesh.vertices)} that it has")
-    if len(mesh.faces) > reader.DEFAULT_LIMITS.triangles:
-        raise GeometryFault(screening.too_many(geometry, len(mesh.faces), reader.DEFAULT_LIMITS.triangles))
+    if len(mesh.faces) > DEFAULT_LIMITS.triangles:
+        raise GeometryFault(screening.too_many(geometry, len(mesh.faces), DEFAULT_LIMITS.triangles))
     scale = _scale(geometry, getattr(source, "units", None))
     mesh.apply_scale(scale)
     check_numbers(mesh.vertices, str(geometry))
