@@ -22,8 +22,8 @@ from tolcontact.cli.progress import waiting
 from tolcontact.errors import OptionError, clipped, shown
 from tolcontact.geometry.step_listing import FacesOfRecords
 from tolcontact.pmi import Datum, Dimension, Pmi, Tolerance, read_pmi
-from tolcontact.pmi.declared import Annotation
-from tolcontact.pmi.declared_file import DeclaredFile, declared_file
+from tolcontact.pmi.claims import Annotation
+from tolcontact.pmi.declared import DeclaredFile, declared_file
 from tolcontact.pmi.script import script
 from tolcontact.report.text.table import FILE_WIDTH
 

@@ -79,8 +79,8 @@ own is listed without it. A damaged file leads to a single message.
 """
 
 from tolcontact.pmi.annotations import Datum, DatumReference, DatumTarget, Dimension, Pmi, Tolerance
-from tolcontact.pmi.declared import DeclaredAnnotation, DeclaredPmi
-from tolcontact.pmi.declaring import features_from_pmi
+from tolcontact.pmi.claims import DeclaredAnnotation
+from tolcontact.pmi.declared import DeclaredPmi, features_from_pmi
 from tolcontact.pmi.reading import read_pmi
 
 __all__ = [
