@@ -7,6 +7,7 @@ import pickle
 import re
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,6 +21,7 @@ from tests.helpers import finish, run, script, start
 from tests.shapes import BLOCK, refusal
 from tests.step_files import Step, step_block
 from tolcontact import shape_worker
+from tolcontact.child import TIME_LIMIT, crash, environment
 from tolcontact.discretization import discretize
 from tolcontact.geometry.files import ReadingLimits, read_files
 from tolcontact.geometry.shapes import shape
@@ -167,6 +169,20 @@ def test_a_process_that_nobody_needs_ends_with_its_parent(early_process):
     with early_process.stdin:
         pass
     assert early_process.wait(timeout=60) == 0
+
+
+@pytest.mark.parametrize(
+    "code, name",
+    [(0, ""), (1, ""), (-11, "signal 11, SIGSEGV"), (-99, "signal 99"), (0xC0000005, "exception 0xc0000005")],
+)
+def test_exit_codes_of_crashes_are_told_on_all_systems(code, name):
+    assert crash(code) == name
+
+
+def test_the_process_limits_its_own_processor_time():
+    limited = "from tolcontact.child import limit_resources; limit_resources(2**33, seconds=1)\nwhile True: pass"
+    done = subprocess.run([sys.executable, "-c", limited], env=environment(), timeout=300, check=False)
+    assert done.returncode == TIME_LIMIT
 
 
 @pytest.mark.parametrize("text", ["tc.Box(1, 1, 1)", "step = 1; step.stp", "# see block.step for its shape"])
