@@ -15,7 +15,7 @@ from tolcontact.geometry.files import BREP, STATED_FACES, SURFACES
 from tolcontact.geometry.files.product import product
 from tolcontact.geometry.files.step_text import StepText
 from tolcontact.geometry.shapes import shape
-from tolcontact.shape_worker import Job, started
+from tolcontact.shape_worker import Job, Worker
 
 
 def test_areas_and_boxes_are_exact():
@@ -62,7 +62,7 @@ def test_a_listing_with_few_triangles_says_what_many_would(body):
 
 def test_a_face_without_triangles_keeps_its_number():
     chord = 0.5
-    with started() as worker:
+    with Worker() as worker:
         content = worker.read(Job(str(COVER), "step", chord, angle=0.5, seconds=60, memory=2**33, triangles=10_000))
     text, (cover,) = StepText(COVER.read_bytes()), content["shapes"]
     assert product(COVER, content, text, chord).missing_faces == 0

@@ -144,9 +144,10 @@ def early_process(tmp_path):
     """A process that was started before its files are known, by a model that names one of them."""
     (tmp_path / "model.py").write_text('part = tc.Mesh("block.step")')
     worker = shape_worker.start_early(["--samples", "20", str(tmp_path / "model.py")])
-    yield worker.process
+    process = worker.process
+    yield process
     shape_worker.end_unused()
-    worker.process.wait()
+    process.wait()
 
 
 def test_the_process_that_was_started_early_reads_the_files(tmp_path, early_process, monkeypatch):

@@ -52,9 +52,9 @@ class Job:
 
 
 class WorkerEnd(Exception):
-    """The worker ended without a result; the message is the rest of a sentence that begins with the name of its file.
+    """There is no result; the message continues a sentence that begins with the name of the file.
 
-    is_unfinished   whether it crashed or stalled, perhaps because the triangles are too fine
+    is_unfinished   whether the process crashed or stalled, perhaps because the triangles are too fine
     """
 
     def __init__(self, message: str, *, is_unfinished: bool) -> None:
@@ -63,10 +63,15 @@ class WorkerEnd(Exception):
 
 
 class Worker:
-    """A process that reads files. As a context, it ends with it."""
+    """A process that reads files, and another one after the end of the former. As a context, it ends the process.
 
-    def __init__(self, *arguments: str) -> None:
-        """Start it. Raises OSError if it cannot be started."""
+    process   None before its start and after its end
+    """
+
+    process: subprocess.Popen[bytes] | None = None
+
+    def start(self, *arguments: str) -> None:
+        """Start the process. Raises OSError if it cannot be started."""
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115  (as long as the process)
         self.process = subprocess.Popen(
             [sys.executable, "-P", os.fspath(PROGRAM), *arguments],
@@ -81,43 +86,53 @@ class Worker:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.process.kill()
-        with self._errors, self.process, contextlib.suppress(OSError):  # of a job that it did not take
-            assert self.process.stdin is not None
-            self.process.stdin.close()
+        if self.process is None:
+            return
+        process, self.process = self.process, None
+        process.kill()
+        with self._errors, process, contextlib.suppress(OSError):  # of a job that it did not take
+            assert process.stdin is not None
+            process.stdin.close()
 
     def read(self, job: Job) -> Any:
         """Return what the process reads for a job. Raises WorkerEnd if it ends first, or takes too long.
 
         The process limits its own processor time. On a busy machine it may take STALL_FACTOR times as long.
         """
-        assert self.process.stdin is not None and self.process.stdout is not None
-        timer = threading.Timer(MAX_START_SECONDS + STALL_FACTOR * job.seconds, self.process.kill)
+        try:
+            if self.process is None:
+                self.start()
+        except OSError as error:
+            raise WorkerEnd(f": its reader process cannot be started ({error})", is_unfinished=False) from error
+        process = self.process
+        assert process is not None and process.stdin is not None and process.stdout is not None
+        timer = threading.Timer(MAX_START_SECONDS + STALL_FACTOR * job.seconds, process.kill)
         timer.daemon = True
         timer.start()
         try:
-            pickle.dump(job, self.process.stdin)
-            self.process.stdin.flush()
-            return pickle.load(self.process.stdout)
+            pickle.dump(job, process.stdin)
+            process.stdin.flush()
+            return pickle.load(process.stdout)
         except (EOFError, OSError, pickle.UnpicklingError):
-            code, is_late = self.process.wait(), not timer.is_alive()
+            end = self._end(process.wait(), not timer.is_alive(), job.seconds)
         finally:
             timer.cancel()
-        raise self._end(code, is_late, job.seconds)
+        with self:
+            raise end
 
     def _end(self, code: int, is_late: bool, seconds: float) -> WorkerEnd:
         self._errors.seek(0)
         message = clipped(self._errors.read().decode("utf-8", "replace").strip().rpartition("\n")[2]) or "no message"
         if is_late or code == TIME_LIMIT:
             text = (
-                f"took too long: it was not read within {seconds:.0f} s of processor time; it is far too fine, or damaged "
+                f" took too long: it was not read within {seconds:.0f} s of processor time; it is far too fine, or damaged "
                 "(look for coordinates that are far off); export it again"
             )
         elif name := crash(code):
             end = f"it crashed its reader process ({name})"
-            text = f"cannot be read: {end}; it is damaged, or beyond the CAD kernel; export it again"
+            text = f" cannot be read: {end}; it is damaged, or beyond the CAD kernel; export it again"
         else:
-            text = f"was not read: its reader process ended with exit code {code} ({message}); export it again"
+            text = f" was not read: its reader process ended with exit code {code} ({message}); export it again"
         return WorkerEnd(text, is_unfinished=is_late or bool(crash(code)))
 
 
@@ -128,9 +143,11 @@ def start_early(arguments: Iterable[str]) -> Worker | None:
     """
     if _early or not any(map(_needs_kernel, arguments)):
         return None
+    worker = Worker()
     with contextlib.suppress(OSError):  # it is started again when it is needed
-        _early.append(Worker(LOAD_KERNEL))
-        return _early[0]
+        worker.start(LOAD_KERNEL)
+        _early.append(worker)
+        return worker
     return None
 
 
@@ -145,11 +162,11 @@ def _needs_kernel(argument: str) -> bool:
         return False
 
 
-def started() -> Worker:
-    """Return the worker that was started early, or a new one. Raises OSError if it cannot be started."""
+def taken() -> Worker:
+    """Return the worker that was started early, if its process is still there, or one that starts when it is needed."""
     while _early:
         worker = _early.pop()
-        if worker.process.poll() is None:
+        if worker.process is not None and worker.process.poll() is None:
             return worker
         with worker:
             pass
@@ -157,7 +174,7 @@ def started() -> Worker:
 
 
 def end_unused() -> None:
-    """End the worker that was started early, if no file was read."""
+    """End the process that was started early, if no file was read."""
     while _early:
         with _early.pop():
             pass

@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ from tolcontact.geometry.files.product import (
     usual_chord,
 )
 from tolcontact.geometry.files.step_text import SOLIDS, USAGES, StepText
-from tolcontact.shape_worker import Job, WorkerEnd, started
+from tolcontact.shape_worker import Job, Worker, WorkerEnd, taken
 
 MAX_ANGLE = 0.5  # [rad] between triangles of round faces
 COARSENINGS = (1, 30)  # times the usual chord, tried one after the other
@@ -73,22 +73,14 @@ _cache: dict[State | None, Product] = {}
 
 def read_files(geometries: Iterable[Geometry], limits: ReadingLimits = DEFAULT_LIMITS) -> Contents:
     """Return the content or the fault of each file that the geometries name. Each file is read once."""
-    files = [geometry for geometry in geometries if isinstance(geometry, Mesh) and isinstance(geometry.source, str | Path)]
     contents: dict[Key, Content | GeometryFault] = {}
-    texts: dict[Key, StepText | None] = {}
-    states: dict[Key, State | None] = {}
-    for key in dict.fromkeys(key_of(geometry) for geometry in files):
-        states[key] = _state(*key, limits)  # before the file is read, since it may change meanwhile
-        if (cached := _cache.get(states[key])) is not None:
-            contents[key] = cached
-            continue
-        try:
-            texts[key] = screening.screen(key[0], limits.triangles)
-        except GeometryFault as fault:
-            contents[key] = fault
-    contents |= _load(texts, limits)
-    for key in texts:
-        _remember(states[key], contents[key])
+    with taken() as worker:
+        for geometry in geometries:
+            if isinstance(geometry, Mesh) and isinstance(geometry.source, str | Path) and key_of(geometry) not in contents:
+                key = key_of(geometry)
+                state = _state(*key, limits)  # before the file is read, since it may change meanwhile
+                contents[key] = content = _cache.get(state) or _content(*key, limits, worker)
+                _remember(state, content)
     return contents
 
 
@@ -114,30 +106,43 @@ def _remember(state: State | None, content: Content | GeometryFault) -> None:
         _cache[state] = content
 
 
-def _load(texts: Mapping[Key, StepText | None], limits: ReadingLimits) -> dict[Key, Content | GeometryFault]:
-    """Return the content or the fault of each file.
+def _content(path: Path, chord: float | None, limits: ReadingLimits, worker: Worker) -> Content | GeometryFault:
+    """Return the content or the fault of a file."""
+    try:
+        text = screening.screen(path, limits.triangles)
+        result, chord = _result(path, chord, text, limits, worker)
+        return result if text is None else product(path, result, text, chord)
+    except GeometryFault as fault:
+        return fault
+
+
+def _result(path: Path, chord: float | None, text: StepText | None, limits: ReadingLimits, worker: Worker) -> tuple[Any, float]:
+    """Return what the worker reads from a file, and the chord [mm] of its triangles. Raises GeometryFault.
 
     A STEP file without a required chord gets coarser triangles if there would be too many, or if they cannot be made.
     """
-    contents: dict[Key, Content | GeometryFault] = {}
-    keys = list(texts)
     for coarsening in COARSENINGS:
-        jobs = [_job(key, texts[key], coarsening, limits) for key in keys]
-        too_fine = []
-        for key, job, result in zip(keys, jobs, _results(jobs), strict=True):
-            path, chord = key
-            is_too_fine = isinstance(result, UnfinishedRead | int)
-            if coarsening > 1 and not is_too_fine:
-                log.warning('"%s": triangles within %.2g mm, since finer ones are too many or cannot be made', path, job.chord)
-            contents[key] = _content(path, result, texts[key], job)
-            if is_too_fine and chord is None and texts[key]:
-                too_fine.append(key)
-        keys = too_fine
-    return contents
+        job = _job(path, chord, text, coarsening, limits)
+        try:
+            result = worker.read(job)
+        except WorkerEnd as end:
+            result = (UnfinishedRead if end.is_unfinished else GeometryFault)(f'"{path}"{end}')
+        is_too_fine = isinstance(result, UnfinishedRead | int)
+        if coarsening > 1 and not is_too_fine:
+            log.warning('"%s": triangles within %.2g mm, since finer ones are too many or cannot be made', path, job.chord)
+        if not is_too_fine or chord is not None or text is None:
+            break
+    match result:
+        case GeometryFault():
+            raise result
+        case str():
+            raise GeometryFault(f'"{path}" {clipped(result)}')
+        case int():
+            raise GeometryFault(screening.too_many(path, result, limits.triangles))
+    return result, job.chord
 
 
-def _job(key: Key, text: StepText | None, coarsening: float, limits: ReadingLimits) -> Job:
-    path, chord = key
+def _job(path: Path, chord: float | None, text: StepText | None, coarsening: float, limits: ReadingLimits) -> Job:
     if chord is None:
         chord = coarsening * (usual_chord(text) if text else STEP_CHORD)
     else:
@@ -154,39 +159,6 @@ def _job(key: Key, text: StepText | None, coarsening: float, limits: ReadingLimi
         has_solids=text is not None and text.has_any(SOLIDS),
         has_pmi=text is not None and text.has_any(USAGES),
     )
-
-
-def _results(jobs: Sequence[Job]) -> Iterator[Any]:
-    """Yield the result of each job, as `worker` describes it, or a fault that continues the name of its file.
-
-    If the process ends, the file that it was reading is at fault, and another process reads the remaining ones.
-    """
-    remaining = list(jobs)
-    while remaining:
-        try:
-            with started() as worker:
-                while remaining:
-                    job = remaining.pop(0)
-                    yield worker.read(job)
-        except WorkerEnd as end:
-            yield (UnfinishedRead if end.is_unfinished else GeometryFault)(f" {end}")
-        except OSError as error:
-            yield from (GeometryFault(f": its reader process cannot be started ({error})") for _ in remaining)
-            return
-
-
-def _content(path: Path, result: Any, text: StepText | None, job: Job) -> Content | GeometryFault:
-    match result:
-        case GeometryFault():
-            return type(result)(f'"{path}"{result}')
-        case str():
-            return GeometryFault(f'"{path}" {clipped(result)}')
-        case int():
-            return GeometryFault(screening.too_many(path, result, job.triangles))
-    try:
-        return result if text is None else product(path, result, text, job.chord)
-    except GeometryFault as fault:
-        return fault
 
 
 def read(geometry: Mesh, contents: Contents) -> Shape:

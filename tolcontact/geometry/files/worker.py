@@ -152,11 +152,16 @@ def result(job: Job) -> Arrays | dict[str, Any] | int | str:
             count = len(content["faces"])
         return content if count <= job.triangles else count
     except MemoryError:
-        return f"takes more than {job.memory / 2**30:.3g} GiB of memory to read; it is damaged, or far too fine"
+        return too_large(job)
     except Refusal as refusal:
         return str(refusal)
     except Exception as error:  # any error is reported as a fault of the file
         return f"is damaged, or of an unknown kind ({type(error).__name__}: {error}); export it again"
+
+
+def too_large(job: Job) -> str:
+    """Return the fault of a file that takes too much memory."""
+    return f"takes more than {job.memory / 2**30:.3g} GiB of memory to read; it is damaged, or far too fine"
 
 
 def work() -> None:
@@ -168,7 +173,12 @@ def work() -> None:
             step_document()
     with contextlib.suppress(EOFError):
         while True:
-            pickle.dump(result(pickle.load(sys.stdin.buffer)), results, protocol=pickle.HIGHEST_PROTOCOL)
+            job = pickle.load(sys.stdin.buffer)
+            try:
+                content = pickle.dumps(result(job), protocol=pickle.HIGHEST_PROTOCOL)
+            except MemoryError:
+                content = pickle.dumps(too_large(job))
+            results.write(content)
             results.flush()
 
 
