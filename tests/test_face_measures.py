@@ -63,7 +63,7 @@ def test_a_listing_with_few_triangles_says_what_many_would(body):
 def test_a_face_without_triangles_keeps_its_number():
     chord = 0.5
     with Worker() as worker:
-        content = worker.read(Job(str(COVER), "step", chord, angle=0.5, seconds=60, memory=2**33, triangles=10_000))
+        content = worker.read(COVER, Job(str(COVER), "step", chord, angle=0.5, seconds=60, memory=2**33, triangles=10_000))
     text, (cover,) = StepText(COVER.read_bytes()), content["shapes"]
     assert product(COVER, content, text, chord).missing_faces == 0
     drawn = cover["brep"] != 4

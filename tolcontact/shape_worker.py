@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from tolcontact.child import STALL_FACTOR, TIME_LIMIT, crash, environment
-from tolcontact.errors import clipped
+from tolcontact.errors import GeometryFault, clipped
 
 PROGRAM = Path(__file__).parent / "geometry" / "files" / "worker.py"
 LOAD_KERNEL = "--kernel"  # argument of the program: load the CAD kernel before the first job
@@ -51,15 +51,8 @@ class Job:
     has_pmi: bool = False
 
 
-class WorkerEnd(Exception):
-    """There is no result; the message continues a sentence that begins with the name of the file.
-
-    is_unfinished   whether the process crashed or stalled, perhaps because the triangles are too fine
-    """
-
-    def __init__(self, message: str, *, is_unfinished: bool) -> None:
-        super().__init__(message)
-        self.is_unfinished = is_unfinished
+class UnfinishedRead(GeometryFault):
+    """Reading a file took too long, or crashed: the file is damaged, or its triangles are too fine for the CAD kernel."""
 
 
 class Worker:
@@ -94,8 +87,8 @@ class Worker:
             assert process.stdin is not None
             process.stdin.close()
 
-    def read(self, job: Job) -> Any:
-        """Return what the process reads for a job. Raises WorkerEnd if it ends first, or takes too long.
+    def read(self, title: object, job: Job) -> Any:
+        """Return what the process reads for a job. Raises GeometryFault about the file with a title if it ends first.
 
         The process limits its own processor time. On a busy machine it may take STALL_FACTOR times as long.
         """
@@ -103,7 +96,7 @@ class Worker:
             if self.process is None:
                 self.start()
         except OSError as error:
-            raise WorkerEnd(f": its reader process cannot be started ({error})", is_unfinished=False) from error
+            raise GeometryFault(f'"{title}": its reader process cannot be started ({error})') from error
         process = self.process
         assert process is not None and process.stdin is not None and process.stdout is not None
         timer = threading.Timer(MAX_START_SECONDS + STALL_FACTOR * job.seconds, process.kill)
@@ -114,26 +107,29 @@ class Worker:
             process.stdin.flush()
             return pickle.load(process.stdout)
         except (EOFError, OSError, pickle.UnpicklingError):
-            end = self._end(process.wait(), not timer.is_alive(), job.seconds)
+            fault = self._fault(title, process.wait(), not timer.is_alive(), job.seconds)
         finally:
             timer.cancel()
         with self:
-            raise end
+            raise fault
 
-    def _end(self, code: int, is_late: bool, seconds: float) -> WorkerEnd:
+    def _fault(self, title: object, code: int, is_late: bool, seconds: float) -> GeometryFault:
+        """Return the fault of the file at which the process ended with an exit code, or was killed since it took too long."""
+        if is_late or code == TIME_LIMIT:
+            return UnfinishedRead(
+                f'"{title}" took too long: it was not read within {seconds:.0f} s of processor time; it is far too fine, or '
+                "damaged (look for coordinates that are far off); export it again"
+            )
+        if name := crash(code):
+            return UnfinishedRead(
+                f'"{title}" cannot be read: it crashed its reader process ({name}); it is damaged, or beyond the CAD kernel; '
+                "export it again"
+            )
         self._errors.seek(0)
         message = clipped(self._errors.read().decode("utf-8", "replace").strip().rpartition("\n")[2]) or "no message"
-        if is_late or code == TIME_LIMIT:
-            text = (
-                f" took too long: it was not read within {seconds:.0f} s of processor time; it is far too fine, or damaged "
-                "(look for coordinates that are far off); export it again"
-            )
-        elif name := crash(code):
-            end = f"it crashed its reader process ({name})"
-            text = f" cannot be read: {end}; it is damaged, or beyond the CAD kernel; export it again"
-        else:
-            text = f" was not read: its reader process ended with exit code {code} ({message}); export it again"
-        return WorkerEnd(text, is_unfinished=is_late or bool(crash(code)))
+        return GeometryFault(
+            f'"{title}" was not read: its reader process ended with exit code {code} ({message}); export it again'
+        )
 
 
 def start_early(arguments: Iterable[str]) -> Worker | None:

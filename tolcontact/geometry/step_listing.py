@@ -19,8 +19,8 @@ from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
 from tolcontact.geometry.files import SURFACES, key_of, read_files
 from tolcontact.geometry.files.bodies import MAX_LISTED
 from tolcontact.geometry.files.product import Product
-from tolcontact.geometry.files.reading import UnfinishedRead
 from tolcontact.readable import Readable
+from tolcontact.shape_worker import UnfinishedRead
 
 LISTING_CHORD = 0.5  # [mm] of triangles that only tell which faces there are, and which of them touch
 

@@ -28,7 +28,7 @@ from tolcontact.geometry.files.product import (
     usual_chord,
 )
 from tolcontact.geometry.files.step_text import SOLIDS, USAGES, StepText
-from tolcontact.shape_worker import Job, Worker, WorkerEnd, taken
+from tolcontact.shape_worker import Job, UnfinishedRead, Worker, taken
 
 MAX_ANGLE = 0.5  # [rad] between triangles of round faces
 COARSENINGS = (1, 30)  # times the usual chord, tried one after the other
@@ -43,10 +43,6 @@ class Shape:
 
     mesh: trimesh.Trimesh
     unsure: bool = False
-
-
-class UnfinishedRead(GeometryFault):
-    """Reading a file took too long, or crashed: the file is damaged, or its triangles are too fine for the CAD kernel."""
 
 
 @dataclass(frozen=True)
@@ -124,16 +120,16 @@ def _result(path: Path, chord: float | None, text: StepText | None, limits: Read
     for coarsening in COARSENINGS:
         job = _job(path, chord, text, coarsening, limits)
         try:
-            result = worker.read(job)
-        except WorkerEnd as end:
-            result = (UnfinishedRead if end.is_unfinished else GeometryFault)(f'"{path}"{end}')
+            result = worker.read(path, job)
+        except UnfinishedRead as fault:
+            result = fault
         is_too_fine = isinstance(result, UnfinishedRead | int)
         if coarsening > 1 and not is_too_fine:
             log.warning('"%s": triangles within %.2g mm, since finer ones are too many or cannot be made', path, job.chord)
         if not is_too_fine or chord is not None or text is None:
             break
     match result:
-        case GeometryFault():
+        case UnfinishedRead():
             raise result
         case str():
             raise GeometryFault(f'"{path}" {clipped(result)}')
