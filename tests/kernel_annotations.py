@@ -12,8 +12,8 @@ from typing import Any
 from tolcontact.child import ChildDiedError, run_child
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.files import screening
-from tolcontact.geometry.files.reader import DEFAULT_LIMITS
-from tolcontact.geometry.files.step_text import record_numbers
+from tolcontact.geometry.files.reading import DEFAULT_LIMITS
+from tolcontact.geometry.files.step_text import StepText
 
 PROGRAM = Path(__file__).parent / "scripts" / "step_annotations.py"
 
@@ -87,7 +87,7 @@ def kernel_annotations(path: str | Path) -> KernelAnnotations:
     except ChildDiedError as error:
         raise GeometryFault(f"the kernel could not read the PMI: {error}") from error
     content = json.loads(output)
-    numbers = record_numbers(path.read_bytes())
+    numbers = StepText(path.read_bytes()).order
     if len(numbers) != content["record_count"]:
         raise GeometryFault(
             f"the kernel could not read the PMI: it counts {content['record_count']} records, and the file has {len(numbers)}"

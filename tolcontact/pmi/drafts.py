@@ -290,7 +290,7 @@ class _Trial:
         return ""
 
 
-def letters_of(constituent: Constituent) -> set[str | None]:
+def letters_of(constituent: Constituent) -> set[str]:
     """Return the letters of the datums to which a tolerance refers."""
     if isinstance(constituent, Size):
         return set()
