@@ -39,9 +39,8 @@ log = logging.getLogger(__name__)
 class Product:
     """The shapes that are bodies somewhere, and the bodies in their places.
 
-    face_count      number of B-rep faces of all shapes
-    missing_faces   number of these without triangles that are no copies of others
-    units           of lengths of shapes, as the file names them; empty if it states none
+    face_count   number of B-rep faces of all shapes, copies included
+    units        of lengths of shapes, as the file names them; empty if it states none
     """
 
     path: Path
