@@ -23,7 +23,7 @@ from tolcontact.geometry.files import BREP, SURFACES, ReadingLimits, read_files
 from tolcontact.geometry.files.product import rigid_motion
 from tolcontact.geometry.files.reading import usual_chord
 from tolcontact.geometry.files.step_surfaces import credible, onto
-from tolcontact.geometry.files.step_text import step_text
+from tolcontact.geometry.files.step_text import StepText
 from tolcontact.geometry.fitting import fit_surface
 from tolcontact.geometry.shapes import shape
 
@@ -353,7 +353,7 @@ def test_the_units_of_a_file_are_stated(file):
         (si % b".MILLI." + inch, "inch"),
         (b"#1=X();", ""),
     ):
-        assert step_text(text).units == units
+        assert StepText(text).units == units
 
 
 @pytest.mark.parametrize("name", ["cover", "housing"])
@@ -396,5 +396,5 @@ def test_surfaces_have_the_numbers_of_the_file(name):
 def test_triangles_are_as_fine_as_the_extent_of_a_file_asks(unit, points, chord):
     records = [f"#{k}=CARTESIAN_POINT( 'P{k}',({','.join(map(str, at))}));" for k, at in enumerate(points * 60)]
     records.append(f"#5001=(LENGTH_UNIT(){unit});")
-    text = step_text("\n".join(["ISO-10303-21;", *records]).encode())
+    text = StepText("\n".join(["ISO-10303-21;", *records]).encode())
     assert usual_chord(text) == pytest.approx(chord)

@@ -11,9 +11,11 @@ from studies.cad.trimmed_faces import area
 from tests.test_cad import COVER, triangles
 from tests.test_whole_surfaces import AS1
 from tolcontact.geometry.brep_face import DESCRIPTIONS, describe_faces
-from tolcontact.geometry.files import BREP, STATED_FACES, SURFACES, read_files
+from tolcontact.geometry.files import BREP, STATED_FACES, SURFACES
 from tolcontact.geometry.files.product import product
+from tolcontact.geometry.files.step_text import StepText
 from tolcontact.geometry.shapes import shape
+from tolcontact.shape_worker import Job, Worker
 
 
 def test_areas_and_boxes_are_exact():
@@ -59,12 +61,15 @@ def test_a_listing_with_few_triangles_says_what_many_would(body):
 
 
 def test_a_face_without_triangles_keeps_its_number():
-    (content,) = read_files([tc.Mesh(COVER)]).values()
-    drawn = content.arrays["brep"] != 4
-    arrays = {**content.arrays, **{name: content.arrays[name][drawn] for name in ("faces", "piece", "brep")}}
-    arrays["face_count"] = np.zeros(1, dtype=np.int64)  # a sheet: a solid would be refused
-    cut = product(COVER, arrays, content.product.text)
-    assert cut.missing_faces == 1 and content.product.missing_faces == 0
+    chord = 0.5
+    with Worker() as worker:
+        content = worker.read(COVER, Job(str(COVER), "step", chord, angle=0.5, seconds=60, memory=2**33, triangles=10_000))
+    text, (cover,) = StepText(COVER.read_bytes()), content["shapes"]
+    assert product(COVER, content, text, chord).missing_faces == 0
+    drawn = cover["brep"] != 4
+    sheet = cover | {"triangles": cover["triangles"][drawn], "brep": cover["brep"][drawn], "face_count": 0}
+    cut = product(COVER, content | {"shapes": [sheet]}, text, chord)  # a solid would be refused
+    assert cut.missing_faces == 1
     mesh = cut.part(None)
     assert set(mesh.face_attributes[BREP]) == set(range(15)) - {4}
     for face, whole in zip(describe_faces(mesh), tc.faces_in(COVER), strict=True):

@@ -12,7 +12,7 @@ from tests.step_files import Step
 from tests.test_cad import COVER
 from tolcontact.discretization import discretize
 from tolcontact.errors import OptionError
-from tolcontact.pmi.declared_file import declared_file
+from tolcontact.pmi.declared import declared_file
 from tolcontact.pmi.script import script
 from tolcontact.variation import Draws
 

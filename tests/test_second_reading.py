@@ -1,19 +1,17 @@
 """The kernel's reading of tolerances and dimensions beside the walk of the text."""
 
-import json
 import re
 from dataclasses import replace
 
 import pytest
 
 import tolcontact as tc
-from tests.helpers import call
+from tests.kernel_annotations import KernelItems, kernel_annotations
+from tests.second_reading import compare, second_reading
 from tests.test_cad import COVER
 from tests.test_pmi import AP242, step
 from tolcontact.errors import GeometryFault
-from tolcontact.geometry.kernel_annotations import KernelItems, kernel_annotations
 from tolcontact.geometry.step_listing import faces_of_records
-from tolcontact.pmi.second_reading import compare, second_reading
 
 ASPECT = "SHAPE_ASPECT('','',#4,.T.)"
 DEGREE = (
@@ -203,22 +201,6 @@ def test_annotations_that_only_one_reading_has_are_told(path, kernel):
     assert (reading.unread_tolerances, reading.unread_dimensions) == ((1, 2, 3), (1, 2, 3, 4))
 
 
-def test_the_command_tells_differences_below_its_tables(path, kernel):
-    done = call(path.parent, "pmi", path.name)
-    assert done.returncode == 0, done.stderr
-    tables, _, end = done.stdout.partition("second reading, by the CAD kernel\n")
-    assert "datums" in tables and end.splitlines() == [
-        "the kernel reads 2 tolerances and 4 dimensions; 1 of them differ",
-        "the kernel does not read tolerances 3",
-        LOST_LIMIT,
-    ]
-    reading = json.loads(call(path.parent, "pmi", path.name, "--json").stdout)["second_reading"]
-    assert reading["differences"] == [
-        {"annotation": "dimension", "number": 3, "attribute": "limits", "listed": "4.5 to 5.5", "kernel": "5 to 5.5"}
-    ]
-    assert (reading["fault"], reading["unread_tolerances"]) == ("", [3])
-
-
 @pytest.mark.parametrize(
     "record, words",
     [
@@ -230,11 +212,7 @@ def test_a_kernel_that_fails_loses_nothing_but_its_reading(tmp_path, record, wor
     path = write(tmp_path / "cover.stp", record)
     reading = second_reading(tc.read_pmi(path), path, {})
     assert reading.fault.startswith("the kernel could not read the PMI: ") and words in str(reading)
-    done = call(tmp_path, "pmi", path.name)
-    assert done.returncode == 0 and "AP242 edition 1: 3 tolerances, 4 dimensions, 3 datums" in done.stdout
-    assert "the kernel could not read the PMI: " in done.stdout
-    reading = json.loads(call(tmp_path, "pmi", path.name, "--json").stdout)["second_reading"]
-    assert words in reading["fault"] and reading["differences"] == []
+    assert reading.differences == () and len(tc.read_pmi(path).tolerances) == 3
 
 
 def test_a_file_without_shapes_has_no_second_reading(tmp_path):

@@ -1,13 +1,16 @@
 """Files of shapes are read by another process: none ends or stalls this one."""
 
 import contextlib
-import json
+import io
 import os
+import pickle
 import re
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +21,7 @@ from tests.helpers import finish, run, script, start
 from tests.shapes import BLOCK, refusal
 from tests.step_files import Step, step_block
 from tolcontact import shape_worker
+from tolcontact.child import TIME_LIMIT, crash, environment
 from tolcontact.discretization import discretize
 from tolcontact.geometry.files import ReadingLimits, read_files
 from tolcontact.geometry.shapes import shape
@@ -91,11 +95,16 @@ def test_a_file_that_takes_too_much_memory_is_a_fault(tmp_path):
 def test_each_file_is_read_once_and_one_process_reads_them_all(tmp_path, monkeypatch):
     started, popen = [], subprocess.Popen
 
-    def noting(command, **keywords):
-        started.append(json.loads((Path(command[-1]) / "jobs.json").read_text())["files"])
-        return popen(command, **keywords)
+    class Noting(popen):
+        """A process that notes what is written to it."""
 
-    monkeypatch.setattr(subprocess, "Popen", noting)
+        def __init__(self, *arguments, **keywords):
+            super().__init__(*arguments, **keywords)
+            started.append(io.BytesIO())
+            stream, self.stdin = self.stdin, SimpleNamespace(flush=lambda: stream.flush(), close=lambda: stream.close())
+            self.stdin.write = lambda content: [file.write(content) for file in (started[-1], stream)]
+
+    monkeypatch.setattr(subprocess, "Popen", Noting)
     a = tc.Assembly("many")
     for k, name in enumerate(("a.stl", "b.ply", "a.stl", "c.step")):
         if name == "c.step":
@@ -106,8 +115,10 @@ def test_each_file_is_read_once_and_one_process_reads_them_all(tmp_path, monkeyp
     a.measure("height", a.parts[0].point(0, 0, 30), along="z")
     with contextlib.suppress(tc.TolcontactError):
         discretize(a)
-    ((*files,),) = started
-    assert [Path(file["path"]).name for file in files] == ["a.stl", "b.ply", "c.step"]
+    (jobs,) = started
+    end = jobs.seek(0, io.SEEK_END)
+    jobs.seek(0)
+    assert [Path(pickle.load(jobs).path).name for _ in range(3)] == ["a.stl", "b.ply", "c.step"] and jobs.tell() == end
 
 
 @pytest.mark.slow
@@ -132,7 +143,8 @@ def test_the_reader_ends_with_an_interrupted_process(tmp_path):
 def early_process(tmp_path):
     """A process that was started before its files are known, by a model that names one of them."""
     (tmp_path / "model.py").write_text('part = tc.Mesh("block.step")')
-    process = shape_worker.start_early(["--samples", "20", str(tmp_path / "model.py")])
+    worker = shape_worker.start_early(["--samples", "20", str(tmp_path / "model.py")])
+    process = worker.process
     yield process
     shape_worker.end_unused()
     process.wait()
@@ -143,7 +155,7 @@ def test_the_process_that_was_started_early_reads_the_files(tmp_path, early_proc
     (tmp_path / "block.step").write_text(step_block())
     (tmp_path / "rotten.step").write_text(step_block().replace("VERTEX_POINT", "VERTEX_PINT"))
     block, rotten = read_files([tc.Mesh(tmp_path / name) for name in ("block.step", "rotten.step")]).values()
-    assert len(block.arrays["faces"]) == 12 and "rotten.step" in str(rotten)
+    assert len(block.shapes[0].triangles) == 12 and "rotten.step" in str(rotten)
     assert early_process.poll() is not None
 
 
@@ -158,6 +170,20 @@ def test_a_process_that_nobody_needs_ends_with_its_parent(early_process):
     with early_process.stdin:
         pass
     assert early_process.wait(timeout=60) == 0
+
+
+@pytest.mark.parametrize(
+    "code, name",
+    [(0, ""), (1, ""), (-11, "signal 11, SIGSEGV"), (-99, "signal 99"), (0xC0000005, "exception 0xc0000005")],
+)
+def test_exit_codes_of_crashes_are_told_on_all_systems(code, name):
+    assert crash(code) == name
+
+
+def test_the_process_limits_its_own_processor_time():
+    limited = "from tolcontact.child import limit_resources; limit_resources(2**33, seconds=1)\nwhile True: pass"
+    done = subprocess.run([sys.executable, "-c", limited], env=environment(), timeout=300, check=False)
+    assert done.returncode == TIME_LIMIT
 
 
 @pytest.mark.parametrize("text", ["tc.Box(1, 1, 1)", "step = 1; step.stp", "# see block.step for its shape"])

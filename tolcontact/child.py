@@ -1,10 +1,12 @@
 """Child processes for files of unknown origin, in which a library may crash, stall or take too much memory."""
 
 import contextlib
+import math
 import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 try:
@@ -13,9 +15,10 @@ except ImportError:  # not on Windows, where nothing is limited
     resource = None  # type: ignore[assignment]
 
 
-STALL_FACTOR = (
-    10  # times the processor time that a child may take: one that lives longer does not wait for a processor, it hangs
-)
+# Times the processor time that a child may take: one that lives longer does not wait for a processor, it hangs.
+STALL_FACTOR = 10
+TIME_LIMIT = -signal.SIGXCPU if hasattr(signal, "SIGXCPU") else None  # exit code of a child at the end of its processor time
+WINDOWS_CRASH = 0xC0000000  # exit codes from here on are exceptions
 
 
 class Refusal(Exception):
@@ -58,43 +61,40 @@ def environment() -> dict[str, str]:
     }
 
 
-def limit_resources(memory: int, *, file_size: int | None = None, seconds: int | None = None) -> None:
-    """Limit this process to `memory` [byte], files of `file_size` [byte] and processor `seconds`, and let it leave no core."""
+def limit_resources(memory: int, *, seconds: float | None = None) -> None:
+    """Limit this process to `memory` [byte] and to `seconds` of processor time from now on, and let it leave no core."""
     if resource is None:
         return
-    limits = {
-        resource.RLIMIT_AS: memory,
-        resource.RLIMIT_FSIZE: file_size,
-        resource.RLIMIT_CPU: seconds,
-        resource.RLIMIT_CORE: 0,
-    }
+    limits = {resource.RLIMIT_AS: memory, resource.RLIMIT_CORE: 0}
+    if seconds is not None:
+        limits[resource.RLIMIT_CPU] = math.ceil(time.process_time() + seconds)
     for name, limit in limits.items():
-        if limit is not None:
-            _, hard = resource.getrlimit(name)
-            allowed = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
-            with contextlib.suppress(OSError, ValueError):  # some systems lack a limit
-                resource.setrlimit(name, (allowed, allowed))
-
-
-def processor_time(pid: int) -> float:
-    """Return the processor time [s] that a running child has taken so far; 0 where the system does not tell."""
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return 0.0
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")  # in user and in system mode
+        _, hard = resource.getrlimit(name)
+        allowed = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+        with contextlib.suppress(OSError, ValueError):  # some systems lack a limit
+            resource.setrlimit(name, (allowed, hard))
 
 
 def peak_memory() -> int | None:
     """Return the largest memory [byte] that this process has used so far; None where the system does not tell."""
-    return None if resource is None else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    if resource is None:
+        return None
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+
+
+def crash(code: int) -> str:
+    """Return the signal or the exception by which a process with an exit code crashed; "" if it did not."""
+    if code < 0:
+        name = f", {signal.Signals(-code).name}" if -code in set(signal.Signals) else ""
+        return f"signal {-code}{name}"
+    return f"exception {code:#x}" if code >= WINDOWS_CRASH else ""
 
 
 def _reason(completed: subprocess.CompletedProcess) -> str:
-    if completed.returncode == -signal.SIGXCPU:
+    if completed.returncode == TIME_LIMIT:
         return "reading it took too long"
-    if completed.returncode < 0:
-        return f"the library that reads it crashed (signal {-completed.returncode})"
+    if name := crash(completed.returncode):
+        return f"the library that reads it crashed ({name.partition(',')[0]})"
     message = (completed.stderr.decode("utf-8", "replace").strip().splitlines() or ["no message"])[-1]
     if message.startswith("MemoryError"):
         return "reading it takes too much memory"

@@ -1,35 +1,149 @@
-"""The process that reads shape files (see geometry.files.reader). A command may start it before the files are known.
+"""The process that reads shape files, so that no file can crash or stall this one. A command may start it early.
 
-To load the CAD kernel takes as long as the imports of a small run. Started early, it happens meanwhile.
+A job and its result pass through the standard streams of the process, one after the other. Loading the CAD kernel takes as
+long as the imports of a small run; started before the files are known, it happens meanwhile.
+
+This is no pool of `concurrent.futures`: its processes import the main script again, which a script without a main guard does
+not survive, they cannot be started in a process of such a pool, and the pool does not tell how a process ended.
 """
 
 import contextlib
 import os
+import pickle
 import re
 import subprocess
 import sys
+import tempfile
+import threading
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
-from tolcontact.child import environment
+from tolcontact.child import STALL_FACTOR, TIME_LIMIT, crash, environment
+from tolcontact.errors import GeometryFault, clipped
 
 PROGRAM = Path(__file__).parent / "geometry" / "files" / "worker.py"
+LOAD_KERNEL = "--kernel"  # argument of the program: load the CAD kernel before the first job
+MAX_START_SECONDS = 30.0  # until the process has loaded its libraries
 STEP_FILE = re.compile(r"\.ste?p$", re.IGNORECASE)
 QUOTED_STEP_FILE = re.compile(r"\.ste?p[\"']", re.IGNORECASE)  # in a script, or a model in JSON
-_early: list[subprocess.Popen] = []  # at most one, which nobody has taken
+_early: "list[Worker]" = []  # at most one, which nobody has taken
 
 
-def start_early(arguments: Iterable[str]) -> subprocess.Popen | None:
-    """Start and return a process that loads the CAD kernel, if an argument of a command is a STEP file or names one.
+@dataclass(frozen=True)
+class Job:
+    """A file to read, its kind ("stl", ..., "step"), and the limits: processor seconds, memory [byte], number of triangles.
+
+    chord, angle    largest distance [mm] and angle [rad] between triangles and true faces of a STEP file
+    has_...         what the text of a STEP file states
+    """
+
+    path: str
+    kind: str
+    chord: float
+    angle: float
+    seconds: float
+    memory: int
+    triangles: int
+    has_face_names: bool = False
+    has_solids: bool = False
+    has_pmi: bool = False
+
+
+class UnfinishedRead(GeometryFault):
+    """Reading a file took too long, or crashed: the file is damaged, or its triangles are too fine for the CAD kernel."""
+
+
+class Worker:
+    """A process that reads files, and another one after the end of the former. As a context, it ends the process.
+
+    process   None before its start and after its end
+    """
+
+    process: subprocess.Popen[bytes] | None = None
+
+    def start(self, *arguments: str) -> None:
+        """Start the process. Raises OSError if it cannot be started."""
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115  (as long as the process)
+        self.process = subprocess.Popen(
+            [sys.executable, "-P", os.fspath(PROGRAM), *arguments],
+            # The memory that is set aside for idle threads would count against the limit.
+            env={**environment(), "MALLOC_ARENA_MAX": "4"},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.process is None:
+            return
+        process, self.process = self.process, None
+        process.kill()
+        with self._errors, process, contextlib.suppress(OSError):  # of a job that it did not take
+            assert process.stdin is not None
+            process.stdin.close()
+
+    def read(self, title: object, job: Job) -> Any:
+        """Return what the process reads for a job. Raises GeometryFault about the file with a title if it ends first.
+
+        The process limits its own processor time. On a busy machine it may take STALL_FACTOR times as long.
+        """
+        try:
+            if self.process is None:
+                self.start()
+        except OSError as error:
+            raise GeometryFault(f'"{title}": its reader process cannot be started ({error})') from error
+        process = self.process
+        assert process is not None and process.stdin is not None and process.stdout is not None
+        timer = threading.Timer(MAX_START_SECONDS + STALL_FACTOR * job.seconds, process.kill)
+        timer.daemon = True
+        timer.start()
+        try:
+            pickle.dump(job, process.stdin)
+            process.stdin.flush()
+            return pickle.load(process.stdout)
+        except (EOFError, OSError, pickle.UnpicklingError):
+            fault = self._fault(title, process.wait(), not timer.is_alive(), job.seconds)
+        finally:
+            timer.cancel()
+        with self:
+            raise fault
+
+    def _fault(self, title: object, code: int, is_late: bool, seconds: float) -> GeometryFault:
+        """Return the fault of the file at which the process ended with an exit code, or was killed since it took too long."""
+        if is_late or code == TIME_LIMIT:
+            return UnfinishedRead(
+                f'"{title}" took too long: it was not read within {seconds:.0f} s of processor time; it is far too fine, or '
+                "damaged (look for coordinates that are far off); export it again"
+            )
+        if name := crash(code):
+            return UnfinishedRead(
+                f'"{title}" cannot be read: it crashed its reader process ({name}); it is damaged, or beyond the CAD kernel; '
+                "export it again"
+            )
+        self._errors.seek(0)
+        message = clipped(self._errors.read().decode("utf-8", "replace").strip().rpartition("\n")[2]) or "no message"
+        return GeometryFault(
+            f'"{title}" was not read: its reader process ended with exit code {code} ({message}); export it again'
+        )
+
+
+def start_early(arguments: Iterable[str]) -> Worker | None:
+    """Start and return a worker that loads the CAD kernel, if an argument of a command is a STEP file or names one.
 
     An argument that is a model names a STEP file if its text does. None is returned if no process is started.
     """
     if _early or not any(map(_needs_kernel, arguments)):
         return None
+    worker = Worker()
     with contextlib.suppress(OSError):  # it is started again when it is needed
-        _early.append(_start([], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
-        return _early[0]
+        worker.start(LOAD_KERNEL)
+        _early.append(worker)
+        return worker
     return None
 
 
@@ -44,34 +158,19 @@ def _needs_kernel(argument: str) -> bool:
         return False
 
 
-def started(folder: Path) -> subprocess.Popen:
-    """Return the process that works through the list in a folder: the one that was started early, or a new one.
-
-    Raises OSError if it cannot be started.
-    """
-    with contextlib.suppress(IndexError, OSError):
-        process = _early.pop()
-        if process.poll() is None:
-            assert process.stdin is not None
-            with process.stdin as stream:
-                stream.write(os.fsencode(folder) + b"\n")
-            return process
-    with (folder / "errors").open("wb") as errors:
-        return _start([os.fspath(folder)], stdin=subprocess.DEVNULL, stdout=errors, stderr=errors)
+def taken() -> Worker:
+    """Return the worker that was started early, if its process is still there, or one that starts when it is needed."""
+    while _early:
+        worker = _early.pop()
+        if worker.process is not None and worker.process.poll() is None:
+            return worker
+        with worker:
+            pass
+    return Worker()
 
 
 def end_unused() -> None:
     """End the process that was started early, if no file was read."""
     while _early:
-        process = _early.pop()
-        process.kill()
-        process.communicate()
-
-
-def _start(arguments: list[str], **streams: Any) -> subprocess.Popen:
-    return subprocess.Popen(
-        [sys.executable, "-P", os.fspath(PROGRAM), *arguments],
-        # The memory that is set aside for idle threads would count against the limit.
-        env={**environment(), "MALLOC_ARENA_MAX": "4"},
-        **streams,
-    )
+        with _early.pop():
+            pass

@@ -12,6 +12,7 @@ import numpy as np
 import tolcontact as tc
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.files import read_files
+from tolcontact.geometry.files.product import Product
 
 FAR = 1e3  # [mm] at which turned normals are compared
 SIZES = {"INCH": 25.4, "MILLI": 1.0, "$,.METRE.": 1e3}  # [mm] of units, by what their entities have in them
@@ -48,12 +49,12 @@ def main() -> None:
     for name in sys.argv[1:]:
         (content,) = read_files([tc.Mesh(name)]).values()
         stated, radii, size = numbers_of(Path(name))
-        if isinstance(content, GeometryFault) or content.product is None or not size:
+        if not isinstance(content, Product) or not size:
             print(f"{name}: left out ({'not read' if isinstance(content, GeometryFault) else 'several units'})")
             continue
         files += 1
         stated[:, 3:], radii = stated[:, 3:] * size, radii * size
-        for surface in (surface for surfaces in content.product.surfaces for surface in surfaces if surface is not None):
+        for surface in (surface for shape in content.shapes for surface in shape.surfaces if surface is not None):
             if surface.kind == "plane":
                 own = np.array([*surface.axis, surface.axis @ surface.origin])
                 off = min(np.abs((stated - sign * own) * [FAR, FAR, FAR, 1]).max(axis=1).min() for sign in (1, -1))

@@ -20,8 +20,8 @@ from tolcontact.discretization import discretize
 from tolcontact.errors import OptionError
 from tolcontact.geometry.shapes import shape
 from tolcontact.pmi import Datum, Dimension, Tolerance
-from tolcontact.pmi.declared import DeclaredAnnotation
-from tolcontact.pmi.declared_file import DeclaredFile, declared_file
+from tolcontact.pmi.claims import DeclaredAnnotation
+from tolcontact.pmi.declared import DeclaredFile, declared_file
 from tolcontact.variation import Draws
 
 COLUMNS = (

@@ -8,7 +8,7 @@ from collections import Counter
 from pathlib import Path
 
 import tolcontact as tc
-from tolcontact.pmi.second_reading import second_reading
+from tests.second_reading import second_reading
 
 
 def counts(path: Path) -> tuple[Counter[str], list[str]]:

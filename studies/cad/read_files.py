@@ -23,12 +23,11 @@ PATIENCE = 600.0  # s
 def off(product: Product) -> dict[str, float]:
     """How far vertices lie off the surfaces that the file states, by their kind [mm]."""
     worst: dict[str, float] = {}
-    vertices = np.asarray(product.mesh.vertices)
-    for k, surfaces in enumerate(product.surfaces):
-        for number, surface in enumerate(surfaces):
-            own = np.unique(product.mesh.faces[(product.shape == k) & (product.brep == number)])
-            if surface is not None and own.size:
-                worst[surface.kind] = max(worst.get(surface.kind, 0.0), float(np.abs(surface.distance(vertices[own])[0]).max()))
+    for shape in product.shapes:
+        for number, surface in enumerate(shape.surfaces):
+            vertices = shape.vertices[np.unique(shape.triangles[shape.brep == number])]
+            if surface is not None and len(vertices):
+                worst[surface.kind] = max(worst.get(surface.kind, 0.0), float(np.abs(surface.distance(vertices)[0]).max()))
     return worst
 
 
@@ -39,15 +38,14 @@ def read(path: Path) -> dict:
     record = {"seconds": time.perf_counter() - start, "MB": resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e3}
     if isinstance(content, GeometryFault):
         return record | {"message": str(content).replace(str(path), path.name)}
-    product = content.product
-    assert product is not None
+    assert isinstance(content, Product)
     return record | {
-        "bodies": len(product.bodies),
-        "faces": sum(len(np.unique(product.brep[body.triangles])) for body in product.bodies),
-        "analytic": sum(surface is not None for surfaces in product.surfaces for surface in surfaces),
-        "of": sum(map(len, product.surfaces)),
-        "triangles": len(product.brep),
-        "off": off(product),
+        "bodies": len(content.bodies),
+        "faces": sum(len(np.unique(body.shape.brep)) for body in content.bodies),
+        "analytic": sum(surface is not None for shape in content.shapes for surface in shape.surfaces),
+        "of": content.face_count,
+        "triangles": sum(len(shape.triangles) for shape in content.shapes),
+        "off": off(content),
     }
 
 

@@ -22,9 +22,11 @@ from tolcontact.errors import GeometryFault
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.edges import rim
 from tolcontact.geometry.files import BREP, STATED_FACES, SURFACES, read_files
+from tolcontact.geometry.files.product import Product
+from tolcontact.geometry.files.step_text import StepText
 
 CHORD = 0.02  # [mm]
-WITH_RECORDS = b"/* GEOMETRIC_ITEM_SPECIFIC_USAGE( */"  # a comment for which the reader looks for the records of faces
+WITH_RECORDS = b"#999999999=GEOMETRIC_ITEM_SPECIFIC_USAGE('','',$,$,$);"  # for which the reader looks for the records of faces
 NEAR = 1e-6  # [mm] of an edge curve from the surface and its vertices, which the file states apart from each other
 FRAMES = Rotation.random(20, random_state=1).as_matrix()  # of a sphere
 
@@ -161,11 +163,12 @@ def faces_of(path: Path) -> Iterator[ReadFace]:
     """Yield the faces of a file, each once."""
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / path.name
-        copy.write_bytes(path.read_bytes().replace(b"DATA;", b"DATA;\n" + WITH_RECORDS, 1))
-        (result,) = read_files([tc.Mesh(copy, chord=CHORD)]).values()
-    if isinstance(result, GeometryFault) or result.product is None:
-        raise result if isinstance(result, GeometryFault) else ValueError(f"{path} is not a STEP file")
-    product, visited = result.product, set()
+        content = path.read_bytes().replace(b"DATA;", b"DATA;\n" + WITH_RECORDS, 1)
+        copy.write_bytes(content)
+        (product,) = read_files([tc.Mesh(copy, chord=CHORD)]).values()
+    if not isinstance(product, Product):
+        raise product if isinstance(product, GeometryFault) else ValueError(f"{path} is not a STEP file")
+    unit, visited = StepText(content).unit, set()
     for number in range(1, len(product.bodies) + 1):
         mesh = product.part(number)
         brep, triangles = np.asarray(mesh.face_attributes[BREP]), np.asarray(mesh.triangles)
@@ -173,7 +176,7 @@ def faces_of(path: Path) -> Iterator[ReadFace]:
             record = face.records[0]
             if record not in visited and face.measure is not None:
                 visited.add(record)
-                yield ReadFace(record, surface, face.measure.area, triangles[brep == k], product.text.unit, float(mesh.scale))
+                yield ReadFace(record, surface, face.measure.area, triangles[brep == k], unit, float(mesh.scale))
 
 
 def main() -> None:

@@ -22,10 +22,9 @@ from tolcontact.cli.progress import waiting
 from tolcontact.errors import OptionError, clipped, shown
 from tolcontact.geometry.step_listing import FacesOfRecords
 from tolcontact.pmi import Datum, Dimension, Pmi, Tolerance, read_pmi
-from tolcontact.pmi.declared import Annotation
-from tolcontact.pmi.declared_file import DeclaredFile, declared_file
+from tolcontact.pmi.claims import Annotation
+from tolcontact.pmi.declared import DeclaredFile, declared_file
 from tolcontact.pmi.script import script
-from tolcontact.pmi.second_reading import SecondReading, second_reading
 from tolcontact.report.text.table import FILE_WIDTH
 
 MAX_ROWS = 2000  # of a table, which takes a second; a drawing has about a hundred
@@ -46,10 +45,7 @@ AsScript = Annotated[bool, flag("--script", "Print a model script that declares 
 
 @app.command(epilog=examples("pmi part.stp", "pmi part.stp --csv > part.csv", "pmi part.stp --script > part.py"))
 def pmi(file: StepFile, as_json: AsJson = False, as_csv: AsCsv = False, as_script: AsScript = False) -> None:
-    """List the tolerances, dimensions and datums of a STEP file of AP242, and how features declare them. In mm and rad.
-
-    The CAD kernel's own reading is compared with the list, and differences are listed.
-    """
+    """List the tolerances, dimensions and datums of a STEP file of AP242, and how features declare them. In mm and rad."""
     only_one(json=as_json, csv=as_csv, script=as_script)
     with waiting(f"reading {file}"):
         information = read_pmi(file)
@@ -64,12 +60,10 @@ def pmi(file: StepFile, as_json: AsJson = False, as_csv: AsCsv = False, as_scrip
         typer.echo(_csv(declared), nl=False)
     elif information.is_empty and not as_json:
         typer.echo(_reason(information, shown(str(file))))
+    elif as_json:
+        typer.echo(json.dumps(_entries(declared), allow_nan=False))
     else:
-        reading = None if information.is_empty else second_reading(information, file, declared.faces)
-        if as_json:
-            typer.echo(json.dumps(_entries(declared, reading), allow_nan=False))
-        else:
-            _print_tables(declared, reading)
+        _print_tables(declared)
 
 
 def _declared(file: Path, information: Pmi) -> DeclaredFile:
@@ -86,14 +80,13 @@ def _declared(file: Path, information: Pmi) -> DeclaredFile:
     return declared
 
 
-def _entries(declared: DeclaredFile, reading: SecondReading | None) -> dict[str, Any]:
-    """Return the content for JSON: the annotations of the file, its faces, the declarations, and the kernel's reading."""
+def _entries(declared: DeclaredFile) -> dict[str, Any]:
+    """Return everything for JSON: what the file states, its faces, and what became of it."""
     faces = {record: asdict(face) for record, face in declared.faces.items()}
     declarations = {
         entry.annotation.record: {"features": entry.features, "reason": entry.reason} for entry in declared.annotations
     }
-    entries = {"faces": faces, "declared": declarations, "second_reading": asdict(reading) if reading else None}
-    return asdict(declared.pmi) | entries
+    return asdict(declared.pmi) | {"faces": faces, "declared": declarations}
 
 
 def _reason(information: Pmi, name: str) -> str:
@@ -109,12 +102,11 @@ def _reason(information: Pmi, name: str) -> str:
     return f'"{name}" states no tolerances, dimensions or datums{details}'
 
 
-def _print_tables(declared: DeclaredFile, reading: SecondReading | None) -> None:
+def _print_tables(declared: DeclaredFile) -> None:
     output = console()
     width = output.width if sys.stdout.isatty() else FILE_WIDTH
     output.print(Text(str(declared.pmi), style="bold"))
-    parts = *_sections(declared), *_undeclared_lines(declared), *([] if reading is None else _reading_lines(reading))
-    for part in parts:
+    for part in (*_sections(declared), *_undeclared_lines(declared)):
         output.print(part, width=width)
 
 
@@ -162,15 +154,6 @@ def _undeclared_lines(declared: DeclaredFile) -> Iterator[RenderableType]:
 
 def _number(annotation: Annotation) -> str:
     return annotation.letter if isinstance(annotation, Datum) else str(annotation.number)
-
-
-def _reading_lines(reading: SecondReading) -> Iterator[RenderableType]:
-    """Yield the sentences about the kernel's reading, and the differences."""
-    yield Text("\nsecond reading, by the CAD kernel", style="bold")
-    yield Text(str(reading))
-    yield from map(Text, map(str, reading.differences[:MAX_ROWS]))
-    if len(reading.differences) > MAX_ROWS:
-        yield Text(f"and {len(reading.differences) - MAX_ROWS} more differences, which --json lists")
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:

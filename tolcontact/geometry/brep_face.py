@@ -13,7 +13,7 @@ from tolcontact.geometry.edges import smooth_pieces
 from tolcontact.geometry.face_groups import FaceGroups
 from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
 from tolcontact.geometry.files import BREP, FACE_NAMES, STATED_FACES, SURFACES
-from tolcontact.geometry.files.stated_face import FaceMeasure, StatedFace
+from tolcontact.geometry.files.bodies import FaceMeasure, StatedFace
 from tolcontact.geometry.fitting import fit_surface
 from tolcontact.geometry.interrupted_surfaces import FaceOnSurface, interruptions
 
@@ -23,7 +23,7 @@ POSITION_TOLERANCE = 1e-9  # of a part's size: distance between faces of one sur
 PIECES = "pieces"
 DESCRIPTIONS = "descriptions"
 ON_SURFACES = "on_surfaces"
-UNKNOWN = StatedFace(0, "", (), 0, None)  # a face of a mesh, or from an archive, which keeps no measures
+UNKNOWN = StatedFace()  # a face of a mesh, or from an archive, which keeps no measures
 
 
 def number_faces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, Sequence[AnalyticSurface | None]]:

@@ -19,8 +19,8 @@ from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
 from tolcontact.geometry.files import SURFACES, key_of, read_files
 from tolcontact.geometry.files.bodies import MAX_LISTED
 from tolcontact.geometry.files.product import Product
-from tolcontact.geometry.files.reader import UnfinishedRead
 from tolcontact.readable import Readable
+from tolcontact.shape_worker import UnfinishedRead
 
 LISTING_CHORD = 0.5  # [mm] of triangles that only show which faces exist and which of them touch
 
@@ -106,7 +106,7 @@ def faces_of_records(path: str | Path) -> dict[int, RecordedFace]:
     """
     recorded_faces: dict[int, RecordedFace] = {}
     for number, body in enumerate(_listed_product(path).bodies, start=1):
-        for face_number, face in enumerate(body.faces, start=1):
+        for face_number, face in enumerate(body.shape.faces, start=1):
             for record in face.records:
                 bodies = (*(recorded_faces[record].bodies if record in recorded_faces else ()), number)
                 recorded_faces[record] = RecordedFace(face_number, face.name, bodies)
@@ -198,7 +198,7 @@ def _listed_product(path: str | Path) -> Product:
     if product.missing_faces:
         log.warning(
             '"%s": %d of %d faces cannot be chosen, since the CAD kernel makes no triangles of them',
-            path, product.missing_faces, sum(map(len, product.surfaces)),
+            path, product.missing_faces, product.face_count,
         )  # fmt: skip
     return product
 
@@ -217,16 +217,16 @@ def _product(path: str | Path, chord: float | None = None) -> Product:
     content = read_files([geometry])[key_of(geometry)]
     if isinstance(content, GeometryFault):
         raise OptionError(str(content)) from content
-    if content.product is None:
+    if not isinstance(content, Product):
         raise OptionError(f'"{path}" is not a STEP file; only these hold bodies and faces that have numbers')
-    return content.product
+    return content
 
 
 def _body(product: Product, number: int) -> BodyInFile:
     body = product.bodies[number - 1]
-    lower, upper = plain_vector(body.lower), plain_vector(body.upper)
+    lower, upper = map(plain_vector, body.box)
     rotation = Rotation.from_matrix(body.place[:3, :3]).as_rotvec()
     place = plain_vector(body.place[:3, 3]), plain_vector(rotation)
     return BodyInFile(
-        number, body.name, body.path, lower, upper, *place, len(body.faces), body.is_open, shown(product.text.units)
+        number, body.name, body.path, lower, upper, *place, len(body.shape.faces), body.is_open, shown(product.units)
     )

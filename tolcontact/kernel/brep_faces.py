@@ -15,16 +15,14 @@ from OCP.ShapeAnalysis import ShapeAnalysis_CanonicalRecognition
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS_Face
-
-from tolcontact.kernel.releases import as_face
+from OCP.TopoDS import TopoDS, TopoDS_Face
 
 RECOGNITION_TOLERANCE = 1e-4  # [mm] between a B-spline surface and the simple surface for which it is taken
 
 AREA_TOLERANCE = 1e-9  # relative, of the areas of planes, and 1e-7 of B-spline surfaces
 
-Piece = tuple[np.ndarray, np.ndarray]  # vertices (vertex, 3) and triangles (face, 3)
 Measure = tuple[float, tuple[float, ...], list[float]]  # area of a face [mm2], a point on it, and its outward normal there
+as_face = getattr(TopoDS, "Face_s", TopoDS.Face)  # a shape as the face that it is; its name in release 7.9 is the former
 
 
 def explore(shape: Any, kind: Any) -> Iterator[Any]:
@@ -46,10 +44,13 @@ def matrix(location: Any) -> np.ndarray:
     return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])
 
 
-def triangulation(faces: Sequence[Any]) -> tuple[Piece, np.ndarray, list[Measure | None]]:
-    """Return the vertices and triangles of faces, seen from outside, the number (face,) of each triangle's face, and measures.
+def triangulation(faces: Sequence[Any]) -> dict[str, Any]:
+    """Return the triangles of faces, seen from outside, and the measures of the faces.
 
-    A face without a surface has no measure.
+    vertices    (vertex, 3) [mm]
+    triangles   (triangle, 3)
+    brep        (triangle,) the face of each triangle, from 0
+    measures    of each face; None for a face without a surface
     """
     corners, triangles, brep = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
     measures: list[Measure | None] = []
@@ -75,7 +76,12 @@ def triangulation(faces: Sequence[Any]) -> tuple[Piece, np.ndarray, list[Measure
         triangles.append((indices[:, ::-1] if face.Orientation() == TopAbs_REVERSED else indices) - 1 + count)
         brep.append(np.full(len(indices), number))
         count += len(nodes)
-    return (np.concatenate(corners), np.concatenate(triangles)), np.concatenate(brep), measures
+    return {
+        "vertices": np.concatenate(corners),
+        "triangles": np.concatenate(triangles),
+        "brep": np.concatenate(brep),
+        "measures": measures,
+    }
 
 
 def middle_of_parameters(face: Any) -> list[tuple[float, float]]:

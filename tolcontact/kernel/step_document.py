@@ -1,14 +1,15 @@
 """A STEP file in the document of the CAD kernel: bodies of products, their places and names. Lengths in mm.
 
+A process of its own imports this module (`geometry.files.worker`): the kernel may crash, and takes 230 MB and 1 s to import.
+
 A product has a shape, which stands at one or several places. Each solid of a shape is a body, and so is each closed shell that
 is no part of a solid. All other faces of a shape are one body together: surfaces of a part need not be sewn.
 """
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from OCP.BRep import BRep_Tool
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
@@ -26,12 +27,13 @@ from OCP.TopoDS import TopoDS_Iterator
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from tolcontact.child import Refusal
-from tolcontact.kernel.brep_faces import explore
-from tolcontact.kernel.releases import LabelSequence
+from tolcontact.kernel.brep_faces import box, explore, matrix, surface, triangulation
 
-NAMED_FACE = re.compile(rb"\b(?:ADVANCED_FACE|FACE_SURFACE)\s*\(\s*'(?!'|NONE')")  # in the text of a file
-SOLID = re.compile(rb"\b(?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\s*\(")
-PMI_FACE = re.compile(rb"\b(?:GEOMETRIC_ITEM_SPECIFIC_USAGE|ITEM_IDENTIFIED_REPRESENTATION_USAGE)\s*\(")
+try:
+    from OCP.collections import Sequence_TDF_Label as LabelSequence
+except ModuleNotFoundError:  # release 7.9 of OCP, which CadQuery 2.8 installs
+    from OCP.TDF import TDF_LabelSequence as LabelSequence
+
 NAMELESS, LABEL = ("NONE", ""), "=>["  # some systems' names of nameless faces; begins the kernel's label of a nameless shape
 
 
@@ -46,9 +48,63 @@ class BodyShape:
     face_count: int = 0
 
 
-@dataclass(frozen=True)
-class PlacedShape:
-    """A shape at a place: `names` from the root on, its `product`, its location there, and the label that holds it."""
+def read(path: Path, chord: float, angle: float, *, has_face_names: bool, has_solids: bool, has_pmi: bool) -> dict[str, Any]:
+    """Return the shapes of a STEP file, each in the frame of its product, and the bodies in their places.
+
+    shapes         a dictionary for each: `triangulation`, and of each B-rep face of it the surface, None if it is not simple,
+                   the name and, if the file has PMI, the place of its record among all; and the number of faces that the file
+                   states for a solid, 0 if it is unknown
+    bodies         of each body the index of its shape, its motion (4, 4), the corners (2, 3) of the box around it in its
+                   place, the names of the products that contain it, and its own name
+    record_count   number of records in the file, if it has PMI
+    """
+    document = Document(path, has_face_names=has_face_names, has_solids=has_solids, has_pmi=has_pmi)
+    indices: dict[str, list[int]] = {}  # of shapes, by the label
+    shapes: list[tuple[BodyShape, dict[str, Any]]] = []
+    placed: list[tuple[int, Place]] = []
+    places = list(document.places())
+    for place in places:
+        key = entry(place.label)
+        if key not in indices:
+            candidates = document.body_shapes(place.label, chord, angle, is_alone=len(places) == 1)
+            triangulated = [(body, triangulation(body.faces)) for body in candidates]
+            pieces = [(body, triangles) for body, triangles in triangulated if len(triangles["brep"])]
+            indices[key] = [*range(len(shapes), len(shapes) + len(pieces))]
+            shapes += pieces
+        placed.extend((index, place) for index in indices[key])
+    names = body_names([(shapes[index][0], place) for index, place in placed])
+    return {
+        "shapes": [
+            triangles
+            | {
+                "surfaces": [surface(face) for face in body.faces],
+                "names": body.face_names,
+                "records": document.face_records(body.faces),
+                "face_count": body.face_count,
+            }
+            for body, triangles in shapes
+        ],
+        "bodies": [
+            (index, matrix(place.location), box(shapes[index][0].faces, place.location), place.names, name)
+            for (index, place), name in zip(placed, names, strict=True)
+        ],
+        "record_count": len(document.entities),
+    }
+
+
+def body_names(placed: Sequence[tuple[BodyShape, "Place"]]) -> list[str]:
+    """Return the name of each body: its place's or its product's; its own if the file consists of solids at one place."""
+    is_one_place = len({id(place) for _, place in placed}) == 1 and all(body.is_solid for body, _ in placed)
+    if is_one_place and len(placed) > 1:
+        return [body.name for body, _ in placed]
+    own = [body.name if is_one_place else "" for body, _ in placed]
+    return [
+        name or (place.names[-1] if place.names else "") or place.product for name, (_, place) in zip(own, placed, strict=True)
+    ]
+
+
+class Place(NamedTuple):
+    """A place of a shape: `names` from the root on, its `product`, its location there, and the label that holds it."""
 
     names: list[str]
     product: str
@@ -59,7 +115,7 @@ class PlacedShape:
 class Document:
     """A STEP file in the kernel's document. It owns all that is taken from it."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, has_face_names: bool, has_solids: bool, has_pmi: bool) -> None:
         self.document = TDocStd_Document(TCollection_ExtendedString("STEP"))
         self.reader = STEPCAFControl_Reader()
         self.reader.SetNameMode(True)
@@ -69,18 +125,17 @@ class Document:
         if self.reader.ReadFile(str(path)) != IFSelect_RetDone or not self.reader.Transfer(self.document):
             raise Refusal("cannot be read as STEP: it is cut off, damaged, or holds no shape; export it again")
         self.transfer = self.reader.Reader().WS().TransferReader()
-        text = path.read_bytes()
-        self.has_face_names, self.has_solids = (pattern.search(text) is not None for pattern in (NAMED_FACE, SOLID))
-        self.entities = self._entities() if PMI_FACE.search(text) else {}
+        self.has_face_names, self.has_solids = has_face_names, has_solids
+        self.entities = self._entities() if has_pmi else {}
 
-    def places(self) -> Iterator[PlacedShape]:
+    def places(self) -> Iterator[Place]:
         """Yield each place of a shape that is no assembly, in the file's order."""
         roots = LabelSequence()
         XCAFDoc_DocumentTool.ShapeTool_s(self.document.Main()).GetFreeShapes(roots)
         for label in roots:
             yield from self._places_within(label, [], TopLoc_Location())
 
-    def _places_within(self, label: Any, parents: list[str], location: Any) -> Iterator[PlacedShape]:
+    def _places_within(self, label: Any, parents: list[str], location: Any) -> Iterator[Place]:
         location = location.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(label))
         referred = TDF_Label()
         if not XCAFDoc_ShapeTool.GetReferredShape_s(label, referred):
@@ -95,7 +150,7 @@ class Document:
                 yield from self._places_within(component, names, location)
         else:
             product = label_name(referred)
-            yield PlacedShape(names, "" if is_nameless(product) else product, location, referred)
+            yield Place(names, "" if is_nameless(product) else product, location, referred)
 
     def body_shapes(self, label: Any, chord: float, angle: float, *, is_alone: bool) -> Iterator[BodyShape]:
         """Yield the bodies of a product's shape, in its own frame, with triangles on their faces.

@@ -70,15 +70,6 @@ places that positions tolerance; sizes without limits, or of other surfaces than
 what other tolerances of the same feature imply. The reader assumes that a pattern keeps together, as in ASME Y14.5; under ISO
 5458 this needs CZ.
 
-## Second reading
-
-The CAD kernel reads the tolerances and dimensions, too, and the command tells where its reading differs from
-the listed one: in kind, value, form of the zone, projected length, modifiers, datums and faces of a tolerance, and in value,
-limits, fit and faces of a dimension. Values agree if they differ by less than 1e-9 of their size. The kernel reads less, so
-that its reading changes nothing: it does not know composite frames, unequally disposed zones, areas per unit and equidistant
-surfaces, and has no signs of lower deviations. Annotations that it does not read are named by their numbers. The kernel runs in
-a process of its own; if it crashes at a file, a sentence says so.
-
 ## Limits
 
 Editions 1 to 3 of AP242 are read; edition 4, AP242 XML and QIF are refused by name. A file of AP203 or AP214 is read, but
@@ -88,8 +79,8 @@ own is listed without it. A damaged file leads to a single message.
 """
 
 from tolcontact.pmi.annotations import Datum, DatumReference, DatumTarget, Dimension, Pmi, Tolerance
-from tolcontact.pmi.declared import DeclaredAnnotation, DeclaredPmi
-from tolcontact.pmi.declaring import features_from_pmi
+from tolcontact.pmi.claims import DeclaredAnnotation
+from tolcontact.pmi.declared import DeclaredPmi, features_from_pmi
 from tolcontact.pmi.reading import read_pmi
 
 __all__ = [

@@ -1,61 +1,87 @@
 """Where on a part the annotations of a file apply: each claims surfaces, which become features."""
 
+from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 from tolcontact.declaration.values import Vector
 from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
 from tolcontact.pmi.declarable import Undeclared
-from tolcontact.pmi.declared import Annotation, DeclaredAnnotation
 from tolcontact.pmi.toleranced_surfaces import TolerancedSurfaces
+from tolcontact.readable import Readable
 
+Annotation = Tolerance | Dimension | Datum
 Place = tuple[frozenset[int], ...]  # of a feature: the numbers of the faces of its surface, or of each of its two planes
 NO_FACE = "the file states no face for it"  # a reason
 MAX_NAMES = 6  # of features in a reason
 _MEDIAN_KINDS = ("position", "symmetry")  # of two opposed planes: of the middle between them
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, repr=False)
+class DeclaredAnnotation(Readable):
+    """A tolerance, dimension or datum of a file: the names of the `features` that state it, and the `reason` if none does.
+
+    With both, the reason says what of it is not declared.
+    """
+
+    annotation: Annotation
+    features: tuple[str, ...]
+    reason: str = ""
+
+    def __str__(self) -> str:
+        names = f"declared as {', '.join(self.features)}" if self.features else "not declared"
+        return f"{self.annotation}: {names}{f' ({self.reason})' if self.reason else ''}"
+
+
+@dataclass(frozen=True, eq=False)
 class Claim:
-    """An annotation, the faces that it claims, the features that state it, and why others do not.
+    """An annotation and the faces that it claims.
 
     stated    number of faces and targets that the file states for it
     numbers   of its faces on the part
     targets   points of a datum that is established by points alone, with the numbers of their faces
     places    of the features that are to state it
-    features  names of the features that state it
-    refusals  names of the features that do not, by the reasons; none if a reason is for all
+    reason    why there are none
     """
 
     annotation: Annotation
     stated: int
-    numbers: list[int]
-    targets: list[tuple[int, Vector]] = field(default_factory=list)
-    places: list[Place] = field(default_factory=list)
-    features: list[str] = field(default_factory=list)
-    refusals: dict[str, list[str]] = field(default_factory=dict)
-
-    @property
-    def result(self) -> DeclaredAnnotation:
-        """What became of the annotation on its part."""
-        missing = [missing_faces(self.stated - len(self.numbers), self.stated)] if self.numbers else []
-        reasons = dict.fromkeys(filter(None, [*missing, *self.reasons]))
-        return DeclaredAnnotation(self.annotation, tuple(dict.fromkeys(self.features)), "; ".join(reasons))
-
-    @property
-    def reasons(self) -> tuple[str, ...]:
-        """Why it is not declared, or not for all features: each reason with their names, unless it is for all."""
-        return tuple(_reason(reason, names, len(self.places)) for reason, names in self.refusals.items())
-
-    def refuse(self, reason: object, name: str = "") -> None:
-        """Write down why it is not declared for the feature with a name, or for none."""
-        self.refusals.setdefault(str(reason), []).extend(filter(None, [name]))
+    numbers: tuple[int, ...]
+    targets: tuple[tuple[int, Vector], ...] = ()
+    places: tuple[Place, ...] = ()
+    reason: str = ""
 
 
-def _reason(reason: str, names: Sequence[str], count: int) -> str:
-    if not names or len(names) >= count:
-        return reason
-    return f"{', '.join(names[:MAX_NAMES])}{', ...' if len(names) > MAX_NAMES else ''}: {reason}"
+class Report:
+    """What becomes of the claims on a part: names of the features that state them, and why others do not."""
+
+    def __init__(self, claims: Sequence[Claim]) -> None:
+        self.names: dict[Claim, list[str]] = defaultdict(list)
+        self._refusals: dict[Claim, dict[str, list[str]]] = {claim: {} for claim in claims}
+        for claim in claims:
+            if claim.reason:
+                self.refuse(claim, claim.reason)
+
+    def refuse(self, claim: Claim, reason: object, name: str = "") -> None:
+        """Note why a claim is not declared for the feature with a name, or for none."""
+        self._refusals[claim].setdefault(str(reason), []).extend(filter(None, [name]))
+
+    def is_refused(self, claim: Claim) -> bool:
+        return bool(self._refusals[claim])
+
+    def reasons(self, claim: Claim) -> list[str]:
+        """Return why a claim is not declared: each reason with the names of the features, unless it is for all."""
+        reasons = []
+        for reason, names in self._refusals[claim].items():
+            listed = f"{', '.join(names[:MAX_NAMES])}{', ...' if len(names) > MAX_NAMES else ''}: "
+            reasons.append(f"{listed if names and len(names) < len(claim.places) else ''}{reason}")
+        return reasons
+
+    def result(self, claim: Claim) -> DeclaredAnnotation:
+        """Return what became of a claim."""
+        missing = [missing_faces(claim.stated - len(claim.numbers), claim.stated)] if claim.numbers else []
+        reasons = dict.fromkeys(filter(None, [*missing, *self.reasons(claim)]))
+        return DeclaredAnnotation(claim.annotation, tuple(dict.fromkeys(self.names[claim])), "; ".join(reasons))
 
 
 def missing_faces(missing: int, stated: int) -> str:
@@ -70,18 +96,17 @@ def claims_of(pmi: Pmi, surfaces: TolerancedSurfaces) -> list[Claim]:
     """
     claims = [_datum_claim(datum, surfaces) for datum in pmi.datums]
     toleranced: tuple[Tolerance | Dimension, ...] = (*pmi.dimensions, *pmi.tolerances)
-    claims += [Claim(one, len(one.face_records), surfaces.numbers(one.face_records)) for one in toleranced]
+    claims += [Claim(one, len(one.face_records), tuple(surfaces.numbers(one.face_records))) for one in toleranced]
+    located: dict[Claim, Claim] = {}
     place_of: dict[int, Place] = {}
     for claim in sorted(claims, key=lambda claim: len(claim.numbers)):
         try:
             _check(claim.annotation)
-            claim.places = _places(claim, surfaces, place_of)
+            located[claim] = replace(claim, places=tuple(_places(claim, surfaces, place_of)))
         except Undeclared as reason:
-            claim.refuse(reason)
-        place_of |= {
-            number: place for place in claim.places for surface in place for number in surface if number not in place_of
-        }
-    return claims
+            located[claim] = replace(claim, reason=str(reason))
+        place_of = {number: place for place in located[claim].places for surface in place for number in surface} | place_of
+    return [located[claim] for claim in claims]
 
 
 def _datum_claim(datum: Datum, surfaces: TolerancedSurfaces) -> Claim:
@@ -90,15 +115,15 @@ def _datum_claim(datum: Datum, surfaces: TolerancedSurfaces) -> Claim:
     A line or an area locks more than a point: its face is taken as a datum feature.
     """
     if numbers := surfaces.numbers(datum.face_records):
-        return Claim(datum, len(numbers), numbers)
+        return Claim(datum, len(numbers), tuple(numbers))
     records = [record for target in datum.targets for record in target.face_records]
     bare = [target for target in datum.targets if not surfaces.numbers(target.face_records)]
     places = [(surfaces.number_at(target.point), target.point) for target in bare if target.point is not None]
-    targets = [(number, point) for number, point in places if number is not None]
+    targets = tuple((number, point) for number, point in places if number is not None)
     numbers = list(dict.fromkeys([*surfaces.numbers(records), *(number for number, _ in targets)]))
     stated = len(numbers) or len(datum.face_records) + len(records) + len(places)
     are_points = len(targets) == len(datum.targets) and all(target.kind == "point" for target in datum.targets)
-    return Claim(datum, stated, numbers, targets if are_points else [])
+    return Claim(datum, stated, tuple(numbers), targets if are_points else ())
 
 
 def _check(annotation: Annotation) -> None:

@@ -1,22 +1,23 @@
-"""Datums, and the datum systems of tolerances."""
+"""Datums, their targets [mm], and the datum systems of tolerances."""
 
+import math
 from collections.abc import Iterator, Sequence
 
 from tolcontact.declaration.values import Vector
 from tolcontact.pmi.annotations import Datum, DatumReference, DatumTarget
 from tolcontact.pmi.aspects import TARGETS, Aspects
-from tolcontact.pmi.part21 import Parameters, Records, Reference, Typed, Word, flat
-from tolcontact.pmi.quantities import length
-from tolcontact.pmi.target_points import target_points
+from tolcontact.pmi.part21 import Parameters, Records, Reference, Typed, Word, flat, length, length_unit
 
 _COMPARTMENT, _ELEMENT = "DATUM_REFERENCE_COMPARTMENT", "DATUM_REFERENCE_ELEMENT"
+_SHAPE = "SHAPE_REPRESENTATION_WITH_PARAMETERS"
+MAX_TARGETS = 10_000  # of a file; a drawing has some ten
 _EARLIER = ("DATUM_REFERENCE", "REFERENCED_MODIFIED_DATUM")  # references without a datum system
 
 
 def datums_of(records: Records, aspects: Aspects) -> tuple[Datum, ...]:
     """Return the datums of a file, in the order of their records."""
     datums = []
-    points = target_points(records)
+    points = _target_points(records)
     for number in records.numbers("DATUM"):
         features = aspects.datum_features.get(number, [])
         letter = _letter(records, number)
@@ -93,3 +94,32 @@ def _target(records: Records, aspects: Aspects, number: int, letter: str, point:
     kind = records.parameters(number, *TARGETS, "SHAPE_ASPECT").text(1)
     items = aspects.items(number, *aspects.datum_features.get(number, ()))
     return DatumTarget(label, kind, number, point, items.faces, items.others)
+
+
+def _target_points(records: Records) -> dict[int, Vector]:
+    """Return the points [mm] of datum targets, in the frame of their product, by the numbers of their records."""
+    shapes = {
+        target: records.parameters(definition.reference(1), _SHAPE)
+        for number in records.numbers("SHAPE_DEFINITION_REPRESENTATION")
+        if (definition := records.parameters(number, "SHAPE_DEFINITION_REPRESENTATION"))
+        and records.has(definition.reference(1), _SHAPE)
+        and records.has(target := records.parameters(definition.reference(0), "PROPERTY_DEFINITION").reference(2), *TARGETS)
+    }
+    items = {item for shape in list(shapes.values())[:MAX_TARGETS] for item in shape.references(1)}
+    placements = {number: item.reference(1) for number, item in records.shapes(*items).items()}
+    coordinates = records.shapes(*placements.values())
+    points = {}
+    for target, shape in shapes.items():
+        unit = length_unit(records, shape.reference(2))
+        places = [coordinates.get(placements.get(item, 0), Parameters()) for item in shape.references(1)]
+        point = next((point for place in places if (point := _point(place, unit or math.nan))), None)
+        if point is not None:
+            points[target] = point
+    return points
+
+
+def _point(coordinates: Parameters, unit: float) -> Vector | None:
+    """Return a point [mm] from the parameters of its record; None if they are no finite coordinates."""
+    values = coordinates.value(1)
+    numbers = [value * unit for value in values if isinstance(value, float)] if isinstance(values, Parameters) else []
+    return (numbers[0], numbers[1], numbers[2]) if len(numbers) == 3 and all(map(math.isfinite, numbers)) else None

@@ -16,9 +16,16 @@ _KINDS = {
 }  # fmt: skip
 _MATERIALS = {"maximum material requirement": "M", "least material requirement": "L"}
 _ROUND_ZONES = ("cylindrical or circular", "within a cylinder", "within a circle", "spherical", "within a sphere")
-# Modifiers that change nothing here: the faces tell zones in common, and the draws are statistical anyhow.
-_UNCHANGED = ("common zone", "separate requirement", "statistical tolerance")
-_MODIFIED = {"free state": "it is for the part in its free state, and parts are rigid here"}
+# Options of a declared tolerance by the modifiers of a stated one, or the reason why it is not declared.
+_MODIFIERS: dict[str, dict[str, Any] | str] = {
+    **{modifier: {"material": material} for modifier, material in _MATERIALS.items()},
+    "tangent plane": {"tangent": True},
+    # They change nothing here: the faces tell zones in common, and the draws are statistical anyhow.
+    "common zone": {},
+    "separate requirement": {},
+    "statistical tolerance": {},
+    "free state": "it is for the part in its free state, and parts are rigid here",
+}
 _DIGITS = 9  # of sizes [mm] after the point
 MAX_SIZE_DIFFERENCE = 1.0  # in widths of the limits: between them and the size of the shape
 
@@ -56,12 +63,10 @@ def _options(stated: Tolerance) -> dict[str, Any]:
     """Return the options of a declared tolerance by their names. Raises Undeclared for modifiers that are none."""
     options: dict[str, Any] = {"projected": stated.projected, "outside": stated.displacement}
     for modifier in stated.modifiers:
-        if modifier in _MATERIALS:
-            options["material"] = _MATERIALS[modifier]
-        elif modifier == "tangent plane":
-            options["tangent"] = True
-        elif modifier not in _UNCHANGED:
-            raise Undeclared(_MODIFIED.get(modifier, f"its modifier, {modifier}, is not one of a declared tolerance"))
+        entry = _MODIFIERS.get(modifier, f"its modifier, {modifier}, is not one of a declared tolerance")
+        if isinstance(entry, str):
+            raise Undeclared(entry)
+        options |= entry
     if stated.per_unit:
         options["per"] = stated.per_unit if len(stated.per_unit) > 1 else stated.per_unit[0]
     return options

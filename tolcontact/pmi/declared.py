@@ -1,35 +1,26 @@
-"""What became of the PMI of a file when the features of a part were declared from it."""
+"""The PMI of a file, declared as features of one part, or of a part for each of its bodies that has toleranced faces."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 
-from tolcontact.declaration import DatumTargets, Feature, Pattern
-from tolcontact.pmi.annotations import Datum, Dimension, Tolerance
+from tolcontact.declaration import Assembly, Mesh, Part
+from tolcontact.errors import GeometryFault, OptionError, shown
+from tolcontact.geometry.brep_face import describe_faces
+from tolcontact.geometry.shapes import shape
+from tolcontact.geometry.step_listing import LISTING_CHORD, FacesOfRecords, bodies_in, faces_of_records, part_name
+from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
+from tolcontact.pmi.claims import NO_FACE, Annotation, Claim, DeclaredAnnotation, Report, missing_faces
+from tolcontact.pmi.drafts import Declared, declare_features
+from tolcontact.pmi.reading import read_pmi
 from tolcontact.readable import Readable
-
-Annotation = Tolerance | Dimension | Datum
-
-
-@dataclass(frozen=True, repr=False)
-class DeclaredAnnotation(Readable):
-    """A tolerance, dimension or datum of a file: the names of the `features` that state it, and the `reason` if none does.
-
-    With both, the reason says what of it is not declared.
-    """
-
-    annotation: Annotation
-    features: tuple[str, ...]
-    reason: str = ""
-
-    def __str__(self) -> str:
-        names = f"declared as {', '.join(self.features)}" if self.features else "not declared"
-        return f"{self.annotation}: {names}{f' ({self.reason})' if self.reason else ''}"
 
 
 @dataclass(frozen=True, repr=False)
 class DeclaredPmi(Readable):
     """The features, patterns and datum targets that the PMI of a file has become, and what became of each annotation."""
 
-    features: tuple[Feature | Pattern | DatumTargets, ...]
+    features: tuple[Declared, ...]
     annotations: tuple[DeclaredAnnotation, ...]
 
     @property
@@ -45,3 +36,105 @@ class DeclaredPmi(Readable):
         ]
         title = f"{len(self.features)} features, patterns and datum targets, which state {', '.join(counts)}"
         return "\n".join([title, *(f"  {annotation}" for annotation in self.undeclared)])
+
+
+@dataclass(frozen=True, repr=False)
+class DeclaredFile(Readable):
+    """The PMI of a file as features of `parts`, one for each body with toleranced faces, and what became of each annotation.
+
+    faces    the faces of the file by their records
+    faults   sentences on bodies whose shapes cannot be used
+    """
+
+    pmi: Pmi
+    parts: tuple[Part, ...]
+    annotations: tuple[DeclaredAnnotation, ...]
+    faces: FacesOfRecords
+    faults: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        features = tuple(declared for part in self.parts for declared in (*part.toleranced, *part.targets))
+        return "\n".join([str(DeclaredPmi(features, self.annotations)), *(f"  {fault}" for fault in self.faults)])
+
+
+def features_from_pmi(part: Part) -> DeclaredPmi:
+    """Declare the features of a part that the PMI of its STEP file states, and return them with all that is not declared.
+
+    The part has to come from a STEP file of AP242. Faces of one surface are one feature, and so are the two planes of a slot or
+    a tab whose size or position is toleranced. A feature is named after the letter of its datum, else after its kind and the
+    number of its first face, as in "cylinder 12". Features that the part has already stay as they are.
+    Raises OptionError if the file cannot be read, or states no PMI.
+    """
+    geometry = part.geometry
+    name = f'part "{shown(part.name)}"'
+    if not (isinstance(geometry, Mesh) and geometry.is_step):
+        raise OptionError(f"{name} is a {geometry}; only a STEP file of AP242 states PMI")
+    try:
+        pmi = read_pmi(geometry.source)
+        read = shape(geometry)
+    except (OptionError, GeometryFault) as error:
+        raise OptionError(f"{name}: {error}") from error
+    if pmi.is_empty:
+        raise OptionError(f"{name}: its file states no tolerances, dimensions or datums as AP242 does")
+    features, claims, report = declare_features(part, pmi, read)
+    return DeclaredPmi(features, tuple(map(report.result, claims)))
+
+
+def declared_file(path: Path, pmi: Pmi) -> DeclaredFile:
+    """Declare the PMI of a file on its bodies, as far as features can state it.
+
+    A body that stands at several places is declared once. Raises OptionError if the file has no shapes that can be used.
+    """
+    model = Assembly(path.stem)
+    bodies, faces = bodies_in(path), faces_of_records(path)
+    parts, known, faults = list[Part](), set[frozenset[int]](), list[str]()
+    reports = list[tuple[list[Claim], Report]]()
+    for body in bodies:
+        records = frozenset(record for record, face in faces.items() if body.number in face.bodies) & _records(pmi)
+        if not records or records in known:
+            continue
+        known.add(records)
+        geometry = Mesh(path, body=body.number if len(bodies) > 1 else None, chord=LISTING_CHORD)
+        try:
+            read = shape(geometry)
+        except GeometryFault as fault:
+            faults.append(f"body {body.number}: {fault}")
+            continue
+        part = model.part(part_name(body), geometry, at=body.at, rotation=body.rotation)
+        reports.append(declare_features(part, pmi, read)[1:])
+        parts.append(part)
+        kinds = {face.number: face.kind for face in describe_faces(read.mesh)}
+        faces |= {record: replace(faces[record], kind=kinds[faces[record].number]) for record in records}
+    if faults and not parts:
+        raise OptionError("; ".join(faults))
+    if not parts:  # what the file states is on edges and curves, or on no body
+        reasons = (
+            (annotation, "none of its faces is on a body" if annotation.face_records else NO_FACE) for annotation in _all(pmi)
+        )
+        return DeclaredFile(pmi, (), tuple(DeclaredAnnotation(annotation, (), reason) for annotation, reason in reasons), faces)
+    merged = tuple(_merged(parts, reports, k) for k in range(len(reports[0][0])))
+    return DeclaredFile(pmi, tuple(parts), merged, faces, tuple(faults))
+
+
+def _records(pmi: Pmi) -> frozenset[int]:
+    """Return the records of all faces to which annotations apply."""
+    ends = (record for dimension in pmi.dimensions for record in dimension.end_face_records)
+    return frozenset((*(record for annotation in _all(pmi) for record in annotation.face_records), *ends))
+
+
+def _all(pmi: Pmi) -> tuple[Annotation, ...]:
+    return (*pmi.datums, *pmi.dimensions, *pmi.tolerances)
+
+
+def _merged(parts: Sequence[Part], reports: Sequence[tuple[list[Claim], Report]], k: int) -> DeclaredAnnotation:
+    """Return what became of annotation `k` on all parts together."""
+    claims = [(part, claims[k], report) for part, (claims, report) in zip(parts, reports, strict=True)]
+    placed = [entry for entry in claims if entry[1].numbers] or claims[:1]
+    names, reasons = list[str](), list[str]()
+    for part, claim, report in placed:
+        names += [f"{part.name}.{name}" if len(parts) > 1 else name for name in report.names[claim]]
+        reasons += [f"{part.name}: {reason}" if len(placed) > 1 else reason for reason in report.reasons(claim)]
+    _, claim, _ = claims[0]
+    missing = claim.stated - sum(len(placed_claim.numbers) for _, placed_claim, _ in placed)
+    reasons += [missing_faces(missing, claim.stated)] if 0 < missing < claim.stated else []
+    return DeclaredAnnotation(claim.annotation, tuple(dict.fromkeys(names)), "; ".join(dict.fromkeys(reasons)))

@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 from tolcontact.pmi.annotations import Dimension
 from tolcontact.pmi.aspects import DATUM_SIZE, LOCATIONS, SIZES, Aspects, features_of
-from tolcontact.pmi.part21 import Records
-from tolcontact.pmi.quantities import Quantity, quantity
+from tolcontact.pmi.part21 import Quantity, Records, quantity
 
 _KINDS = {
     "ANGULAR_SIZE": "angular size", "DIMENSIONAL_SIZE_WITH_PATH": "size with path", DATUM_SIZE: "size",

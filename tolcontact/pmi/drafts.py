@@ -1,29 +1,37 @@
-"""Drafts of the features and patterns that annotations of a file state, before their tolerances are tried together."""
+"""Declaration of features, patterns and datum targets of a part from the PMI of its file.
+
+Annotations of one surface make up a draft. Drafts become features one after the other, each after its datums and with as many
+of its tolerances as go together; a report collects the reasons for the others. The part gets each
+feature as it is made, since patterns ask it for their members.
+"""
 
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 from tolcontact.declaration import Brep, DatumTargets, Face, Feature, Part, Pattern
 from tolcontact.declaration.feature_tolerance import GeometricTolerance
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.values import Vector, script_line
 from tolcontact.errors import GeometryFault
+from tolcontact.features import Features, datum_order
 from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, SlabFeature
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.pattern_geometry import check_alike
 from tolcontact.geometry.faces import Meshes, patch
+from tolcontact.geometry.files import Shape
 from tolcontact.pmi import declarable
-from tolcontact.pmi.annotations import Datum, Dimension, Tolerance
-from tolcontact.pmi.claims import Claim, Place
+from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
+from tolcontact.pmi.claims import Claim, Place, Report, claims_of
 from tolcontact.pmi.declarable import Undeclared
 from tolcontact.pmi.toleranced_surfaces import TolerancedSurfaces
 
 Constituent = Size | GeometricTolerance
+Statement = tuple[Claim, Constituent]
 Declared = Feature | Pattern | DatumTargets
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class Draft:
     """A feature, a pattern of several members or targets of a datum, and the tolerances that it may state, with their claims.
 
@@ -32,51 +40,35 @@ class Draft:
     datum       claim of the datum that it is
     borrowed    drafts whose features make up a pattern that is a datum alone, or on which targets are
     targets     points of a datum, one for each of `borrowed`
-    is_needed   whether it is to be declared even without tolerances
-    declared    what it became
     """
 
     name: str
-    faces: list[tuple[Face, ...]] = field(default_factory=list)
-    geometries: list[FeatureGeometry] = field(default_factory=list)
+    faces: tuple[tuple[Face, ...], ...] = ()
+    geometries: tuple[FeatureGeometry, ...] = ()
     datum: Claim | None = None
-    stated: list[tuple[Claim, Constituent]] = field(default_factory=list)
+    stated: tuple[Statement, ...] = ()
     borrowed: "tuple[Draft, ...]" = ()
     targets: tuple[Vector, ...] = ()
-    is_needed: bool = False
-    declared: Declared | None = None
 
     @property
     def letter(self) -> str | None:
         """The letter of the datum that it is."""
         return self.datum.annotation.letter if self.datum and isinstance(self.datum.annotation, Datum) else None
 
-    @property
-    def letters(self) -> set[str]:
-        """The letters of the datums to which its tolerances refer."""
-        return {letter for _, constituent in self.stated for letter in letters_of(constituent)}
 
-    def with_tolerances(self, part: Part, tolerances: tuple[Constituent, ...]) -> Declared:
-        """Return what it declares with some tolerances."""
-        name = self.letter or self.name
-        if len(self.faces) == 1:
-            return Feature(name, part, self.faces[0], tolerances, self.letter, script_line())
-        borrowed = tuple(draft.declared for draft in self.borrowed if isinstance(draft.declared, Feature))
-        if self.targets:
-            points = zip(borrowed, self.targets, strict=True) if len(borrowed) == len(self.targets) else ()
-            return DatumTargets(name, tuple(feature.point(*point) for feature, point in points), script_line())
-        return Pattern(name, part, borrowed or tuple(self.faces), tolerances, self.letter, script_line())
+def declare_features(part: Part, pmi: Pmi, read: Shape) -> tuple[tuple[Declared, ...], list[Claim], Report]:
+    """Declare the features that PMI states of a part with a shape; return them, and what became of each claim."""
+    surfaces = TolerancedSurfaces(read)
+    claims = claims_of(pmi, surfaces)
+    report = Report(claims)
+    meshes = {part: read.mesh}
+    drafts = _drafts(part, meshes, claims, surfaces, report)
+    declared = _Trial(part, meshes, report).features(drafts)
+    return tuple(declared[draft] for draft in drafts if draft in declared), claims, report
 
 
-def letters_of(constituent: Constituent) -> set[str]:
-    """Return the letters of the datums to which a tolerance refers."""
-    if isinstance(constituent, Size):
-        return set()
-    return {letter for compartment in constituent.system for letter in compartment}
-
-
-def drafts_of(part: Part, meshes: Meshes, claims: Sequence[Claim], surfaces: TolerancedSurfaces) -> list[Draft]:
-    """Return drafts of the features and patterns of a part. Claims that cannot be stated get the reasons."""
+def _drafts(part: Part, meshes: Meshes, claims: Sequence[Claim], surfaces: TolerancedSurfaces, report: Report) -> list[Draft]:
+    """Return drafts of the features and patterns of a part."""
     drafts: dict[Place, Draft] = {}
     for claim in claims:
         for place in claim.places:
@@ -84,24 +76,23 @@ def drafts_of(part: Part, meshes: Meshes, claims: Sequence[Claim], surfaces: Tol
             try:
                 if place not in drafts:
                     drafts[place] = _draft(name, part, meshes, place)
-                _state(claim, drafts[place])
+                drafts[place] = _with_claim(drafts[place], claim)
             except (Undeclared, GeometryFault) as reason:
-                claim.refuse(reason, name)
-    datums = [claim for claim in claims if isinstance(claim.annotation, Datum) and not claim.refusals]
+                report.refuse(claim, reason, name)
+    datums = [claim for claim in claims if isinstance(claim.annotation, Datum) and not report.is_refused(claim)]
     targeted = [claim for claim in datums if claim.targets]
     common_datums: dict[frozenset[Place], Claim] = {}
     for claim in datums:
         if len(claim.places) > 1 and not claim.targets:
             earlier = common_datums.setdefault(frozenset(claim.places), claim)
             if earlier is not claim and isinstance(earlier.annotation, Datum):
-                claim.refuse(f"its surfaces are datum {earlier.annotation.letter} already")
+                report.refuse(claim, f"its surfaces are datum {earlier.annotation.letter} already")
     separate = [*common_datums.keys(), *(frozenset([place]) for claim in targeted for place in claim.places)]
-    merged = list(_patterns(drafts, separate))
-    for pattern, places in merged:
-        pattern.datum = common_datums.pop(places, None)
+    patterns = []
+    for pattern, places in list(_patterns(drafts, separate)):
+        patterns.append(replace(pattern, datum=common_datums.pop(places, None)))
         for place in places:
             del drafts[place]
-    patterns = [pattern for pattern, _ in merged]
     datum_drafts = [_common_datum(claim, drafts) for claim in (*common_datums.values(), *targeted)]
     return [*drafts.values(), *patterns, *datum_drafts]
 
@@ -117,28 +108,30 @@ def _draft(name: str, part: Part, meshes: Meshes, place: Place) -> Draft:
     geometry = feature_geometry([patch(face, meshes) for face in faces])
     if isinstance(geometry, SlabFeature):
         name = name.replace("planes", "slot" if geometry.is_inner else "tab")
-    return Draft(name, [faces], [geometry])
+    return Draft(name, (faces,), (geometry,))
 
 
-def _state(claim: Claim, draft: Draft) -> None:
-    """Add what a claim states to a draft of a feature. Raises Undeclared."""
+def _with_claim(draft: Draft, claim: Claim) -> Draft:
+    """Return a draft of a feature with what a claim states. Raises Undeclared."""
     (geometry,) = draft.geometries
+    constituent: Constituent
     match claim.annotation:
         case Datum():
             if len(claim.places) > 1 or claim.targets:
-                return
+                return draft
             if draft.letter is not None:
                 raise Undeclared(f"its surface is datum {draft.letter} already")
-            draft.datum = claim
+            return replace(draft, datum=claim)
         case Dimension() as dimension:
             if not isinstance(geometry, FeatureOfSize):
                 kind = draft.name.split()[0]
                 raise Undeclared(
                     f"sizes of features are those of cylinders, spheres and two opposed planes, and it is a {kind}"
                 )
-            draft.stated.append((claim, declarable.size(dimension, geometry.size, is_inner=geometry.is_inner)))
+            constituent = declarable.size(dimension, geometry.size, is_inner=geometry.is_inner)
         case tolerance:
-            draft.stated.append((claim, declarable.tolerance(tolerance, is_axis=isinstance(geometry, AxisFeature))))
+            constituent = declarable.tolerance(tolerance, is_axis=isinstance(geometry, AxisFeature))
+    return replace(draft, stated=(*draft.stated, (claim, constituent)))
 
 
 def _patterns(drafts: Mapping[Place, Draft], datums: Collection[frozenset[Place]]) -> Iterator[tuple[Draft, frozenset[Place]]]:
@@ -153,10 +146,10 @@ def _patterns(drafts: Mapping[Place, Draft], datums: Collection[frozenset[Place]
     for group in groups.values():
         places, members = frozenset(group), [drafts[place] for place in group]
         is_divided = any(places & datum and places != datum for datum in datums)
-        if len(members) > 1 and not is_divided and _are_alike(members):
+        geometries = tuple(geometry for member in members for geometry in member.geometries)
+        if len(members) > 1 and not is_divided and _are_alike(geometries):
             kind, number = members[0].name.split()
-            faces = [faces for member in members for faces in member.faces]
-            geometries = [geometry for member in members for geometry in member.geometries]
+            faces = tuple(faces for member in members for faces in member.faces)
             yield Draft(f"{kind}s {number}", faces, geometries, stated=members[0].stated), places
 
 
@@ -168,19 +161,137 @@ def _keeps_together(claim: Claim) -> bool:
     )
 
 
-def _are_alike(members: Sequence[Draft]) -> bool:
+def _are_alike(geometries: Sequence[FeatureGeometry]) -> bool:
     try:
-        check_alike([geometry for member in members for geometry in member.geometries])
+        check_alike(geometries)
     except GeometryFault:
         return False
     return True
 
 
 def _common_datum(claim: Claim, drafts: Mapping[Place, Draft]) -> Draft:
-    """Return the draft of a datum of several surfaces, or of targets on them; each surface is a feature by itself."""
+    """Return the draft of a datum of several surfaces, or of targets on them; each surface is a feature of its own."""
     place_of = {number: place for place in claim.places for surface in place for number in surface}
     places = [place_of[number] for number, _ in claim.targets] or claim.places
     borrowed = tuple(drafts[place] for place in places)
-    for draft in borrowed:
-        draft.is_needed = True
     return Draft("", datum=claim, borrowed=borrowed, targets=tuple(point for _, point in claim.targets))
+
+
+class _Trial:
+    """The features of a part as numbers, and what drafts become of them one after the other."""
+
+    def __init__(self, part: Part, meshes: Meshes, report: Report) -> None:
+        self._part, self._meshes, self._report = part, meshes, report
+        self._numbers = Features(0)
+        self._declared: dict[Draft, Declared] = {}
+        for earlier in datum_order(part)[0]:
+            self._add(earlier, self._numbers)
+
+    def features(self, drafts: Sequence[Draft]) -> dict[Draft, Declared]:
+        """Declare the features of drafts, each after its datums and members, as far as their tolerances go together."""
+        needed = {member for draft in drafts for member in draft.borrowed}
+        letters = {None, *self._numbers.datums(0)}
+        stated = {draft: draft.stated for draft in drafts}
+        stated = self._followable(drafts, stated, letters | {draft.letter for draft in drafts}, "is not declared")
+        waiting = list(drafts)
+        while waiting:
+            ready = [
+                draft
+                for draft in waiting
+                if not any(letters_of(constituent) - letters for _, constituent in stated[draft])
+                and not any(member in waiting for member in draft.borrowed)
+            ]
+            for draft in ready:
+                declared = self._made(draft, stated[draft], is_needed=draft in needed)
+                if declared is not None:
+                    self._add(declared, self._numbers)
+                    self._declared[draft] = declared
+                    self._part.add(declared)
+            waiting = [draft for draft in waiting if draft not in ready]
+            letters |= {draft.letter for draft in ready}
+            if not ready:  # a circle: its first draft with tolerances goes without those that lead into it
+                first = next(draft for draft in waiting if stated[draft])
+                stated |= self._followable([first], stated, letters, "refers back to it")
+        return self._declared
+
+    def _followable(
+        self,
+        drafts: Sequence[Draft],
+        stated: Mapping[Draft, tuple[Statement, ...]],
+        letters: Collection[str | None],
+        reason: str,
+    ) -> dict[Draft, tuple[Statement, ...]]:
+        """Return the statements of each draft that refer to datums with some letters only."""
+        followable = dict[Draft, tuple[Statement, ...]]()
+        for draft in drafts:
+            absent = {claim: letters_of(constituent) - set(letters) for claim, constituent in stated[draft]}
+            for claim, missing in absent.items():
+                if missing:
+                    self._report.refuse(claim, f"datum {min(missing)} {reason}", draft.name)
+            followable[draft] = tuple(statement for statement in stated[draft] if not absent[statement[0]])
+        return followable
+
+    def _made(self, draft: Draft, stated: Sequence[Statement], *, is_needed: bool) -> Declared | None:
+        """Return a feature with all that it can state together; None if that is nothing."""
+        tolerances: tuple[Constituent, ...] = ()
+        datum, name, refuse = draft.datum, draft.letter or draft.name, self._report.refuse
+        absent = [member.letter or member.name for member in draft.borrowed if member not in self._declared]
+        if absent and datum:
+            refuse(datum, f"of its surfaces, {', '.join(dict.fromkeys(absent))} could not be declared")
+            return None
+        if datum and draft.letter in self._numbers.datums(0):
+            refuse(datum, self._fault(self._feature(draft, ())) or f"the part has a datum {draft.letter} already")
+            if draft.borrowed:
+                return None
+            draft = replace(draft, datum=None)
+            datum, name = None, draft.name
+        for claim, constituent in sorted(stated, key=lambda statement: not isinstance(statement[1], Size)):
+            if reason := self._fault(self._feature(draft, (*tolerances, constituent))):
+                refuse(claim, reason, name)
+            else:
+                self._report.names[claim].append(name)
+                tolerances = (*tolerances, constituent)
+        if not (tolerances or datum or is_needed):
+            return None
+        declared = self._feature(draft, tolerances)
+        reason = self._fault(declared)
+        if datum and reason:
+            refuse(datum, reason)
+        elif datum:
+            self._report.names[datum].append(name)
+        return None if reason else declared
+
+    def _feature(self, draft: Draft, tolerances: tuple[Constituent, ...]) -> Declared:
+        """Return what a draft declares with some tolerances."""
+        name, letter, part = draft.letter or draft.name, draft.letter, self._part
+        if len(draft.faces) == 1:
+            return Feature(name, part, draft.faces[0], tolerances, letter, script_line())
+        members = [self._declared.get(member) for member in draft.borrowed]
+        borrowed = tuple(member for member in members if isinstance(member, Feature))
+        if draft.targets:
+            points = zip(borrowed, draft.targets, strict=True) if len(borrowed) == len(draft.targets) else ()
+            return DatumTargets(name, tuple(feature.point(*point) for feature, point in points), script_line())
+        return Pattern(name, part, borrowed or draft.faces, tolerances, letter, script_line())
+
+    def _add(self, declared: Declared, numbers: Features) -> None:
+        if isinstance(declared, DatumTargets):
+            numbers.add_targets(declared, 0)
+        else:
+            numbers.add(declared, 0, self._meshes)
+
+    def _fault(self, declared: Declared) -> str:
+        """Return why something cannot be added to what is declared before it; "" if it can."""
+        for fault in declared.faults():
+            return fault
+        try:
+            self._add(declared, self._numbers.copy())
+        except GeometryFault as error:
+            return str(error)
+        return ""
+
+
+def letters_of(constituent: Constituent) -> set[str]:
+    """Return the letters of the datums to which a tolerance refers."""
+    if isinstance(constituent, Size):
+        return set()
+    return {letter for compartment in constituent.system for letter in compartment}

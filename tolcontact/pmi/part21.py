@@ -1,36 +1,27 @@
-"""The records of a STEP file (ISO 10303-21), by number and entity. Parameters are parsed when they are asked for.
+"""The records of a STEP file (ISO 10303-21), by number and entity, and the measures that they state [mm, rad].
 
-Time and memory are linear in the size of any text: the patterns are possessive and never backtrack.
+Parameters are parsed when they are asked for, in linear time: the patterns are possessive and never backtrack.
 """
 
+import math
 import re
-import sys
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple, TypeAlias
 
 from tolcontact.errors import OptionError
-from tolcontact.geometry.files.step_text import decoded
+from tolcontact.geometry.files.step_text import STATEMENT, StepText, decoded, entity_name
 
+MAX_CONVERSIONS = 4  # an inch is defined in mm: one conversion
+_PREFIXES = {
+    "exa": 1e18, "peta": 1e15, "tera": 1e12, "giga": 1e9, "mega": 1e6, "kilo": 1e3, "hecto": 1e2, "deca": 10.0, "deci": 0.1,
+    "centi": 0.01, "milli": 1e-3, "micro": 1e-6, "nano": 1e-9, "pico": 1e-12, "femto": 1e-15, "atto": 1e-18,
+}  # fmt: skip
 MAX_NESTING = 64  # lists in lists; files have three or four
-# Up to a semicolon outside strings: number, entity, parameters, semicolon. A longer number is no number.
-_STATEMENT = re.compile(rb"\s*+(?:#(\d{1,18}+)\s*+=\s*+)?+([A-Za-z_]\w*+)?+((?:[^';]++|'[^']*+'?)*+)(;?)")
-_COMMENT = re.compile(rb"('[^']*+'?)|/\*(?:[^*]++|\*(?!/))*+(?:\*/)?")
-_STRING = re.compile(rb"'[^']*+'?")
-_ENTITY = re.compile(rb"([A-Za-z_]\w*+)\s*+\(")
-_SCHEMA = re.compile(rb"'((?:[^']|'')*+)'")
 _TOKEN = re.compile(
     rb"""\s*+(?:(?P<open>(?:!?[A-Za-z_]\w*+\s*+)?+\()|(?P<close>\))|(?P<comma>,)|(?P<reference>\#\d{1,18}+)|(?P<unset>[$*])
     |(?P<string>'(?:[^']|'')*+')|(?P<word>\.\w++\.)|(?P<number>[-+]?\d++(?:\.\d*+)?+(?:[eE][-+]?\d++)?+)|(?P<binary>"\w*+"))""",
     re.VERBOSE,
 )
-# Shapes are most of a file, and the walk does not enter them.
-_SHAPES = frozenset(
-    (b"CARTESIAN_POINT", b"DIRECTION", b"VECTOR", b"LINE", b"VERTEX_POINT", b"EDGE_CURVE", b"ORIENTED_EDGE", b"EDGE_LOOP",
-     b"FACE_BOUND", b"FACE_OUTER_BOUND", b"AXIS2_PLACEMENT_3D", b"CIRCLE", b"PCURVE", b"SURFACE_CURVE", b"SEAM_CURVE", b"PLANE",
-     b"CYLINDRICAL_SURFACE", b"B_SPLINE_CURVE_WITH_KNOTS", b"B_SPLINE_SURFACE_WITH_KNOTS", b"COORDINATES_LIST", b"POLYLINE",
-     b"TESSELLATED_CURVE_SET", b"DEFINITIONAL_REPRESENTATION", b"STYLED_ITEM", b"COMPOSITE_CURVE_SEGMENT")
-)  # fmt: skip
 
 
 class Reference(int):
@@ -99,34 +90,31 @@ class Records:
     """
 
     def __init__(self, content: bytes, title: str) -> None:
-        self.schema = ""
+        self._text = StepText(content)
+        self.schema = self._text.schema
         self._title = title
-        self._bodies: dict[int, bytes] = {}
-        self._entities: dict[int, str] = {}  # of simple instances, so that most records are never parsed
         self._parsed: dict[int, Mapping[str, Parameters]] = {}
-        self._numbers: dict[str, list[int]] = defaultdict(list)
-        self._content = _COMMENT.sub(rb"\1", content) if b"/*" in content else content
-        if not self._scan(self._content):
+        if not self._text.is_complete:
             raise OptionError(
                 f'"{title}" is cut off, or a text in it is not closed: it does not end with END-ISO-10303-21; export it again'
             )
 
     def __len__(self) -> int:
-        return len(self._bodies)
+        return len(self._text.bodies)
 
     def names(self) -> Iterable[str]:
         """Return the names of all entities in the file, but those of most shapes."""
-        return self._numbers.keys()
+        return self._text.numbers.keys()
 
     def numbers(self, *entities: str) -> list[int]:
         """Return the numbers of all records of these entities, in ascending order."""
-        numbers = {number for entity in entities for number in self._numbers.get(entity, ())}
+        numbers = {number for entity in entities for number in self._text.numbers.get(entity, ())}
         return sorted(number for number in numbers if self.has(number, *entities))
 
     def has(self, number: int, *entities: str) -> bool:
         """Return whether a record is of one of these entities."""
-        if number in self._entities:
-            return self._entities[number] in entities
+        if number in self._text.entities:
+            return self._text.entities[number] in entities
         return not self.entities(number).keys().isdisjoint(entities)
 
     def entities(self, number: int) -> Mapping[str, Parameters]:
@@ -135,7 +123,7 @@ class Records:
         Raises OptionError if it is damaged.
         """
         if number not in self._parsed:
-            body = self._bodies.get(number, b"")
+            body = self._text.bodies.get(number, b"")
             values = _parse(body)
             if values is None:
                 raise OptionError(
@@ -154,41 +142,12 @@ class Records:
     def shapes(self, *numbers: int) -> dict[int, Parameters]:
         """Return the parameters of records of shapes, by their numbers. All of the file is searched, once for each call."""
         found, wanted = dict[int, Parameters](), frozenset(numbers)
-        for match in _STATEMENT.finditer(self._content) if numbers else ():
+        for match in STATEMENT.finditer(self._text.content) if numbers else ():
             number, entity, body, _ = match.groups()
             if number is not None and entity is not None and int(number) in wanted:
                 values = _parse(body)
                 found[int(number)] = next((value for value in values or () if isinstance(value, Parameters)), Parameters())
         return found
-
-    def _scan(self, content: bytes) -> bool:
-        """Take the records of a file, and return whether it is complete."""
-        for match in _STATEMENT.finditer(content):
-            number, entity, body, end = match.groups()
-            if number is not None:
-                self._take(int(number), entity, body)
-            elif entity == b"FILE_SCHEMA" and (schema := _SCHEMA.search(body)):
-                self.schema = decoded(schema[1])
-            elif entity == b"END" and body.startswith(b"-ISO-10303-21"):
-                return bool(end)
-        return False
-
-    def _take(self, number: int, entity: bytes | None, body: bytes) -> None:
-        if entity in _SHAPES or number in self._bodies:
-            return
-        if entity is None:
-            self._bodies[number] = body
-            for name in dict.fromkeys(_ENTITY.findall(_STRING.sub(b"", body))):
-                self._numbers[_name(name)].append(number)
-            return
-        name = sys.intern(_name(entity))
-        self._bodies[number] = entity + body
-        self._entities[number] = name
-        self._numbers[name].append(number)
-
-
-def _name(entity: bytes) -> str:
-    return entity.decode("latin-1").upper()
 
 
 def _parse(text: bytes) -> Parameters | None:
@@ -202,7 +161,7 @@ def _parse(text: bytes) -> Parameters | None:
         position = token.end()
         match token.lastgroup:
             case "open":
-                stack.append((_name(token["open"][:-1].strip()), []))
+                stack.append((entity_name(token["open"][:-1].strip()), []))
             case "close":
                 name, values = stack.pop()
                 if not stack:
@@ -226,3 +185,57 @@ def _value(kind: str, token: bytes) -> Value:
         case "number":
             return float(token)
     return None
+
+
+class Quantity(NamedTuple):
+    """A `value` in its `unit`: "mm" or "rad"."""
+
+    value: float
+    unit: str
+
+
+def quantity(records: Records, number: int) -> Quantity | None:
+    """Return the measure that a record states; None if it states no finite length or angle."""
+    return _quantity(records, number, MAX_CONVERSIONS)
+
+
+def length(records: Records, number: int) -> float | None:
+    """Return the length [mm] that a record states, or None."""
+    measure = quantity(records, number)
+    return measure.value if measure and measure.unit == "mm" else None
+
+
+def length_unit(records: Records, context: int) -> float | None:
+    """Return the unit [mm] of lengths in the context of a representation; None if it states none."""
+    assigned = records.parameters(context, "GLOBAL_UNIT_ASSIGNED_CONTEXT")
+    units = (_unit(records, number, MAX_CONVERSIONS) for number in assigned.references(0))
+    return next((unit.value for unit in units if unit is not None and unit.unit == "mm"), None)
+
+
+def _quantity(records: Records, number: int, conversions: int) -> Quantity | None:
+    for entity, parameters in records.entities(number).items():
+        if entity.endswith(("MEASURE_WITH_UNIT", "MEASURE_REPRESENTATION_ITEM")) and parameters:
+            return _measure(records, parameters, conversions)
+    return None
+
+
+def _measure(records: Records, parameters: Parameters, conversions: int) -> Quantity | None:
+    """Return a measure from its parameters: a number, with or without its type, and its unit, after a name if it has any."""
+    for index, value in enumerate(parameters):
+        for number in flat(value) if isinstance(value, Typed | float) else ():
+            unit = _unit(records, parameters.reference(index + 1), conversions)
+            if isinstance(number, float) and unit is not None and math.isfinite(number * unit.value):
+                return Quantity(number * unit.value, unit.unit)
+    return None
+
+
+def _unit(records: Records, number: int, conversions: int) -> Quantity | None:
+    """Return a unit of length or of angle in mm or rad; None for any other, and for one that is defined by itself."""
+    instance = records.entities(number)
+    if "CONVERSION_BASED_UNIT" in instance and conversions:
+        return _quantity(records, instance["CONVERSION_BASED_UNIT"].reference(1), conversions - 1)
+    words = [word for index in range(3) for word in instance.get("SI_UNIT", Parameters()).words(index)]
+    scale = next((_PREFIXES[word] for word in words if word in _PREFIXES), 1.0)
+    if "metre" in words:
+        return Quantity(scale / _PREFIXES["milli"], "mm")
+    return Quantity(scale, "rad") if "radian" in words else None

@@ -13,7 +13,7 @@ from tolcontact.declaration.feature_tolerance import GeometricTolerance
 from tolcontact.declaration.size import Size
 from tolcontact.errors import shown
 from tolcontact.pmi.annotations import Tolerance
-from tolcontact.pmi.declared_file import DeclaredFile
+from tolcontact.pmi.declared import DeclaredFile
 
 MAX_WIDTH = 120  # of a line that can be broken
 _DIGITS = 9  # of lengths: more than a shape resolves

@@ -6,8 +6,7 @@ from typing import NamedTuple
 from tolcontact.pmi.annotations import Tolerance
 from tolcontact.pmi.aspects import Aspects
 from tolcontact.pmi.datums import datum_system
-from tolcontact.pmi.part21 import Parameters, Records
-from tolcontact.pmi.quantities import length
+from tolcontact.pmi.part21 import Parameters, Records, length
 
 # Entities, and the kinds of tolerances that ISO 1101 and ASME Y14.5 know.
 KINDS = {

@@ -1,8 +1,7 @@
 """Shape files: they are screened, read in another process, and split into bodies."""
 
 from tolcontact.geometry.files.product import BREP, FACE_NAMES, STATED_FACES, SURFACES
-from tolcontact.geometry.files.reader import ReadingLimits
-from tolcontact.geometry.files.reading import Contents, Shape, key_of, read, read_files
+from tolcontact.geometry.files.reading import Contents, ReadingLimits, Shape, key_of, read, read_files
 
 __all__ = [
     "BREP",

@@ -1,4 +1,8 @@
-"""The bodies of a STEP file: their triangles and their places. A part is one body. Lengths in mm."""
+"""The bodies of a STEP file: their shapes, their B-rep faces and their places. A part is one body. Lengths in mm.
+
+A face may stand in its shell a second time. Its triangles then repeat those of the first one, which counts for both. All other
+faces have numbers, also those of which the kernel makes no triangles at some chord: numbers do not depend on it.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -6,9 +10,62 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tolcontact.errors import clipped
-from tolcontact.geometry.files.stated_face import StatedFace
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 
 MAX_LISTED = 12  # bodies that a message lists
+
+
+@dataclass(frozen=True, eq=False)
+class FaceMeasure:
+    """The `area` of a face [mm2], a `point` (3,) on it [mm], and its outward `normal` (3,) there."""
+
+    area: float
+    point: np.ndarray
+    normal: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class StatedFace:
+    """A B-rep face.
+
+    name     "" for a face without a name
+    records  numbers of its records in the file's text, its own first, then those of its copies; empty if it states no PMI
+    copies   number of other faces that stand in the same place, and have no triangles of their own
+    measure  None if the kernel finds none, as for a face that the file states by triangles
+    """
+
+    name: str = ""
+    records: tuple[int, ...] = ()
+    copies: int = 0
+    measure: FaceMeasure | None = None
+
+    def placed(self, R: np.ndarray, t: np.ndarray) -> "StatedFace":
+        """Return the face in a frame to which its own is turned by `R` (3, 3) and moved by `t` (3,) [mm]."""
+        if self.measure is None:
+            return self
+        return replace(self, measure=FaceMeasure(self.measure.area, R @ self.measure.point + t, R @ self.measure.normal))
+
+
+@dataclass(frozen=True, eq=False)
+class StepShape:
+    """The shape of a body, or of several equal ones, in the frame of its product.
+
+    vertices     (vertex, 3) [mm]
+    triangles    (triangle, 3)
+    brep         (triangle,) the B-rep face of each triangle, from 0
+    faces        the B-rep faces, in the file's order
+    surfaces     of the B-rep faces; None for an unknown one
+    face_count   number of B-rep faces that the file states for a solid; 0 if it is no solid
+    gap_count    number of edges that have a triangle on one side only
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    brep: np.ndarray
+    faces: tuple[StatedFace, ...]
+    surfaces: tuple[AnalyticSurface | None, ...]
+    face_count: int
+    gap_count: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,62 +75,24 @@ class Body:
     name          a name that no other body of the file has; "" if the file states none
     path          names of the products that contain the body, from the root on
     place         (4, 4): from its own frame to the frame of the file [mm]
-    triangles     (face,) its triangles among those of the file
-    lower, upper  (3,) corners of the box around the body in its place
+    box           (2, 3) lower and upper corner of the box around the body in its place
     is_open       whether its triangles do not close
-    faces         its B-rep faces, in the file's order
-    face_count    number of B-rep faces that the file states for a solid; 0 if it is no solid
     """
 
     name: str
     path: tuple[str, ...]
     place: np.ndarray
-    triangles: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
+    box: np.ndarray
     is_open: bool
-    faces: tuple[StatedFace, ...]
-    face_count: int
+    shape: StepShape
 
     def __str__(self) -> str:
         title = ("open, " if self.is_open else "") + (f'"{clipped(self.name, 60)}"' if self.name else "without a name")
-        size = " x ".join(f"{length:.4g}" for length in self.upper - self.lower)
-        return f"{title}, {size} mm at ({', '.join(f'{x:.4g}' for x in (self.lower + self.upper) / 2)})"
+        size = " x ".join(f"{length:.4g}" for length in self.box[1] - self.box[0])
+        return f"{title}, {size} mm at ({', '.join(f'{x:.4g}' for x in self.box.sum(axis=0) / 2)})"
 
 
-@dataclass(frozen=True, eq=False)
-class StepShape:
-    """The shape of a body in the frame of its product.
-
-    triangles     (face,) its triangles among those of the file
-    is_open       whether the triangles do not close
-    faces         its B-rep faces, in the file's order
-    face_count    number of B-rep faces that the file states for a solid; 0 if it is no solid
-    """
-
-    triangles: np.ndarray
-    is_open: bool
-    faces: tuple[StatedFace, ...]
-    face_count: int
-
-
-@dataclass(frozen=True)
-class ShapePlace:
-    """A `shape` at a `place` (4, 4) [mm] within a `box` (2, 3); `path` are names of its products, `name` is the body's."""
-
-    shape: int
-    place: np.ndarray
-    box: np.ndarray
-    path: tuple[str, ...]
-    name: str
-
-
-def bodies(shapes: Sequence[StepShape], places: Sequence[ShapePlace]) -> list[Body]:
-    """Return the bodies of a file in its order."""
-    return list(_uniquely_named([_body(shapes[place.shape], place, is_alone=len(places) == 1) for place in places]))
-
-
-def _uniquely_named(bodies: Sequence[Body]) -> Iterator[Body]:
+def uniquely_named(bodies: Sequence[Body]) -> Iterator[Body]:
     """Yield the bodies with different names: repeated names are numbered in the file's order."""
     names = {body.name for body in bodies}
     used: set[str] = set()
@@ -90,12 +109,3 @@ def listed(bodies: Sequence[Body]) -> str:
     """Return a list of bodies for a message: numbers, names, sizes and places."""
     entries = "; ".join(f"{number}. {body}" for number, body in enumerate(bodies[:MAX_LISTED], start=1))
     return entries + (f"; and {len(bodies) - MAX_LISTED} more (see tolcontact bodies)" if len(bodies) > MAX_LISTED else "")
-
-
-def _body(shape: StepShape, place: ShapePlace, *, is_alone: bool) -> Body:
-    """Return the body of a shape at a place. A solid that is alone in its file is no sheet, though faces may be missing."""
-    is_open = shape.is_open and not (is_alone and shape.face_count)
-    lower, upper = place.box
-    return Body(
-        place.name, place.path, place.place, shape.triangles, lower, upper, is_open, shape.faces, shape.face_count
-    )  # fmt: skip

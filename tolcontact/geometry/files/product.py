@@ -3,23 +3,22 @@
 Lengths in mm.
 """
 
-import json
 import logging
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy.spatial
 import trimesh
 
 from tolcontact.errors import GeometryFault, nearest_name
-from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.edges import distinct_triangles, rim
-from tolcontact.geometry.files.bodies import Body, ShapePlace, StepShape, bodies, listed
-from tolcontact.geometry.files.stated_face import first_faces, stated_faces
-from tolcontact.geometry.files.step_surfaces import credible, onto, stated_surfaces
-from tolcontact.geometry.files.step_text import StepText, record_numbers
+from tolcontact.geometry.files.bodies import Body, FaceMeasure, StatedFace, StepShape, listed, uniquely_named
+from tolcontact.geometry.files.step_surfaces import credible, onto, stated_surface
+from tolcontact.geometry.files.step_text import StepText
 
 STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # largest distance [mm] and angle [rad] between triangles and true faces of a STEP file
 STEP_SHARE = 5e-6  # the chord of files larger than 0.4 m, as a share of their extent
@@ -38,19 +37,22 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class Product:
-    """All shapes in one mesh, each in its own frame, and the bodies in their places.
+    """The shapes that are bodies somewhere, and the bodies in their places.
 
-    shape, brep   (face,) the shape of each triangle, and the B-rep face within the shape
-    surfaces      (shape,) lists of the surfaces of B-rep faces, None for an unknown one
+    face_count   number of B-rep faces of all shapes, copies included
+    units        of lengths of shapes, as the file names them; empty if it states none
     """
 
     path: Path
-    mesh: trimesh.Trimesh
-    shape: np.ndarray
-    brep: np.ndarray
-    surfaces: tuple[list[AnalyticSurface | None], ...]
+    shapes: tuple[StepShape, ...]
     bodies: tuple[Body, ...]
-    text: StepText
+    face_count: int
+    units: str
+
+    @property
+    def missing_faces(self) -> int:
+        """The number of B-rep faces without triangles that are no copies of others."""
+        return sum(len(shape.faces) - len(np.unique(shape.brep)) for shape in self.shapes)
 
     def body(self, selector: str | int | None) -> Body:
         """Return the body with a name or a number from 1; with None, the only body.
@@ -76,90 +78,67 @@ class Product:
             raise GeometryFault(f'"{self.path}" holds no body {selector!r}; it holds {bodies}')
         return self.bodies[number]
 
-    @property
-    def missing_faces(self) -> int:
-        """The number of B-rep faces without triangles that are no copies of others."""
-        faces_of_shapes = {int(self.shape[body.triangles[0]]): body.faces for body in self.bodies}
-        pairs = np.unique(np.column_stack([self.shape, self.brep]), axis=0)
-        return sum(map(len, faces_of_shapes.values())) - len(pairs)
-
     def part(self, selector: str | int | None) -> trimesh.Trimesh:
         """Return the mesh of a body: in its own frame if it is selected, in its place if `selector` is None.
 
         The mesh carries BREP, whose numbers start from 0 in the file's order, SURFACES, FACE_NAMES and STATED_FACES.
         """
         body = self.body(selector)
-        triangles = body.triangles
-        corners, faces = np.unique(self.mesh.faces[triangles], return_inverse=True)
-        vertices = np.asarray(self.mesh.vertices)[corners]
-        brep = np.searchsorted([face.place for face in body.faces], self.brep[triangles])
-        stated = self.surfaces[int(self.shape[triangles[0]])]
-        surfaces, stated_faces = [stated[face.place] for face in body.faces], body.faces
+        shape = body.shape
+        vertices, surfaces, faces = np.array(shape.vertices), list(shape.surfaces), shape.faces
         if selector is None and not np.array_equal(body.place, np.eye(4)):
-            vertices = vertices @ body.place[:3, :3].T + body.place[:3, 3]
-            surfaces = [
-                None if surface is None else surface.placed(body.place[:3, :3], body.place[:3, 3]) for surface in surfaces
-            ]
-            stated_faces = tuple(face.placed(body.place[:3, :3], body.place[:3, 3]) for face in stated_faces)
-        mesh = trimesh.Trimesh(vertices, faces.reshape(-1, 3), process=False)
+            R, t = body.place[:3, :3], body.place[:3, 3]
+            vertices = vertices @ R.T + t
+            surfaces = [None if surface is None else surface.placed(R, t) for surface in surfaces]
+            faces = tuple(face.placed(R, t) for face in faces)
+        mesh = trimesh.Trimesh(vertices, np.array(shape.triangles), process=False)
         mesh.units = "mm"
-        mesh.face_attributes[BREP] = brep
-        mesh.metadata[SURFACES] = surfaces
-        names = tuple(face.name for face in stated_faces)
-        mesh.metadata[FACE_NAMES] = names if any(names) else ()
-        mesh.metadata[STATED_FACES] = stated_faces
-        self._check_closed(body, mesh)
+        mesh.face_attributes[BREP] = np.array(shape.brep)
+        names = tuple(face.name for face in faces)
+        mesh.metadata |= {SURFACES: surfaces, FACE_NAMES: names if any(names) else (), STATED_FACES: faces}
+        if shape.face_count and len(self.bodies) == 1 and shape.gap_count:
+            raise GeometryFault(
+                f'"{self.path}" holds a solid whose faces do not close ({shape.gap_count} edges have a triangle on one side '
+                f"only; {len(np.unique(shape.brep))} of {shape.face_count} faces could be read); repair it in CAD, or export "
+                "it again"
+            )
         return mesh
 
-    def _check_closed(self, body: Body, mesh: trimesh.Trimesh) -> None:
-        gaps = len(rim(mesh.faces)) if body.face_count and len(self.bodies) == 1 else 0
-        if gaps:
-            raise GeometryFault(
-                f'"{self.path}" holds a solid whose faces do not close ({gaps} edges have a triangle on one side only; '
-                f"{len(np.unique(mesh.face_attributes[BREP]))} of {body.face_count} faces could be read); repair it in CAD, or "
-                "export it again"
-            )
 
-
-def product(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> Product:
-    """Return the product in a STEP file from the `arrays` of `worker` and the file's text.
+def product(path: Path, content: Mapping[str, Any], text: StepText, chord: float) -> Product:
+    """Return the product in a STEP file from what the kernel reads at a `chord` [mm] (`kernel.step_document`), and the text.
 
     Raises GeometryFault if the file holds no surfaces, or coordinates are not finite or too large.
     """
-    check_numbers(arrays["vertices"], f'"{path}"')
-    shape_of_vertex = np.zeros(len(arrays["vertices"]), dtype=np.int64)
-    shape_of_vertex[arrays["faces"].ravel()] = np.repeat(arrays["piece"], 3)
-    vertices, faces = _merge_vertices(arrays["vertices"], arrays["faces"], shape_of_vertex)
-    proper, repeated = _proper_triangles(path, faces)
-    owner = np.column_stack([arrays["piece"], arrays["brep"]])
-    (shape, brep), faces = owner[proper].T, faces[proper]
-    max_distance = MAX_OFFSET * min(float(arrays["chord"]), usual_chord(text))  # vertices are on the true faces at any chord
-    if not len(faces):
+    vertices = np.concatenate([np.zeros((0, 3)), *(entry["vertices"] for entry in content["shapes"])])
+    check_numbers(vertices, f'"{path}"')
+    merge_distance = MERGE_DISTANCE * max(1.0, float(np.abs(_rounded(vertices)).max(initial=0)))
+    max_offset = MAX_OFFSET * min(chord, usual_chord(text))  # vertices are on the true faces at any chord
+    # The kernel counts records; if it counts others than the text has, their numbers are unknown.
+    is_counted = content["record_count"] == len(text.order)
+    numbers = np.array([0, *text.order]) if is_counted else np.zeros(content["record_count"] + 1, dtype=np.int64)
+    omissions: Counter[str] = Counter()
+    shapes = [_shape(entry, numbers, merge_distance, max_offset, omissions) for entry in content["shapes"]]
+    for kind, count in omissions.items():
+        log.info('"%s": %d triangles %s are left out', path, count, kind)
+    if not any(len(shape.triangles) for shape in shapes):
         raise GeometryFault(f'"{path}" holds no surfaces that could be read; export the part itself as a solid')
-    surfaces: list[list[AnalyticSurface | None]] = []
-    for k, stated in enumerate(arrays["surfaces"]):
-        triangles = np.flatnonzero(shape == k)
-        corners, own_faces = np.unique(faces[triangles], return_inverse=True)
-        own_faces, face_numbers = own_faces.reshape(-1, 3), brep[triangles]
-        surfaces.append(credible(vertices[corners], own_faces, face_numbers, stated_surfaces(str(stated)), max_distance))
-        vertices[corners] = onto(vertices[corners], own_faces, face_numbers, surfaces[-1], max_distance)
-    mesh = trimesh.Trimesh(vertices, faces, process=False)
-    has_triangles = np.isin(arrays["shape"], shape)
-    places = [
-        ShapePlace(int(number), rigid_motion(path, transform), box, tuple(json.loads(str(names))), str(name))
-        for number, transform, box, names, name in zip(
-            *(arrays[name][has_triangles] for name in ("shape", "transforms", "boxes", "paths", "names")), strict=True
+    entries = [entry for entry in content["bodies"] if len(shapes[entry[0]].triangles)]
+    bodies = [
+        # A solid that is alone in its file is no sheet, though faces may be missing.
+        Body(
+            name,
+            tuple(names),
+            rigid_motion(path, transform),
+            box,
+            shapes[index].gap_count > 0 and not (len(entries) == 1 and shapes[index].face_count),
+            shapes[index],
         )
+        for index, transform, box, names, name in entries
     ]
-    shapes = []
-    numbers_of_records = _record_numbers(path, int(arrays["record_count"]))
-    for k, face_count in enumerate(arrays["face_count"]):
-        triangles = np.flatnonzero(shape == k)
-        pairs = repeated[owner[repeated[:, 0], 0] == k]
-        first_of = first_faces(brep[triangles], owner[pairs, 1], len(surfaces[k]))
-        described = stated_faces(arrays, k, numbers_of_records, first_of)
-        shapes.append(StepShape(triangles, len(rim(faces[triangles])) > 0, described, int(face_count)))
-    return Product(path, mesh, shape, brep, tuple(surfaces), tuple(bodies(shapes, places)), text)
+    face_count = sum(len(entry["surfaces"]) for entry in content["shapes"])
+    drawn = tuple(shape for shape in shapes if len(shape.triangles))
+    return Product(path, drawn, tuple(uniquely_named(bodies)), face_count, text.units)
 
 
 def usual_chord(text: StepText) -> float:
@@ -167,23 +146,53 @@ def usual_chord(text: StepText) -> float:
     return max(STEP_CHORD, STEP_SHARE * text.extent * text.unit)
 
 
-def _record_numbers(path: Path, count: int) -> np.ndarray:
-    """Return the numbers (record + 1,) of the `count` records in a file's text, after a 0; zeros if they cannot be told."""
-    numbers = record_numbers(path.read_bytes()) if count else []
-    return np.array([0, *numbers] if len(numbers) == count else np.zeros(count + 1), dtype=np.int64)
+def _shape(
+    entry: Mapping[str, Any], numbers: np.ndarray, merge_distance: float, max_offset: float, omissions: Counter[str]
+) -> StepShape:
+    """Return a shape, without triangles that are degenerate or repeat others.
 
-
-def _proper_triangles(path: Path, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return indices of triangles (face, 3), without repeated ones and without those that have two corners in one place.
-
-    The second array (repeated, 2) has the indices of each repeated triangle and of that which it repeats: they come from a face
-    that stands twice in its shell. Corners fall together at the ends of an edge that is shorter than coordinates resolve.
+    entry            what the kernel reads
+    numbers          (record + 1,) numbers of all records in the file's text, after a 0
+    merge_distance   [mm] between vertices that are one
+    max_offset       [mm] by which a vertex may be moved onto the surfaces of its faces
+    omissions        counts of triangles by the reason for which they are left out
     """
-    proper = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
-    unique, group = distinct_triangles(faces[proper])
-    for count, kind in ((len(faces) - len(proper), "on edges of no length"), (len(proper) - len(unique), "that stand twice")):
-        if count:
-            log.info('"%s": %d triangles %s are left out', path, count, kind)
+    vertices, triangles = _merge_vertices(entry["vertices"], entry["triangles"], merge_distance)
+    proper, repeated = _proper_triangles(triangles, omissions)
+    brep = entry["brep"][proper]
+    corners, triangles = np.unique(triangles[proper], return_inverse=True)
+    vertices, triangles = vertices[corners], triangles.reshape(-1, 3)
+    surfaces = credible(vertices, triangles, brep, list(map(stated_surface, entry["surfaces"])), max_offset)
+    vertices = onto(vertices, triangles, brep, surfaces, max_offset)
+    # Of each face, the face of which it is a copy, or itself.
+    first = np.arange(len(surfaces))
+    first[entry["brep"][repeated[::-1, 0]]] = entry["brep"][repeated[::-1, 1]]
+    first[brep] = brep
+    places, faces = np.unique(first), []
+    for place in places:
+        members = [place, *(member for member in np.flatnonzero(first == place) if member != place)]
+        records = [int(numbers[entry["records"][member]]) for member in members] if entry["records"] else []
+        measure = entry["measures"][place]
+        measured = None if measure is None else FaceMeasure(measure[0], np.array(measure[1]), np.array(measure[2]))
+        faces.append(StatedFace(entry["names"][place], tuple(filter(None, records)), len(members) - 1, measured))
+    stated = tuple(surfaces[place] for place in places)
+    gap_count = len(rim(triangles))
+    return StepShape(
+        vertices, triangles, np.searchsorted(places, brep), tuple(faces), stated, entry["face_count"], gap_count
+    )  # fmt: skip
+
+
+def _proper_triangles(triangles: np.ndarray, omissions: Counter[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Return indices of triangles (triangle, 3), without repeated ones and without those that have two corners in one place.
+
+    The second array (repeated, 2) has the indices of each repeated triangle and of the triangle that it repeats: they come
+    from a face that stands twice in its shell. Corners fall together at the ends of an edge that is shorter than coordinates
+    resolve.
+    """
+    proper = np.flatnonzero((triangles != np.roll(triangles, 1, axis=1)).all(axis=1))
+    unique, group = distinct_triangles(triangles[proper])
+    counts = {"on edges of no length": len(triangles) - len(proper), "that stand twice": len(proper) - len(unique)}
+    omissions += Counter(counts)
     pairs = np.column_stack([proper, proper[unique][group]])
     return proper[np.sort(unique)], pairs[pairs[:, 0] != pairs[:, 1]]
 
@@ -200,22 +209,22 @@ def check_numbers(vertices: np.ndarray, subject: str) -> None:
         )
 
 
-def _merge_vertices(vertices: np.ndarray, faces: np.ndarray, shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return vertices (vertex, 3) [mm] without those that nearly repeat others, and `faces` (face, 3) that refer to them.
+def _rounded(vertices: np.ndarray) -> np.ndarray:
+    return np.round(vertices, COORDINATE_DIGITS) + 0.0  # no negative zeros
 
-    Vertices stay apart if their `shape` (vertex,) differs. The ends of an edge that is shorter than the kernel's triangulation
-    resolves fall together.
+
+def _merge_vertices(vertices: np.ndarray, triangles: np.ndarray, distance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices (vertex, 3) [mm] without those that are within a `distance` of others, and `triangles` (triangle, 3).
+
+    The ends of an edge that is shorter than the kernel's triangulation resolves fall together.
     """
-    rounded = np.round(vertices, COORDINATE_DIGITS) + 0.0  # no negative zeros
-    rows, number = np.unique(np.column_stack([shape, rounded]), axis=0, return_inverse=True)
-    radius = MERGE_DISTANCE * max(1.0, float(np.abs(rounded).max(initial=0)))
-    pairs = scipy.spatial.cKDTree(rows[:, 1:]).query_pairs(radius, output_type="ndarray")
-    pairs = pairs[rows[pairs[:, 0], 0] == rows[pairs[:, 1], 0]]
+    rows, number = np.unique(_rounded(vertices), axis=0, return_inverse=True)
+    pairs = scipy.spatial.cKDTree(rows).query_pairs(distance, output_type="ndarray")
     if not len(pairs):
-        return rows[:, 1:], number.ravel()[faces]
+        return rows, number.ravel()[triangles]
     label = trimesh.graph.connected_component_labels(pairs, node_count=len(rows))
     _, first, cluster = np.unique(label, return_index=True, return_inverse=True)
-    return rows[first, 1:], cluster.ravel()[number.ravel()][faces]
+    return rows[first], cluster.ravel()[number.ravel()][triangles]
 
 
 def rigid_motion(path: Path, transform: np.ndarray) -> np.ndarray:

@@ -5,16 +5,17 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
 
 from tolcontact.declaration import Geometry, Mesh
 from tolcontact.declaration.geometry import UNITS
-from tolcontact.errors import GeometryFault
+from tolcontact.errors import GeometryFault, clipped
 from tolcontact.geometry.coordinate_error import COORDINATE_SPACING
 from tolcontact.geometry.edges import rim
-from tolcontact.geometry.files import reader, screening
+from tolcontact.geometry.files import screening
 from tolcontact.geometry.files.product import (
     BREP,
     FACE_NAMES,
@@ -26,7 +27,8 @@ from tolcontact.geometry.files.product import (
     product,
     usual_chord,
 )
-from tolcontact.geometry.files.step_text import StepText
+from tolcontact.geometry.files.step_text import SOLIDS, USAGES, StepText
+from tolcontact.shape_worker import Job, UnfinishedRead, Worker, taken
 
 MAX_ANGLE = 0.5  # [rad] between triangles of round faces
 COARSENINGS = (1, 30)  # times the usual chord, tried one after the other
@@ -43,43 +45,37 @@ class Shape:
 
 
 @dataclass(frozen=True)
-class Content:
-    """The content of a file: the arrays that `worker` reads and, for a STEP file, their product."""
+class ReadingLimits:
+    """The limits for reading a file: processor time, memory [byte] and number of triangles.
 
-    arrays: Mapping[str, np.ndarray]
-    product: Product | None
+    On an idle core a STEP file of 1 MB takes some 2 s, one of 20 MB 41 s. A million triangles take some 0.5 GiB to read, and
+    some 3 GiB on the way through a simulation with contact on all of them.
+    """
+
+    seconds: float = 30.0
+    seconds_per_mb: float = 20.0
+    memory: int = 6 * 2**30
+    triangles: int = 1_000_000
 
 
+DEFAULT_LIMITS = ReadingLimits()
 Key = tuple[Path, float | None]  # a file and its required chord
+Content = Product | Mapping[str, np.ndarray]  # of a STEP file, and of a mesh file as `worker` reads it
 Contents = Mapping[Key, Content | GeometryFault]
-State = tuple[str, int, int, int, float | None, reader.ReadingLimits]
-_cache: dict[State | None, Content] = {}
+State = tuple[str, int, int, int, float | None, ReadingLimits]
+_cache: dict[State | None, Product] = {}
 
 
-def read_files(geometries: Iterable[Geometry], limits: reader.ReadingLimits = reader.DEFAULT_LIMITS) -> Contents:
+def read_files(geometries: Iterable[Geometry], limits: ReadingLimits = DEFAULT_LIMITS) -> Contents:
     """Return the content or the fault of each file that the geometries name. Each file is read once."""
-    files = [geometry for geometry in geometries if isinstance(geometry, Mesh) and isinstance(geometry.source, str | Path)]
     contents: dict[Key, Content | GeometryFault] = {}
-    texts: dict[Key, StepText | None] = {}
-    states: dict[Key, State | None] = {}
-    for key in dict.fromkeys(key_of(geometry) for geometry in files):
-        states[key] = _state(*key, limits)  # before the file is read, since it may change meanwhile
-        if (cached := _cache.get(states[key])) is not None:
-            contents[key] = cached
-            continue
-        try:
-            texts[key] = screening.screen(key[0], limits.triangles)
-        except GeometryFault as fault:
-            contents[key] = fault
-    for key, result in _load(texts, limits).items():
-        path, _ = key
-        if isinstance(result, GeometryFault):
-            contents[key] = result
-        elif "count" in result:
-            contents[key] = GeometryFault(screening.too_many(path, int(result["count"]), limits.triangles))
-        else:
-            contents[key] = _content(path, result, texts[key])
-            _remember(states[key], contents[key])
+    with taken() as worker:
+        for geometry in geometries:
+            if isinstance(geometry, Mesh) and isinstance(geometry.source, str | Path) and key_of(geometry) not in contents:
+                key = key_of(geometry)
+                state = _state(*key, limits)  # before the file is read, since it may change meanwhile
+                contents[key] = content = _cache.get(state) or _content(*key, limits, worker)
+                _remember(state, content)
     return contents
 
 
@@ -88,7 +84,7 @@ def key_of(geometry: Mesh) -> Key:
     return Path(geometry.source), geometry.chord
 
 
-def _state(path: Path, chord: float | None, limits: reader.ReadingLimits) -> State | None:
+def _state(path: Path, chord: float | None, limits: ReadingLimits) -> State | None:
     """Return a value that changes when the file does; None if there is no file."""
     try:
         status = path.stat()
@@ -99,54 +95,65 @@ def _state(path: Path, chord: float | None, limits: reader.ReadingLimits) -> Sta
 
 def _remember(state: State | None, content: Content | GeometryFault) -> None:
     """Keep the content of a STEP file, since listing, declaring and discretizing its bodies each ask for it."""
-    if isinstance(content, Content) and content.product is not None and state is not None:
+    if isinstance(content, Product) and state is not None:
         while len(_cache) >= CACHE_SIZE:
             _cache.pop(next(iter(_cache)), None)
         _cache[state] = content
 
 
-def _load(
-    texts: Mapping[Key, StepText | None], limits: reader.ReadingLimits
-) -> dict[Key, dict[str, np.ndarray] | GeometryFault]:
-    """Return the arrays or the fault of each file.
+def _content(path: Path, chord: float | None, limits: ReadingLimits, worker: Worker) -> Content | GeometryFault:
+    """Return the content or the fault of a file."""
+    try:
+        text = screening.screen(path, limits.triangles)
+        result, chord = _result(path, chord, text, limits, worker)
+        return result if text is None else product(path, result, text, chord)
+    except GeometryFault as fault:
+        return fault
+
+
+def _result(path: Path, chord: float | None, text: StepText | None, limits: ReadingLimits, worker: Worker) -> tuple[Any, float]:
+    """Return what the worker reads from a file, and the chord [mm] of its triangles. Raises GeometryFault.
 
     A STEP file without a required chord gets coarser triangles if there would be too many, or if they cannot be made.
     """
-    results: dict[Key, dict[str, np.ndarray] | GeometryFault] = {}
-    keys = list(texts)
     for coarsening in COARSENINGS:
-        jobs = [_job(key, texts[key], coarsening) for key in keys]
-        results |= dict(zip(keys, reader.load(jobs, limits), strict=True)) if keys else {}
-        if coarsening > 1:
-            for key, job in zip(keys, jobs, strict=True):
-                if not _is_too_fine(results[key]):
-                    log.warning(
-                        '"%s": triangles within %.2g mm, since finer ones are too many or cannot be made', job.path, job.chord
-                    )
-        keys = [
-            (path, chord) for path, chord in keys if chord is None and texts[path, chord] and _is_too_fine(results[path, chord])
-        ]
-    return results
+        job = _job(path, chord, text, coarsening, limits)
+        try:
+            result = worker.read(path, job)
+        except UnfinishedRead as fault:
+            result = fault
+        is_too_fine = isinstance(result, UnfinishedRead | int)
+        if coarsening > 1 and not is_too_fine:
+            log.warning('"%s": triangles within %.2g mm, since finer ones are too many or cannot be made', path, job.chord)
+        if not is_too_fine or chord is not None or text is None:
+            break
+    match result:
+        case UnfinishedRead():
+            raise result
+        case str():
+            raise GeometryFault(f'"{path}" {clipped(result)}')
+        case int():
+            raise GeometryFault(screening.too_many(path, result, limits.triangles))
+    return result, job.chord
 
 
-def _job(key: Key, text: StepText | None, coarsening: float) -> reader.Job:
-    path, chord = key
+def _job(path: Path, chord: float | None, text: StepText | None, coarsening: float, limits: ReadingLimits) -> Job:
     if chord is None:
         chord = coarsening * (usual_chord(text) if text else STEP_CHORD)
     else:
         coarsening = chord / STEP_CHORD
-    return reader.Job(path, screening.kind(path), chord, min(math.sqrt(coarsening) * STEP_ANGLE, MAX_ANGLE))
-
-
-def _is_too_fine(result: dict[str, np.ndarray] | GeometryFault) -> bool:
-    return isinstance(result, reader.UnfinishedRead) if isinstance(result, GeometryFault) else "count" in result
-
-
-def _content(path: Path, arrays: Mapping[str, np.ndarray], text: StepText | None) -> Content | GeometryFault:
-    try:
-        return Content(arrays, None if text is None else product(path, arrays, text))
-    except GeometryFault as fault:
-        return fault
+    return Job(
+        path=str(path.absolute()),
+        kind=screening.kind(path),
+        chord=chord,
+        angle=min(math.sqrt(coarsening) * STEP_ANGLE, MAX_ANGLE),
+        seconds=limits.seconds + limits.seconds_per_mb * path.stat().st_size / 1e6,
+        memory=limits.memory,
+        triangles=limits.triangles,
+        has_face_names=text is not None and text.has_face_names,
+        has_solids=text is not None and text.has_any(SOLIDS),
+        has_pmi=text is not None and text.has_any(USAGES),
+    )
 
 
 def read(geometry: Mesh, contents: Contents) -> Shape:
@@ -161,14 +168,14 @@ def read(geometry: Mesh, contents: Contents) -> Shape:
     content = contents[key_of(geometry)]
     if isinstance(content, GeometryFault):
         raise content
-    if content.product is not None:
-        return Shape(content.product.part(geometry.body))
-    mesh = trimesh.Trimesh(content.arrays["vertices"], content.arrays["faces"], process=False)
-    scale = _scale(geometry, str(content.arrays["units"]) or None)
+    if isinstance(content, Product):
+        return Shape(content.part(geometry.body))
+    mesh = trimesh.Trimesh(content["vertices"], content["faces"], process=False)
+    scale = _scale(geometry, str(content["units"]) or None)
     mesh.apply_scale(scale)
     check_numbers(mesh.vertices, str(geometry))
-    merged = _merge_vertices(mesh, content.arrays["piece"])
-    _state_spacing(merged, scale * content.arrays["spacing"])
+    merged = _merge_vertices(mesh, content["piece"])
+    _state_spacing(merged, scale * content["spacing"])
     return Shape(merged)
 
 
@@ -177,8 +184,8 @@ def _in_memory(geometry: Mesh) -> trimesh.Trimesh:
     mesh = trimesh.Trimesh(source.vertices, source.faces, process=False)
     if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
         raise GeometryFault(f"{geometry}: its triangles refer to vertices beyond the {len(mesh.vertices)} that it has")
-    if len(mesh.faces) > reader.DEFAULT_LIMITS.triangles:
-        raise GeometryFault(screening.too_many(geometry, len(mesh.faces), reader.DEFAULT_LIMITS.triangles))
+    if len(mesh.faces) > DEFAULT_LIMITS.triangles:
+        raise GeometryFault(screening.too_many(geometry, len(mesh.faces), DEFAULT_LIMITS.triangles))
     scale = _scale(geometry, getattr(source, "units", None))
     mesh.apply_scale(scale)
     check_numbers(mesh.vertices, str(geometry))

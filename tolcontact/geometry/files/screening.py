@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tolcontact.declaration.geometry import STEP
 from tolcontact.errors import GeometryFault, clipped
-from tolcontact.geometry.files.step_text import StepText, endless_number, step_text
+from tolcontact.geometry.files.step_text import StepText
 
 MESH_SUFFIXES = (".stl", ".obj", ".ply", ".glb", ".gltf")
 HEAD_SIZE = 10_000  # [byte] at the beginning of a file, by which its kind is recognized
@@ -155,8 +155,8 @@ def _check_step(path: Path) -> StepText:
         raise GeometryFault(
             f'"{path}" begins with a byte order mark, which no STEP file has; save it as UTF-8 without this mark'
         )
-    text = step_text(content)
-    references = text.files or (() if b"_SHELL" in content else text.documents)
+    text = StepText(content)
+    references = text.shape_files or (() if b"_SHELL" in content else text.documents)
     if references:
         raise GeometryFault(
             f'"{path}" refers to other files for shapes ({_listed(references)}), which are not read; give the file of the part '
@@ -164,7 +164,7 @@ def _check_step(path: Path) -> StepText:
         )
     if b"END-ISO-10303-21" not in content:
         raise GeometryFault(f'"{path}" is cut off: it does not end with END-ISO-10303-21; export it again')
-    if number := endless_number(content):
+    if number := text.endless_number:
         raise GeometryFault(
             f'"{path}" is damaged: it holds the number {clipped(number, 40)}, which is not finite; export it again'
         )

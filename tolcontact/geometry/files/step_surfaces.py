@@ -1,7 +1,6 @@
 """The surfaces that a STEP file states for its B-rep faces, and vertices moved onto them. Lengths in mm."""
 
-import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,12 +11,10 @@ MAX_ITERATIONS = 4  # of Newton's method: they bring vertices that are off by mi
 PARALLEL = 0.05  # smallest relative singular value of the normals in a vertex whose surfaces count as different
 
 
-def stated_surfaces(text: str) -> list[AnalyticSurface | None]:
-    """Return the surface of each B-rep face, from the JSON of `kernel.step_bodies`; None for a face of another kind."""
-    return [None if entry is None else _surface(entry) for entry in json.loads(text)]
-
-
-def _surface(entry: dict[str, Any]) -> AnalyticSurface | None:
+def stated_surface(entry: Mapping[str, Any] | None) -> AnalyticSurface | None:
+    """Return the surface of a B-rep face as `kernel.brep_faces` describes it; None for a face of another kind."""
+    if entry is None:
+        return None
     numbers = {name: np.array(value) if isinstance(value, list) else value for name, value in entry.items() if name != "kind"}
     return ANALYTIC_SURFACES[entry["kind"]].of(numbers) if all(np.isfinite(value).all() for value in numbers.values()) else None
 

@@ -1,31 +1,32 @@
-"""Units, lengths and references in the text of a STEP file (ISO 10303-21)."""
+"""The records in the text of a STEP file (ISO 10303-21), taken in one pass; and its units, extent and references.
+
+Time and memory are linear in the size of any text: the patterns are possessive and never backtrack.
+"""
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+import sys
+from collections import defaultdict
+from collections.abc import Iterable
+from functools import cached_property
 from pathlib import PurePosixPath, PureWindowsPath
-from typing import NamedTuple
 
 import numpy as np
 
 from tolcontact.declaration.geometry import UNITS
 
-# Up to a semicolon outside strings and comments. Possessive: no text makes it backtrack.
-_RECORD = re.compile(rb"(?:[^';/]++|'[^']*+'?|/\*(?:[^*]++|\*(?!/))*+(?:\*/)?|/)++;?")
-_COMMENT = re.compile(rb"/\*(?:[^*]++|\*(?!/))*+\*/")
-_INSTANCE = re.compile(rb"\s*#(\d+)\s*=\s*(.*)", re.DOTALL)
-_DOCUMENTS = (b"DOCUMENT_FILE", b"APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT")
-_ENTITY = re.compile(rb"\b(%b|GLOBAL_UNIT_ASSIGNED_CONTEXT|LENGTH_UNIT)\s*\(" % b"|".join(_DOCUMENTS))
-_IGNORED = re.compile(rb"'[^']*+'|" + _COMMENT.pattern)  # together: strings may hold signs of comments, and these quotes
-_NUMBER = re.compile(rb"(?:^|;)\s*#(\d+)\s*=")
+# Up to a semicolon outside strings: number, entity, parameters, semicolon. A longer number is no number.
+STATEMENT = re.compile(rb"\s*+(?:#(\d{1,18}+)\s*+=\s*+)?+([A-Za-z_]\w*+)?+((?:[^';]++|'[^']*+'?)*+)(;?)")
+_COMMENT = re.compile(rb"('[^']*+'?)|/\*(?:[^*]++|\*(?!/))*+(?:\*/)?")
+_STRINGS = re.compile(rb"'[^']*+'?")
 _STRING = re.compile(rb"'((?:[^']|'')*+)'")
+_ENTITY = re.compile(rb"([A-Za-z_]\w*+)\s*+\(")
 _REFERENCE = re.compile(rb"#(\d+)")
-_LINK = re.compile(rb"<([^<>]*)>")
 _WIDE = re.compile(r"\\X2\\((?:[0-9A-F]{4})*)\\X0\\|\\X\\([0-9A-F]{2})")
 _POINT = re.compile(
     rb"CARTESIAN_POINT\s*\(\s*'(?:[^']|'')*+'\s*,\s*\(\s*([-+.\dEe]+)\s*,\s*([-+.\dEe]+)\s*,\s*([-+.\dEe]+)\s*\)"
 )
 _METRES = re.compile(rb"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.")
+_NAMED_FACE = re.compile(rb"\b(?:ADVANCED_FACE|FACE_SURFACE)\s*\(\s*'(?!'|NONE')")
 # NaN, or a number that exceeds double precision.
 _ENDLESS = re.compile(
     rb"[(,]\s*+([-+]?(?:nan|inf|infinity|\d++\.?+\d*+e\+?+0*+(?:\d{4,}|[4-9]\d\d|3[1-9]\d|309)))\s*+(?=[,)])", re.IGNORECASE
@@ -33,106 +34,141 @@ _ENDLESS = re.compile(
 _UNIT_NAMES = {
     "micrometre": "um", "millimetre": "mm", "centimetre": "cm", "metre": "m", "inch": "in", "foot": "ft", "feet": "ft",
 }  # fmt: skip
-SHAPES = (".step", ".stp", ".p21", ".stpz", ".stpx", ".stpnc")
+_DOCUMENTS = ("DOCUMENT_FILE", "APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT")
+FACES = ("ADVANCED_FACE", "FACE_SURFACE")
+SOLIDS = ("MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "FACETED_BREP")
+USAGES = ("GEOMETRIC_ITEM_SPECIFIC_USAGE", "ITEM_IDENTIFIED_REPRESENTATION_USAGE")  # link PMI and faces
+SHAPE_SUFFIXES = (".step", ".stp", ".p21", ".stpz", ".stpx", ".stpnc")
+# Shapes are most of a file, and nobody asks for their records.
+_SHAPES = frozenset(
+    (b"CARTESIAN_POINT", b"DIRECTION", b"VECTOR", b"LINE", b"VERTEX_POINT", b"EDGE_CURVE", b"ORIENTED_EDGE", b"EDGE_LOOP",
+     b"FACE_BOUND", b"FACE_OUTER_BOUND", b"AXIS2_PLACEMENT_3D", b"CIRCLE", b"PCURVE", b"SURFACE_CURVE", b"SEAM_CURVE", b"PLANE",
+     b"CYLINDRICAL_SURFACE", b"B_SPLINE_CURVE_WITH_KNOTS", b"B_SPLINE_SURFACE_WITH_KNOTS", b"COORDINATES_LIST", b"POLYLINE",
+     b"TESSELLATED_CURVE_SET", b"DEFINITIONAL_REPRESENTATION", b"STYLED_ITEM", b"COMPOSITE_CURVE_SEGMENT")
+)  # fmt: skip
 
 
-@dataclass(frozen=True)
 class StepText:
-    """The names of shape `files` and other `documents` to which a STEP file refers, and its lengths.
+    """The records of a STEP file; of a damaged file, what is legible.
 
-    units   of lengths of shapes, as the file names them: "millimetre", "inch"; empty if not stated
-    extent  the longest side of the box around nearly all points (98 % along each axis), in these units; 0 without points
+    content       the text without comments
+    schema        name of the schema and its object identifier, as the file states them
+    is_complete   whether the file ends with END-ISO-10303-21
+    order         numbers of all records in the order of the file
+    bodies        entity and parameters of each record by its number, without most shapes
+    entities      the entity of a record by its number; none of a complex instance, which has several
+    numbers       numbers of the records of each entity, by its name
+    documents     names of other files to which the file refers, each once
     """
 
-    files: tuple[str, ...]
-    documents: tuple[str, ...]
-    units: str
-    extent: float
+    def __init__(self, content: bytes) -> None:
+        self.content = _COMMENT.sub(rb"\1", content) if b"/*" in content else content
+        self.schema = ""
+        self.order: list[int] = []
+        self.bodies: dict[int, bytes] = {}
+        self.entities: dict[int, str] = {}
+        self.numbers: dict[str, list[int]] = defaultdict(list)
+        self._points: list[bytes] = []
+        self._documents: list[str] = []
+        self.is_complete = self._scan()
+        self.documents = tuple(name for name in dict.fromkeys(self._documents) if name.strip())
+
+    @property
+    def shape_files(self) -> tuple[str, ...]:
+        """The documents that are files of shapes."""
+        return tuple(name for name in self.documents if _suffix(name) in SHAPE_SUFFIXES)
+
+    def has_any(self, entities: Iterable[str]) -> bool:
+        """Return whether there is a record of one of some entities."""
+        return any(entity in self.numbers for entity in entities)
+
+    @property
+    def has_face_names(self) -> bool:
+        """Whether a B-rep face has a name."""
+        return any(_NAMED_FACE.search(self.bodies[number]) for entity in FACES for number in self.numbers.get(entity, ()))
+
+    @property
+    def units(self) -> str:
+        """The unit of lengths of shapes, as the file names it: "millimetre", "inch"; empty if it is not stated.
+
+        Files with inches define them in mm first, so that they have both.
+        """
+        units = {}
+        for number in self.numbers.get("LENGTH_UNIT", ()):
+            metres, name = _METRES.search(self.bodies[number]), _STRING.search(self.bodies[number])
+            units[number] = f"{(metres[1] or b'').decode()}metre" if metres else decoded(name[1]) if name else ""
+        contexts = self.numbers.get("GLOBAL_UNIT_ASSIGNED_CONTEXT", ())
+        references = (int(number) for context in contexts for number in _REFERENCE.findall(self._outside_strings(context)))
+        assigned = [units[number].lower() for number in references if number in units]
+        candidates = assigned or [unit.lower() for unit in units.values()]
+        return next((unit for unit in candidates if not unit.endswith("metre")), candidates[0] if candidates else "")
 
     @property
     def unit(self) -> float:
         """The unit of length [mm]; 1 if none is stated."""
         return UNITS[_UNIT_NAMES.get(self.units.removesuffix("es"), "mm")]
 
+    @cached_property
+    def extent(self) -> float:
+        """The longest side of the box around nearly all points, in units of the file; 0 without points.
 
-class _Record(NamedTuple):
-    """An instance of an entity: its number and text, the strings in it, and the numbers of the instances that it names."""
-
-    number: int
-    entity: bytes
-    text: bytes
-    strings: list[str]
-    references: list[int]
+        It holds 98 % of them along each axis: a few may be far off, on axes, or on planes that a body does not reach.
+        """
+        numbers = np.array([corner for point in _POINT.findall(b";".join(self._points)) for corner in point], dtype="S32")
+        try:
+            points = numbers.astype(float).reshape(-1, 3)
+        except ValueError:  # damaged
+            return 0.0
+        finite = points[np.isfinite(points).all(axis=1)]
+        return float(np.ptp(np.quantile(finite, [0.01, 0.99], axis=0), axis=0).max()) if len(finite) else 0.0
 
     @property
-    def name(self) -> str:
-        return self.strings[0] if self.strings else ""
+    def endless_number(self) -> str:
+        """The first number that is NaN or too large; "" if all numbers are finite."""
+        if _ENDLESS.search(self.content) is None:  # the usual case, in which strings need not be left out
+            return ""
+        match = _ENDLESS.search(_STRING.sub(b"''", self.content))
+        return match[1].decode() if match else ""
+
+    def _scan(self) -> bool:
+        """Take the records, and return whether the text is complete."""
+        for match in STATEMENT.finditer(self.content):
+            number, entity, body, end = match.groups()
+            if number is not None:
+                self._take(int(number), entity, body)
+            elif entity == b"FILE_SCHEMA" and (schema := _STRING.search(body)):
+                self.schema = decoded(schema[1])
+            elif entity == b"END" and body.startswith(b"-ISO-10303-21"):
+                return bool(end)
+        return False
+
+    def _take(self, number: int, entity: bytes | None, body: bytes) -> None:
+        self.order.append(number)
+        if entity == b"CARTESIAN_POINT" or (entity is None and b"CARTESIAN_POINT" in body):
+            self._points.append((entity or b"") + body)
+        if entity in _SHAPES or number in self.bodies:
+            return
+        if entity is None:
+            self.bodies[number] = body
+            if body.startswith(b"<"):  # a link to a record of another file
+                self._documents.append(decoded(body[1:].partition(b">")[0]).partition("#")[0])
+            names = [entity_name(name) for name in dict.fromkeys(_ENTITY.findall(self._outside_strings(number)))]
+        else:
+            self.bodies[number] = entity + body
+            names = [entity_name(entity)]
+            self.entities[number] = names[0]
+        for name in names:
+            self.numbers[name].append(number)
+            if name in _DOCUMENTS and (document := _STRING.search(body)):
+                self._documents.append(decoded(document[1]))
+
+    def _outside_strings(self, number: int) -> bytes:
+        return _STRINGS.sub(b"", self.bodies[number])
 
 
-def step_text(content: bytes) -> StepText:
-    """Return what a STEP file's `content` states; for a damaged file, what is legible."""
-    records = list(_records(content))
-    documents = _documents(records, content)
-    files = tuple(name for name in documents if _suffix(name) in SHAPES)
-    others = tuple(name for name in documents if name not in files)
-    return StepText(files, others, _units(records), _extent(content))
-
-
-def endless_number(content: bytes) -> str:
-    """Return the first number in a STEP file's `content` that is NaN or too large; "" if all numbers are finite."""
-    if _ENDLESS.search(content) is None:  # the usual case, in which strings and comments need not be left out
-        return ""
-    match = _ENDLESS.search(b"".join(_STRING.sub(b"''", _COMMENT.sub(b"", record[0])) for record in _RECORD.finditer(content)))
-    return match[1].decode() if match else ""
-
-
-def record_numbers(content: bytes) -> list[int]:
-    """Return the numbers of all records in a STEP file, in their order."""
-    return [int(number) for number in _NUMBER.findall(_IGNORED.sub(b"", content))]
-
-
-def _records(content: bytes) -> Iterator[_Record]:
-    """Yield the instances of the entities in _ENTITY."""
-    for match in _RECORD.finditer(content):
-        instance = _INSTANCE.match(_COMMENT.sub(b"", match[0])) if _ENTITY.search(match[0]) else None
-        if instance is None:
-            continue
-        text = instance[2]
-        outside = _STRING.sub(b"", text)
-        if entity := _ENTITY.search(outside):
-            strings = [decoded(string) for string in _STRING.findall(text)]
-            yield _Record(int(instance[1]), entity[1], text, strings, [int(number) for number in _REFERENCE.findall(outside)])
-
-
-def _documents(records: Sequence[_Record], content: bytes) -> list[str]:
-    """Return the names of the files to which a file refers, each once."""
-    links = re.search(rb"\bREFERENCE\s*;(.*?)\bENDSEC\s*;", content, re.DOTALL)
-    names = [record.name for record in records if record.entity in _DOCUMENTS]
-    names.extend(decoded(link).partition("#")[0] for link in _LINK.findall(links[1] if links else b""))
-    return [name for name in dict.fromkeys(names) if name.strip()]
-
-
-def _units(records: Sequence[_Record]) -> str:
-    """Return the unit of shapes. Files with inches define them in mm first, so that they have both."""
-    units = {}
-    for record in (record for record in records if record.entity == b"LENGTH_UNIT"):
-        metres = _METRES.search(record.text)
-        units[record.number] = f"{(metres[1] or b'').decode()}metre".lower() if metres else record.name.lower()
-    contexts = [record for record in records if record.entity == b"GLOBAL_UNIT_ASSIGNED_CONTEXT"]
-    assigned = [units[number] for record in contexts for number in record.references if number in units]
-    candidates = assigned or list(units.values())
-    return next((unit for unit in candidates if not unit.endswith("metre")), candidates[0] if candidates else "")
-
-
-def _extent(content: bytes) -> float:
-    """Return the extent of StepText: a few points may be far off, on axes, or on planes that a body does not reach."""
-    numbers = np.array([corner for point in _POINT.findall(content) for corner in point], dtype="S32")
-    try:
-        points = numbers.astype(float).reshape(-1, 3)
-    except ValueError:  # damaged
-        return 0.0
-    finite = points[np.isfinite(points).all(axis=1)]
-    return float(np.ptp(np.quantile(finite, [0.01, 0.99], axis=0), axis=0).max()) if len(finite) else 0.0
+def entity_name(text: bytes) -> str:
+    """Return the name of an entity in capital letters."""
+    return sys.intern(text.decode("latin-1").upper())
 
 
 def decoded(string: bytes) -> str:

@@ -1,9 +1,8 @@
-"""The program of the process that reads shape files for `reader`, so that no file can end or stall that one.
+"""The program of the process that reads shape files (see shape_worker), so that no file can end or stall another process.
 
-`python -P worker.py FOLDER` writes FOLDER/ready once it has started, and works through the list in FOLDER/jobs.json. For job
-k it writes FOLDER/k.npz with the arrays it read, or FOLDER/k.txt with the fault of the file. Of tolcontact it imports only
-`child`, `stored_coordinates`, and `kernel` when a STEP file comes, so that it starts quickly. Without FOLDER it loads the
-kernel first, and then waits for a line with the folder on its standard input.
+It takes jobs from its standard input, and writes the result of each to its standard output: arrays by their names, the number
+of triangles if these are too many, or the fault of the file as a text. Of tolcontact it imports only `shape_worker`,
+`stored_coordinates`, and `kernel` when a STEP file comes, so that it starts quickly.
 """
 
 import contextlib
@@ -11,6 +10,7 @@ import gc
 import io
 import json
 import os
+import pickle
 import sys
 from functools import cache
 from importlib import import_module
@@ -21,6 +21,7 @@ import lazy_loader
 import numpy as np
 
 from tolcontact.child import Refusal, limit_resources
+from tolcontact.shape_worker import LOAD_KERNEL, Job
 from tolcontact.stored_coordinates import is_binary_stl, is_single, printed_spacing, single_spacing
 
 Arrays = dict[str, np.ndarray]
@@ -109,21 +110,12 @@ def in_utf8(content: bytes) -> bytes:
     return content
 
 
-def read_step(path: Path, chord: float, angle: float) -> Arrays:
-    """Return the shapes of a STEP file [mm] with the arrays that `step_bodies.read` describes, and their chord [mm].
-
-    vertices, faces, piece  as from `join`; a piece is a shape
-    """
-    pieces, arrays = step_bodies().read(path, chord, angle)
-    return {**join(pieces), **arrays, "chord": np.array(chord)}
-
-
 @cache
-def step_bodies() -> Any:
+def step_document() -> Any:
     """Return the module that reads STEP files. The CAD kernel takes 230 MB and 1 s: only STEP files load it."""
     gc.disable()  # it finds nothing in what is imported, and takes a tenth of the time
     try:
-        return import_module("tolcontact.kernel.step_bodies")
+        return import_module("tolcontact.kernel.step_document")
     except ModuleNotFoundError as error:
         raise Refusal(
             'is a STEP file, which needs the package cadquery-ocp-novtk; install it with: pip install "tolcontact[step]"'
@@ -146,57 +138,50 @@ def join(pieces: list[tuple[np.ndarray, np.ndarray]]) -> Arrays:
     return {"vertices": np.concatenate(vertices), "faces": np.concatenate(faces), "piece": np.concatenate(piece)}
 
 
-def work(folder: Path) -> None:
-    """Read the files that the list in `folder` names."""
-    jobs = json.loads((folder / "jobs.json").read_text())
-    limit_resources(jobs["memory"], file_size=jobs["memory"], seconds=jobs["seconds"])
-    (folder / "ready").touch()
-    for k, job in enumerate(jobs["files"]):
-        path = Path(job["path"])
-        try:
-            is_step = job["kind"] == "step"
-            arrays = read_step(path, job["chord"], job["angle"]) if is_step else read_mesh(path, job["kind"])
-            count = len(arrays["faces"])
-            write_arrays(folder, k, arrays if count <= jobs["max_triangles"] else {"count": np.array(count)})
-        except MemoryError:
-            gigabytes = f"{jobs['memory'] / 2**30:.3g} GiB"
-            write_fault(folder, k, f"takes more than {gigabytes} of memory to read; it is damaged, or far too fine")
-        except Refusal as refusal:
-            write_fault(folder, k, str(refusal))
-        except Exception as error:  # any error is reported as a fault of the file
-            write_fault(folder, k, f"is damaged, or of an unknown kind ({type(error).__name__}: {error}); export it again")
+def result(job: Job) -> Arrays | dict[str, Any] | int | str:
+    """Return what a file holds, the number of its triangles if these are too many, or its fault."""
+    limit_resources(job.memory, seconds=job.seconds)
+    path = Path(job.path)
+    try:
+        if job.kind == "step":
+            flags = {name: getattr(job, name) for name in ("has_face_names", "has_solids", "has_pmi")}
+            content = step_document().read(path, job.chord, job.angle, **flags)
+            count = sum(len(shape["triangles"]) for shape in content["shapes"])
+        else:
+            content = read_mesh(path, job.kind)
+            count = len(content["faces"])
+        return content if count <= job.triangles else count
+    except MemoryError:
+        return too_large(job)
+    except Refusal as refusal:
+        return str(refusal)
+    except Exception as error:  # any error is reported as a fault of the file
+        return f"is damaged, or of an unknown kind ({type(error).__name__}: {error}); export it again"
 
 
-def write_arrays(folder: Path, k: int, arrays: Arrays) -> None:
-    """Write the arrays of job `k`. Their file appears only when it is complete."""
-    with (folder / "part").open("wb") as file:
-        np.savez(file, **arrays)  # type: ignore[arg-type]
-    (folder / "part").replace(folder / f"{k}.npz")
+def too_large(job: Job) -> str:
+    """Return the fault of a file that takes too much memory."""
+    return f"takes more than {job.memory / 2**30:.3g} GiB of memory to read; it is damaged, or far too fine"
 
 
-def write_fault(folder: Path, k: int, message: str) -> None:
-    """Write the fault of job `k`. Its file appears only when it is complete."""
-    (folder / "part").write_text(message, encoding="utf-8", errors="replace")
-    (folder / "part").replace(folder / f"{k}.txt")
-
-
-def awaited_folder() -> Path:
-    """Load the CAD kernel, and return the folder that a line of standard input names; its file `errors` gets all output.
-
-    The process ends if there is no such line: nobody needs it.
-    """
-    with contextlib.suppress(Refusal):  # the fault of a STEP file, if one comes
-        step_bodies()
-    name = sys.stdin.readline().rstrip("\n")
-    if not name:
-        os._exit(0)
-    folder = Path(name)
-    with (folder / "errors").open("wb") as errors:
-        for stream in (sys.stdout, sys.stderr):
-            os.dup2(errors.fileno(), stream.fileno())
-    return folder
+def work() -> None:
+    """Work through the jobs on the standard input."""
+    results = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # the kernel prints messages
+    if LOAD_KERNEL in sys.argv:
+        with contextlib.suppress(Refusal):  # the fault of a STEP file, if one comes
+            step_document()
+    with contextlib.suppress(EOFError):
+        while True:
+            job = pickle.load(sys.stdin.buffer)
+            try:
+                content = pickle.dumps(result(job), protocol=pickle.HIGHEST_PROTOCOL)
+            except MemoryError:
+                content = pickle.dumps(too_large(job))
+            results.write(content)
+            results.flush()
 
 
 if __name__ == "__main__":
-    work(Path(sys.argv[1]) if len(sys.argv) > 1 else awaited_folder())
+    work()
     os._exit(0)  # compiled libraries may crash when they tidy up after a damaged file

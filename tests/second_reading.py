@@ -1,6 +1,6 @@
-"""The product and manufacturing information of a file beside that which the CAD kernel reads from it.
+"""Compare the product and manufacturing information that `tc.read_pmi` returns with what the CAD kernel reads.
 
-The kernel reads less, so that its reading changes nothing: differences are only told. Annotations of one record are compared.
+The kernel reads less than the file states. Annotations of the same record are compared.
 """
 
 import math
@@ -8,14 +8,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tolcontact.errors import GeometryFault, shown
-from tolcontact.geometry.kernel_annotations import (
+from tests.kernel_annotations import (
     KernelAnnotations,
     KernelDimension,
     KernelItems,
     KernelTolerance,
     kernel_annotations,
 )
+from tolcontact.errors import GeometryFault, shown
 from tolcontact.geometry.step_listing import FacesOfRecords
 from tolcontact.pmi.annotations import Dimension, Pmi, Tolerance
 from tolcontact.readable import Readable

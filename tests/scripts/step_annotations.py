@@ -1,7 +1,7 @@
-"""Tolerances and dimensions of a STEP file as the CAD kernel reads them by itself. Lengths in mm, angles in degrees.
+"""Tolerances and dimensions of a STEP file as the CAD kernel reads them. Lengths in mm, angles in degrees.
 
-`python -P step_annotations.py FILE MEMORY SECONDS` prints them as JSON. `kernel_annotations` runs it, since the kernel may
-crash at a damaged file. Of tolcontact it imports only `child`.
+`python -P step_annotations.py FILE MEMORY SECONDS` prints them as JSON. `tests.kernel_annotations` runs it, since the kernel
+may crash at a damaged file.
 
 The kernel does not say from which record an annotation comes, but it passes on the name of that record. Before the transfer,
 each record of an annotation gets its place among all records as its name. The kernel then does not know a dimension by its
@@ -16,7 +16,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from OCP.collections import Sequence_TDF_Label
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPCAFControl import STEPCAFControl_Reader
 from OCP.StepDimTol import StepDimTol_GeometricTolerance
@@ -37,6 +36,7 @@ from OCP.XCAFDoc import (
 )
 
 from tolcontact.child import limit_resources
+from tolcontact.kernel.step_document import LabelSequence
 
 ANNOTATIONS = (StepDimTol_GeometricTolerance, StepShape_DimensionalLocation, StepShape_DimensionalSize)
 # Words of the kernel where standards have others.
@@ -112,7 +112,7 @@ class Document:
 
     def _items(self, label: Any) -> list[tuple[list[int], int]]:
         """Return the places of the records of faces, and the number of other shapes, of both sides of an annotation."""
-        sides = Sequence_TDF_Label(), Sequence_TDF_Label()
+        sides = LabelSequence(), LabelSequence()
         XCAFDoc_DimTolTool.GetRefShapeLabel_s(label, *sides)
         items = []
         for side in sides:
@@ -140,7 +140,7 @@ def datum_system(label: Any) -> list[list[list[str]]]:
 
 def objects(fill: Callable[[Any], object], kind: Any) -> Iterator[tuple[Any, Any]]:
     """Yield the labels that `fill` adds to a sequence, with the object of a kind that each has."""
-    labels = Sequence_TDF_Label()
+    labels = LabelSequence()
     fill(labels)
     for label in labels:
         attributes = TDF_AttributeIterator(label, True)

@@ -1,6 +1,6 @@
-"""Tolerances and dimensions of a STEP file as read by the CAD kernel alone, for comparison. Lengths in mm.
+"""Tolerances and dimensions of a STEP file as the CAD kernel reads them, to compare with `tc.read_pmi`. Lengths in mm.
 
-The kernel reads less than the file states, and may crash, so it runs in a separate process.
+The kernel reads less than the file states, and may crash, so it runs in a process of its own.
 """
 
 import json
@@ -12,10 +12,10 @@ from typing import Any
 from tolcontact.child import ChildDiedError, run_child
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.files import screening
-from tolcontact.geometry.files.reader import DEFAULT_LIMITS
-from tolcontact.geometry.files.step_text import record_numbers
+from tolcontact.geometry.files.reading import DEFAULT_LIMITS
+from tolcontact.geometry.files.step_text import StepText
 
-PROGRAM = Path(__file__).parents[1] / "kernel" / "step_annotations.py"
+PROGRAM = Path(__file__).parent / "scripts" / "step_annotations.py"
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def kernel_annotations(path: str | Path) -> KernelAnnotations:
     except ChildDiedError as error:
         raise GeometryFault(f"the kernel could not read the PMI: {error}") from error
     content = json.loads(output)
-    numbers = record_numbers(path.read_bytes())
+    numbers = StepText(path.read_bytes()).order
     if len(numbers) != content["record_count"]:
         raise GeometryFault(
             f"the kernel could not read the PMI: it counts {content['record_count']} records, and the file has {len(numbers)}"
