@@ -1,4 +1,4 @@
-"""Tables of NumPy arrays: they hold and select what xarray does, from archives of every format."""
+"""Tables of NumPy arrays: they hold and select what xarray does, from an archive too."""
 
 import gzip
 from pathlib import Path
@@ -67,7 +67,7 @@ def check_group(group: Group, tree: xr.DataTree):
 
 
 @pytest.mark.parametrize("stored", ARCHIVES, ids=lambda path: path.name)
-def test_archives_of_every_format_are_read_and_summed_up_as_with_xarray(stored, tmp_path):
+def test_archives_are_read_and_summed_up_as_with_xarray(stored, tmp_path):
     path = tmp_path / "run.nc"
     path.write_bytes(gzip.decompress(stored.read_bytes()))
     with tc.open_archive(path) as tree:

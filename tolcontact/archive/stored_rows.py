@@ -39,12 +39,9 @@ def stored(block: Block, labels: Sequence[str], nominal: Nominal) -> StoredBlock
 
 
 def check_rows(results: Results) -> None:
-    """Raise ArchiveError if finished realizations are not what was written.
-
-    Archives of format 1 have no checksums; nor are there any for rows that were taken from an archive.
-    """
+    """Raise ArchiveError if finished realizations are not what was written; rows that were selected have no checksums."""
     stored = results.to_dataset()
-    count, rows = stored.sizes[terms.REALIZATION], int(stored.attrs.get("block_rows", terms.BLOCK_ROWS))
+    count, rows = stored.sizes[terms.REALIZATION], int(stored.attrs["block_rows"])
     samples = int(stored.attrs["samples"])
     if terms.ROW_CHECKSUM.name not in stored or count not in (samples, min(samples, terms.FIRST_ROWS)):
         return

@@ -79,9 +79,8 @@ class ArchiveWriter:
             # Fields and checks were of the earlier rows.
             initial = {terms.field_of(part.name): empty_field(len(part.vertices)) for part in program.nominal.last_parts}
             initial["surface"] = empty_checks(run.surfaces, len(program.nominal.pairs))
+            initial["contact"] = empty_touching(sum(len(pair.P_m) for pair in program.nominal.pairs))
             with contextlib.closing(RawFile(copy)) as values:
-                if values.has("contact", terms.TOUCHING_SHARE):  # not in archives that were begun before
-                    initial["contact"] = empty_touching(sum(len(pair.P_m) for pair in program.nominal.pairs))
                 values.overwrite_together(initial)
         writer._go_on(path, program.nominal, run.checkpoint_interval)
         return writer
@@ -197,10 +196,9 @@ class ArchiveWriter:
 
     def write_touching(self, share: np.ndarray, interval: np.ndarray, realizations: int) -> None:
         """Write the share of realizations in which each contact point touches (point,), with its interval (point, bound)."""
-        if self._values.has("contact", terms.TOUCHING_SHARE):
-            with _as_archive_error(self._path):
-                values = dict(zip(terms.TOUCHING, (share, interval, realizations), strict=True))
-                self._values.overwrite_together({"contact": values})
+        with _as_archive_error(self._path):
+            values = dict(zip(terms.TOUCHING, (share, interval, realizations), strict=True))
+            self._values.overwrite_together({"contact": values})
 
 
 @contextlib.contextmanager

@@ -5,24 +5,20 @@ from typing import Any
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.labelled import Results, Table
+from tolcontact.labelled import Results
 from tolcontact.statistics import intervals
 from tolcontact.vocabulary import ArchiveVariable
 
 
 def surface_values(results: Results, limit: float) -> dict[ArchiveVariable, Any]:
-    """Return what the check found, with shares of depths above `limit` [mm]; NaN for archives that lack a variable of it."""
-    pairs = results.sizes[terms.PAIR]
-    surface = results["surface"].to_dataset() if "surface" in results.children else Table({})
+    """Return the results of the check, with shares of depths above `limit` [mm]."""
+    surface = results["surface"].to_dataset()
 
     def depths(variable: ArchiveVariable) -> np.ndarray:
-        return surface[variable.name].values if variable.name in surface else np.full((0, pairs), np.nan)
+        return np.asarray(surface[variable.name].values)
 
-    def checked(variable: ArchiveVariable, value: int) -> np.ndarray:
-        return surface[variable.name].values == value if variable.name in surface else np.zeros(0, dtype=bool)
-
-    count = len(checked(terms.CHECKED_REALIZATION, -1)) - int(checked(terms.CHECKED_REALIZATION, terms.UNFINISHED).sum())
-    at_random = checked(terms.AT_RANDOM, 1)
+    count = int((surface[terms.CHECKED_REALIZATION.name].values != terms.UNFINISHED).sum())
+    at_random = surface[terms.AT_RANDOM.name].values == 1
     return {
         terms.DEEPEST_SURFACE: _over(np.nanmax, depths(terms.SURFACE_PENETRATION)),
         terms.FARTHEST_BESIDE: _over(np.nanmax, depths(terms.BESIDE)),

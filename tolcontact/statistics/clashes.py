@@ -29,9 +29,8 @@ class Clashes:
         self.counts = Counter[tuple[int, int, bool]]()
         self.depths = dict[tuple[int, int, bool], float]()
         self._parts = [str(name) for name in rows[terms.PART].values]
-        if all(name in rows for name in VARIABLES):
-            for piece in pieces(rows[VARIABLES]):
-                self._add(*(np.asarray(piece[name].values) for name in VARIABLES))
+        for piece in pieces(rows[VARIABLES]):
+            self._add(*(np.asarray(piece[name].values) for name in VARIABLES))
 
     def _add(self, clashes: np.ndarray, depth: np.ndarray, part: np.ndarray, other: np.ndarray) -> None:
         self.watched += int((clashes >= 0).sum())

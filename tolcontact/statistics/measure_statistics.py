@@ -8,7 +8,7 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.labelled import Rows
-from tolcontact.limits import GAP_ACCURACY, Limits
+from tolcontact.limits import Limits
 from tolcontact.statistics import capability, intervals
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.statistics.sample import Sample, measured_sample
@@ -105,11 +105,5 @@ def _changes(raw: Sample, corrected: Sample) -> list[Estimate]:
 
 def limits(rows: Rows) -> list[Limits]:
     """Return the limits of each measure; not a number where a side is open."""
-    if terms.LOWER_LIMIT.name in rows:
-        lower, upper = rows[terms.LOWER_LIMIT.name].values, rows[terms.UPPER_LIMIT.name].values
-    else:
-        nominal, half = rows[terms.MEASURE_NOMINAL.name].values, rows[terms.MEASURE_TOLERANCE.name].values / 2
-        lower, upper = nominal - half, nominal + half
-    is_stated = terms.MEASURE_ACCURACY.name in rows  # archives of former versions do not state it
-    accuracies = rows[terms.MEASURE_ACCURACY.name].values if is_stated else np.full(len(lower), GAP_ACCURACY)
-    return [Limits(*map(float, values)) for values in zip(lower, upper, accuracies, strict=True)]
+    columns = (rows[variable.name].values for variable in (terms.LOWER_LIMIT, terms.UPPER_LIMIT, terms.MEASURE_ACCURACY))
+    return [Limits(*map(float, values)) for values in zip(*columns, strict=True)]

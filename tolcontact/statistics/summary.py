@@ -38,17 +38,17 @@ def summary_table(results: Results) -> Table:
         **surface_values(results, terms.NOTICED_SHARE * smallest),
         **_field_values(results),
     }
-    units = {terms.PAIR_REACTION: {"units": rows[terms.REACTION.name].attrs.get("units", "1")}}
+    units = {terms.PAIR_REACTION: {"units": rows[terms.REACTION.name].attrs["units"]}}
     return Table(
         {variable.name: variable.entry(array, **units.get(variable, {})) for variable, array in values.items()},
         _coordinates(rows, combinations)
         | {terms.MEASURE_STOPS: (terms.MEASURE, of_measures.stops), terms.CLASH: clashes.labels},
         {
-            "title": results.attrs.get("title", ""),
+            "title": results.attrs["title"],
             "realizations": count,
             "samples": _planned_samples(results, count),
             **{name: results.attrs[name] for name in terms.METHOD_ATTRIBUTES},
-            "search": results.attrs.get("search", "fixed"),  # formats 1 and 2 do not say it
+            "search": results.attrs["search"],
             "datum_shifts": ", ".join(_datum_shifts(results)),
             "smallest_range": smallest,
             terms.INTERFERENCE_DEPTH: float(results.attrs.get(terms.INTERFERENCE_DEPTH, np.nan)),
@@ -96,7 +96,7 @@ def _coordinates(rows: Rows, combinations: list[tuple[tuple[str, ...], int]]) ->
             name: (terms.MEASURE, np.array(values))
             for name, values in zip(terms.MEASURE_LIMITS, zip(*limits(rows), strict=True), strict=True)
         },
-        terms.QUANTITY.name: (terms.MEASURE, _quantities(rows)),
+        terms.QUANTITY.name: (terms.MEASURE, rows[terms.QUANTITY.name].values),
         **{label.name: (label.dims, rows[label.name].values) for label in terms.OF_STATIONS if label.name in rows},
     }
 
@@ -168,9 +168,7 @@ def _steps(rows: Rows) -> list[float]:
 def _smallest_range(results: Results, rows: Rows) -> float:
     """Return the smallest tolerance range above 0 of any contributor or measure [mm]; infinite if there is none."""
     sample = results["sample"].to_dataset()
-    contributors = sample[terms.TOLERANCE_RANGE.name].values
-    if terms.CONTRIBUTOR_UNITS.name in sample:  # archives up to format 3 have locators alone
-        contributors = contributors[sample[terms.CONTRIBUTOR_UNITS.name].values == "mm"]
+    contributors = sample[terms.TOLERANCE_RANGE.name].values[sample[terms.CONTRIBUTOR_UNITS.name].values == "mm"]
     ranges = np.concatenate(
         [contributors, rows[terms.MEASURE_TOLERANCE.name].values[rows[terms.MEASURE_UNITS.name].values == "mm"]]
     )
@@ -180,8 +178,6 @@ def _smallest_range(results: Results, rows: Rows) -> float:
 def _datum_shifts(results: Results) -> list[str]:
     """Return the features with a datum at maximum or least material, as part.feature."""
     sample = results["sample"].to_dataset()
-    if terms.DISTRIBUTION.name not in sample or terms.CONTRIBUTOR not in sample[terms.DISTRIBUTION.name].dims:
-        return []
     labels = zip(sample[terms.CONTRIBUTOR].values, sample[terms.DISTRIBUTION.name].values, strict=True)
     shifted = [
         str(label).rpartition(".")[0]
@@ -196,12 +192,6 @@ def _planned_samples(results: Results, count: int) -> int:
     samples, size = int(results.attrs["samples"]), results.to_dataset().sizes[terms.REALIZATION]
     is_unfinished = size > count or size == terms.FIRST_ROWS
     return max(samples, count) if is_unfinished else count
-
-
-def _quantities(rows: Rows) -> np.ndarray:
-    """Return the quantity of each measure; empty in archives before format 4, which do not state it."""
-    is_stated = terms.QUANTITY.name in rows
-    return np.asarray(rows[terms.QUANTITY.name].values if is_stated else [""] * rows.sizes[terms.MEASURE], dtype=object)
 
 
 def _field_extremes(results: Results, part: str) -> np.ndarray:
@@ -222,17 +212,13 @@ def _field_extremes(results: Results, part: str) -> np.ndarray:
 def _summed(results: Results, part: str) -> int:
     """Return the number of realizations in the field of a part; 0 while the field is being written."""
     field = _field(results, part)
-    if terms.FIELD_REALIZATIONS.name not in field:  # archives of format 1 have fields of all their rows, or none
-        return results.to_dataset().sizes[terms.REALIZATION]
     is_written = int(field[terms.GROUP_CHECKSUM.name]) != terms.UNFINISHED
     return int(field[terms.FIELD_REALIZATIONS.name]) if is_written else 0
 
 
 def _magnitudes(results: Results, part: str) -> int:
-    """Return the number of realizations in the magnitude of a part's field; before format 3 all of the field's."""
-    field, summed = _field(results, part), _summed(results, part)
-    is_stated = terms.MAGNITUDE_REALIZATIONS.name in field
-    return min(int(field[terms.MAGNITUDE_REALIZATIONS.name]), summed) if is_stated else summed
+    """Return the number of realizations in the magnitude of a part's field."""
+    return min(int(_field(results, part)[terms.MAGNITUDE_REALIZATIONS.name]), _summed(results, part))
 
 
 def _field(results: Results, part: str) -> Rows:
