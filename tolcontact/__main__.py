@@ -9,20 +9,19 @@ from typing import NoReturn
 import tolcontact
 from tolcontact import interrupts
 
-STOPPED = "stopped"
 MIN_ADDRESS_SPACE = 1_500_000_000  # bytes
 
 
 def command_line() -> None:
     """Run the command line (see tolcontact.cli)."""
     try:
-        with interrupts.stoppable(at_once=STOPPED):
+        with interrupts.stoppable(at_once=True):
             open_streams()
             check_address_space()
             limit_threads()
             _imported()()
     except KeyboardInterrupt:  # between the end of a command and that of the process
-        interrupts.end(STOPPED)
+        interrupts.end("stopped")
 
 
 def _imported() -> Callable[[], None]:

@@ -6,7 +6,6 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from tolcontact import cli, interrupts, shape_worker
-from tolcontact.cli.quick_imports import quick_imports
 
 # The module of each command in this folder, and the line that describes the command in the list of commands.
 COMMANDS = {
@@ -88,7 +87,7 @@ class Commands(TyperGroup):
 def declared_command(name: str) -> Any:
     """Return a command with its options. The module that declares the command is imported."""
     module, _ = COMMANDS[name]
-    with quick_imports():
+    with interrupts.stoppable(at_once=True):  # in native modules that are being loaded an exception may be fatal
         getattr(cli, module)  # its import declares the command
     app = cli.app.app
     return next(
