@@ -10,8 +10,8 @@ import pandas as pd
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.file_tables import library_errors
 from tolcontact.archive.inspection import check_archive
+from tolcontact.archive.netcdf_library import small_caches
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.document import from_document
 from tolcontact.errors import ArchiveError
@@ -32,9 +32,12 @@ def open_archive(path: str | Path) -> xr.DataTree:
 
 def open_unchecked(path: Path) -> xr.DataTree:
     """Open an archive that is known to be undamaged."""
-    with library_errors(path):
-        # Numbers of realizations are not read, which takes as much memory as all else together: they are 0, 1, 2, ...
-        tree = xr.open_datatree(path, engine="netcdf4", drop_variables=terms.REALIZATION)
+    try:
+        with small_caches():
+            # Numbers of realizations are not read, which takes as much memory as all else together: they are 0, 1, 2, ...
+            tree = xr.open_datatree(path, engine="netcdf4", drop_variables=terms.REALIZATION)
+    except Exception as error:  # libraries may find a fault that the inspection did not
+        raise ArchiveError(f'"{path}" cannot be read: {type(error).__name__}: {error}') from error
     numbers = pd.RangeIndex(tree.sizes[terms.REALIZATION])
     tree.coords[terms.REALIZATION] = (terms.REALIZATION, numbers, terms.NUMBERS.all_attributes)
     return tree

@@ -3,14 +3,14 @@
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.labelled import Results
 from tolcontact.statistics import intervals
 from tolcontact.vocabulary import ArchiveVariable
 
 
-def surface_values(results: Results, limit: float) -> dict[ArchiveVariable, Any]:
+def surface_values(results: xr.DataTree, limit: float) -> dict[ArchiveVariable, Any]:
     """Return the results of the check, with shares of depths above `limit` [mm]."""
     surface = results["surface"].to_dataset()
 

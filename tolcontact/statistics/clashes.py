@@ -4,9 +4,9 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.labelled import Rows
 from tolcontact.realizations import pieces
 from tolcontact.statistics import intervals
 from tolcontact.vocabulary import ArchiveVariable
@@ -24,7 +24,7 @@ class Clashes:
     depths      [mm], by the same: their largest depth; missing if none is measured
     """
 
-    def __init__(self, rows: Rows) -> None:
+    def __init__(self, rows: xr.Dataset) -> None:
         self.watched, self.clashing = 0, 0
         self.counts = Counter[tuple[int, int, bool]]()
         self.depths = dict[tuple[int, int, bool], float]()

@@ -3,9 +3,9 @@
 from collections import Counter
 
 import numpy as np
+import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.labelled import Rows
 from tolcontact.realizations import pieces
 from tolcontact.statistics import intervals
 from tolcontact.statistics.sample import Sample
@@ -13,14 +13,14 @@ from tolcontact.statistics.sample import Sample
 MAX_COMBINATIONS = 10  # of pairs that carry together
 
 
-def carried(rows: Rows) -> np.ndarray:
+def carried(rows: xr.Dataset) -> np.ndarray:
     """Return the share of realizations in which each pair carries, (pair, interval)."""
     counts = np.sum([(piece[terms.CARRYING.name].values > 0).sum(axis=0) for piece in pieces(rows)], axis=0)
     total = rows.sizes[terms.REALIZATION]
     return np.array([intervals.proportion_of(int(k), total) for k in counts]).reshape(-1, len(terms.ESTIMATE))
 
 
-def reactions(rows: Rows) -> np.ndarray:
+def reactions(rows: xr.Dataset) -> np.ndarray:
     """Return mean and percentiles of the reaction of each pair over all realizations, (pair, of_reaction, interval)."""
     estimates = []
     for pair in range(rows.sizes[terms.PAIR]):
@@ -30,7 +30,7 @@ def reactions(rows: Rows) -> np.ndarray:
     return np.array(estimates).reshape(-1, 1 + len(terms.REACTION_PERCENTILES), len(terms.ESTIMATE))
 
 
-def combinations(rows: Rows) -> list[tuple[tuple[str, ...], int]]:
+def combinations(rows: xr.Dataset) -> list[tuple[tuple[str, ...], int]]:
     """Return which pairs carry together, and in how many realizations: the most frequent combinations."""
     names, counts = [str(name) for name in rows[terms.PAIR].values], Counter[tuple[bool, ...]]()
     for piece in pieces(rows):

@@ -4,10 +4,10 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.errors import ArchiveError
-from tolcontact.labelled import Results, Rows, Table
 from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import contact, intervals
 from tolcontact.statistics.checked_surfaces import surface_values
@@ -19,8 +19,8 @@ from tolcontact.vocabulary import ArchiveVariable
 MIN_REALIZATIONS = 2
 
 
-def summary_table(results: Results) -> Table:
-    """Return the statistics of a run as a table (see summarize)."""
+def estimates_of(results: xr.DataTree) -> xr.Dataset:
+    """Return the statistics of a run (see summarize)."""
     count = finished(results)
     if count < MIN_REALIZATIONS:
         raise ArchiveError(f"{count} realizations are finished, too few for statistics; continue with --resume")
@@ -39,7 +39,7 @@ def summary_table(results: Results) -> Table:
         **_field_values(results),
     }
     units = {terms.PAIR_REACTION: {"units": rows[terms.REACTION.name].attrs["units"]}}
-    return Table(
+    return xr.Dataset(
         {variable.name: variable.entry(array, **units.get(variable, {})) for variable, array in values.items()},
         _coordinates(rows, combinations)
         | {terms.MEASURE_STOPS: (terms.MEASURE, of_measures.stops), terms.CLASH: clashes.labels},
@@ -58,14 +58,14 @@ def summary_table(results: Results) -> Table:
     )
 
 
-def estimate_of(results: Results, measure: str, statistic: str) -> Estimate:
+def estimate_of(results: xr.DataTree, measure: str, statistic: str) -> Estimate:
     """Return one of `STATISTICS` of a corrected measure."""
     rows = results.to_dataset().isel({terms.REALIZATION: slice(finished(results))})
     number = rows[terms.MEASURE].values.tolist().index(measure)
     return STATISTICS[statistic](MeasuredValues(rows, number, terms.STATES[terms.CORRECTED], limits(rows)[number]))
 
 
-def in_conflict(rows: Rows, rigid: np.ndarray) -> np.ndarray:
+def in_conflict(rows: xr.Dataset, rigid: np.ndarray) -> np.ndarray:
     """Return which pairs contradict each other where no pose is free of penetration, (realization, pair) bool.
 
     These are the `rigid` pairs (pair,) that still penetrate at the pose of least penetration.
@@ -75,7 +75,7 @@ def in_conflict(rows: Rows, rigid: np.ndarray) -> np.ndarray:
     return stuck[:, None] & (gap < -rows.attrs["solver_accuracy"]) & rigid
 
 
-def _coordinates(rows: Rows, combinations: list[tuple[tuple[str, ...], int]]) -> dict[str, Any]:
+def _coordinates(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int]]) -> dict[str, Any]:
     """Return the labels of all dimensions, and what describes each measure."""
     return {
         terms.MEASURE: rows[terms.MEASURE].values,
@@ -101,7 +101,7 @@ def _coordinates(rows: Rows, combinations: list[tuple[tuple[str, ...], int]]) ->
     }
 
 
-def _status_values(rows: Rows, rigid: np.ndarray) -> dict[ArchiveVariable, Any]:
+def _status_values(rows: xr.Dataset, rigid: np.ndarray) -> dict[ArchiveVariable, Any]:
     """Return how many realizations have each status, and the shares and the conflicts of `rigid` pairs that follow."""
     by_status = np.sum([np.bincount(piece, minlength=len(terms.STATUS_MEANINGS)) for piece in statuses(rows)], axis=0)
     total, not_assemblable = int(by_status.sum()), by_status[terms.Status.NOT_ASSEMBLABLE]
@@ -113,7 +113,7 @@ def _status_values(rows: Rows, rigid: np.ndarray) -> dict[ArchiveVariable, Any]:
     }
 
 
-def _contact_values(rows: Rows, combinations: list[tuple[tuple[str, ...], int]]) -> dict[ArchiveVariable, Any]:
+def _contact_values(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int]]) -> dict[ArchiveVariable, Any]:
     """Return how often pairs carry, alone and in combinations, and their reactions."""
     total = rows.sizes[terms.REALIZATION]
     shares = np.array([intervals.proportion_of(count, total) for _, count in combinations])
@@ -124,7 +124,7 @@ def _contact_values(rows: Rows, combinations: list[tuple[tuple[str, ...], int]])
     }
 
 
-def _field_values(results: Results) -> dict[ArchiveVariable, Any]:
+def _field_values(results: xr.DataTree) -> dict[ArchiveVariable, Any]:
     """Return the extremes of the displacement fields, and how many realizations all of them cover."""
     parts = [str(part) for part in results.to_dataset()[terms.PART].values]
     return {
@@ -134,7 +134,7 @@ def _field_values(results: Results) -> dict[ArchiveVariable, Any]:
     }
 
 
-def _is_rigid(results: Results) -> np.ndarray:
+def _is_rigid(results: xr.DataTree) -> np.ndarray:
     """Return whether no point of a pair gives way (pair,)."""
     rigid = np.ones(results.to_dataset().sizes[terms.PAIR], dtype=bool)
     if terms.POINT_STIFFNESS.name in (contact := results["contact"].to_dataset()):
@@ -143,7 +143,7 @@ def _is_rigid(results: Results) -> np.ndarray:
     return rigid
 
 
-def _penetration(rows: Rows, rigid: np.ndarray) -> np.ndarray:
+def _penetration(rows: xr.Dataset, rigid: np.ndarray) -> np.ndarray:
     """Return the largest penetration of any contact point of the `rigid` pairs (pair,) in each state [mm]."""
     if not (rows[terms.GAP_MIN.name].size and rigid.any()):
         return np.zeros(len(terms.STATES))
@@ -151,7 +151,7 @@ def _penetration(rows: Rows, rigid: np.ndarray) -> np.ndarray:
     return np.maximum(-np.min([np.fmin.reduce(gap[..., rigid], axis=(1, 2)) for gap in gaps], axis=0), 0)
 
 
-def _steps(rows: Rows) -> list[float]:
+def _steps(rows: xr.Dataset) -> list[float]:
     """Return the median and the largest number of linear steps, of the realizations that took any."""
     counts: Counter[int] = Counter()
     for piece in pieces(rows[[terms.ITERATIONS.name]]):
@@ -165,7 +165,7 @@ def _steps(rows: Rows) -> list[float]:
     return [float(np.mean([positive[k] for k in middle])), float(positive[-1])]
 
 
-def _smallest_range(results: Results, rows: Rows) -> float:
+def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
     """Return the smallest tolerance range above 0 of any contributor or measure [mm]; infinite if there is none."""
     sample = results["sample"].to_dataset()
     contributors = sample[terms.TOLERANCE_RANGE.name].values[sample[terms.CONTRIBUTOR_UNITS.name].values == "mm"]
@@ -175,7 +175,7 @@ def _smallest_range(results: Results, rows: Rows) -> float:
     return float(np.min(ranges, where=ranges > 0, initial=np.inf))
 
 
-def _datum_shifts(results: Results) -> list[str]:
+def _datum_shifts(results: xr.DataTree) -> list[str]:
     """Return the features with a datum at maximum or least material, as part.feature."""
     sample = results["sample"].to_dataset()
     labels = zip(sample[terms.CONTRIBUTOR].values, sample[terms.DISTRIBUTION.name].values, strict=True)
@@ -187,14 +187,14 @@ def _datum_shifts(results: Results) -> list[str]:
     return list(dict.fromkeys(shifted))
 
 
-def _planned_samples(results: Results, count: int) -> int:
+def _planned_samples(results: xr.DataTree, count: int) -> int:
     """Return the number of realizations that the run was started with, or `count` if rows were selected from an archive."""
     samples, size = int(results.attrs["samples"]), results.to_dataset().sizes[terms.REALIZATION]
     is_unfinished = size > count or size == terms.FIRST_ROWS
     return max(samples, count) if is_unfinished else count
 
 
-def _field_extremes(results: Results, part: str) -> np.ndarray:
+def _field_extremes(results: xr.DataTree, part: str) -> np.ndarray:
     """Return 6 sigma of |u|, and its interval, where the archived field is least and largest, (state, extreme, interval)."""
     extremes = np.full((len(terms.STATES), len(terms.EXTREMES), len(terms.ESTIMATE)), np.nan)
     if not _summed(results, part):
@@ -209,17 +209,17 @@ def _field_extremes(results: Results, part: str) -> np.ndarray:
     return extremes
 
 
-def _summed(results: Results, part: str) -> int:
+def _summed(results: xr.DataTree, part: str) -> int:
     """Return the number of realizations in the field of a part; 0 while the field is being written."""
     field = _field(results, part)
     is_written = int(field[terms.GROUP_CHECKSUM.name]) != terms.UNFINISHED
     return int(field[terms.FIELD_REALIZATIONS.name]) if is_written else 0
 
 
-def _magnitudes(results: Results, part: str) -> int:
+def _magnitudes(results: xr.DataTree, part: str) -> int:
     """Return the number of realizations in the magnitude of a part's field."""
     return min(int(_field(results, part)[terms.MAGNITUDE_REALIZATIONS.name]), _summed(results, part))
 
 
-def _field(results: Results, part: str) -> Rows:
+def _field(results: xr.DataTree, part: str) -> xr.Dataset:
     return results["field"].children[terms.group_of(part)].to_dataset()
