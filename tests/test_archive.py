@@ -12,7 +12,7 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import SCRIPTS, run, script
 from tolcontact.archive import bytes_of_rows, stored_rows
-from tolcontact.archive.writer import open_locked
+from tolcontact.archive.netcdf_library import open_netcdf
 from tolcontact.errors import ArchiveError
 from tolcontact.testing import assert_gaps_recompute, assert_same_run
 from tolcontact.vocabulary import BY_REALIZATION
@@ -133,7 +133,7 @@ def test_the_bytes_of_a_row_are_foreseen(keep, tmp_path):
 
 
 def test_values_are_not_masked(archive):
-    with open_locked(archive, "r") as file:
+    with open_netcdf(archive, "r") as file:
         assert all(type(file[name][:5]) is np.ndarray for name in ("status", "measured", "contact/moving_point"))
 
 

@@ -202,13 +202,6 @@ def test_the_page_of_a_comparison_is_read(runs, width, tmp_path, open_page):  # 
     assert y == pytest.approx([100, 100, 100])
 
 
-def test_archives_of_before_are_compared_with_those_of_today(runs, tmp_path):
-    """What a measure is a value of is not said there."""
-    old = runs["one"].copy()
-    old.dataset = old.to_dataset().drop_vars("measure_quantity")
-    assert "thickness" in tc.compare_runs({"old": old, "new": runs["higher"]})["measure"].values
-
-
 def test_what_is_no_run_is_refused(runs, archive):
     with pytest.raises(tc.OptionError, match="at least two runs"):
         tc.compare_runs(archive)

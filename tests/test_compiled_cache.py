@@ -1,13 +1,13 @@
 """Compiled functions are kept on disk where that is possible, and work where it is not."""
 
-import hashlib
 import os
 import shutil
+from pathlib import Path
 
 import pytest
 
+import tolcontact
 from tests.helpers import finish, nightly, script, start
-from tolcontact.compiled import compiled
 
 pytestmark = pytest.mark.slow
 
@@ -44,39 +44,9 @@ def counted(begun):
     return int(hits), int(misses)
 
 
-def folder_of(home):
-    return home / ".cache/tolcontact/code"
-
-
-def cached(home):
-    (file,) = folder_of(home).iterdir()
-    return file
-
-
 def test_a_second_process_finds_it_compiled(home):
     assert count(home) == (1, 0)
     assert count(home, "-O") == (1, 0)
-
-
-@pytest.mark.parametrize("left", ["half", *nightly("nothing", "garbage", "another pickle")])
-def test_a_damaged_file_is_replaced(left, home):
-    file = cached(home)
-    whole = file.read_bytes()
-    pickled = b"\x80\x04K\x05."
-    file.write_bytes({
-        "nothing": b"", "half": whole[: len(whole) // 2], "garbage": b"\x80\x05garbage" * 50,
-        "another pickle": hashlib.blake2b(pickled, digest_size=32).digest() + pickled,
-    }[left])  # fmt: skip
-    assert count(home) == (0, 1)
-    assert count(home) == (1, 0)
-
-
-def test_a_damaged_file_that_cannot_be_replaced_is_passed_over(home):
-    """A folder where a file should be stands for what even root cannot write to."""
-    file = cached(home)
-    file.unlink()
-    file.mkdir()
-    assert count(home) == (0, 1)
 
 
 def test_without_a_place_to_write_it_compiles_anew(home):
@@ -89,21 +59,21 @@ def test_several_processes_may_begin_at_once(tmp_path):
     assert count(tmp_path) == (1, 0)
 
 
-def caller(added):
-    """A compiled function, always the same, that calls another one."""
-    names = {"compiled": compiled}
-    exec(f"@compiled\ndef called(x): return x + {added}\n@compiled\ndef calling(x): return called(x)\n", names)
-    return names["calling"]
+def test_a_change_in_a_kernel_of_the_package_is_noticed(tmp_path):
+    """A compiled function may call one of another file, which Numba would not look at."""
+    package = shutil.copytree(Path(tolcontact.__file__).parent, tmp_path / "tolcontact")
+    counts = [count(tmp_path, PYTHONPATH=str(tmp_path)) for _ in range(2)]
+    with (package / "geometry/vector_kernel.py").open("a") as kernel:
+        kernel.write("# changed\n")
+    assert [*counts, count(tmp_path, PYTHONPATH=str(tmp_path))] == [(0, 1), (1, 0), (0, 1)]
 
 
-def test_a_change_in_a_function_that_it_calls_is_noticed(monkeypatch, tmp_path):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    found = []
-    for added in (1, 2, 1):
-        calling = caller(added)
-        assert calling(1.0) == 1 + added
-        found.append(sum(calling.stats.cache_hits.values()))
-    assert found == [0, 0, 1]
+def test_all_that_is_written_lies_in_the_cache_folder(tmp_path):
+    """So a package in a folder that is read-only is cached, too."""
+    package = shutil.copytree(Path(tolcontact.__file__).parent, tmp_path / "tolcontact")
+    assert count(tmp_path, "-B", PYTHONPATH=str(tmp_path)) == (0, 1)
+    assert not list(package.rglob("*.nb[ci]"))
+    assert len(list((tmp_path / ".cache/tolcontact/numba").rglob("*.nb[ci]"))) == 2
 
 
 @pytest.mark.parametrize("home", ["own", *nightly("not writable", "writable", "missing")])

@@ -4,11 +4,11 @@ from collections import Counter
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import tolcontact as tc
 from tests import cases
 from tests.test_report import browser, data_of, needs_browser, open_page  # noqa: F401 (fixtures)
-from tolcontact.labelled import Table
 from tolcontact.report import write_page
 from tolcontact.statistics import touching
 from tolcontact.statistics.contact import combinations
@@ -50,7 +50,7 @@ def test_combinations_of_pairs_are_counted(pairs):
     names = [f"pair {k}" for k in range(pairs)]
     masks = np.random.default_rng(pairs).random((6, pairs)) < 0.3
     carrying = np.repeat(masks, [1, 2, 3, 4, 5, 6], axis=0).astype(np.int16)
-    found = combinations(Table({"carrying": (("realization", "pair"), carrying)}, {"pair": names}))
+    found = combinations(xr.Dataset({"carrying": (("realization", "pair"), carrying)}, {"pair": names}))
     expected = Counter(tuple(np.array(names)[row].tolist()) for row in carrying > 0)
     assert Counter(dict(found)) == expected
 

@@ -10,25 +10,9 @@ from scipy.stats import qmc
 from tests.helpers import call, finish, start
 from tolcontact.cli.app import app
 from tolcontact.cli.commands import COMMANDS, declared_command
-from tolcontact.cli.quick_imports import DEFERRED
 from tolcontact.variation.sobol_points import MAX_DIMENSIONS, scrambled_points
 
 LISTING = "import sys; from tolcontact.cli import command_line\ntry: command_line({})\nexcept SystemExit: print(*sys.modules)"
-
-# Names of deferred modules after the imports of a command, and after a sphere around a box, which needs one of them.
-DEFERRAL = """
-import gc, sys, types
-from tolcontact.cli.commands import declared_command
-from tolcontact.cli.quick_imports import DEFERRED
-declared_command("run")
-deferred = lambda: (name for name in DEFERRED if name in sys.modules and type(sys.modules[name]) is not types.ModuleType)
-print(*deferred())
-import trimesh
-sphere = trimesh.creation.box().bounding_sphere
-print(*deferred())
-print(sphere.primitive.radius)
-print(gc.isenabled())
-"""
 
 
 def imported(folder, *arguments):
@@ -47,19 +31,7 @@ def test_a_run_imports_what_it_needs(tmp_path):
     call(tmp_path, "new", "small")
     modules = imported(tmp_path, "run", "small.py", "--samples", "20")
     assert "casadi" in modules
-    assert not {
-        "xarray", "pandas", "dask.base", "scipy.stats", "scipy.optimize", "scipy.ndimage", "distributed.client", "jaxtyping",
-        "tolcontact.analyses", "tolcontact.pmi", "tolcontact.report.html",
-    } & modules  # fmt: skip
-
-
-def test_deferred_modules_are_loaded_when_they_are_needed():
-    done = finish(start([sys.executable, "-c", DEFERRAL]))
-    assert done.returncode == 0, done.stderr
-    names, later_names, radius, is_collecting = done.stdout.splitlines()
-    assert set(names.split()) == DEFERRED
-    assert "trimesh.nsphere" not in later_names.split() and "trimesh.voxel" in later_names.split()
-    assert float(radius) == pytest.approx(np.sqrt(3) / 2, rel=1e-6) and is_collecting == "True"
+    assert not {"distributed.client", "jaxtyping", "tolcontact.analyses", "tolcontact.pmi", "tolcontact.report.html"} & modules
 
 
 @pytest.mark.parametrize("name", COMMANDS)

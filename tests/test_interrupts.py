@@ -1,4 +1,4 @@
-"""One signal ends a command, also where a library swallows the exception, or makes another one of it."""
+"""A signal ends a command, also if a library makes another exception of it; a second one if a library ignores the first."""
 
 import signal
 import sys
@@ -27,8 +27,6 @@ except KeyboardInterrupt:
 PLACES = {
     "anywhere": ("stop()", signal.SIGINT),
     "SIGTERM": ("stop(signal.SIGTERM)", signal.SIGTERM),
-    "ignored in a clean-up": ("Cleaned(); time.sleep(60)", signal.SIGINT),
-    "caught by a library": ("try: stop()\n        except BaseException: pass\n        time.sleep(60)", signal.SIGINT),
     "made another error": (
         "try: stop()\n        except BaseException as error: raise ImportError('x') from error", signal.SIGINT,
     ),
@@ -43,10 +41,23 @@ def test_one_signal_is_enough(place):
     assert (done.returncode, done.stdout, done.stderr) == (128 + number, "", "stopped\n")
 
 
-def test_a_second_one_does_not_disturb_the_cleaning_up():
-    code = "try: stop()\n        finally: stop(); time.sleep(1); stop(signal.SIGTERM); sys.stdout.write('cleaned')"
+@pytest.mark.parametrize(
+    "code",
+    [
+        "Cleaned()\n        stop(); time.sleep(60)",
+        "try: stop()\n        except BaseException: pass\n        stop(); time.sleep(60)",
+    ],
+    ids=["in a clean-up", "by a library"],
+)
+def test_a_second_one_ends_what_ignored_the_first(code):
     done = run([sys.executable, "-c", f"{BEGIN}        {code}{END}"])
-    assert (done.returncode, done.stdout, done.stderr) == (130, "cleaned", "stopped\n")
+    assert (done.returncode, done.stdout) == (130, "") and done.stderr.endswith("stopped\n")
+
+
+def test_where_nothing_is_to_be_cleaned_up_one_ends_the_process():
+    code = "try: stop()\n        finally: print('cleaned')"
+    done = run([sys.executable, "-c", f"{BEGIN.replace('stoppable()', 'stoppable(at_once=True)')}        {code}{END}"])
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "stopped\n")
 
 
 def test_without_a_signal_everything_is_as_before():

@@ -1,12 +1,7 @@
 """Two-sided locators that give way under forces: a bar on springs by its stiffness matrix, and what the archive says."""
 
-import gzip
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
-import xarray as xr
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
@@ -87,32 +82,6 @@ def test_forces_follow_from_the_archive_alone(tmp_path):
         assert forces[:, [0, 2]].sum(axis=1) + np.maximum(forces[:, 1], 0) == pytest.approx(LOAD, rel=1e-6)
         rebuilt = tc.model_of(tree)
     assert [locator.stiffness for locator in rebuilt.locations[0].scheme] == [*STIFFNESS, None, None, None, None]
-
-
-def test_a_stiffness_in_an_older_archive_lets_nothing_give_way(tmp_path):
-    path = tmp_path / "bar.nc"
-    tc.run(bar_on_springs(), samples=2, out=path)
-    with tc.open_archive(path) as tree:
-        assert tree.attrs["format"] == 8
-        document = json.loads(str(tree["model/declaration"].values))
-        for locator in document["locations"][0]["scheme"]:
-            locator.pop("springy", None)
-        older = xr.DataTree.from_dict({"model": xr.Dataset({"declaration": json.dumps(document)})})
-        older.attrs = tree.attrs | {"format": 6}
-        models = tc.model_of(older), tc.model_of(tree)
-    stiffness = [[locator.stiffness for locator in model.locations[0].scheme[:3]] for model in models]
-    assert stiffness == [[None, None, None], list(STIFFNESS)]
-
-
-def test_an_archive_of_the_first_format_with_springs_is_read(tmp_path):
-    path = tmp_path / "bar.nc"
-    path.write_bytes(gzip.decompress((Path(__file__).parent / "archives/springs_7.nc.gz").read_bytes()))
-    assert_gaps_recompute(path)
-    with tc.open_archive(path) as then:
-        forces = then.reaction.mean("realization").values
-        assert forces == pytest.approx([19.150274, -26.998281, 87.848006], abs=1e-6)
-        now = tc.run(tc.model_of(then), samples=8, seed=1, solver="daqp", surfaces=4)
-        assert np.abs(now.measured - then.measured).max() < 1e-9
 
 
 def test_stiff_springs_are_rigid_locators():

@@ -64,7 +64,7 @@ APART = {
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
     "version", "errors", "interrupts", "readable", "child", "stored_coordinates", "shape_worker", "kernel",
-    "vocabulary", "checksums", "labelled", "realizations",
+    "vocabulary", "checksums", "realizations",
     "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "features",
     "fasteners", "pmi", "discretization", "interference", "variation", "mechanics",
     "compilation", "statics", "contact", "simulation", "plausibility", "statistics", "archive", "report", "plot", "workflow",

@@ -3,19 +3,19 @@
 from collections.abc import Iterator
 
 import numpy as np
+import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.errors import ArchiveError
-from tolcontact.labelled import Results, Rows, RowsOf
 
 
-def pieces(rows: RowsOf) -> Iterator[RowsOf]:
+def pieces(rows: xr.Dataset) -> Iterator[xr.Dataset]:
     """Yield the realizations in pieces that fit into memory."""
     for start in range(0, rows.sizes[terms.REALIZATION], terms.PIECE_ROWS):
         yield rows.isel({terms.REALIZATION: slice(start, start + terms.PIECE_ROWS)})
 
 
-def statuses(rows: Rows) -> Iterator[np.ndarray]:
+def statuses(rows: xr.Dataset) -> Iterator[np.ndarray]:
     """Yield their statuses, piece by piece. Raises ArchiveError for one that has no meaning."""
     for piece in pieces(rows[[terms.STATUS.name]]):
         status = piece[terms.STATUS.name].values
@@ -24,7 +24,7 @@ def statuses(rows: Rows) -> Iterator[np.ndarray]:
         yield status
 
 
-def finished(results: Results) -> int:
+def finished(results: xr.DataTree) -> int:
     """Return how many rows, from the first on, were written completely."""
     rows = 0
     for piece in statuses(results.to_dataset()):

@@ -1,8 +1,7 @@
 """Write a small archive, compressed, to be kept for good and read by all later versions: write_archive.py ARCHIVE.nc.gz.
 
 It holds something of everything: two bars as meshes, locators with and without a distribution, one of them one-sided, a pair of
-faces, measures of three kinds, a force; since format 4 also features and a variable, since format 5 also form;
-since format 8 its bodies are watched.
+faces, measures of three kinds, a force, features with form, and a variable; its bodies are watched.
 The bars have so many sections that they need no more points for their fields.
 """
 

@@ -43,7 +43,7 @@ lie in each other deeper than the attribute `interference_depth` [mm] where `cla
 The attribute `not_watched` names what the test leaves out: parts that are not closed, contact pairs that give way or have
 form, overlaps that are declared, and round faces of a contact pair, which are judged by their gaps. Where `clashes` is 0 and
 `clash_part` is not -1, parts with declared contact lie in each other, and the realization is `doubtful`.
-Linearized runs, and archives before format 8, were not tested.
+Linearized runs were not tested.
 
 Where files round coordinates noticeably, the attribute `stored_coordinates` says to what, and what contact allows;
 `coordinate_error` in the group `contact` states the amount for each pair [mm].
@@ -154,7 +154,7 @@ realizations or `samples`, whichever is larger.
 ... resumed after 0 realizations
 
 A resumed run starts after the last checkpoint, here after none. The model, its contact points, the solver and the method must
-be the same as before; otherwise the run is refused. Archives of an earlier format can be read, not resumed.
+be the same as before; otherwise the run is refused.
 
 ## Checksums and untrusted archives
 

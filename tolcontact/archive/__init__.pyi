@@ -1,7 +1,6 @@
 from .analyses import check_room_for as check_room_for, keep as keep
 from .archive_lock import locked_archive as locked_archive
 from .disk_space import bytes_of_rows as bytes_of_rows, size_in_words as size_in_words
-from .file_tables import open_tables as open_tables, open_tables_unchecked as open_tables_unchecked
 from .labelled_rows import labelled as labelled
 from .reader import (
     method_of_run as method_of_run,

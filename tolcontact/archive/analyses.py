@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 from tolcontact import vocabulary as terms
 from tolcontact.archive.archive_lock import locked_archive
 from tolcontact.archive.inspection import inspect
+from tolcontact.archive.netcdf_library import open_netcdf
 from tolcontact.archive.resuming import check_same_model
-from tolcontact.archive.writer import open_locked, replacing_archive
+from tolcontact.archive.writer import replacing_archive
 from tolcontact.checksums import crc32
 from tolcontact.compilation import Program
 from tolcontact.errors import ArchiveError
@@ -24,7 +25,7 @@ def check_room_for(path: str | Path, record: terms.AnalysisRecord, program: Prog
     if not archive.is_file():
         raise ArchiveError(f'archive "{path}" does not exist; write one with: tolcontact run MODEL.py --out {path}')
     inspect(archive)
-    with open_locked(archive, "r") as file:
+    with open_netcdf(archive, "r") as file:
         check_same_model(file, archive, program)
         if terms.ANALYSES_GROUP in file.groups and record.name in file[terms.ANALYSES_GROUP].groups:
             group = f"{terms.ANALYSES_GROUP}/{record.name}"

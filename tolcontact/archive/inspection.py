@@ -36,15 +36,24 @@ SIZES = {
     terms.BOUND: 2,
     terms.LINE_END: 2,
 }
-GROUPS = ("model", "contact", "sample", "field")
-ADDED = ("surface",)  # groups that archives of format 1 may not have
+GROUPS = ("model", "contact", "sample", "surface", "field")
 LABELS = (terms.PART, terms.PAIR, terms.MEASURE, terms.ROW_VARIABLE)
 CHANGES_VALUES = ("scale_factor", "add_offset", "missing_value", "_Unsigned", "calendar")  # when xarray reads them
-TEXT_ATTRIBUTES = ("title", "history", "versions", "resolution", "objective", "active_set")  # texts that a summary repeats
-OF_FIELD = (terms.FIELD_VERTICES, terms.FIELD_FACES, terms.FIELD_MEAN, terms.FIELD_SIX_SIGMA, terms.FIELD_INTERVAL)
-OF_CONTACT = (terms.MOVING_PART, terms.REFERENCE_PART)
-OF_SAMPLE = (terms.LOCATOR_LABEL, terms.TOLERANCE_RANGE)
-BEFORE_CONTRIBUTORS = 3  # format of archives in which locators alone varied
+TEXT_ATTRIBUTES = ("title", "history", "versions", "resolution", "objective", "active_set", "search")  # that a summary repeats
+NEEDED = {  # variables of groups that summaries and models are read from
+    "": (
+        terms.MEASURE_NOMINAL, terms.MEASURE_TOLERANCE, terms.MEASURE_UNITS, terms.LOWER_LIMIT, terms.UPPER_LIMIT,
+        terms.MEASURE_ACCURACY, terms.QUANTITY, terms.ROW_CHECKSUM, terms.ROW_VARIABLE_LABEL, terms.SUMMED_ROWS,
+    ),
+    "contact": (terms.MOVING_PART, terms.REFERENCE_PART, *terms.TOUCHING, terms.GROUP_CHECKSUM),
+    "sample": (
+        terms.CONTRIBUTOR_LABEL, terms.CONTRIBUTOR_SOURCE, terms.CONTRIBUTOR_UNITS, terms.TOLERANCE_RANGE, terms.DISTRIBUTION,
+        terms.LOCATOR_LABEL, terms.LOCATOR_POINT, terms.LOCATOR_DIRECTION, terms.ONE_SIDED,
+    ),
+    "surface": (*terms.SURFACE, terms.GROUP_CHECKSUM),
+    "model": (terms.DECLARATION,),
+}  # fmt: skip
+OF_FIELD = (terms.FIELD_VERTICES, terms.FIELD_FACES, *terms.FIELDS, terms.GROUP_CHECKSUM)
 OF_MESH = (terms.MESH_VERTICES, terms.MESH_FACES)
 CHECKED_GROUPS = ("", "model", "contact", "sample", "surface", "field", terms.STATIONS_GROUP)
 VARIABLES = {  # by name; no two variables of an archive differ that have one name
@@ -110,12 +119,15 @@ def _fault(path: Path) -> str:
 
 
 def _check_format(file: netCDF4.Dataset) -> None:
-    number = file.getncattr("format") if "format" in file.ncattrs() else 1
+    if "format" not in file.ncattrs():
+        raise DamagedError("is not an archive of tolcontact: it states no format")
+    number = file.getncattr("format")
     if not isinstance(number, int | np.integer) or number < 1:
         raise DamagedError(f"is damaged: its format is {number!r}")
-    if number > terms.FORMAT:
+    if number != terms.FORMAT:
         raise DamagedError(
-            f"has format {number}; this version of tolcontact reads formats up to {terms.FORMAT}; use a newer one"
+            f"has format {number}, and this version of tolcontact reads format {terms.FORMAT}; run the model again, or use the "
+            "version that wrote it"
         )
 
 
@@ -169,10 +181,8 @@ def _check_text(name: str, text: str) -> None:
 
 
 def _check_archive(file: netCDF4.Dataset, groups: list[netCDF4.Dataset]) -> None:
-    optional = (*terms.POSES, *terms.ADDED)
-    missing = [v.name for v in terms.ROWS if v not in optional and v.name not in file.variables]
-    is_format_1 = getattr(file, "format", 1) == 1
-    missing += [group for group in (GROUPS if is_format_1 else (*GROUPS, *ADDED)) if group not in file.groups]
+    missing = [v.name for v in terms.ROWS if v not in terms.POSES and v.name not in file.variables]
+    missing += [group for group in GROUPS if group not in file.groups]
     missing += [name for name in TEXT_ATTRIBUTES if not isinstance(getattr(file, name, None), str)]
     if missing:
         raise DamagedError(f"is not an archive of tolcontact: it has no {', '.join(missing)}")
@@ -190,7 +200,7 @@ def _check_archive(file: netCDF4.Dataset, groups: list[netCDF4.Dataset]) -> None
             labels = _texts(file[name])
             if len(set(labels)) < len(labels) or "" in labels:
                 raise DamagedError(f"is damaged: its {name} names are empty, or not unique")
-    rows = getattr(file, "block_rows", terms.BLOCK_ROWS)
+    rows = getattr(file, "block_rows", 0)
     if not (isinstance(rows, int | np.integer) and 0 < rows <= terms.BLOCK_ROWS):
         raise DamagedError(f"is damaged: its blocks have {rows!r} realizations")
     _check_needed(file)
@@ -207,10 +217,7 @@ def _check_variable(group: netCDF4.Dataset, stored: netCDF4.Variable, variable: 
     where = f"{group.path.rstrip('/')}/{variable.name}"
     text = stored.dtype is str or np.dtype(stored.dtype).kind == "S"
     dims = stored.dimensions[:-1] if text and stored.dtype is not str else stored.dimensions
-    expected = variable.dims
-    if getattr(_top(group), "format", 1) <= BEFORE_CONTRIBUTORS:
-        expected = tuple(terms.LOCATOR if d == terms.CONTRIBUTOR else d for d in expected)
-    if dims != expected or text != (variable.kind is str):
+    if dims != variable.dims or text != (variable.kind is str):
         raise DamagedError(f"is damaged: {where} does not have the dimensions and the type that it has in an archive")
     if text or variable is terms.NUMBERS:
         return
@@ -228,15 +235,12 @@ def _check_needed(file: netCDF4.Dataset) -> None:
         _need(file["contact"], terms.FORMS)
     if any(variable.name in file["contact"].variables for variable in terms.TANGENTS):
         _need(file["contact"], (*terms.FORMS, *terms.TANGENTS))
-    for group, needed in (("contact", OF_CONTACT), ("sample", OF_SAMPLE), ("model", (terms.DECLARATION,))):
-        _need(file[group], needed)
-    _need(file, (terms.MEASURE_NOMINAL, terms.MEASURE_TOLERANCE, terms.MEASURE_UNITS))
-    if getattr(file, "format", 1) > 1:
-        _need(file, (terms.ROW_CHECKSUM, terms.ROW_VARIABLE_LABEL, terms.SUMMED_ROWS))
-        summed = np.ma.getdata(file[terms.SUMMED_ROWS.name][...])
-        max_rows = len(file.dimensions[terms.BLOCK]) * int(file.block_rows)
-        if (summed < terms.UNFINISHED).any() or (summed > max_rows).any():
-            raise DamagedError("is damaged: its checkpoints cover more realizations than it has")
+    for group, needed in NEEDED.items():
+        _need(file[group] if group else file, needed)
+    summed = np.ma.getdata(file[terms.SUMMED_ROWS.name][...])
+    max_rows = len(file.dimensions[terms.BLOCK]) * int(file.block_rows)
+    if (summed < terms.UNFINISHED).any() or (summed > max_rows).any():
+        raise DamagedError("is damaged: its checkpoints cover more realizations than it has")
     if tuple(_texts(file[terms.STATE])) != terms.STATES:
         raise DamagedError("is damaged: its states are not raw and corrected")
     _check_stations(file)
@@ -302,8 +306,7 @@ def _check_sums(group: netCDF4.Dataset) -> None:
     if terms.GROUP_CHECKSUM.name in group.variables:
         expected, checksum = int(group[terms.GROUP_CHECKSUM.name][...]), 0
         for variable in {"surface": terms.SURFACE, "contact": terms.TOUCHING}.get(kind, terms.FIELDS):
-            if variable.name in group.variables:  # magnitude_realizations is not in archives of format 2
-                checksum = crc32(variable, _values(group[variable.name], variable), checksum)
+            checksum = crc32(variable, _values(group[variable.name], variable), checksum)
         if expected not in (terms.UNFINISHED, checksum):
             raise DamagedError(f"is damaged: group {group.path} does not hold what was written")
 

@@ -1,21 +1,31 @@
-"""The netCDF library: its lock, since only one thread may use it at a time, and the memory of its caches."""
+"""The netCDF library: only one thread may use it at a time, and its caches take memory."""
 
 import contextlib
-import sys
+import gc
 from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal
 
 import netCDF4
 
-CACHE_BYTES = 1 << 20  # a chunk of most variables; with the size that is usual, all would take as much memory as all else
+CACHE_BYTES = 1 << 20  # a chunk of most variables; with the usual size, all caches would take as much memory as all else
 
 
-def library_lock() -> contextlib.AbstractContextManager[object]:
-    """Return the lock that xarray holds while it reads and closes files; before xarray is imported, nobody else does."""
-    locks = sys.modules.get("xarray.backends.locks")
-    if locks is None:
-        return contextlib.nullcontext()
-    lock: contextlib.AbstractContextManager[object] = locks.combine_locks([locks.NETCDFC_LOCK, locks.HDF5_LOCK])
-    return lock
+@contextlib.contextmanager
+def open_netcdf(path: Path, mode: Literal["w", "r+", "r"]) -> Iterator[netCDF4.Dataset]:
+    """Open a file whose values are read and written as they are, without masks.
+
+    Meanwhile the collector is off: in another thread it might close a file of xarray that nobody uses any more.
+    """
+    was_collecting = gc.isenabled()
+    gc.disable()
+    try:
+        with small_caches(), netCDF4.Dataset(path, mode, format="NETCDF4") as file:
+            file.set_auto_maskandscale(False)
+            yield file
+    finally:
+        if was_collecting:
+            gc.enable()
 
 
 @contextlib.contextmanager

@@ -63,14 +63,7 @@ class RawFile:
             data = data[self._file.write(data) :]
 
     def overwrite_together(self, values: Mapping[str, Mapping[ArchiveVariable, Any]]) -> None:
-        """Overwrite the values of groups, by their paths, and their checksums. A run that is killed meanwhile leaves -1.
-
-        Variables that the file does not have are left out: it was begun before they existed.
-        """
-        values = {
-            group: {variable: array for variable, array in variables.items() if self.has(group, variable)}
-            for group, variables in values.items()
-        }
+        """Overwrite the values of groups, by their paths, and their checksums. A run that is killed meanwhile leaves -1."""
         for group in values:
             self.overwrite(group, terms.GROUP_CHECKSUM, terms.UNFINISHED)
         for group, variables in values.items():

@@ -10,18 +10,13 @@ import pandas as pd
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.file_tables import library_errors
 from tolcontact.archive.inspection import check_archive
+from tolcontact.archive.netcdf_library import small_caches
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.document import from_document
-from tolcontact.declaration.feature_tolerance import KINDS
 from tolcontact.errors import ArchiveError
 from tolcontact.geometry import surfaces_of, with_known_surfaces
 from tolcontact.method import Method
-
-FIRST_WITH_FORM = 5  # the first format of archives with faces that are not flat
-FIRST_WITH_SPRINGS = 7  # and with locators that give way
-FORM_KINDS = [kind for kind, tolerance in KINDS.items() if tolerance.is_form]
 
 
 def open_archive(path: str | Path) -> xr.DataTree:
@@ -37,9 +32,12 @@ def open_archive(path: str | Path) -> xr.DataTree:
 
 def open_unchecked(path: Path) -> xr.DataTree:
     """Open an archive that is known to be undamaged."""
-    with library_errors(path):
-        # Numbers of realizations are not read, which takes as much memory as all else together: they are 0, 1, 2, ...
-        tree = xr.open_datatree(path, engine="netcdf4", drop_variables=terms.REALIZATION)
+    try:
+        with small_caches():
+            # Numbers of realizations are not read, which takes as much memory as all else together: they are 0, 1, 2, ...
+            tree = xr.open_datatree(path, engine="netcdf4", drop_variables=terms.REALIZATION)
+    except Exception as error:  # libraries may find a fault that the inspection did not
+        raise ArchiveError(f'"{path}" cannot be read: {type(error).__name__}: {error}') from error
     numbers = pd.RangeIndex(tree.sizes[terms.REALIZATION])
     tree.coords[terms.REALIZATION] = (terms.REALIZATION, numbers, terms.NUMBERS.all_attributes)
     return tree
@@ -51,50 +49,17 @@ def model_of(results: xr.DataTree) -> Assembly:
         document = json.loads(str(results["model"][terms.DECLARATION.name].values))
     except (KeyError, ValueError, RecursionError) as error:
         raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
-    number = int(results.attrs.get("format", 1))
-    if number < FIRST_WITH_FORM:
-        _state_form_alone(document)
-    if number < FIRST_WITH_SPRINGS:
-        _leave_locators_rigid(document, presses=method_of_run(results).minimizes.presses)
     meshes = {}
     if "mesh" in results["model"].children:
-        for name, group in results["model/mesh"].children.items():
+        for group in results["model/mesh"].children.values():
             mesh = group.to_dataset()
-            # Groups of format 1 do not say the part's name: it was their own.
-            meshes[str(mesh.attrs.get("part", name))] = _mesh(mesh)
+            meshes[str(mesh.attrs["part"])] = _mesh(mesh)
     return from_document(document, meshes)
 
 
-def _state_form_alone(document: Any) -> None:
-    """Let tolerances of form in a document leave the shape of features as it is: formats before form drew none."""
-    try:
-        tolerances = [
-            tolerance
-            for part in document["parts"]
-            for feature in part.get("features", ())
-            for tolerance in feature["tolerances"]
-        ]
-        for tolerance in tolerances:
-            if tolerance["kind"] in FORM_KINDS:
-                tolerance.setdefault("form", None)
-    except (KeyError, TypeError, AttributeError):  # the reading of the document finds what is wrong with it
-        return
-
-
-def _leave_locators_rigid(document: Any, *, presses: bool) -> None:
-    """Leave out stiffnesses in a document that had no effect: formats before springs let no locator give way to forces."""
-    try:
-        schemes = [location["scheme"] for location in document["locations"]]
-        for locator in [locator for scheme in schemes if isinstance(scheme, list) for locator in scheme]:
-            if not locator.get("springy") and (locator["one_sided"] or presses):
-                locator.pop("stiffness", None)
-    except (KeyError, TypeError, AttributeError):  # the reading of the document finds what is wrong with it
-        return
-
-
 def method_of_run(results: xr.DataTree) -> Method:
-    """Return the method of a run; choices that an earlier format does not state are the usual ones."""
-    choices: dict[str, Any] = {field.name: results.attrs[field.name] for field in fields(Method) if field.name in results.attrs}
+    """Return the method of a run."""
+    choices: dict[str, Any] = {field.name: results.attrs[field.name] for field in fields(Method)}
     return Method(**{name: value if isinstance(value, str) else float(value) for name, value in choices.items()})  # type: ignore[arg-type]
 
 

@@ -19,8 +19,6 @@ POINT_TOLERANCE = 1e-9  # mm: points may differ by rounding from one machine to 
 
 def check_same_run(file: netCDF4.Dataset, path: Path, program: Program, settings: Mapping[str, Any], surfaces: int) -> None:
     """Raise ArchiveError if the archive `file`, in the file `path`, is of another model or another run."""
-    if getattr(file, "format", 1) < terms.FORMAT:
-        raise ArchiveError(f'"{path}" was begun by an earlier version of tolcontact: it can be read, not resumed')
     if not file.dimensions[terms.REALIZATION].isunlimited():
         raise ArchiveError(f'"{path}" is a copy that cannot grow; resume the archive that tolcontact wrote')
     check_same_model(file, path, program)

@@ -1,23 +1,20 @@
 """Rows of realizations as they are stored: which variables, in which chunks and blocks, with which checksums."""
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import netCDF4
 import numpy as np
+import xarray as xr
 
 from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.archive.rows import Row, group_of_rows, kept_rows, row_values
 from tolcontact.checksums import crc32
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
-from tolcontact.labelled import Column, Results, Rows
 from tolcontact.realizations import finished
 from tolcontact.simulation import Block
 from tolcontact.vocabulary import ArchiveVariable
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 PIECE_BYTES = 1 << 22  # of a variable that are read at once to compare them with their checksums
 
@@ -38,13 +35,10 @@ def stored(block: Block, labels: Sequence[str], nominal: Nominal) -> StoredBlock
     return StoredBlock(block.start, block.start + len(block), values, checksums)
 
 
-def check_rows(results: Results) -> None:
-    """Raise ArchiveError if finished realizations are not what was written.
-
-    Archives of format 1 have no checksums; nor are there any for rows that were taken from an archive.
-    """
+def check_rows(results: xr.DataTree) -> None:
+    """Raise ArchiveError if finished realizations are not what was written; rows that were selected have no checksums."""
     stored = results.to_dataset()
-    count, rows = stored.sizes[terms.REALIZATION], int(stored.attrs.get("block_rows", terms.BLOCK_ROWS))
+    count, rows = stored.sizes[terms.REALIZATION], int(stored.attrs["block_rows"])
     samples = int(stored.attrs["samples"])
     if terms.ROW_CHECKSUM.name not in stored or count not in (samples, min(samples, terms.FIRST_ROWS)):
         return
@@ -58,7 +52,7 @@ def check_rows(results: Results) -> None:
         raise ArchiveError(f"the archive is damaged: its realizations cannot be read ({error}); run it again") from error
 
 
-def _damaged(results: Results, stored: Rows, rows: int) -> Iterator[tuple[str, int]]:
+def _damaged(results: xr.DataTree, stored: xr.Dataset, rows: int) -> Iterator[tuple[str, int]]:
     """Yield the variables and blocks of `rows` realizations whose values do not match their checksums."""
     done = finished(results)
     complete = done if done == stored.sizes[terms.REALIZATION] else done // rows * rows
@@ -79,7 +73,7 @@ def _damaged(results: Results, stored: Rows, rows: int) -> Iterator[tuple[str, i
             yield from ((row.label, int(block)) for block in wrong[:1])
 
 
-def _checksums(variable: ArchiveVariable, values: "Column | xr.DataArray", rows: int) -> np.ndarray:
+def _checksums(variable: ArchiveVariable, values: xr.DataArray, rows: int) -> np.ndarray:
     """Return the checksums (block,) of the values of a variable in blocks of `rows` realizations."""
     row_bytes = values.dtype.itemsize * max(values.size // max(len(values), 1), 1)
     checksums, step = [], max(min(terms.PIECE_ROWS, PIECE_BYTES // row_bytes) // rows, 1) * rows

@@ -12,18 +12,18 @@ import shutil
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive.disk_space import check_room, lay_out_rows
-from tolcontact.archive.file_tables import open_tables_unchecked
 from tolcontact.archive.header import empty_field, empty_touching, write_header
 from tolcontact.archive.inspection import inspect
-from tolcontact.archive.netcdf_library import library_lock, small_caches
+from tolcontact.archive.netcdf_library import open_netcdf
 from tolcontact.archive.raw_file import RawFile
+from tolcontact.archive.reader import open_unchecked
 from tolcontact.archive.resuming import check_same_run
 from tolcontact.archive.rows import kept_rows
 from tolcontact.archive.settings import Run, now, run_settings, versions
@@ -49,7 +49,7 @@ class ArchiveWriter:
         Raises ArchiveError if it cannot be written, or if there is no room for it.
         """
         check_room(path, program.nominal, kept_rows(program.nominal, run.keep), run.samples)
-        with replacing_archive(path) as part, open_locked(part, "w") as file:
+        with replacing_archive(path) as part, open_netcdf(part, "w") as file:
             write_header(file, program, run, sums)
             lay_out_rows(file, 0, min(run.samples, terms.FIRST_ROWS))
         self._go_on(path, program.nominal, run.checkpoint_interval)
@@ -65,9 +65,9 @@ class ArchiveWriter:
         with replacing_archive(path) as copy:
             # Only the copy is opened: the old file may be open in this process, and HDF5 does not open a file twice.
             shutil.copyfile(path, copy)
-            with open_tables_unchecked(copy) as results:
+            with open_unchecked(copy) as results:
                 check_rows(results)
-            with open_locked(copy, "r+") as file:
+            with open_netcdf(copy, "r+") as file:
                 check_same_run(file, path, program, run_settings(program, run), run.surfaces)
                 rows = last_checkpoint(file, path, [part.name for part in program.nominal.last_parts]).rows
                 samples, length = max(run.samples, int(file.samples)), len(file.dimensions[terms.REALIZATION])
@@ -79,9 +79,8 @@ class ArchiveWriter:
             # Fields and checks were of the earlier rows.
             initial = {terms.field_of(part.name): empty_field(len(part.vertices)) for part in program.nominal.last_parts}
             initial["surface"] = empty_checks(run.surfaces, len(program.nominal.pairs))
+            initial["contact"] = empty_touching(sum(len(pair.P_m) for pair in program.nominal.pairs))
             with contextlib.closing(RawFile(copy)) as values:
-                if values.has("contact", terms.TOUCHING_SHARE):  # not in archives that were begun before
-                    initial["contact"] = empty_touching(sum(len(pair.P_m) for pair in program.nominal.pairs))
                 values.overwrite_together(initial)
         writer._go_on(path, program.nominal, run.checkpoint_interval)
         return writer
@@ -92,7 +91,7 @@ class ArchiveWriter:
         self._checkpoint_interval = checkpoint_interval
         with _as_archive_error(path):
             self._values = RawFile(path)
-            with open_locked(path, "r") as file:
+            with open_netcdf(path, "r") as file:
                 self._length, self._block_rows = len(file.dimensions[terms.REALIZATION]), int(file.block_rows)
                 self.samples, self._checked = int(file.samples), len(file["surface"].dimensions[terms.CHECKED])
                 self._go_back(last_checkpoint(file, path, self._parts))
@@ -100,7 +99,7 @@ class ArchiveWriter:
 
     def load_checkpoint(self) -> list[np.ndarray]:
         """Go back to the last checkpoint, and return its sums of fields, (state, number) for each part; empty without one."""
-        with open_locked(self._path, "r") as file:
+        with open_netcdf(self._path, "r") as file:
             checkpoint = last_checkpoint(file, self._path, self._parts)
         self._go_back(checkpoint)
         return checkpoint.sums
@@ -133,7 +132,7 @@ class ArchiveWriter:
         try:
             with replacing_archive(self._path) as part:
                 shutil.copyfile(self._path, part)
-                with open_locked(part, "r+") as file:
+                with open_netcdf(part, "r+") as file:
                     lay_out_rows(file, self._length, self.samples)
             self._length = self.samples
         finally:  # a run may be stopped here, and still writes its fields
@@ -168,12 +167,12 @@ class ArchiveWriter:
 
     def rows_to_check(self, seed: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the numbers (row,) of the realizations to check against the surfaces, and whether each is a random choice."""
-        with open_locked(self._path, "r") as file:
+        with open_netcdf(self._path, "r") as file:
             return choose(file, self._checked, seed)
 
     def poses(self, rows: np.ndarray) -> np.ndarray | None:
         """Return corrected poses (row, part, 12) of some rows; None if they are not kept."""
-        with open_locked(self._path, "r") as file:
+        with open_netcdf(self._path, "r") as file:
             return archived_poses(file, rows, self._stations)
 
     def first_poses(self, end: int) -> tuple[np.ndarray, np.ndarray]:
@@ -181,7 +180,7 @@ class ArchiveWriter:
 
         poses   (row, part, 12), which the archive has to keep
         """
-        with open_locked(self._path, "r") as file:
+        with open_netcdf(self._path, "r") as file:
             rows = np.flatnonzero(file[terms.SEARCHED.name][:end] == 0)
             poses = archived_poses(file, rows, self._stations)
         assert poses is not None
@@ -197,10 +196,9 @@ class ArchiveWriter:
 
     def write_touching(self, share: np.ndarray, interval: np.ndarray, realizations: int) -> None:
         """Write the share of realizations in which each contact point touches (point,), with its interval (point, bound)."""
-        if self._values.has("contact", terms.TOUCHING_SHARE):
-            with _as_archive_error(self._path):
-                values = dict(zip(terms.TOUCHING, (share, interval, realizations), strict=True))
-                self._values.overwrite_together({"contact": values})
+        with _as_archive_error(self._path):
+            values = dict(zip(terms.TOUCHING, (share, interval, realizations), strict=True))
+            self._values.overwrite_together({"contact": values})
 
 
 @contextlib.contextmanager
@@ -218,14 +216,6 @@ def _as_archive_error(path: Path) -> Iterator[None]:
     except (OSError, RuntimeError) as error:
         reason = getattr(error, "strerror", None) or f"{error} (is the disk full?)"
         raise ArchiveError(f'archive "{path}" cannot be written: {reason}') from error
-
-
-@contextlib.contextmanager
-def open_locked(path: Path, mode: Literal["w", "r+", "r"]) -> Iterator[netCDF4.Dataset]:
-    """Open a file while no other thread may use the netCDF library: garbage collection there could close a file."""
-    with library_lock(), small_caches(), netCDF4.Dataset(path, mode, format="NETCDF4") as file:
-        file.set_auto_maskandscale(False)  # values are what they are; looking for masks takes longer than writing them
-        yield file
 
 
 class Checkpoint(NamedTuple):

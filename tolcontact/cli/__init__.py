@@ -51,7 +51,7 @@ prints JSON with `--json`, and writes netCDF with `--out`.
 | 0 | done |
 | 1 | done, but more than 0.1 % of the realizations are not resolved, or what `--until` or `--require` states is not met |
 | 2 | invalid input: one message, nothing written |
-| 130, 143 | stopped by a single Ctrl-C or SIGTERM; finished realizations are in the archive |
+| 130, 143 | stopped by Ctrl-C or SIGTERM (a second one ends it at once); finished realizations are in the archive |
 
 >>> from typer.testing import CliRunner
 >>> from tolcontact.cli.app import app

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from tolcontact import archive as archives, report as reports, statistics, workflow
+from tolcontact import archive as archives, report as reports, workflow
 from tolcontact.cli.app import Archive, AsCsv, AsJson, Overwrite, app, examples, flag, only_one
 from tolcontact.cli.json_output import print_data
 from tolcontact.cli.output import check_page, check_spreadsheet, console, print_summary
@@ -26,20 +26,18 @@ def summary(
 ) -> None:
     """Print the statistics of an archive."""
     only_one(json=as_json, csv=as_csv, limits=limits)
-    with archives.open_tables(archive) as results:
-        archives.check_rows(results)
-        table = statistics.summary_table(results)
+    estimates = workflow.summarize(archive)
     if as_csv:
-        values = statistics.dataset_of(table)["statistic_value"].to_dataset("interval").to_dataframe()
+        values = estimates["statistic_value"].to_dataset("interval").to_dataframe()
         names = values.index.get_level_values(STATISTIC)
         values["units"] = [units_of(*labels) for labels in zip(names, values[MEASURE_UNITS.name], strict=True)]
         typer.echo(values[[*ESTIMATE, "units"]].to_csv(lineterminator="\n"), nl=False)
     elif as_json:
-        print_data(statistics.dataset_of(table))
+        print_data(estimates)
     elif limits:
-        console().print(capability_text(table))
+        console().print(capability_text(estimates))
     else:
-        print_summary(table)
+        print_summary(estimates)
 
 
 @app.command(epilog=examples("report run.nc", "report run.nc --out page.html", "report run.nc --xlsx tables.xlsx"))

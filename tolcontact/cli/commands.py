@@ -6,7 +6,6 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from tolcontact import cli, interrupts, shape_worker
-from tolcontact.cli.quick_imports import quick_imports
 
 # The module of each command in this folder, and its line in the list of commands.
 COMMANDS = {
@@ -88,8 +87,8 @@ class Commands(TyperGroup):
 def declared_command(name: str) -> Any:
     """Return a command with its options. The module that declares the command is imported."""
     module, _ = COMMANDS[name]
-    with quick_imports():
-        getattr(cli, module)  # the import declares the command
+    with interrupts.stoppable(at_once=True):  # in native modules that are being loaded an exception may be fatal
+        getattr(cli, module)  # its import declares the command
     app = cli.app.app
     return next(
         typer.main.get_command_from_info(

@@ -4,11 +4,11 @@ import sys
 from pathlib import Path
 
 import typer
+import xarray as xr
 from rich.console import Console
 
 from tolcontact import report
 from tolcontact.errors import OptionError
-from tolcontact.labelled import Rows
 from tolcontact.report.text import summary_text
 from tolcontact.vocabulary import BY_STATUS, UNRESOLVED
 
@@ -41,7 +41,7 @@ def check_spreadsheet(path: Path, *, overwrite: bool = False) -> None:
         raise OptionError(f'"{path}" exists; choose another name, or replace it with --overwrite')
 
 
-def print_summary(summary: Rows) -> None:
+def print_summary(summary: xr.Dataset) -> None:
     """Print the summary of a run. Raises typer.Exit with code 1 if too many realizations were not resolved."""
     console().print(summary_text(summary))
     failed = sum(int(summary[BY_STATUS.name][status]) for status in UNRESOLVED)

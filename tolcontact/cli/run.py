@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from tolcontact import archive, report as reports, statistics
-from tolcontact.archive import Run
+from tolcontact import report as reports
+from tolcontact.archive import Run, open_unchecked
 from tolcontact.cli.app import (
     Model,
     Objective,
@@ -40,11 +40,12 @@ from tolcontact.cli.title_options import (
     titled_model,
 )
 from tolcontact.errors import OptionError, shown
-from tolcontact.labelled import Table
 from tolcontact.simulation.cluster import client_of
+from tolcontact.statistics import Summary
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.archived_run import SURFACES, write_run
 from tolcontact.workflow.models import DEFAULT_SOLVER
+from tolcontact.workflow.summaries import summarize
 from tolcontact.workflow.until import Target
 
 Until = Annotated[
@@ -133,20 +134,17 @@ def _check_files(out: Path | None, report: Path | None, *, overwrite: bool, resu
         check_page(report, overwrite=overwrite)
 
 
-def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Table, str]:
-    """Return the summary of the archive at a path, and its shortfall from `until`; write its page."""
-    with archive.open_tables_unchecked(path) as results:
-        archive.check_rows(results)
-        summary = statistics.summary_table(results)
-        shortfall = Target.of(until).shortfall(results) if until is not None else ""
-    if report is not None:
-        with archive.open_unchecked(path) as tree:
-            reports.write_page(tree, statistics.dataset_of(summary), report)
-    return summary, shortfall
+def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Summary, str]:
+    """Return the summary of the archive at a path, and what it lacks that `until` states; write its page."""
+    with open_unchecked(path) as results:
+        summary = summarize(results)
+        if report is not None:
+            reports.write_page(results, summary, report)
+        return summary, Target.of(until).shortfall(results) if until is not None else ""
 
 
-def _print_results(summary: Table, out: Path | None, shortfall: str, *, quiet: bool) -> None:
-    """Print the summary of results. Raises typer.Exit with code 1 if there is a shortfall."""
+def _print_results(summary: Summary, out: Path | None, shortfall: str, *, quiet: bool) -> None:
+    """Print the summary of results. Raises typer.Exit with code 1 if they lack something."""
     print_summary(summary)
     if out is not None:
         typer.echo(f"\narchive: {shown(str(out))}")

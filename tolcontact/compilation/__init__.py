@@ -51,9 +51,10 @@ True
 
 Each QP covers the parts that contact couples: parts that touch no common free part have separate QPs. Rows are scaled to
 length 1 and increments to mm, so that residuals and tolerances are lengths. Functions that are evaluated more than 10 000
-times, in one process or several, are compiled to machine code. The machine code gives the same results to the last bit as
-CasADi's interpreter. It is stored in the user's cache folder (`~/.cache/tolcontact` on Linux, 268 MB at most), so the next
-process that simulates the same model need not compile it again.
+times, in one process or several, are compiled to machine code, which gives the same results to the last bit as CasADi's
+interpreter. The machine code is kept in the user's cache folder (`~/.cache/tolcontact` on Linux, 268 MB at most), so the next
+process that simulates the same model need not compile it again. Kernels that Numba compiles are kept there, too, in a folder
+for each version of their sources.
 
 A group of few bodies has one function that assembles its QP, and one that judges the answer. With six or more coupled bodies, a
 QP is assembled from elements. An element is a pair of faces with the parts that its increments move or, if forces press, a part

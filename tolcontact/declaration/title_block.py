@@ -51,6 +51,6 @@ class TitleBlock:
 
 
 def title_block_of(attributes: Mapping[Any, Any]) -> TitleBlock:
-    """Return the title block from the attributes of an archive; archives of earlier versions have none."""
+    """Return the title block from the attributes of an archive; empty if it has none."""
     names = [member.name for member in fields(TitleBlock)]
     return TitleBlock(**{name: str(attributes.get(f"{TITLE_PREFIX}{name}", "")) for name in names})

@@ -106,7 +106,7 @@ def _shares(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
         missed.append("no linear shares: it has a kink in the assembly as drawn, or no slope there")
     small = dataset.sizes["group"] - len(rows)
     remarks = [f"and {small} of less than {100 * SMALL_SHARE:g} % each"] if small else []
-    if "minor" in dataset and dataset["minor"].any():  # older archives do not state it
+    if dataset["minor"].any():
         together = percent(dataset["minor_total"].isel(state=terms.CORRECTED).values)
         remarks.append(f"{int(dataset['minor'].sum())} minor ones, estimated together: with contact {together} in total")
     columns = ["", "without\ncontact", "with contact,\nalone", "in total", "linear"]
@@ -193,8 +193,7 @@ def _extremes(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
             extreme = dataset.sel(state=state, end=end)
             found, linear = float(extreme["worst"]), float(extreme["bound"])
             cells = [f"{found:.6g}", f"{linear:.6g}" if math.isfinite(linear) else "no limit"]
-            if "agreeing" in dataset:  # older archives do not state it
-                cells.append(f"{int(extreme['agreeing'])} of {searches}")
+            cells.append(f"{int(extreme['agreeing'])} of {searches}")
             rows.append([f"{word}, {terms.WORD_OF_STATE[state]}", *cells])
     remarks = []
     beyond = float((np.array(terms.SENSES) * (dataset["worst"] - dataset["bound"]).values).max())
@@ -202,11 +201,10 @@ def _extremes(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
         remarks.append(f"Found up to {beyond:.2g} beyond linear: sensitivities change when parts tilt that far.")
     if not np.isfinite(dataset["bound"].values).all():
         remarks.append("No limit: a kink in the nominal assembly, or contact alone would have to hold the part.")
-    if "agreeing" in dataset and int(dataset["agreeing"].min()) <= FEW_SEARCHES * searches:
+    if int(dataset["agreeing"].min()) <= FEW_SEARCHES * searches:
         remarks.append("Where few searches met, there may be worse combinations; more --samples find more.")
     title = f"{dataset['measure'].values} [{dataset['measure_units'].values}]"
-    columns = ["", "found", "linear", "searches"][: len(rows[0])]
-    yield AnalysisTable(title, columns, rows, remarks)
+    yield AnalysisTable(title, ["", "found", "linear", "searches"], rows, remarks)
     deviations = dataset["deviations"].isel(state=terms.CORRECTED).transpose("contributor", "end").values
     combination = [
         [str(label), *(f"{value:+.4g}" for value in values)]
@@ -224,13 +222,11 @@ def _tails(dataset: xr.Dataset) -> AnalysisReport:
         rows.append([str(event), "-" if math.isnan(ppm[0]) else f"{estimate} [{lower}, {upper}]"])
     count = f"{grouped(int(dataset['simulated'].sum()))} realizations"
     notes = ["Probabilities in ppm, with contact, by searches and importance sampling; 95 % intervals."]
-    disagreement = dataset["disagreement"].values if "disagreement" in dataset else np.ones(len(rows))  # older archives
-    for event, factor in zip(dataset["event"].values, disagreement, strict=True):
+    for event, factor in zip(dataset["event"].values, dataset["disagreement"].values, strict=True):
         if factor > 1:
             differ = f"disagree by a factor of {factor:.2g}" if math.isfinite(factor) else "disagree: only one of them found it"
             notes.append(f"{event}: two searches {differ}; more realizations are needed.")
-    stops = dataset["stop"].values if "stop" in dataset else np.zeros(len(rows))
-    for event in dataset["event"].values[stops == 1]:
+    for event in dataset["event"].values[dataset["stop"].values == 1]:
         notes.append(f"{event}: values stop at a limit; none was found beyond it.")
     for event in dataset["event"].values[np.isnan(dataset["probability"].values[:, 0])]:
         notes.append(f"{event}: the measurement is not a number in some realizations, so its probability is not defined.")
@@ -254,10 +250,9 @@ def _allocation(dataset: xr.Dataset) -> AnalysisReport:
         *(_effects(dataset["effect"].sel(measure=measure)) for measure in dataset["measure"].values),
     ]
     notes = [f"Requirements in fresh runs of {grouped(dataset.attrs['fresh'])} realizations; 95 % intervals."]
-    if "floor" in dataset.attrs:
-        least, most = (f"{dataset.attrs[name]:g} times" for name in ("floor", "ceiling"))
-        notes.append(f"Tolerances may be {least} (smallest allowed) to {most} (largest allowed) those before.\n")
-    if "idle_tried" in dataset.attrs and dataset["idle"].values.any():
+    least, most = (f"{dataset.attrs[name]:g} times" for name in ("floor", "ceiling"))
+    notes.append(f"Tolerances may be {least} (smallest allowed) to {most} (largest allowed) those before.\n")
+    if dataset["idle"].values.any():
         count, ends = (
             dataset.attrs["idle_tried"],
             " or ".join(f"{dataset.attrs[name]:g} times" for name in ("floor", "ceiling")),
@@ -266,7 +261,7 @@ def _allocation(dataset: xr.Dataset) -> AnalysisReport:
             f"No influence: with all of these tolerances together at {ends} those before, none of {grouped(count)} "
             f"resolved realizations changed. So at most {3 / count:.2g} of them do, with 95 % confidence.\n"
         )
-    met = dataset["met"].values if "met" in dataset else np.ones(len(requirements))  # older archives do not state it
+    met = dataset["met"].values
     for name, values in zip(dataset["requirement"].values[met == 0], dataset["kept"].values[met == 0], strict=True):
         text = share if f": {terms.PPM}" in str(name) else number
         notes.append(f'"{name}" is not met by any tolerances allowed; the best found: {text(values[1])}.\n')
@@ -274,9 +269,7 @@ def _allocation(dataset: xr.Dataset) -> AnalysisReport:
 
 
 def _remark_on(row: xr.Dataset, attributes: dict) -> str:
-    """Return why a tolerance did not change further, if there is a reason; older archives do not state any."""
-    if "idle" not in row:
-        return ""
+    """Return why a tolerance did not change further, if there is a reason."""
     if int(row["idle"]):
         return "no influence"
     factor = float(row["factor"])

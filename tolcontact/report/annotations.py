@@ -79,8 +79,6 @@ def fixed_points(pair: ContactPoints) -> tuple[np.ndarray, np.ndarray]:
 
 def _locators(results: xr.DataTree) -> list[Mark]:
     sample = results["sample"].to_dataset()
-    if terms.LOCATOR_POINT.name not in sample:
-        return []
     points, directions = sample[terms.LOCATOR_POINT.name].values, sample[terms.LOCATOR_DIRECTION.name].values
     return [
         {"name": str(name), "at": at.tolist(), "along": along.tolist()}
@@ -107,7 +105,7 @@ def _features(results: xr.DataTree) -> list[Mark]:
 
 
 def _lines(results: xr.DataTree) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lines (line, 2, 3) that show measurements, and their measure indices (line,); none in old archives."""
+    """Return the lines (line, 2, 3) that show measurements, and the number of the measure (line,) of each, if there are any."""
     model = results["model"].to_dataset()
     if terms.LINE_ENDS.name not in model:
         return np.zeros((0, 2, 3)), np.zeros(0, dtype=int)

@@ -12,4 +12,4 @@ SETTINGS = (
 
 def archived_settings(results: xr.DataTree) -> dict[str, Any]:
     """Return the settings that an archive states, by the names of its attributes."""
-    return {name: results.attrs[name] for name in SETTINGS if name in results.attrs}
+    return {name: results.attrs[name] for name in SETTINGS}

@@ -73,10 +73,8 @@ def _without(note: str) -> ContributorShares:
 
 def _groups(results: xr.DataTree, sample: xr.Dataset, columns: np.ndarray) -> dict[str, np.ndarray]:
     """Return the positions in `columns` of each group, by name."""
-    labels = [str(label) for label in sample[sample[terms.DEVIATION.name].dims[-1]].values]
-    is_stated = terms.CONTRIBUTOR_SOURCE.name in sample  # archives before format 4 have only locators
-    sources = sample[terms.CONTRIBUTOR_SOURCE.name].values if is_stated else np.full(len(labels), "locator")
-    owners = [_owner(label, source) for label, source in zip(labels, sources, strict=True)]
+    labels = [str(label) for label in sample[terms.CONTRIBUTOR].values]
+    owners = [_owner(label, source) for label, source in zip(labels, sample[terms.CONTRIBUTOR_SOURCE.name].values, strict=True)]
     leader = {owner: owner for owner in owners}
 
     def find(owner: str) -> str:

@@ -2,7 +2,8 @@
 
 import math
 
-from tolcontact.labelled import Rows
+import xarray as xr
+
 from tolcontact.limits import GAP_ACCURACY
 
 MAX_DECIMALS = 6
@@ -34,7 +35,7 @@ def settled(penetration: float) -> float:
     return penetration if penetration > GAP_ACCURACY else 0.0
 
 
-def limits_text(measure: Rows) -> str:
+def limits_text(measure: xr.Dataset) -> str:
     """Return the limits of a measure in words, and which of them are stops; empty without limits."""
     lower, upper = float(measure["measure_lower"].values), float(measure["measure_upper"].values)
     stops = str(measure["measure_stops"].values) if "measure_stops" in measure.coords else ""

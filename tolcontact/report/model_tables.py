@@ -89,21 +89,16 @@ def _features(document: Entry, results: xr.DataTree) -> ModelTable:
 
 def _locators(document: Entry, results: xr.DataTree) -> ModelTable:
     sample = results["sample"].to_dataset()
-    if terms.LOCATOR_POINT.name not in sample:
-        return ModelTable("", [], [])
     labels = [str(label) for label in sample[terms.LOCATOR].values]
-    dim = sample[terms.TOLERANCE_RANGE.name].dims[0]
-    numbers = {str(label): k for k, label in enumerate(sample[dim].values)}
+    numbers = {str(label): k for k, label in enumerate(sample[terms.CONTRIBUTOR].values)}
     rows: list[list[Cell]] = []
     compliant = _compliant_locators(results["contact"].to_dataset())
     for k, label in enumerate(labels):
         part, _, name = label.rpartition(".")
         at, along = (sample[v.name].values[k] for v in (terms.LOCATOR_POINT, terms.LOCATOR_DIRECTION))
         width = float(sample[terms.TOLERANCE_RANGE.name].values[numbers[label]])
-        is_stated = terms.DISTRIBUTION.name in sample and sample[terms.DISTRIBUTION.name].dims == (dim,)
-        distribution = str(sample[terms.DISTRIBUTION.name].values[numbers[label]]) if is_stated else ""
-        one_sided = terms.ONE_SIDED.name in sample and bool(sample[terms.ONE_SIDED.name].values[k])
-        kind = "one-sided" if one_sided else "two-sided"
+        distribution = str(sample[terms.DISTRIBUTION.name].values[numbers[label]])
+        kind = "one-sided" if sample[terms.ONE_SIDED.name].values[k] else "two-sided"
         if k in compliant:
             kind += f", {float(sample[terms.STIFFNESS.name].values[k]):g} N/mm"
         rows.append([part, name, _triple(at), _triple(along), width if math.isfinite(width) else None, distribution, kind])
@@ -143,10 +138,7 @@ def _measurements(document: Entry, results: xr.DataTree) -> ModelTable:
     root = results.to_dataset()
     rows: list[list[Cell]] = []
     for k, measure in enumerate(document["measures"]):
-        lower, upper = (
-            float(root[variable.name].values[k]) if variable.name in root else math.nan
-            for variable in (terms.LOWER_LIMIT, terms.UPPER_LIMIT)
-        )
+        lower, upper = (float(root[variable.name].values[k]) for variable in (terms.LOWER_LIMIT, terms.UPPER_LIMIT))
         scale = upper - lower if math.isfinite(upper - lower) else None
         along = "" if measure.get("along") is None else _triple(measure["along"])
         nominal = plain(float(root[terms.MEASURE_NOMINAL.name].values[k]), scale)

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.labelled import Rows
 from tolcontact.report.figures import grouped, number, percent, plain
 from tolcontact.statistics.verdict import FAILS, UNDECIDED, Verdict, verdict
 
@@ -49,7 +49,7 @@ class ResultRow(NamedTuple):
     states: list[StateFigures]
 
 
-def share_units(summary: Rows) -> str:
+def share_units(summary: xr.Dataset) -> str:
     """Return the units of all shares out of specification in a table, "%" or "ppm"."""
     shares = summary["statistic_value"].sel(statistic=terms.OUTSIDE, interval="estimate").values
     return "%" if np.nan_to_num(shares).max(initial=0.0) >= PPM_BELOW else "ppm"
@@ -70,17 +70,17 @@ def with_units(values: np.ndarray, units: str) -> str:
     return share_in(values, units).replace(" [", f" {units} [")
 
 
-def share_heading(summary: Rows) -> str:
+def share_heading(summary: xr.Dataset) -> str:
     """Return the heading above the last two columns of the table, `SIDES`."""
     return f"{terms.OUT_OF_SPECIFICATION}, {share_units(summary)}"
 
 
-def result_rows(summary: Rows) -> list[ResultRow]:
+def result_rows(summary: xr.Dataset) -> list[ResultRow]:
     """Return the rows of the table for each measurement."""
     return [_row(summary.sel(measure=name), summary) for name in summary["measure"].values]
 
 
-def _row(measure: Rows, summary: Rows) -> ResultRow:
+def _row(measure: xr.Dataset, summary: xr.Dataset) -> ResultRow:
     opinion = verdict_of(measure, summary.attrs["realizations"])
     nominal, lower, upper = (float(measure[name].values) for name in (terms.MEASURE_NOMINAL.name, *terms.MEASURE_LIMITS[:2]))
     scale = upper - lower if math.isfinite(upper - lower) else None
@@ -98,13 +98,13 @@ def _row(measure: Rows, summary: Rows) -> ResultRow:
     )
 
 
-def _state_figures(of_state: Rows, units: str) -> StateFigures:
+def _state_figures(of_state: xr.Dataset, units: str) -> StateFigures:
     values = of_state["statistic_value"].sel(statistic=list(STATISTICS)).transpose("statistic", "interval").values
     below, above = (share_in(share, units) for share in values[3:])
     return StateFigures(terms.WORD_OF_STATE[str(of_state["state"].values)], values, [*map(number, values[:3]), below, above])
 
 
-def verdict_of(measure: Rows, realizations: int) -> Verdict | None:
+def verdict_of(measure: xr.Dataset, realizations: int) -> Verdict | None:
     """Return the verdict on one measure of a summary; None without limits."""
     return verdict(measure["statistic_value"].sel(state=terms.STATES[1], statistic=terms.OUTSIDE).values, realizations)
 
@@ -121,19 +121,19 @@ def verdict_text(opinion: Verdict | None) -> str:
     return f"{UNDECIDED}: about {grouped(int(round(opinion.more, min(digits, 0))))} more realizations"
 
 
-def reservation(summary: Rows) -> str:
+def reservation(summary: xr.Dataset) -> str:
     """Return the text after each verdict if parts without declared contact penetrate each other; otherwise ""."""
     share = summary["clash_share"].values
     return f"; but parts lie in each other in {percent(share)} of realizations" if share[0] > 0 else ""
 
 
-def full_name(measure: Rows) -> str:
+def full_name(measure: xr.Dataset) -> str:
     """Return the name of one measure of a summary, with its station if the assembly has stations."""
     name, station = str(measure[terms.MEASURE].values), terms.MEASURE_STATION.name
     return f"{name}, station {measure[station].values}" if station in measure.coords else name
 
 
-def verdict_lines(summary: Rows) -> Iterator[str]:
+def verdict_lines(summary: xr.Dataset) -> Iterator[str]:
     """Yield the verdict on each measurement that has limits."""
     for name in summary["measure"].values:
         measure = summary.sel(measure=name)
@@ -146,7 +146,7 @@ def overview_columns() -> list[str]:
     return ["", "mean", "6 sigma", terms.PPK, terms.OUT_OF_SPECIFICATION_COLUMN]
 
 
-def overview_rows(summary: Rows) -> list[list[str]]:
+def overview_rows(summary: xr.Dataset) -> list[list[str]]:
     """Return rows of each measurement and state: mean, 6 sigma, Ppk and share out of specification."""
     rows, units = [], share_units(summary)
     for name in summary["measure"].values:

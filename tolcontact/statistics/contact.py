@@ -4,9 +4,9 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.labelled import Results, Rows, Table
 from tolcontact.realizations import pieces
 from tolcontact.statistics import intervals
 from tolcontact.statistics.sample import Sample
@@ -17,14 +17,14 @@ MAX_PAIRS = 20  # of parts, the most frequent ones
 VARIABLES = [variable.name for variable in (terms.CLASHES, terms.CLASH_DEPTH, terms.CLASH_PART, terms.CLASH_OTHER)]
 
 
-def carried(rows: Rows) -> np.ndarray:
+def carried(rows: xr.Dataset) -> np.ndarray:
     """Return the share of realizations with each pair under load, (pair, interval)."""
     counts = np.sum([(piece[terms.CARRYING.name].values > 0).sum(axis=0) for piece in pieces(rows)], axis=0)
     total = rows.sizes[terms.REALIZATION]
     return np.array([intervals.proportion_of(int(k), total) for k in counts]).reshape(-1, len(terms.ESTIMATE))
 
 
-def reactions(rows: Rows) -> np.ndarray:
+def reactions(rows: xr.Dataset) -> np.ndarray:
     """Return mean and percentiles of the reaction of each pair over all realizations, (pair, of_reaction, interval)."""
     estimates = []
     for pair in range(rows.sizes[terms.PAIR]):
@@ -34,7 +34,7 @@ def reactions(rows: Rows) -> np.ndarray:
     return np.array(estimates).reshape(-1, 1 + len(terms.REACTION_PERCENTILES), len(terms.ESTIMATE))
 
 
-def combinations(rows: Rows) -> list[tuple[tuple[str, ...], int]]:
+def combinations(rows: xr.Dataset) -> list[tuple[tuple[str, ...], int]]:
     """Return the most frequent combinations of pairs under load, with their numbers of realizations."""
     names, counts = [str(name) for name in rows[terms.PAIR].values], Counter[tuple[bool, ...]]()
     for piece in pieces(rows):
@@ -83,19 +83,15 @@ class TouchingShares:
         return estimates[:, 0], estimates[:, 1:], self._realizations
 
 
-def surface_values(results: Results, limit: float) -> dict[ArchiveVariable, Any]:
-    """Return the results of the surface check, with shares of depths above `limit` [mm]; NaN where a variable is missing."""
-    pairs = results.sizes[terms.PAIR]
-    surface = results["surface"].to_dataset() if "surface" in results.children else Table({})
+def surface_values(results: xr.DataTree, limit: float) -> dict[ArchiveVariable, Any]:
+    """Return the results of the surface check, with shares of depths above `limit` [mm]."""
+    surface = results["surface"].to_dataset()
 
     def depths(variable: ArchiveVariable) -> np.ndarray:
-        return surface[variable.name].values if variable.name in surface else np.full((0, pairs), np.nan)
+        return np.asarray(surface[variable.name].values)
 
-    def checked(variable: ArchiveVariable, value: int) -> np.ndarray:
-        return surface[variable.name].values == value if variable.name in surface else np.zeros(0, dtype=bool)
-
-    count = len(checked(terms.CHECKED_REALIZATION, -1)) - int(checked(terms.CHECKED_REALIZATION, terms.UNFINISHED).sum())
-    at_random = checked(terms.AT_RANDOM, 1)
+    count = int((surface[terms.CHECKED_REALIZATION.name].values != terms.UNFINISHED).sum())
+    at_random = surface[terms.AT_RANDOM.name].values == 1
     return {
         terms.DEEPEST_SURFACE: _over(np.nanmax, depths(terms.SURFACE_PENETRATION)),
         terms.FARTHEST_BESIDE: _over(np.nanmax, depths(terms.BESIDE)),
@@ -129,14 +125,13 @@ class Clashes:
     depths      [mm], by the same keys: their largest depth; missing if none was measured
     """
 
-    def __init__(self, rows: Rows) -> None:
+    def __init__(self, rows: xr.Dataset) -> None:
         self.watched, self.clashing = 0, 0
         self.counts = Counter[tuple[int, int, bool]]()
         self.depths = dict[tuple[int, int, bool], float]()
         self._parts = [str(name) for name in rows[terms.PART].values]
-        if all(name in rows for name in VARIABLES):
-            for piece in pieces(rows[VARIABLES]):
-                self._add(*(np.asarray(piece[name].values) for name in VARIABLES))
+        for piece in pieces(rows[VARIABLES]):
+            self._add(*(np.asarray(piece[name].values) for name in VARIABLES))
 
     def _add(self, clashes: np.ndarray, depth: np.ndarray, part: np.ndarray, other: np.ndarray) -> None:
         self.watched += int((clashes >= 0).sum())

@@ -5,10 +5,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.labelled import Rows
-from tolcontact.limits import GAP_ACCURACY, Limits
+from tolcontact.limits import Limits
 from tolcontact.statistics import capability, intervals
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.statistics.sample import Sample, measured_sample
@@ -17,7 +17,7 @@ from tolcontact.statistics.sample import Sample, measured_sample
 class MeasuredValues:
     """The values of a measure in one state, with its limits; intermediate results of several statistics are computed once."""
 
-    def __init__(self, rows: Rows, measure: int, state: str, limits: Limits) -> None:
+    def __init__(self, rows: xr.Dataset, measure: int, state: str, limits: Limits) -> None:
         self.sample: Sample = measured_sample(rows, measure, state)
         self.limits = limits
 
@@ -76,7 +76,7 @@ class MeasureEstimates(NamedTuple):
     stops: np.ndarray
 
 
-def measure_estimates(rows: Rows) -> MeasureEstimates:
+def measure_estimates(rows: xr.Dataset) -> MeasureEstimates:
     """Return the estimates of all measures; the values of one measure are in memory at a time."""
     statistics, changes, stops = [], [], []
     for number, limits_of_measure in enumerate(limits(rows)):
@@ -103,13 +103,7 @@ def _changes(raw: Sample, corrected: Sample) -> list[Estimate]:
     return [estimates[name] for name in terms.CHANGES]
 
 
-def limits(rows: Rows) -> list[Limits]:
+def limits(rows: xr.Dataset) -> list[Limits]:
     """Return the limits of each measure; not a number where a side is open."""
-    if terms.LOWER_LIMIT.name in rows:
-        lower, upper = rows[terms.LOWER_LIMIT.name].values, rows[terms.UPPER_LIMIT.name].values
-    else:
-        nominal, half = rows[terms.MEASURE_NOMINAL.name].values, rows[terms.MEASURE_TOLERANCE.name].values / 2
-        lower, upper = nominal - half, nominal + half
-    is_stated = terms.MEASURE_ACCURACY.name in rows  # archives of earlier versions do not state it
-    accuracies = rows[terms.MEASURE_ACCURACY.name].values if is_stated else np.full(len(lower), GAP_ACCURACY)
-    return [Limits(*map(float, values)) for values in zip(lower, upper, accuracies, strict=True)]
+    columns = (rows[variable.name].values for variable in (terms.LOWER_LIMIT, terms.UPPER_LIMIT, terms.MEASURE_ACCURACY))
+    return [Limits(*map(float, values)) for values in zip(*columns, strict=True)]

@@ -91,7 +91,7 @@ def _shared_measures(summaries: Mapping[str, xr.Dataset]) -> list[str]:
     def is_shared(name: str) -> bool:
         entries = [table.get(name) for table in tables]
         units, quantities = ({entry[k] for entry in entries if entry is not None} for k in (0, 1))
-        return None not in entries and len(units) == 1 and len(quantities - {""}) <= 1  # old archives do not state the quantity
+        return None not in entries and len(units) == 1 and len(quantities) == 1
 
     return [name for name in tables[0] if is_shared(name)]
 

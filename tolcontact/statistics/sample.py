@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache, cached_property
 
 import numpy as np
+import xarray as xr
 from scipy import special
 
 from tolcontact import vocabulary as terms
-from tolcontact.labelled import Rows
 from tolcontact.realizations import pieces
 
 MAX_SORTED_VALUES = 1 << 20  # larger samples are not sorted in memory
@@ -158,7 +158,7 @@ class Sample:
         return different, np.bincount(numbers, np.concatenate(times), minlength=len(different)).astype(np.int64)
 
 
-def measured_sample(rows: Rows, measure: int, state: str) -> Sample:
+def measured_sample(rows: xr.Dataset, measure: int, state: str) -> Sample:
     """Return the values of a measure, given by its index, in a state; they are read from the rows when needed.
 
     Up to MAX_KEPT_VALUES are read once, and kept for the lifetime of the sample.

@@ -4,10 +4,10 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.errors import ArchiveError
-from tolcontact.labelled import Results, Rows, Table
 from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import contact, intervals
 from tolcontact.statistics.contact import Clashes, surface_values
@@ -18,8 +18,8 @@ from tolcontact.vocabulary import ArchiveVariable
 MIN_REALIZATIONS = 2
 
 
-def summary_table(results: Results) -> Table:
-    """Return the statistics of a run as a table (see summarize)."""
+def estimates_of(results: xr.DataTree) -> xr.Dataset:
+    """Return the statistics of a run (see summarize)."""
     count = finished(results)
     if count < MIN_REALIZATIONS:
         raise ArchiveError(f"{count} realizations are finished, too few for statistics; continue with --resume")
@@ -37,17 +37,17 @@ def summary_table(results: Results) -> Table:
         **surface_values(results, terms.NOTICED_SHARE * smallest),
         **_field_values(results),
     }
-    units = {terms.PAIR_REACTION: {"units": rows[terms.REACTION.name].attrs.get("units", "1")}}
-    return Table(
+    units = {terms.PAIR_REACTION: {"units": rows[terms.REACTION.name].attrs["units"]}}
+    return xr.Dataset(
         {variable.name: variable.entry(array, **units.get(variable, {})) for variable, array in values.items()},
         _coordinates(rows, combinations)
         | {terms.MEASURE_STOPS: (terms.MEASURE, of_measures.stops), terms.CLASH: clashes.labels},
         {
-            "title": results.attrs.get("title", ""),
+            "title": results.attrs["title"],
             "realizations": count,
             "samples": _planned_samples(results, count),
             **{name: results.attrs[name] for name in terms.METHOD_ATTRIBUTES},
-            "search": results.attrs.get("search", "fixed"),  # formats 1 and 2 do not state it
+            "search": results.attrs["search"],
             "datum_shifts": ", ".join(_datum_shifts(results)),
             "smallest_range": smallest,
             terms.INTERFERENCE_DEPTH: float(results.attrs.get(terms.INTERFERENCE_DEPTH, np.nan)),
@@ -57,14 +57,14 @@ def summary_table(results: Results) -> Table:
     )
 
 
-def estimate_of(results: Results, measure: str, statistic: str) -> Estimate:
+def estimate_of(results: xr.DataTree, measure: str, statistic: str) -> Estimate:
     """Return one of `STATISTICS` of a corrected measure."""
     rows = results.to_dataset().isel({terms.REALIZATION: slice(finished(results))})
     number = rows[terms.MEASURE].values.tolist().index(measure)
     return STATISTICS[statistic](MeasuredValues(rows, number, terms.STATES[terms.CORRECTED], limits(rows)[number]))
 
 
-def in_conflict(rows: Rows, rigid: np.ndarray) -> np.ndarray:
+def in_conflict(rows: xr.Dataset, rigid: np.ndarray) -> np.ndarray:
     """Return the pairs that contradict each other where no pose is free of penetration, (realization, pair) bool.
 
     These are the `rigid` pairs (pair,) that still penetrate at the pose of least penetration.
@@ -74,7 +74,7 @@ def in_conflict(rows: Rows, rigid: np.ndarray) -> np.ndarray:
     return stuck[:, None] & (gap < -rows.attrs["solver_accuracy"]) & rigid
 
 
-def _coordinates(rows: Rows, combinations: list[tuple[tuple[str, ...], int]]) -> dict[str, Any]:
+def _coordinates(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int]]) -> dict[str, Any]:
     """Return the labels of all dimensions, and the descriptions of measures."""
     return {
         terms.MEASURE: rows[terms.MEASURE].values,
@@ -95,12 +95,12 @@ def _coordinates(rows: Rows, combinations: list[tuple[tuple[str, ...], int]]) ->
             name: (terms.MEASURE, np.array(values))
             for name, values in zip(terms.MEASURE_LIMITS, zip(*limits(rows), strict=True), strict=True)
         },
-        terms.QUANTITY.name: (terms.MEASURE, _quantities(rows)),
+        terms.QUANTITY.name: (terms.MEASURE, rows[terms.QUANTITY.name].values),
         **{label.name: (label.dims, rows[label.name].values) for label in terms.OF_STATIONS if label.name in rows},
     }
 
 
-def _status_values(rows: Rows, rigid: np.ndarray) -> dict[ArchiveVariable, Any]:
+def _status_values(rows: xr.Dataset, rigid: np.ndarray) -> dict[ArchiveVariable, Any]:
     """Return the number of realizations of each status, and the resulting shares and conflicts of `rigid` pairs."""
     by_status = np.sum([np.bincount(piece, minlength=len(terms.STATUS_MEANINGS)) for piece in statuses(rows)], axis=0)
     total, not_assemblable = int(by_status.sum()), by_status[terms.Status.NOT_ASSEMBLABLE]
@@ -112,7 +112,7 @@ def _status_values(rows: Rows, rigid: np.ndarray) -> dict[ArchiveVariable, Any]:
     }
 
 
-def _contact_values(rows: Rows, combinations: list[tuple[tuple[str, ...], int]]) -> dict[ArchiveVariable, Any]:
+def _contact_values(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int]]) -> dict[ArchiveVariable, Any]:
     """Return how often pairs are under load, alone and in combinations, and their reactions."""
     total = rows.sizes[terms.REALIZATION]
     shares = np.array([intervals.proportion_of(count, total) for _, count in combinations])
@@ -123,7 +123,7 @@ def _contact_values(rows: Rows, combinations: list[tuple[tuple[str, ...], int]])
     }
 
 
-def _field_values(results: Results) -> dict[ArchiveVariable, Any]:
+def _field_values(results: xr.DataTree) -> dict[ArchiveVariable, Any]:
     """Return the extremes of the displacement fields, and the number of realizations that all of them cover."""
     parts = [str(part) for part in results.to_dataset()[terms.PART].values]
     return {
@@ -133,7 +133,7 @@ def _field_values(results: Results) -> dict[ArchiveVariable, Any]:
     }
 
 
-def _is_rigid(results: Results) -> np.ndarray:
+def _is_rigid(results: xr.DataTree) -> np.ndarray:
     """Return whether no point of a pair is compliant, (pair,)."""
     rigid = np.ones(results.to_dataset().sizes[terms.PAIR], dtype=bool)
     if terms.POINT_STIFFNESS.name in (contact := results["contact"].to_dataset()):
@@ -142,7 +142,7 @@ def _is_rigid(results: Results) -> np.ndarray:
     return rigid
 
 
-def _penetration(rows: Rows, rigid: np.ndarray) -> np.ndarray:
+def _penetration(rows: xr.Dataset, rigid: np.ndarray) -> np.ndarray:
     """Return the largest penetration of any contact point of the `rigid` pairs (pair,) in each state [mm]."""
     if not (rows[terms.GAP_MIN.name].size and rigid.any()):
         return np.zeros(len(terms.STATES))
@@ -150,7 +150,7 @@ def _penetration(rows: Rows, rigid: np.ndarray) -> np.ndarray:
     return np.maximum(-np.min([np.fmin.reduce(gap[..., rigid], axis=(1, 2)) for gap in gaps], axis=0), 0)
 
 
-def _steps(rows: Rows) -> list[float]:
+def _steps(rows: xr.Dataset) -> list[float]:
     """Return the median and the largest number of linear steps, over the realizations with at least one."""
     counts: Counter[int] = Counter()
     for piece in pieces(rows[[terms.ITERATIONS.name]]):
@@ -164,23 +164,19 @@ def _steps(rows: Rows) -> list[float]:
     return [float(np.mean([positive[k] for k in middle])), float(positive[-1])]
 
 
-def _smallest_range(results: Results, rows: Rows) -> float:
+def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
     """Return the smallest tolerance range above 0 of any contributor or measure [mm]; infinite if there is none."""
     sample = results["sample"].to_dataset()
-    contributors = sample[terms.TOLERANCE_RANGE.name].values
-    if terms.CONTRIBUTOR_UNITS.name in sample:  # archives up to format 3 have only locators
-        contributors = contributors[sample[terms.CONTRIBUTOR_UNITS.name].values == "mm"]
+    contributors = sample[terms.TOLERANCE_RANGE.name].values[sample[terms.CONTRIBUTOR_UNITS.name].values == "mm"]
     ranges = np.concatenate(
         [contributors, rows[terms.MEASURE_TOLERANCE.name].values[rows[terms.MEASURE_UNITS.name].values == "mm"]]
     )
     return float(np.min(ranges, where=ranges > 0, initial=np.inf))
 
 
-def _datum_shifts(results: Results) -> list[str]:
+def _datum_shifts(results: xr.DataTree) -> list[str]:
     """Return the features with a datum at maximum or least material condition, as part.feature."""
     sample = results["sample"].to_dataset()
-    if terms.DISTRIBUTION.name not in sample or terms.CONTRIBUTOR not in sample[terms.DISTRIBUTION.name].dims:
-        return []
     labels = zip(sample[terms.CONTRIBUTOR].values, sample[terms.DISTRIBUTION.name].values, strict=True)
     shifted = [
         str(label).rpartition(".")[0]
@@ -190,21 +186,15 @@ def _datum_shifts(results: Results) -> list[str]:
     return list(dict.fromkeys(shifted))
 
 
-def _planned_samples(results: Results, count: int) -> int:
+def _planned_samples(results: xr.DataTree, count: int) -> int:
     """Return the number of realizations that the run was started with, or `count` if rows were selected from an archive."""
     samples, size = int(results.attrs["samples"]), results.to_dataset().sizes[terms.REALIZATION]
     is_unfinished = size > count or size == terms.FIRST_ROWS
     return max(samples, count) if is_unfinished else count
 
 
-def _quantities(rows: Rows) -> np.ndarray:
-    """Return the quantity of each measure; empty for archives before format 4, which do not state it."""
-    is_stated = terms.QUANTITY.name in rows
-    return np.asarray(rows[terms.QUANTITY.name].values if is_stated else [""] * rows.sizes[terms.MEASURE], dtype=object)
-
-
-def _field_extremes(results: Results, part: str) -> np.ndarray:
-    """Return the least and the largest 6 sigma of |u| in the archived field, with intervals, (state, extreme, interval)."""
+def _field_extremes(results: xr.DataTree, part: str) -> np.ndarray:
+    """Return 6 sigma of |u|, and its interval, where the archived field is least and largest, (state, extreme, interval)."""
     extremes = np.full((len(terms.STATES), len(terms.EXTREMES), len(terms.ESTIMATE)), np.nan)
     if not _summed(results, part):
         return extremes
@@ -218,21 +208,17 @@ def _field_extremes(results: Results, part: str) -> np.ndarray:
     return extremes
 
 
-def _summed(results: Results, part: str) -> int:
+def _summed(results: xr.DataTree, part: str) -> int:
     """Return the number of realizations in the field of a part; 0 while the field is being written."""
     field = _field(results, part)
-    if terms.FIELD_REALIZATIONS.name not in field:  # archives of format 1 have fields over all their rows, or none
-        return results.to_dataset().sizes[terms.REALIZATION]
     is_written = int(field[terms.GROUP_CHECKSUM.name]) != terms.UNFINISHED
     return int(field[terms.FIELD_REALIZATIONS.name]) if is_written else 0
 
 
-def _magnitudes(results: Results, part: str) -> int:
-    """Return the number of realizations in the magnitude of a part's field; before format 3, all realizations of the field."""
-    field, summed = _field(results, part), _summed(results, part)
-    is_stated = terms.MAGNITUDE_REALIZATIONS.name in field
-    return min(int(field[terms.MAGNITUDE_REALIZATIONS.name]), summed) if is_stated else summed
+def _magnitudes(results: xr.DataTree, part: str) -> int:
+    """Return the number of realizations in the magnitude of a part's field."""
+    return min(int(_field(results, part)[terms.MAGNITUDE_REALIZATIONS.name]), _summed(results, part))
 
 
-def _field(results: Results, part: str) -> Rows:
+def _field(results: xr.DataTree, part: str) -> xr.Dataset:
     return results["field"].children[terms.group_of(part)].to_dataset()

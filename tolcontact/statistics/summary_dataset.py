@@ -2,9 +2,8 @@
 
 import xarray as xr
 
-from tolcontact.labelled import Column, Results, Table
 from tolcontact.readable import Pictured
-from tolcontact.statistics.summary import summary_table
+from tolcontact.statistics.summary import estimates_of
 
 
 class Summary(xr.Dataset):  # type: ignore[no-untyped-call]
@@ -16,7 +15,7 @@ class Summary(xr.Dataset):  # type: ignore[no-untyped-call]
         return Pictured.picture(self)
 
 
-def summarize(results: Results) -> Summary:
+def summarize(results: xr.DataTree) -> Summary:
     """Return the statistics of a run, each as (estimate, lower, upper) with a 95 % interval.
 
     statistic_value (measure, state, statistic, interval) in the measure's units; shares are of 1
@@ -51,13 +50,5 @@ def summarize(results: Results) -> Summary:
     The attribute `realizations` is the number of finished realizations, `samples` the number that the run was started with.
     Raises ArchiveError if fewer than MIN_REALIZATIONS realizations are finished.
     """
-    return dataset_of(summary_table(results))
-
-
-def dataset_of(table: Table) -> Summary:
-    """Return the dataset of a summary table."""
-    return Summary(_entries(table.data_vars), coords=_entries(table.coords), attrs=table.attrs)
-
-
-def _entries(columns: dict[str, Column]) -> dict[str, tuple[tuple[str, ...], object, dict[str, object]]]:
-    return {name: (column.dims, column.values, column.attrs) for name, column in columns.items()}
+    dataset = estimates_of(results)
+    return Summary(dataset.data_vars, dataset.coords, dataset.attrs)

@@ -14,15 +14,15 @@ def touching(results: xr.DataTree) -> xr.Dataset:
     pair       (point) name of its pair
     point      (point, axis) of the moving part, nominal [mm]
 
-    The attribute `realizations` is their number. It is 0, and shares are NaN, if the archive is from an earlier version, or
-    does not keep the poses (or the deviations where gaps depend on them).
+    The attribute `realizations` is their number. It is 0, and shares are NaN, if the archive does not keep the poses (or, where
+    gaps depend on them, the deviations).
     """
     contact, names = results["contact"].to_dataset(), results.to_dataset()[terms.PAIR].values
     pair_of_point, points = np.zeros(0, dtype=int), np.zeros((0, len(terms.AXES)))  # for a model without contact
     if terms.PAIR_OF_POINT.name in contact:
         pair_of_point, points = contact[terms.PAIR_OF_POINT.name].values, contact[terms.MOVING_POINT.name].values
     values, count = np.full((len(pair_of_point), len(terms.ESTIMATE)), np.nan), 0
-    if len(points) and all(variable.name in contact for variable in terms.TOUCHING):
+    if len(points):
         share, interval, realizations = (contact[variable.name].values for variable in terms.TOUCHING)
         values, count = np.column_stack([share, interval]), int(realizations)
     return xr.Dataset(

@@ -185,7 +185,6 @@ ROWS = (
     STATUS,
 )
 POSES = (TRANSLATION, ROTATION)
-ADDED = ROWS[ROWS.index(STARTS) : -1]  # not in archives of format 1, nor is the group `surface`
 
 BY_REALIZATION = (*ROWS, DEVIATION)
 ROW_VARIABLE_LABEL = label(ROW_VARIABLE, "variable of realizations")
@@ -221,7 +220,6 @@ QUANTITY = ArchiveVariable(
     "what a measure is the value of: displacement, coordinate, distance, deviation of distance, a kind of measurement such as "
     "gap, clearance or angle, or expression of the poses",
 )
-LIMITS = (LOWER_LIMIT, UPPER_LIMIT, QUANTITY)  # not in archives before format 4
 MEASURE_UNITS = ArchiveVariable("measure_units", (MEASURE,), str, "units of the measure")
 
 MEASURE_LINE, LINE_END = "measure_line", "line_end"

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 CONVENTIONS = "CF-1.11"
-FORMAT = 8  # of the archive; earlier formats can be read, and format 1 is not stated
+FORMAT = 1  # of the archive
 STATES = ("raw", "corrected")
 RAW, CORRECTED = 0, 1  # their positions
 AXES = ("x", "y", "z")

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tolcontact.archive import ArchiveWriter, Run, locked_archive, open_tables_unchecked
+from tolcontact.archive import ArchiveWriter, Run, locked_archive, open_unchecked
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
@@ -48,7 +48,7 @@ def write_run(
             target.check(program)
         write_archive(path, program, settings, target, client, progress, is_resumed=resume and path.exists())
     if target:
-        with open_tables_unchecked(path) as results:
+        with open_unchecked(path) as results:
             if sentence := target.shortfall(results):
                 log.warning(sentence)
     return path

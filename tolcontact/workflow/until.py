@@ -4,9 +4,10 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from tolcontact.archive import open_tables_unchecked
+import xarray as xr
+
+from tolcontact.archive import open_unchecked
 from tolcontact.compilation import Program
-from tolcontact.labelled import Results
 from tolcontact.simulation import block_rows
 from tolcontact.statistics import STATISTICS, estimate_of
 from tolcontact.statistics.statistic_request import HALF_WIDTH, StatisticRequest
@@ -49,7 +50,7 @@ class Target:
 
         None means that the interval is narrow enough, or cannot become narrow enough.
         """
-        with open_tables_unchecked(path) as results:
+        with open_unchecked(path) as results:
             samples = int(results.attrs["samples"])
             estimate, half, target_half = self._widths(results)
         is_hopeless = math.isnan(half) and samples >= MAX_WITHOUT_INTERVAL
@@ -61,7 +62,7 @@ class Target:
         rows = block_rows(program)
         return -(-int(samples * min(max(growth, MIN_GROWTH), MAX_GROWTH)) // rows) * rows
 
-    def shortfall(self, results: Results) -> str:
+    def shortfall(self, results: xr.DataTree) -> str:
         """Return a sentence that states why the interval of finished results is not narrow enough; empty if it is."""
         estimate, half, target_half = self._widths(results)
         if math.isnan(estimate):
@@ -73,7 +74,7 @@ class Target:
             "more will not give one" if math.isnan(half) else f"+- {target_half:.2g} needs more than {MAX_REALIZATIONS}"
         )
 
-    def _widths(self, results: Results) -> tuple[float, float, float]:
+    def _widths(self, results: xr.DataTree) -> tuple[float, float, float]:
         """Return the estimate, the half-width of its interval, and the largest permitted half-width."""
         estimate, lower, upper = estimate_of(results, self.measure, self.statistic)
         return estimate, (upper - lower) / 2, self.half * (abs(estimate) if self.is_relative else 1.0)

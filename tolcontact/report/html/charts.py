@@ -92,15 +92,10 @@ def relations_of(results: xr.DataTree, summary: xr.Dataset) -> dict[str, Any]:
         "contributors": [],
     }
     if terms.DEVIATION.name in sample:
-        dim = sample[terms.DEVIATION.name].dims[-1]  # archives before format 4 have only locators
         deviations = sample[terms.DEVIATION.name].isel(selection).values
         is_varying = np.ptp(deviations, axis=0) > 0
-        units = (
-            sample[terms.CONTRIBUTOR_UNITS.name].values
-            if terms.CONTRIBUTOR_UNITS.name in sample
-            else np.full(len(is_varying), "mm")
-        )
-        labels = zip(sample[dim].values[is_varying], units[is_varying], strict=True)
+        units = sample[terms.CONTRIBUTOR_UNITS.name].values
+        labels = zip(sample[terms.CONTRIBUTOR].values[is_varying], units[is_varying], strict=True)
         relations["contributors"] = [{"name": str(name), "units": str(unit)} for name, unit in labels]
         relations["deviations"] = packed(deviations[:, is_varying])
     return relations

@@ -62,19 +62,15 @@ def station_poses(results: xr.DataTree, station: str, rows: np.ndarray) -> tuple
 
 
 def worst_poses(results: xr.DataTree, station: str, worst: xr.Dataset | None) -> tuple[np.ndarray, np.ndarray]:
-    """Return R (case, state, part, 3, 3) and t (case, state, part, 3) [mm] of worst cases in a station; none without them.
-
-    They are NaN for worst cases from earlier versions, which do not contain the poses of stations.
-    """
+    """Return R (case, state, part, 3, 3) and t (case, state, part, 3) [mm] of worst cases in a station; none without them."""
     sizes = {
         str(group.attrs["station"]): group.sizes[terms.STATION_PART]
         for group in results[terms.STATIONS_GROUP].children.values()
     }
-    names, count = list(sizes), 0 if worst is None else worst.sizes[terms.CASE]
-    if worst is None or terms.STATION_ROTATION.name not in worst:
-        parts = results.sizes[terms.PART]
-        unknown = np.full((count, len(terms.STATES), parts, 3, 3), np.nan)
-        return unknown, unknown[..., 0]
+    names = list(sizes)
+    if worst is None:
+        none = np.zeros((0, len(terms.STATES), results.sizes[terms.PART], 3, 3))
+        return none, none[..., 0]
     start = sum(sizes[name] for name in names[: names.index(station)])
     station_columns = slice(start, start + sizes[station])
     t_held, R_held = (worst[variable.name].values[:, :, station_columns] for variable in terms.STATION_POSES)

@@ -4,11 +4,11 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import xarray as xr
 from rich.console import Group
 from rich.padding import Padding
 from rich.text import Text
 
-from tolcontact.labelled import Rows
 from tolcontact.report.figures import NO_INTERVAL, grouped, limits_text, number, percent, settled, share
 from tolcontact.report.results_table import full_name, overview_columns, overview_rows, verdict_lines
 from tolcontact.report.text.table import FigureTable
@@ -47,12 +47,12 @@ WITHOUT = (
 )
 
 
-def summary_text(summary: Rows) -> Group:
+def summary_text(summary: xr.Dataset) -> Group:
     """Return a summary (see summarize) for rich to print."""
     return Group(*_sections(summary))
 
 
-def _sections(summary: Rows) -> Iterator[Text | FigureTable | Padding]:
+def _sections(summary: xr.Dataset) -> Iterator[Text | FigureTable | Padding]:
     count = summary.attrs["realizations"]
     yield Text(f"{summary.attrs['title']}: {count} realizations", style="bold")
     if summary.attrs["samples"] > count:
@@ -76,14 +76,14 @@ def _sections(summary: Rows) -> Iterator[Text | FigureTable | Padding]:
         yield FigureTable(pair_columns(summary), pair_rows(summary))
 
 
-def capability_text(summary: Rows) -> Group:
+def capability_text(summary: xr.Dataset) -> Group:
     """Return shares out of specification and capability of each measurement of a summary."""
     return Group(
         Text(f"{summary.attrs['title']}: {summary.attrs['realizations']} realizations", style="bold"), *_limits(summary)
     )
 
 
-def _limits(summary: Rows) -> Iterator[Text | FigureTable]:
+def _limits(summary: xr.Dataset) -> Iterator[Text | FigureTable]:
     for name in summary["measure"].values:
         measure = summary.sel(measure=name)
         yield Text(f"\n{name} ({measure['measure_units'].values}): {limits_text(measure) or 'no limits'}", style="bold")
@@ -93,7 +93,7 @@ def _limits(summary: Rows) -> Iterator[Text | FigureTable]:
             yield from map(Text, notes(rows))
 
 
-def _measure_section(measure: Rows) -> Iterator[Text | FigureTable]:
+def _measure_section(measure: xr.Dataset) -> Iterator[Text | FigureTable]:
     units, quantity = str(measure["measure_units"].values), str(measure["measure_quantity"].values)
     subtitle = ", ".join(text for text in (quantity, limits_text(measure)) if text)
     yield Text(f"\n{full_name(measure)} ({units}){': ' if subtitle else ''}{subtitle}", style="bold")
@@ -109,7 +109,7 @@ def notes(rows: Sequence[Sequence[str]]) -> list[str]:
     return [note for note, is_there in marks.items() if is_there]
 
 
-def measure_rows(measure: Rows) -> list[list[str]]:
+def measure_rows(measure: xr.Dataset) -> list[list[str]]:
     """Return rows of label, both states and change of a measurement; * marks an index that differs from the percentile one."""
     rows = []
     estimates = dict(
@@ -141,7 +141,7 @@ def _are_disjoint(a: np.ndarray, b: np.ndarray) -> bool:
     return bool(a[1] > b[2] or b[1] > a[2])
 
 
-def _field_table(summary: Rows) -> FigureTable:
+def _field_table(summary: xr.Dataset) -> FigureTable:
     """Return the table of the displacement fields of the parts that move."""
     rows = []
     for part in summary["part"].values[_is_moving(summary)]:
@@ -152,17 +152,17 @@ def _field_table(summary: Rows) -> FigureTable:
     return FigureTable(["part", "", "smallest", "largest"], rows)
 
 
-def _is_moving(summary: Rows) -> np.ndarray:
+def _is_moving(summary: xr.Dataset) -> np.ndarray:
     """Return a mask (part,) of the parts with a displacement other than 0 in any state."""
     return np.asarray((summary["field_extreme"].values != 0).any(axis=(1, 2, 3)))
 
 
-def pair_columns(summary: Rows) -> list[str]:
+def pair_columns(summary: xr.Dataset) -> list[str]:
     """Return the heading of `pair_rows`."""
     return ["contact pair", IN_CONTACT, reaction_words(summary["reaction"].attrs["units"]).heading, "95th\npercentile"]
 
 
-def pair_rows(summary: Rows) -> list[list[str]]:
+def pair_rows(summary: xr.Dataset) -> list[list[str]]:
     """Return rows of each pair: the share of realizations with contact, and its reaction."""
     rows = []
     for pair in summary["pair"].values:
@@ -171,7 +171,7 @@ def pair_rows(summary: Rows) -> list[list[str]]:
     return rows
 
 
-def contact_lines(summary: Rows, count: int) -> Iterator[str]:
+def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
     """Yield lines about the contact of a run of `count` realizations."""
     yield f"realizations touched by contact: {percent(summary['touched'].values)}"
     by_status = _by_status(summary)
@@ -199,7 +199,7 @@ def contact_lines(summary: Rows, count: int) -> Iterator[str]:
     yield from _advice(summary, corrected)
 
 
-def _doubts(summary: Rows, doubtful: int, count: int) -> Iterator[str]:
+def _doubts(summary: xr.Dataset, doubtful: int, count: int) -> Iterator[str]:
     """Yield lines about answers that are not certified."""
     in_bodies = min(int(summary["clash_count"].values[summary["clash_declared"].values == 1].sum()), doubtful)
     if in_bodies < doubtful:
@@ -211,7 +211,7 @@ def _doubts(summary: Rows, doubtful: int, count: int) -> Iterator[str]:
         yield "advice: they probably meet beyond the chosen faces; tolcontact check names these, and writes the lines to add"
 
 
-def _clashes(summary: Rows, count: int) -> Iterator[str]:
+def _clashes(summary: xr.Dataset, count: int) -> Iterator[str]:
     """Yield lines about bodies without contact that penetrate each other, and about the test of all bodies."""
     watched, share = int(summary["watched"]), summary["clash_share"].values
     if not watched:
@@ -231,7 +231,7 @@ def _clashes(summary: Rows, count: int) -> Iterator[str]:
         yield f"not tested for interference: {summary.attrs['not_watched']}"
 
 
-def _clashes_of(summary: Rows, *, is_declared: bool) -> list[str]:
+def _clashes_of(summary: xr.Dataset, *, is_declared: bool) -> list[str]:
     """Return the pairs of parts that penetrate each other, with the number of realizations and the largest depth."""
     columns = [summary[name].values for name in ("clash", "clash_count", "clash_largest_depth", "clash_declared")]
     texts = []
@@ -241,7 +241,7 @@ def _clashes_of(summary: Rows, *, is_declared: bool) -> list[str]:
     return texts
 
 
-def _between(summary: Rows, count: int) -> Iterator[str]:
+def _between(summary: xr.Dataset, count: int) -> Iterator[str]:
     """Yield lines about penetration between contact points, and about contact beyond the ends of faces."""
     checked, depth, overhang = (float(summary[name]) for name in ("surfaces_checked", "surface_penetration", "beside"))
     limit = NOTICED_SHARE * summary.attrs["smallest_range"]
@@ -264,7 +264,7 @@ def _between(summary: Rows, count: int) -> Iterator[str]:
             yield f"advice: its faces end within reach of contact; {_way_out(summary)}"
 
 
-def _way_out(summary: Rows) -> str:
+def _way_out(summary: xr.Dataset) -> str:
     """Return advice for surfaces that penetrate each other, or were resolved although they were apart."""
     if summary.attrs["resolution"] == "linearized":
         return "use --resolution exact"
@@ -273,7 +273,7 @@ def _way_out(summary: Rows) -> str:
     return f'leave out search="{summary.attrs["search"]}"'
 
 
-def _advice(summary: Rows, penetration: float) -> Iterator[str]:
+def _advice(summary: xr.Dataset, penetration: float) -> Iterator[str]:
     """Yield advice on penetration that remains after a linear step, or with the paper's set of active points."""
     limit = NOTICED_SHARE * summary.attrs["smallest_range"]
     if penetration > limit and summary.attrs["active_set"] == "initial":
@@ -284,5 +284,5 @@ def _advice(summary: Rows, penetration: float) -> Iterator[str]:
         yield "advice: some realizations did not converge; use --resolution exact"
 
 
-def _by_status(summary: Rows) -> dict[str, int]:
+def _by_status(summary: xr.Dataset) -> dict[str, int]:
     return {str(m): int(n) for m, n in zip(summary["status_meaning"].values, summary["by_status"].values, strict=True)}
