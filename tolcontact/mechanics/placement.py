@@ -128,7 +128,7 @@ def misfit(system: GroupEquations, poses: Sequence[Pose], *, linear: bool = Fals
 
 
 def exact_pose(locators: Locators, steps: ca.SX, start: Pose, within: Sequence[Pose | None], centre: ca.DM) -> Pose:
-    """Return the pose in which the faces pass through the tips of the locators, or fit them best.
+    """Return the pose that makes the faces pass through the tips of the locators, or fit them best.
 
     To first order a locator pushes a point of its part along its direction. Exactly, the face of the part, a plane through that
     point, has to pass through the tip of the locator, at any point of the face. Six locators give six equations for the pose.

@@ -182,8 +182,8 @@ def _merged(vectors: int) -> ca.Function:
 
     Its results are the gap and slope of the fixed tangent, the load that it passes to the nearest tangent, and the load that it
     keeps. If both tangents have nearly the same direction, the fixed one takes gap and slope of the nearest one, and passes its
-    load. The coordinates are those of one or two `vectors`, the centre and the axis. `squares` (vector, vector) are the
-    products of their derivatives by X_RM (see _Body).
+    load. The coordinates consist of one or two `vectors`: the centre and the axis. `squares` (vector, vector) are the products
+    of their derivatives by X_RM (see _Body).
     """
     gap, nearest_gap, load = (ca.SX.sym(name) for name in ("gap", "nearest_gap", "load"))
     slope, nearest_slope = (ca.SX.sym(name, 1, 3 * vectors) for name in ("slope", "nearest_slope"))

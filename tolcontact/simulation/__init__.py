@@ -33,7 +33,7 @@ block depends only on the seed and on its position in the run.
 True
 
 The solvers `qpoases`, `osqp` and `highs` start each QP from the previous one within a block, or a piece of the last block. The
-last digits of their results therefore depend on which realizations share a block, and so on the number of realizations.
+last digits of their results therefore depend on the realizations in the same block, and so on the number of realizations.
 
 ## Many processes, many machines
 

@@ -17,7 +17,7 @@ MEASURED_STEP = 16  # realizations: the depth of bodies with more triangles is m
 class WatchedBodies:
     """Bodies that lie in each other, in n realizations.
 
-    withdrawn   stations, and the rows (k,) in which bodies with declared contact there lie in each other
+    withdrawn   stations, and the rows (k,) where bodies with declared contact at the station lie in each other
     clashes     (n,) number of pairs of parts without declared contact that lie in each other
     depth       (n,) [mm]: penetration of the deepest of these pairs; 0 for none, NaN if it is not measured
     part, other (n,) indices of the parts of this pair in the assembly; -1 for none
@@ -31,7 +31,7 @@ class WatchedBodies:
 
     @classmethod
     def none(cls, count: int) -> "WatchedBodies":
-        """Return `count` realizations in which no bodies lie in each other."""
+        """Return `count` realizations without bodies that lie in each other."""
         return cls(np.zeros(count, dtype=int), np.zeros(count), np.full(count, -1), np.full(count, -1))
 
     def name(self, rows: Int[Array, " k"], depths: Float[Array, " k"], parts: tuple[int, int]) -> None:
