@@ -157,7 +157,7 @@ def test_a_face_that_stands_twice_counts_once(tmp_path, caplog):
     with caplog.at_level("INFO"):
         mesh = shape(tc.Mesh(tmp_path / "twice.step")).mesh
     assert mesh.is_watertight and mesh.volume == pytest.approx(6000) and len(tc.faces_in(tmp_path / "twice.step")) == 6
-    assert "2 repeated triangles are left out" in caplog.text
+    assert "2 triangles that stand twice are left out" in caplog.text
 
 
 def test_a_face_on_a_part_of_a_spline_surface_is_read(tmp_path):
