@@ -66,7 +66,7 @@ def judged(scene: Scene, samples: int, seed: int, solver: str) -> Findings:
     program = tc.build(scene.assembly, solver=solver)
     is_stiff = leaves_rotations_free(program)
     if is_stiff:
-        program = tc.build(scene.assembly, solver=solver, method=scene.assembly.method.with_choices(objective=STIFF))
+        program = tc.build(scene.assembly, solver=solver, method=program.method.with_choices(objective=STIFF))
     blocks = list(simulate_blocks(program, samples=samples, seed=seed, threads=1))
     names = [part.name for part in program.nominal.parts]
     order = [names.index(f"body {k}") for k in range(len(scene.bodies))]
@@ -113,7 +113,7 @@ def leaves_rotations_free(program: tc.Program) -> bool:
     points: dict[int, list[np.ndarray]] = collections.defaultdict(list)
     for pair in program.nominal.pairs:
         points[pair.moving].append(pair.P_m)
-        points[pair.reference].append(pair.P_r)
+        points[pair.moving if pair.reference is None else pair.reference].append(pair.P_r)
     for part, sets in points.items():
         centred = np.concatenate(sets) - np.concatenate(sets).mean(axis=0)
         axis = np.linalg.svd(centred)[2][0]  # of the line nearest to the points

@@ -75,8 +75,7 @@ def allocate(
     )  # fmt: skip
     program = analysis.program
     requirements = _requirements(require, program, samples)
-    groups = _groups(program, by)
-    curves = _curves(costs, groups)
+    curves = _curves(costs, groups := _groups(program, by))
     trials = ScaledTrials(analysis.engine(_expected(samples, len(groups))), list(groups.values()), seed, samples)
     prices = Prices([curves.get(name, 0.0) for name in groups], np.array([name in curves for name in groups]))
     search = Search(trials, requirements, prices)
