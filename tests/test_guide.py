@@ -1,7 +1,6 @@
 """Guide and README: their examples run."""
 
 import doctest
-import importlib
 import io
 import re
 from pathlib import Path
@@ -18,18 +17,28 @@ CHAPTERS = (
     "interference", "compilation",
     "plausibility", "contact", "simulation", "statistics", "archive", "report", "plot", "workflow", "analyses", "cli",
 )  # fmt: skip
-PACKAGES = ("tolcontact", *(f"tolcontact.{chapter}" for chapter in CHAPTERS))
+GUIDE = Path(tc.__file__).parent / "guide"
+
+
+def examples(text, name):
+    """Return the examples between the fences of a Markdown text."""
+    unfenced = re.sub("^```.*$", "", text, flags=re.MULTILINE)
+    return doctest.DocTestParser().get_doctest(unfenced, {}, name, None, 0)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("package", PACKAGES)
-def test_examples_of_the_guide_run(package):
-    text = importlib.import_module(package).__doc__
-    test = doctest.DocTestParser().get_doctest(text, {}, package, None, 0)
+@pytest.mark.parametrize("chapter", ["", *CHAPTERS])
+def test_examples_of_the_guide_run(chapter):
+    text = (GUIDE / f"{chapter}.md").read_text(encoding="utf-8") if chapter else tc.__doc__
+    test = examples(text, chapter)
     assert test.examples
     failures = []
     doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE).run(test, out=failures.append)
     assert not failures, "".join(failures)
+
+
+def test_the_guide_has_no_other_chapters():
+    assert {path.stem for path in GUIDE.iterdir()} == set(CHAPTERS)
 
 
 def test_front_names_every_chapter_in_order():

@@ -7,7 +7,7 @@ import pytest
 import tolcontact as tc
 from studies.benchmarks.problem import problems
 from studies.site.build import build, models
-from tests.test_guide import CHAPTERS
+from tests.test_guide import CHAPTERS, GUIDE
 
 
 @pytest.mark.nightly
@@ -20,7 +20,8 @@ def test_the_site_is_built(tmp_path, drawing):
     front = (tmp_path / "reference" / "tolcontact.html").read_text()
     assert all(f'id="{name}"' in front for name in tc.__all__ if name not in ("__version__", "plot"))
     for chapter in CHAPTERS:
-        assert "A chapter of the guide." in (tmp_path / "reference" / "tolcontact" / f"{chapter}.html").read_text()
+        title = (GUIDE / f"{chapter}.md").read_text(encoding="utf-8").partition("\n")[0].removeprefix("# ")
+        assert f">{title}" in (tmp_path / "reference" / "tolcontact" / f"{chapter}.html").read_text()
     gallery = (tmp_path / "gallery.html").read_text()
     assert "What does contact do to its corner height?" in gallery and '<table class="results">' in gallery
     assert {"ra1.webp", "clutch.webp"} == {path.name for path in tmp_path.glob("*.webp")}

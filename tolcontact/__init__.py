@@ -18,7 +18,7 @@ measure with and without contact, each figure with a 95 % confidence interval. L
 
 ## The guide
 
-Each phase of a run is a package, and its documentation is a chapter: read them in this order.
+Each phase of a run is a package. Its chapter is the file of that name in `tolcontact/guide`: read them in this order.
 
 | phase | chapter | subject |
 |---|---|---|
@@ -43,7 +43,7 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | analyse | `tolcontact.analyses` | what matters, what is extreme or rare, which tolerances and positions suffice, what seats |
 | whole flow in a shell | `tolcontact.cli` | the command `tolcontact`, its exit codes |
 
-`python -m pydoc tolcontact.declaration` shows a chapter in the terminal. Every example in the guide is run by the tests.
+Every example in the guide is run by the tests.
 
 ## Names
 
