@@ -11,13 +11,13 @@ from scipy.optimize import brentq
 import tolcontact as tc
 from tests import cases
 from tests.helpers import call, nightly, simulate
-from tolcontact import statistics
+from tests.test_guide import GUIDE
 from tolcontact.limits import Limits
 from tolcontact.simulation import simulate_blocks
 from tolcontact.statistics import capability, intervals
 from tolcontact.statistics.sample import Sample
 
-GUIDE = " ".join(statistics.__doc__.split())
+CHAPTER = " ".join((GUIDE / "statistics.md").read_text(encoding="utf-8").split())
 PERCENTS = (0.00135, 0.5, 0.99865)
 DISTRIBUTIONS = {
     "normal": (stats.norm(0, 1), -3.0, 4.0),
@@ -108,7 +108,7 @@ def test_the_realizations_that_a_positive_bound_of_ppk_needs_are_those_of_the_gu
     one = np.log(0.025) / np.log(1 - p)
     two = brentq(lambda n: 2 * (1 - p) ** n - (1 - 2 * p) ** n - 0.025, 2000, 5000)
     stated = f"Fewer than about {round(one, -1):.0f} realizations with one limit, or {round(two, -1):.0f} with two limits"
-    assert stated in GUIDE
+    assert stated in CHAPTER
     for limits, needed in ((Limits(-np.inf, 4.0), one), (Limits(-4.0, 4.0), two)):
         for factor, is_bounded in ((0.98, False), (1.02, True)):
             normal = stats.norm.ppf((np.arange(int(factor * needed)) + 0.5) / int(factor * needed))
@@ -289,7 +289,7 @@ def test_a_lower_limit_is_the_upper_one_of_the_mirrored_values():
 def test_intervals_of_skewed_measures_in_few_realizations_cover_as_often_as_the_guide_says():
     rng = np.random.default_rng(5)
     for name, distribution, stated in (("exponential", stats.expon(), 90), ("lognormal", stats.lognorm(0.5), 89)):
-        assert f"{stated} % ({name})" in GUIDE
+        assert f"{stated} % ({name})" in CHAPTER
         samples = distribution.ppf(rng.random((4000, 30)))
         found = [intervals.root(intervals.variance(Sample.of(sample)), times=6) for sample in samples]
         covered = np.mean([low <= 6 * distribution.std() <= high for _, low, high in found])
