@@ -45,7 +45,7 @@ from tolcontact.statistics import Summary
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.archived_run import SURFACES, write_run
 from tolcontact.workflow.models import DEFAULT_SOLVER
-from tolcontact.workflow.summaries import summarize
+from tolcontact.workflow.accessor import summarize
 from tolcontact.workflow.until import Target
 
 Until = Annotated[
