@@ -87,14 +87,6 @@ def test_what_cannot_be_drawn_is_said(draw, said, results, drawing):
         draw(results)
 
 
-def test_limits_of_archives_of_before_are_drawn(results):
-    """Which have a tolerance around the nominal value instead."""
-    old = results.copy()
-    old.dataset = old.to_dataset().drop_vars(["measure_lower_limit", "measure_upper_limit"])
-    axes = tc.plot.histogram(old)
-    assert [line.get_xdata()[0] for line in axes.lines if line.get_label() == "_limit"] == [-0.5, 0.5]
-
-
 def test_two_states_are_drawn_into_one_picture(results, drawing):
     plotter = tc.plot.assembly(results, realization=7, state="raw", marks=False)
     before = len(plotter.renderer.actors)
