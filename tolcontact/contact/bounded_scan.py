@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import SLOTS
 from tolcontact.contact import bounded_kernel
@@ -114,15 +113,6 @@ class BoundedScan(SlotScan):
         bounded_kernel.contains(points, self.labels, self.valid, found)
         return found
 
-    def guarded(self, X_RM: Float[Array, "n 12"], carried: Int[Array, "n slot"]) -> Places:
-        """Return the places (n, 1) that a guard added, at other poses X_RM; no place where it is not among those `carried`."""
-        labels = np.where((carried == GUARD).any(axis=1, keepdims=True), GUARD, -1)
-        P_m, P_r, n_r = self.rows(np.maximum(labels, 0), np.empty((len(X_RM), 0)))
-        is_held = self.holds(labels)
-        arms = np.einsum("nij,nj->ni", pose.rotation(X_RM), P_m[:, 0]) + pose.translation(X_RM) - P_r[:, 0]
-        gaps = (arms * n_r[:, 0]).sum(axis=1, keepdims=True)
-        return Places(np.where(is_held, labels, -1), np.where(is_held, gaps, np.inf), P_m, P_r, n_r)
-
     def moves(self, points: np.ndarray) -> np.ndarray:
         if not len(self.meeting.kinds):
             return np.zeros(points.shape, dtype=bool)
@@ -150,43 +140,33 @@ def bounded_scan(
     parting: Parting | None = None,
     carried: Int[Array, "n slot"] | None = None,
     deepest: Float[Array, " n"] | None = None,
-    former: Scan | None = None,
 ) -> BoundedScan:
     """Return the places at which a pair can touch at X_RM (n, 12); see raised_places for the other arguments.
 
-    Where no place shows penetration, a `guard` adds one if bodies lie in each other, or keeps that of the `former` scan if it
-    carried. A `parting` leaves out places that hold bodies apart in other directions than the one in which they part best, and
-    adds the place that does; `carried` (n, slot) are the labels of places that carried before, -1 for none. Places deeper than
-    `deepest` (n,) [mm] do not count.
+    Where no place shows penetration, a `guard` adds one if bodies lie in each other. A `parting` leaves out places that hold
+    bodies apart in other directions than the one in which they part best, and adds the place that does; `carried` (n, slot) are
+    the labels of places that carried before, -1 for none. Places deeper than `deepest` (n,) [mm] do not count.
     """
     found, heights = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness, depth)
     if deepest is not None:
         found = found._replace(gaps=np.where(found.gaps - heights >= -deepest[:, None], found.gaps, np.inf))
     if guard is not None:
-        earlier = former.guarded(X_RM, carried) if isinstance(former, BoundedScan) and carried is not None else None
-        found, heights = _with_guard(found, heights, guard, X_RM, earlier)
+        found, heights = _with_guard(found, heights, guard, X_RM)
     if parting is not None:
         found, heights = _with_parting(found, heights, parting, X_RM, carried)
     arrays = found.labels, found.P_m, found.P_r, found.n_r, np.isfinite(found.gaps)
     return BoundedScan(scan.tables, scan.P_m, scan.offsets, meeting, *arrays, np.ascontiguousarray(heights))
 
 
-def _with_guard(
-    found: Places, heights: np.ndarray, guard: Guard, X_RM: np.ndarray, former: Places | None
-) -> tuple[Places, np.ndarray]:
-    """Return places, and their heights (n, place), with one more where bodies lie in each other and no place shows it.
-
-    The `former` place stays while it carries, or bodies would go in again as soon as they are out.
-    """
-    count = len(X_RM)
-    extra = Places(np.full((count, 1), -1), np.full((count, 1), np.inf), *np.zeros((3, count, 1, 3)))
-    extra = extra if former is None else former
-    least = np.minimum((found.gaps - heights).min(axis=1, initial=np.inf), extra.gaps[:, 0])
-    rows = np.flatnonzero(least >= -PENETRATION)
+def _with_guard(found: Places, heights: np.ndarray, guard: Guard, X_RM: np.ndarray) -> tuple[Places, np.ndarray]:
+    """Return places, and their heights (n, place), with one more where bodies lie in each other and no place shows it."""
+    rows = np.flatnonzero((found.gaps - heights).min(axis=1, initial=np.inf) >= -PENETRATION)
     rows = rows[guard.interferes(X_RM[rows])]
     way = guard.ways_out(X_RM[rows])
     rows, way = rows[way.widths > 0], WayOut(*(values[way.widths > 0] for values in way))
-    for values, of_rows in zip(extra, (GUARD, -way.widths, way.places, way.feet, way.normals), strict=True):
+    count, added = len(X_RM), (GUARD, -way.widths, way.places, way.feet, way.normals)
+    extra = Places(np.full((count, 1), -1), np.full((count, 1), np.inf), *np.zeros((3, count, 1, 3)))
+    for values, of_rows in zip(extra, added, strict=True):
         values[rows, 0] = of_rows
     joined = Places(*(np.concatenate(arrays, axis=1) for arrays in zip(found, extra, strict=True)))
     return joined, np.concatenate([heights, np.zeros((count, 1))], axis=1)

@@ -156,7 +156,7 @@ class Candidates:
             limits = np.full(len(relative), self.free_depth) if start.free and deepest is None else deepest
             scans[k] = bounded_scan(
                 scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness, depth, guard, parting,
-                carried, limits, former,
+                carried, limits,
             )  # fmt: skip
             if start.free and isinstance(former, BoundedScan):
                 scans[k] = bounded(scans[k]).with_barriers(former.barriers)

@@ -28,7 +28,6 @@ from tolcontact.contact.starts import (
     FREE,
     FREE_WHERE_RAW,
     GUARDED,
-    GUARDED_SMALL,
     OTHER_STARTS,
     OTHER_STARTS_CURVED,
     PARTED,
@@ -200,11 +199,12 @@ class ContactResolver:
         """
         if self._candidates.curved:
             self._try_again(task, state, np.flatnonzero(state.rank == NO_ANSWER), BALANCE)
-        self._try_again(task, state, self._doubted_inside(state), GUARDED)
+        rows = self._doubted_inside(state)
+        for start in GUARDED:
+            rows = self._try_again(task, state, rows, start)
         rows = self._uncertain(task, state)
         for start in OTHER_STARTS_CURVED if self._candidates.curved else OTHER_STARTS:
             rows = self._try_again(task, state, rows, start)
-        self._try_again(task, state, self._doubted_inside(state), GUARDED_SMALL)
         rows = self._without_answer(state)
         for start in PARTED if rows.size and self._candidates.partings else ():
             rows = self._try_again(task, state, rows, start)

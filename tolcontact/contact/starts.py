@@ -31,7 +31,7 @@ OTHER_STARTS = (Start(at_nominal=True), Start(stride=SMALL_STRIDE))  # if no fac
 OTHER_STARTS_CURVED = (Start(projected=True), Start(projected=True, at_nominal=True))
 # Planes at fixed points of a shaft leave it as it spins. If its spin is free, rounding grows until it falls through them.
 BALANCE = Start(balances=True)
-GUARDED, GUARDED_SMALL = Start(guarded=True), Start(guarded=True, stride=SMALL_STRIDE)
+GUARDED = (Start(guarded=True), Start(guarded=True, stride=SMALL_STRIDE))
 PARTED = (Start(parted=True), Start(parted=True, stride=SMALL_STRIDE))
 # Where bodies part in several directions, full steps go to and fro between these, or ask for contradictory ones.
 FREE_WHERE_RAW = Start(free=True)
