@@ -17,8 +17,6 @@ from tolcontact.method import Method
 
 ADRIFT_SIZES = 10  # a part that travelled by more sizes has nothing to rest on
 TURN_FACTOR = 2  # times the turn that lifts the end of a face as far as contact may push
-HELD_SHARE = 1 / 50  # of the size of a part: distance of its contact points from a line from which on these hold every turn
-NO_POINTS = np.zeros((0, 3))
 LOST_SIZES = 1e5  # no step will bring a part back from there
 # Faces may lie in each other, beside what their triangles leave open, by the smaller of these two:
 DEPTH_SIZES = 1e-4  # sizes of the parts
@@ -42,19 +40,11 @@ class AcceptanceLimits:
         for k in curved_pairs(nominal, group):
             surface, points = self._group_pairs[k].reference_face, self._group_pairs[k].P_m
             self._round[k] = (surface.curvature if surface is not None else 0.0, *_ball(points))
-        parts = [(k, nominal.parts[group.parts[k]].body.scale) for k in self._movers]
-        of_parts = [
-            (np.concatenate([side.points for side in group.sides if side.part == k] or [NO_POINTS]), s) for k, s in parts
-        ]
-        self._holds_turns = not method.minimizes.counts_points or all(
-            _distance_from_line(points) > HELD_SHARE * scale for points, scale in of_parts
-        )
         self._balls = [(side.part, *_ball(side.points)) for side in group.sides]
 
-    def is_near(self, task: Task, state: State, candidates: Candidates) -> Bool[Array, " n"]:
-        """Return whether no part has turned, and no contact point travelled, beyond limits (n,)."""
-        is_turned = self._is_turned(task, state) | self._is_turned_by_contact(task, state, candidates)
-        return ~is_turned & ~self._is_far(task, state)
+    def is_near(self, task: Task, state: State) -> Bool[Array, " n"]:
+        """Return whether no part has turned, and no contact point travelled, beyond the method's limits (n,)."""
+        return ~self._is_turned(task, state) & ~self._is_far(task, state)
 
     def is_lost(self, task: Task, state: State) -> Bool[Array, " n"]:
         """Return whether forces pulled a part so far away that no step will bring it back (n,)."""
@@ -73,14 +63,13 @@ class AcceptanceLimits:
         """Return whether an answer remains doubtful once the faces themselves are checked (n,).
 
         It does if a part turned too far, also beside what its tolerances allow: unless forces do so, contact has no reason to
-        turn a part farther than gaps are deep, over the size of its face. Where the objective holds every rotation, and the
-        complete test knows every body, such an answer may be certified: other starts have not found a better one. If parts
-        only travelled, or so far that places of contact may have been missed, the faces must be free of penetration, and hold
-        the points that carry.
+        turn a part farther than gaps are deep, over the size of its face. If parts only travelled, or so far that places of
+        contact may have been missed, the faces must be free of penetration, and hold the points that carry.
         """
         doubtful = self._is_turned(task, state)
-        if not (self._holds_turns and candidates.are_guarded):
-            doubtful |= self._is_turned_by_contact(task, state, candidates)
+        if not self._presses:
+            for k, places in candidates.bounded.items():
+                doubtful |= pose.turn(state.relative[:, k], task.relative[:, k]) > TURN_FACTOR * places.turn
         far = self._is_far(task, state)
         for k, places in candidates.bounded.items():
             far |= ~places.reaches(state.relative[:, k])
@@ -116,13 +105,6 @@ class AcceptanceLimits:
                 depth = faces.depth(state.relative[rows, k], pair.heights(deviations), pair.form(deviations))
                 found[rows] |= depth > self._allowed_in_form
         return found
-
-    def _is_turned_by_contact(self, task: Task, state: State, candidates: Candidates) -> Bool[Array, " n"]:
-        """Return whether bodies of a bounded pair turned by more than the depth of their gaps explains (n,)."""
-        is_turned = np.zeros(len(state), dtype=bool)
-        for k, places in candidates.bounded.items() if not self._presses else ():
-            is_turned |= pose.turn(state.relative[:, k], task.relative[:, k]) > TURN_FACTOR * places.turn
-        return is_turned
 
     def _is_turned(self, task: Task, state: State) -> Bool[Array, " n"]:
         """Return whether a part turned too far from its raw pose (n,)."""
@@ -168,14 +150,6 @@ def _displacement(difference: np.ndarray, centre: np.ndarray, radius: float) -> 
     """Return a bound of how far points of a ball move (n,) [mm], for differences of two poses (n, 12)."""
     turn = np.sqrt((difference[:, :9] ** 2).sum(axis=1))
     return np.linalg.norm(pose.apply(difference, centre)[:, 0], axis=1) + radius * turn
-
-
-def _distance_from_line(points: np.ndarray) -> float:
-    """Return the root mean square distance [mm] of points (point, 3) from the line nearest to them."""
-    if not len(points):
-        return 0.0
-    widths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return float(np.linalg.norm(widths[1:])) / np.sqrt(len(points))
 
 
 def _ball(points: np.ndarray) -> tuple[np.ndarray, float]:

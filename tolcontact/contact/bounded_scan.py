@@ -16,16 +16,10 @@ from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.parting import Parting
 from tolcontact.interference import WayOut
 
-FIRST_BARRIER = 1 << 42  # label of the first barrier of a pair (see barriers)
 PENETRATION = 1e-10  # mm: less than this is no penetration
 MAX_DEEPEST = SLOTS  # places of a pair that get a row in one round
 ALIGNED = 0.87  # cosine of the angle to the axis along which bodies part, up to which places in each other count
 SHOWN_SHARE = 0.05  # of the gap along this axis: where other places show it up to that, it needs no place of its own
-
-
-def is_barrier(labels: Int[Array, "n k"]) -> Bool[Array, "n k"]:
-    """Return which labels of places are those of barriers."""
-    return (labels >= FIRST_BARRIER) & (labels < FIRST_PLACE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,29 +52,6 @@ class BoundedScan(SlotScan):
         """The labels of minima of the gap between contact points, -1 for none."""
         is_minimum = self.labels >= FIRST_PLACE
         return np.where(is_minimum, self.labels, -1)[:, is_minimum.any(axis=0)]
-
-    @property
-    def barriers(self) -> Places:
-        """The barriers of the pair, without gaps."""
-        columns = is_barrier(self.labels).any(axis=0)
-        labels, *vectors = (values[:, columns] for values in (self.labels, self.places, self.feet, self.normals))
-        return Places(labels, np.where(labels < 0, np.inf, 0.0), *vectors)
-
-    def with_barriers(self, barriers: Places) -> "BoundedScan":
-        """Return the scan with `barriers` in place of those that it has."""
-        others = ~is_barrier(self.labels).any(axis=0)
-        joined = (
-            np.concatenate([values[:, others], added], axis=1)
-            for values, added in (
-                (self.labels, barriers.labels),
-                (self.places, barriers.P_m),
-                (self.feet, barriers.P_r),
-                (self.normals, barriers.n_r),
-                (self.valid, barriers.labels >= 0),
-                (self.heights, np.zeros(barriers.labels.shape)),
-            )
-        )
-        return BoundedScan(self.tables, self.P_m, self.offsets, self.meeting, *joined)
 
     def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         gaps = np.where(self.valid, 0.0, np.inf)
@@ -118,12 +89,6 @@ class BoundedScan(SlotScan):
             return np.zeros(points.shape, dtype=bool)
         at_ends = np.where(points < FIRST_POINT, points, 0)
         return (self.meeting.kinds[at_ends] == CORNER_ON_FACET) & (points < FIRST_POINT)
-
-
-def bounded(scan: Scan) -> BoundedScan:
-    """Return a scan, which must be one of bodies as they end."""
-    assert isinstance(scan, BoundedScan)
-    return scan
 
 
 def bounded_scan(

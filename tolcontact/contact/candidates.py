@@ -8,7 +8,7 @@ import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
-from tolcontact.contact.bounded_scan import BoundedScan, bounded, bounded_scan, is_barrier
+from tolcontact.contact.bounded_scan import BoundedScan, bounded_scan
 from tolcontact.contact.guard import GUARD, Guard
 from tolcontact.contact.projected_scan import half_spacing, project
 from tolcontact.contact.raised_scan import RaisedScan, raised_scan
@@ -30,6 +30,8 @@ EDGE_SHARE = 1 / 4000  # of the smallest tolerance range: error of planes beyond
 BULGE_SHARE = 1 / 2500  # of the same: depth to which planes with form may lie in each other between contact points
 MIN_BULGE = 1e-7  # mm
 OVERHANG_SHARE = 0.01  # of their radius, by which balls and shafts that travelled far may carry beside a wall
+
+FREE_DEPTH = 1e-3  # mm: free bodies are not deeper in each other
 
 
 def _lies_between(labels: Int[Array, "n k"]) -> Bool[Array, "n k"]:
@@ -131,8 +133,8 @@ class Candidates:
         remain a little beyond their edges, `width` times as far as they may in an answer, unless the realization is `at_rest`.
         If the `start` is guarded, bodies that lie in each other where no place shows it get one more place (see Guard). If it
         is parted, places hold convex bodies apart only in the direction in which they part best (see Parting). If it is free,
-        places deeper than `deepest` (realization,) [mm], `free_depth` by default, are on the far side of a body and do not
-        count. Its steps keep barriers and know places a little beside edges: a corner in a valley meets both sides of it.
+        places deeper than `deepest` (realization,) [mm], FREE_DEPTH by default, are on the far side of a body and do not count.
+        Its steps know places a little beside their edges: a corner in a valley then meets both sides of it.
         With `projected`, points against curved faces are projected, too. `earlier` are scans with the sums of heights.
         """
         scans = list(self._carrying_scans)
@@ -146,20 +148,20 @@ class Candidates:
         for k, places in (self._widened if start.free and slots else self.bounded).items():
             kept, error = (slots[self._varying.index(k)].labels, width * self._edge_error) if slots else (None, 0.0)
             carried = None if kept is None else kept.copy()
-            if kept is not None and at_rest is not None:  # places between the ends of faces with form come and go with no edge
+            if kept is not None and at_rest is not None:
+                # Places between the ends of faces with form come and go with no edge.
                 kept[at_rest[:, None] & ~_lies_between(kept)] = -1
             former = earlier[k] if earlier else None
             if kept is not None and isinstance(former, BoundedScan):
                 kept = np.concatenate([kept, former.minima], axis=1)
             nearness, guard = NEARNESS if width == 1 else np.inf, self.guards.get(k) if start.guarded else None
-            depth, parting = self._bulge if k in self._with_minima else np.inf, self.partings.get(k) if start.parted else None
-            limits = np.full(len(relative), self.free_depth) if start.free and deepest is None else deepest
+            depth = self._bulge if k in self._with_minima else np.inf
+            parting = self.partings.get(k) if start.parted else None
+            limits = np.full(len(relative), FREE_DEPTH) if start.free and deepest is None else deepest
             scans[k] = bounded_scan(
                 scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness, depth, guard, parting,
                 carried, limits,
             )  # fmt: skip
-            if start.free and isinstance(former, BoundedScan):
-                scans[k] = bounded(scans[k]).with_barriers(former.barriers)
         return scans
 
     def _raised(
@@ -201,15 +203,6 @@ class Candidates:
         """Whether there are bounded pairs, and of each it is known whether its bodies lie in each other."""
         return len(self.bounded) > 0 and len(self.guards) == len(self.bounded)
 
-    def slot_of(self, k: int) -> int:
-        """Return the index of pair k among the pairs whose points take turns in slots."""
-        return self._varying.index(k)
-
-    @property
-    def free_depth(self) -> float:
-        """How deep [mm] free bodies lie in each other at most: it follows the smallest tolerance range."""
-        return max((guard.depth for guard in self.guards.values()), default=0.0)
-
     @cached_property
     def partings(self) -> dict[int, Parting]:
         """Of bounded pairs those of convex bodies without deviations, by their number in the group."""
@@ -222,16 +215,11 @@ class Candidates:
         return {k: found for k, found in partings.items() if found is not None}
 
     def are_apart(self, state: State) -> Bool[Array, " n"]:
-        """Return whether bodies of a bounded pair that carry load touch nowhere (n,).
-
-        At barriers they touch: else steps release these.
-        """
+        """Return whether bodies of a bounded pair that carry load touch nowhere (n,)."""
         found = np.zeros(len(state), dtype=bool)
         for k in self.bounded:
             if not self._pairs[k].has_form:  # whose minima are not among the gaps
-                loaded = state.loaded[:, self._spans[k]]
-                at_barrier = is_barrier(state.slots[self.slot_of(k)].labels) & loaded
-                found |= loaded.any(axis=1) & ~at_barrier.any(axis=1) & (state.gap_min[:, k] > APART * self._edge_error)
+                found |= state.loaded[:, self._spans[k]].any(axis=1) & (state.gap_min[:, k] > APART * self._edge_error)
         return found
 
     def hold(self, task: Task, state: State, start: Start) -> Bool[Array, " n"]:

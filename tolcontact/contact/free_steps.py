@@ -8,9 +8,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.acceptance import AcceptanceLimits
-from tolcontact.contact.barriers import TOUCHING, add_barriers, release
-from tolcontact.contact.bounded_scan import bounded
-from tolcontact.contact.candidates import Candidates
+from tolcontact.contact.candidates import FREE_DEPTH, Candidates
 from tolcontact.contact.linear_step import LinearStep
 from tolcontact.contact.scan import min_gaps
 from tolcontact.contact.starts import FREE_WHERE_RAW, STRIDE
@@ -19,7 +17,8 @@ from tolcontact.discretization import ContactPoints
 from tolcontact.mechanics import Group
 
 MAX_HALVINGS = 20
-SINK_SHARE = 1.0  # of a step, by which places may sink in: planes that face each other touch along the normal of one
+SINK_SHARE = 0.02  # of a step, by which places may sink in: they follow planes, and rotations are curved
+TOUCHING = 1e-9  # mm: bodies no deeper in each other touch
 GAIN_SHARE = 1e-9  # of the objective, by which rounding may raise it
 MAX_LIFTS = 30
 LIFT_FACTOR = 1.1  # times the width of what bodies share, by which they are moved apart
@@ -44,15 +43,12 @@ class FreeSteps:
         self._relate, self._energy = relate, energy
         self._centres = np.array([np.asarray(mobility.centre, dtype=float).ravel() for mobility in group.mobilities])
 
-    def shorten(
-        self, step: LinearStep, task: Task, before: State, state: State, size: Float[Array, " n"]
-    ) -> tuple[Task, Bool[Array, " n"]]:
-        """Shorten steps from `before` to `state`, of a size (n,) [mm], so that bodies stay free.
+    def shorten(self, step: LinearStep, task: Task, before: State, state: State, size: Float[Array, " n"]) -> Bool[Array, " n"]:
+        """Shorten steps from `before` to `state`, of a size (n,) [mm], so that bodies stay free; return which are short (n,).
 
         What a short step left in each other since rotations are curved comes free by another one, the smallest that does.
-        Returns the task with barriers that the next step has to know, and whether there must be one (n,).
         """
-        is_short, entering, limits = self._hold_back(task, before, state, size)
+        is_short = self._hold_back(task, before, state, size)
         rows = np.flatnonzero(is_short)
         if rows.size:
             part, held = task.take(rows), state.take(rows)
@@ -62,43 +58,23 @@ class FreeSteps:
             size_of_rows, _ = step.take(part, freed, stride=STRIDE)
             self._hold_back(part, held, freed, size_of_rows)
             state.poses[rows], state.relative[rows] = freed.poses, freed.relative
-        rows = np.flatnonzero(np.isfinite(entering).all(axis=(1, 2)))
-        scans, entering = list(task.scans), entering[rows]
-        entered = self._candidates.scans(entering, task.deviations[rows], start=FREE_WHERE_RAW, deepest=limits[rows])
-        is_whole, is_short = ~is_short, is_short & (size > TOUCHING)
-        for k, guard in self._candidates.guards.items():
-            X_RM = state.relative[:, k]
-            scan = add_barriers(bounded(scans[k]), guard, X_RM, rows, entering[:, k], bounded(entered[k]))
-            carried = np.where(is_whole[:, None], state.slots[self._candidates.slot_of(k)].labels, -1)
-            scans[k], is_released = release(scan, guard, X_RM, carried)
-            is_short = is_short | is_released
-        return replace(task, scans=scans), is_short
+        return is_short
 
-    def _hold_back(
-        self, task: Task, before: State, state: State, size: Float[Array, " n"]
-    ) -> tuple[Bool[Array, " n"], Float[Array, "n pair 12"], Float[Array, " n"]]:
-        """Halve steps until no body enters another one and the objective is lower; return which are short (n,).
-
-        Returns also the last X_RM (n, pair, 12) at which a body entered another one, NaN if none did, and the depth (n,) [mm]
-        up to which places counted there.
-        """
-        shares, entering, limits = np.ones(len(task)), np.full(state.relative.shape, np.nan), np.zeros(len(task))
+    def _hold_back(self, task: Task, before: State, state: State, size: Float[Array, " n"]) -> Bool[Array, " n"]:
+        """Halve steps until no body enters another one and the objective is lower; return which are short (n,)."""
+        shares = np.ones(len(task))
         rows = np.flatnonzero(np.isfinite(before.poses).all(axis=(1, 2)) & np.isfinite(state.poses).all(axis=(1, 2)))
-        depths = self._depths(task, before.relative, np.full(len(task), self._candidates.free_depth))
+        depths = self._depths(task, before.relative, np.full(len(task), FREE_DEPTH))
         enters = ~self._candidates.interfere(before.relative)
         objective = self._energy(task, before) * (1 + GAIN_SHARE)
-        # What comes out of a place, or of a barrier, may cost.
-        costs = min_gaps(task.scans, before.relative, task.deviations).min(axis=1) < -TOUCHING
-        objective[(depths > TOUCHING) | ~enters | costs] = np.inf
+        objective[(depths > TOUCHING) | ~enters] = np.inf
         motions = self._limits.displacement(before.poses, state.poses)
         for _ in range(MAX_HALVINGS):
             part, share = task.take(rows), shares[rows]
             # Places that show more than bodies have moved are on the far side of a body.
-            counted = depths[rows] + share * motions[rows] + TOUCHING
-            depth = self._depths(part, state.relative[rows], counted)
+            depth = self._depths(part, state.relative[rows], depths[rows] + share * motions[rows] + TOUCHING)
             fails = depth > TOUCHING + depths[rows] * (1 - share) + SINK_SHARE * share * size[rows]
             fails |= enters[rows] & self._candidates.interfere(state.relative[rows])
-            entering[rows[fails]], limits[rows[fails]] = state.relative[rows[fails]], counted[fails]
             fails |= self._energy(part, state.take(rows)) > objective[rows]
             rows, part = rows[fails], part.take(fails)
             if not rows.size:
@@ -109,7 +85,7 @@ class FreeSteps:
         # Places show themselves once bodies have moved a little, unless only the complete test sees what is in the way.
         rows = rows[enters[rows] & self._candidates.interfere(state.relative[rows])]
         state.poses[rows], state.relative[rows] = before.poses[rows], before.relative[rows]
-        return shares < 1, entering, limits
+        return shares < 1
 
     def lift(
         self, poses: Float[Array, "n part 12"], relative: Float[Array, "n pair 12"], deviations: Float[Array, "n contributor"]

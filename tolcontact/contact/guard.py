@@ -33,11 +33,6 @@ class Guard:
         neighbours = program.watch.neighbours(bodies)
         return None if neighbours is None else cls(neighbours, pair.moving != bodies[0])
 
-    @property
-    def depth(self) -> float:
-        """How deep [mm] bodies may lie in each other that do not count as such."""
-        return sum(self.neighbours.insets)
-
     def interferes(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
         """Return whether the bodies lie in each other at X_RM (n,)."""
         return self.neighbours.interfere(pose.inverse(X_RM) if self.is_swapped else X_RM)

@@ -14,7 +14,7 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ACCURACY, ContactGroup, Program
 from tolcontact.contact.acceptance import AcceptanceLimits
-from tolcontact.contact.candidates import Candidates
+from tolcontact.contact.candidates import FREE_DEPTH, Candidates
 from tolcontact.contact.free_steps import FreeSteps
 from tolcontact.contact.iterated_search import search
 from tolcontact.contact.linear_step import MAX_ROUNDS, PENETRATION, LinearStep
@@ -138,7 +138,7 @@ class ContactResolver:
         """Return the realizations (k,) whose raw bodies are apart, though places with a least gap (n, pair) [mm] deny it."""
         if not self._candidates.are_guarded or self._method.minimizes.presses:
             return np.zeros(0, dtype=int)
-        rows = np.flatnonzero((min_gap < -self._candidates.free_depth).any(axis=1))
+        rows = np.flatnonzero((min_gap < -FREE_DEPTH).any(axis=1))
         return rows[~self._candidates.interfere(task.relative[rows])]
 
     def _stays(self, task: Task, state: State) -> Bool[Array, " n"]:
@@ -199,26 +199,18 @@ class ContactResolver:
         """
         if self._candidates.curved:
             self._try_again(task, state, np.flatnonzero(state.rank == NO_ANSWER), BALANCE)
-        rows = self._doubted_inside(state)
+        doubtful = np.flatnonzero(state.doubtful)
+        rows = doubtful[self._candidates.interfere(state.relative[doubtful])]
         for start in GUARDED:
             rows = self._try_again(task, state, rows, start)
-        rows = self._uncertain(task, state)
+        rows = np.flatnonzero((state.rank > 0) | ~self._limits.is_near(task, state))
         for start in OTHER_STARTS_CURVED if self._candidates.curved else OTHER_STARTS:
             rows = self._try_again(task, state, rows, start)
         rows = self._without_answer(state)
         for start in PARTED if rows.size and self._candidates.partings else ():
             rows = self._try_again(task, state, rows, start)
         for start in FREE if self._candidates.are_guarded else ():
-            self._try_again(task, state, self._uncertain(task, state), start)
-
-    def _uncertain(self, task: Task, state: State) -> Int[Array, " k"]:
-        """Return the realizations (k,) that are not certified, or far from their raw pose."""
-        return np.flatnonzero((state.rank > 0) | ~self._limits.is_near(task, state, self._candidates))
-
-    def _doubted_inside(self, state: State) -> Int[Array, " k"]:
-        """Return the realizations (k,) whose answers are doubtful, with bodies of a pair in each other."""
-        doubtful = np.flatnonzero(state.doubtful)
-        return doubtful[self._candidates.interfere(state.relative[doubtful])]
+            self._try_again(task, state, np.flatnonzero(state.rank > 0), start)
 
     def _without_answer(self, state: State) -> Int[Array, " k"]:
         """Return the realizations (k,) without an answer in which bodies are apart; one that is far away counts as one."""
