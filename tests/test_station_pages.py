@@ -62,10 +62,11 @@ def test_the_station_is_chosen_and_a_play_goes_through_all(pages, open_page):  #
     assert opened.evaluate("window.viewer.pairs[0].points.visible")
     opened.locator("#play").click()
     shown = set()
-    for _ in range(100):
+    for _ in range(400):
         shown.add((opened.locator("#station").input_value(), opened.locator("#which").input_value()))
-        if {("0", "1"), ("1", "1")} <= shown:
+        of_both = {which for station, which in shown if station == "0"} & {which for station, which in shown if station == "1"}
+        if len(of_both) >= 2:  # a busy machine does not see each
             break
         opened.wait_for_timeout(50)
-    assert {("0", "1"), ("1", "1")} <= shown
+    assert len(of_both) >= 2
     opened.locator("#play").click()

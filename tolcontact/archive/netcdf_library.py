@@ -1,12 +1,12 @@
 """The netCDF library: only one thread may use it at a time, and its caches take memory."""
 
 import contextlib
-import gc
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
 import netCDF4
+from xarray.backends import locks
 
 CACHE_BYTES = 1 << 20  # a chunk of most variables; with the usual size, all caches would take as much memory as all else
 
@@ -15,17 +15,12 @@ CACHE_BYTES = 1 << 20  # a chunk of most variables; with the usual size, all cac
 def open_netcdf(path: Path, mode: Literal["w", "r+", "r"]) -> Iterator[netCDF4.Dataset]:
     """Open a file whose values are read and written as they are, without masks.
 
-    Meanwhile the collector is off: in another thread it might close a file of xarray that nobody uses any more.
+    Meanwhile xarray neither reads nor closes files: the lock that it takes for that is held.
     """
-    was_collecting = gc.isenabled()
-    gc.disable()
-    try:
-        with small_caches(), netCDF4.Dataset(path, mode, format="NETCDF4") as file:
-            file.set_auto_maskandscale(False)
-            yield file
-    finally:
-        if was_collecting:
-            gc.enable()
+    library = locks.combine_locks([locks.NETCDFC_LOCK, locks.HDF5_LOCK])
+    with library, small_caches(), netCDF4.Dataset(path, mode, format="NETCDF4") as file:
+        file.set_auto_maskandscale(False)
+        yield file
 
 
 @contextlib.contextmanager
