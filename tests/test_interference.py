@@ -111,6 +111,18 @@ def test_bodies_part_along_the_direction_in_which_they_share_least():
     assert pair.interfere(X)[0] and not pair.interfere(moved)[0]
 
 
+def test_bodies_that_share_two_regions_part_at_the_deeper_one_or_along_a_given_direction():
+    stepped = trimesh.boolean.union([box((0, 0, 0), (10, 10, 10)), box((9, 0, 0), (30, 10, 12))])
+    table = trimesh.boolean.union([box((0, 0, 9.7), (5, 5, 20)), box((20, 0, 11.9), (25, 5, 20)), box((0, 0, 19), (25, 5, 22))])
+    hook = trimesh.boolean.union([table, box((30, 1, 0), (32, 4, 22)), box((24, 1, 19), (32, 4, 22))])
+    way = neighbours(hook, stepped).ways_out(AT_REST[None])
+    np.testing.assert_allclose([way.widths[0], *way.normals[0]], [0.3, 0, 0, 1], atol=1e-3)
+    X = pose(shift=(-0.05, 0, 0))[None]
+    for direction, width in {(0, 0, 1): 0.3, (1, 0, 0): 0.05}.items():
+        way = neighbours(hook, stepped).ways_out(X, np.array([direction], dtype=float))
+        np.testing.assert_allclose([way.widths[0], *way.normals[0]], [width, *direction], atol=1e-3)
+
+
 def test_vertices_stay_on_planes_that_deviate():
     closed = solid(box(*BOX))
     top = np.flatnonzero(closed.normals[:, 2] > 0.5)

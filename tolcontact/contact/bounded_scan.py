@@ -7,14 +7,13 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import SLOTS
 from tolcontact.contact import bounded_kernel
-from tolcontact.contact.guard import GUARD, Guard
+from tolcontact.contact.guard import GUARD, Guard, is_guard, no_places
 from tolcontact.contact.scan import Deepest, Scan, SlotScan
 from tolcontact.discretization import FIRST_POINT, ContactPoints, raised_places
 from tolcontact.geometry.kernel import CORNER_ON_FACET, INSIDE
 from tolcontact.geometry.meeting import NEARNESS, Meeting, Places
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.parting import Parting
-from tolcontact.interference import WayOut
 
 PENETRATION = 1e-10  # mm: less than this is no penetration
 MAX_DEEPEST = SLOTS  # places of a pair that get a row in one round
@@ -108,33 +107,38 @@ def bounded_scan(
 ) -> BoundedScan:
     """Return the places at which a pair can touch at X_RM (n, 12); see raised_places for the other arguments.
 
-    Where no place shows penetration, a `guard` adds one if bodies lie in each other. A `parting` leaves out places that hold
-    bodies apart in other directions than the one in which they part best, and adds the place that does; `carried` (n, slot) are
-    the labels of places that carried before, -1 for none. Places deeper than `deepest` (n,) [mm] do not count.
+    Where no place shows penetration, a `guard` adds one if bodies lie in each other, and finds it again while it carries. A
+    `parting` leaves out places that hold bodies apart in other directions than the one in which they part best, and adds the
+    place that does; `carried` (n, slot) are the labels of places that carried before, -1 for none. Places deeper than `deepest`
+    (n,) [mm] do not count.
     """
     found, heights = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness, depth)
     if deepest is not None:
         found = found._replace(gaps=np.where(found.gaps - heights >= -deepest[:, None], found.gaps, np.inf))
     if guard is not None:
-        found, heights = _with_guard(found, heights, guard, X_RM)
+        found, heights = _with_guard(found, heights, guard, X_RM, carried)
     if parting is not None:
         found, heights = _with_parting(found, heights, parting, X_RM, carried)
     arrays = found.labels, found.P_m, found.P_r, found.n_r, np.isfinite(found.gaps)
     return BoundedScan(scan.tables, scan.P_m, scan.offsets, meeting, *arrays, np.ascontiguousarray(heights))
 
 
-def _with_guard(found: Places, heights: np.ndarray, guard: Guard, X_RM: np.ndarray) -> tuple[Places, np.ndarray]:
-    """Return places, and their heights (n, place), with one more where bodies lie in each other and no place shows it."""
-    rows = np.flatnonzero((found.gaps - heights).min(axis=1, initial=np.inf) >= -PENETRATION)
-    rows = rows[guard.interferes(X_RM[rows])]
-    way = guard.ways_out(X_RM[rows])
-    rows, way = rows[way.widths > 0], WayOut(*(values[way.widths > 0] for values in way))
-    count, added = len(X_RM), (GUARD, -way.widths, way.places, way.feet, way.normals)
-    extra = Places(np.full((count, 1), -1), np.full((count, 1), np.inf), *np.zeros((3, count, 1, 3)))
-    for values, of_rows in zip(extra, added, strict=True):
-        values[rows, 0] = of_rows
+def _with_guard(
+    found: Places, heights: np.ndarray, guard: Guard, X_RM: np.ndarray, carried: np.ndarray | None
+) -> tuple[Places, np.ndarray]:
+    """Return places, and their heights (n, place), with one more where bodies lie in each other and no place shows it.
+
+    Where such a place was among those that `carried` (n, k) it is found again, or bodies would go in as soon as they are out.
+    """
+    labels = np.full(len(X_RM), -1)
+    if carried is not None:
+        labels = np.where(is_guard(carried), carried, -1).max(axis=1, initial=-1)
+    rows = np.flatnonzero((labels >= 0) | ((found.gaps - heights).min(axis=1, initial=np.inf) >= -PENETRATION))
+    extra = no_places(len(X_RM))
+    for values, of_rows in zip(extra, guard.places(X_RM[rows], labels[rows]), strict=True):
+        values[rows] = of_rows
     joined = Places(*(np.concatenate(arrays, axis=1) for arrays in zip(found, extra, strict=True)))
-    return joined, np.concatenate([heights, np.zeros((count, 1))], axis=1)
+    return joined, np.concatenate([heights, np.zeros(extra.gaps.shape)], axis=1)
 
 
 def _with_parting(

@@ -72,7 +72,11 @@ class Carriers(NamedTuple):
 
 
 class Candidates:
-    """The contact points of a group, with X_RM of its pairs as (realization, pair, 12)."""
+    """The contact points of a group, with X_RM of its pairs as (realization, pair, 12).
+
+    bounded   the meetings of pairs whose places are found at every pose, by their number in the group
+    guards    guards of these, one for each two bodies: that of their first pair
+    """
 
     def __init__(self, program: Program, group: ContactGroup) -> None:
         self._method = program.method
@@ -106,7 +110,9 @@ class Candidates:
         }
         self.bounded = {k: program.meetings[index] for k, index in enumerate(group.group.pairs) if index in program.meetings}
         guards = {k: Guard.of(program, group.group.pairs[k]) for k in self.bounded}
-        self.guards = {k: guard for k, guard in guards.items() if guard is not None}
+        self._guards = {k: guard for k, guard in guards.items() if guard is not None}
+        of_bodies = {id(guard.neighbours): k for k, guard in reversed(self._guards.items())}
+        self.guards = {k: self._guards[k] for k in sorted(of_bodies.values())}
         is_iterated = self._method.is_iterated
         curved = curved_pairs(program.nominal, group.group) if self._method.is_exact and not is_iterated else []
         self.curved = [k for k in curved if k not in self.bounded]
@@ -126,12 +132,14 @@ class Candidates:
         earlier: Sequence[Scan] = (),
         start: Start = FIRST,
         deepest: Float[Array, " realization"] | None = None,
+        answered: Sequence[Slots] = (),
     ) -> list[Scan]:
         """Return scans of the points that may carry, projected again if the method requires it.
 
         Places of bounded pairs are found anew; in steps, with the `slots` of the pairs with changing points, places that carry
         remain a little beyond their edges, `width` times as far as they may in an answer, unless the realization is `at_rest`.
-        If the `start` is guarded, bodies that lie in each other where no place shows it get one more place (see Guard). If it
+        If the `start` is guarded, bodies that lie in each other where no place shows it get one more place (see Guard), which
+        remains where it is among those of the `answered` slots. If it
         is parted, places hold convex bodies apart only in the direction in which they part best (see Parting). If it is free,
         places deeper than `deepest` (realization,) [mm], FREE_DEPTH by default, are on the far side of a body and do not count.
         Its steps know places a little beside their edges: a corner in a valley then meets both sides of it.
@@ -147,7 +155,8 @@ class Candidates:
                 scans[k] = self.projected(k, relative[:, k])
         for k, places in (self._widened if start.free and slots else self.bounded).items():
             kept, error = (slots[self._varying.index(k)].labels, width * self._edge_error) if slots else (None, 0.0)
-            carried = None if kept is None else kept.copy()
+            carrying = slots or (answered if start.guarded else ())
+            carried = carrying[self._varying.index(k)].labels if carrying else None
             if kept is not None and at_rest is not None:
                 # Places between the ends of faces with form come and go with no edge.
                 kept[at_rest[:, None] & ~_lies_between(kept)] = -1
@@ -201,13 +210,13 @@ class Candidates:
     @property
     def are_guarded(self) -> bool:
         """Whether there are bounded pairs, and of each it is known whether its bodies lie in each other."""
-        return len(self.bounded) > 0 and len(self.guards) == len(self.bounded)
+        return len(self.bounded) > 0 and len(self._guards) == len(self.bounded)
 
     @cached_property
     def partings(self) -> dict[int, Parting]:
         """Of bounded pairs those of convex bodies without deviations, by their number in the group."""
         partings = {}
-        for k, guard in self.guards.items():
+        for k, guard in self._guards.items():
             pair = self._pairs[k]
             assert pair.reference is not None
             if not any(pair.deviating) and not guard.neighbours.varies:

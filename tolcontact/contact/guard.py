@@ -5,11 +5,36 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact import poses as pose
-from tolcontact.arrays import Array, Bool, Float
+from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import Program
+from tolcontact.geometry.meeting import Places
 from tolcontact.interference import Neighbours, WayOut, ordered
 
-GUARD = 1 << 41  # label of the place that a guard adds
+GUARD = 1 << 41  # first label of places that a guard adds: a label says in which direction the place parts the bodies
+LEVELS = 1 << 12  # of a component of that direction
+APART = 2.0 * 8.0 ** np.arange(3)  # insets of both bodies, by which they may be apart where a place holds them
+
+
+def is_guard(labels: Int[Array, "..."]) -> Bool[Array, "..."]:
+    """Return which labels are those of places that a guard added."""
+    return (labels >= GUARD) & (labels < 2 * GUARD)
+
+
+def _label(normals: Float[Array, "n 3"]) -> Int[Array, " n"]:
+    digits = np.round((normals + 1) / 2 * (LEVELS - 1)).astype(np.int64)
+    return GUARD + (digits[:, 0] * LEVELS + digits[:, 1]) * LEVELS + digits[:, 2]
+
+
+def _direction(labels: Int[Array, " n"]) -> Float[Array, "n 3"]:
+    code = labels - GUARD
+    digits = np.stack([code // LEVELS**2, code // LEVELS % LEVELS, code % LEVELS], axis=1)
+    normals = digits / (LEVELS - 1) * 2 - 1
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def no_places(count: int) -> Places:
+    """Return places (n, 1) that are none."""
+    return Places(np.full((count, 1), -1), np.full((count, 1), np.inf), *np.zeros((3, count, 1, 3)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +62,38 @@ class Guard:
         """Return whether the bodies lie in each other at X_RM (n,)."""
         return self.neighbours.interfere(pose.inverse(X_RM) if self.is_swapped else X_RM)
 
-    def ways_out(self, X_RM: Float[Array, "n 12"]) -> WayOut:
-        """Return how the bodies part: P_m, P_r and n_r of the paper, and how deep the place P_m lies (n,) [mm]."""
+    def places(self, X_RM: Float[Array, "n 12"], labels: Int[Array, " n"]) -> Places:
+        """Return a place (n, 1) that parts the bodies at X_RM where they lie in each other, or touch; an infinite gap for none.
+
+        labels   (n,) of the places that held the bodies apart before, -1 for none: these bodies touch, or are a little apart
+        """
+        found = no_places(len(X_RM))
+        self._part(found, np.arange(len(X_RM)), X_RM, np.zeros((len(X_RM), 3)))
+        for apart in APART * sum(self.neighbours.insets):
+            rows = np.flatnonzero((found.labels[:, 0] < 0) & (labels >= 0))
+            self._part(found, rows, X_RM, -apart * _direction(labels[rows]))
+        return found
+
+    def _part(self, found: Places, rows: Int[Array, " k"], X_RM: Float[Array, "n 12"], shift: Float[Array, "k 3"]) -> None:
+        """Write the place that parts bodies in some rows, which overlap once the moving one is shifted."""
+        shifted = X_RM[rows]
+        shifted[:, 9:] += shift
+        way = self.ways_out(shifted, -shift)
+        is_known = way.widths > 0
+        rows, way = rows[is_known], WayOut(*(values[is_known] for values in way))
+        arms = np.einsum("nij,nj->ni", pose.rotation(X_RM[rows]), way.places) + pose.translation(X_RM[rows]) - way.feet
+        gaps = (arms * way.normals).sum(axis=1)
+        for values, of_rows in zip(found, (_label(way.normals), gaps, way.places, way.feet, way.normals), strict=True):
+            values[rows, 0] = of_rows
+
+    def ways_out(self, X_RM: Float[Array, "n 12"], directions: Float[Array, "n 3"] | None = None) -> WayOut:
+        """Return how the bodies part: P_m, P_r and n_r of the paper, and how deep the place P_m lies (n,) [mm].
+
+        directions   (n, 3) in which they part, if known (see Neighbours)
+        """
         if not self.is_swapped:
-            return self.neighbours.ways_out(X_RM)
-        way = self.neighbours.ways_out(pose.inverse(X_RM))
-        normals = -np.einsum("nij,nj->ni", pose.rotation(X_RM), way.normals)
-        return WayOut(way.feet, way.places, normals, way.widths)
+            return self.neighbours.ways_out(X_RM, directions)
+        R = pose.rotation(X_RM)
+        given = None if directions is None else -np.einsum("nji,nj->ni", R, directions)
+        way = self.neighbours.ways_out(pose.inverse(X_RM), given)
+        return WayOut(way.feet, way.places, -np.einsum("nij,nj->ni", R, way.normals), way.widths)

@@ -158,7 +158,9 @@ class ContactResolver:
             self._step.take(task, state, stride=start.stride)
         state.searched[:] = projected
         self._leave_adrift(task, state)
-        scans = self._candidates.scans(state.relative, task.deviations, projected=projected, earlier=task.scans, start=start)
+        scans = self._candidates.scans(
+            state.relative, task.deviations, projected=projected, earlier=task.scans, start=start, answered=state.slots
+        )
         task = replace(task, scans=scans)
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
         if self._method.is_exact:
@@ -224,6 +226,8 @@ class ContactResolver:
             return rows
         part = task.take(rows)
         poses, relative = self._at_nominal(part) if start.at_nominal else (part.raw, part.relative)
+        if start.at_answer:
+            poses, relative = state.poses[rows], state.relative[rows]
         if start.free:
             poses, relative = self._free_steps.lift(poses, relative, part.deviations)
         part = replace(

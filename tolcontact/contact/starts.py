@@ -9,6 +9,7 @@ class Start(NamedTuple):
     """Where steps start, and how large they may be.
 
     at_nominal   whether they start from the nominal instead of the raw place
+    at_answer    whether they start from the best answer so far
     projected    whether contact points are projected again, before every step, onto curved faces
     stride       the largest turn of a part in one step [rad]
     balances     whether steps end where they are rounding, though they may grow from there
@@ -18,6 +19,7 @@ class Start(NamedTuple):
     """
 
     at_nominal: bool = False
+    at_answer: bool = False
     projected: bool = False
     stride: float = STRIDE
     balances: bool = False
@@ -31,7 +33,7 @@ OTHER_STARTS = (Start(at_nominal=True), Start(stride=SMALL_STRIDE))  # if no fac
 OTHER_STARTS_CURVED = (Start(projected=True), Start(projected=True, at_nominal=True))
 # Planes at fixed points of a shaft leave it as it spins. If its spin is free, rounding grows until it falls through them.
 BALANCE = Start(balances=True)
-GUARDED = (Start(guarded=True), Start(guarded=True, stride=SMALL_STRIDE))
+GUARDED = (Start(guarded=True, at_answer=True), Start(guarded=True), Start(guarded=True, stride=SMALL_STRIDE))
 PARTED = (Start(parted=True), Start(parted=True, stride=SMALL_STRIDE))
 # Where bodies part in several directions, full steps go to and fro between these, or ask for contradictory ones.
 FREE_WHERE_RAW = Start(free=True)

@@ -24,9 +24,11 @@ class Side(NamedTuple):
     faces       (t, 3)
     planes      (t, 4): outward normal n and level n . x of each triangle; NaN for triangles that deviations move
     edges       (e, 2), those nominally nearest to the other body first
+    sides       (e, 2): the facets at each edge
     outward     (e, 3): sums of the outward normals of the facets that meet at each edge
     distances   (e,) [mm]: bounds from below of their nominal distances from it
     facets      (f, 10): of each facet, triangles in one plane, its box (6), normal n and level n . x; NaN if it is not flat
+    facet_of    (t,): the facet of each triangle
     members, first_members   the triangles of each facet, as in a CSR matrix
     vertices_of_facets   (f, 3): three vertices of facets that deviations move, -1 for others
     starts, listed, reaches   the facets near each edge, as in a CSR matrix, the nearest first, with their nominal distances
@@ -46,9 +48,11 @@ class Side(NamedTuple):
     faces: np.ndarray
     planes: np.ndarray
     edges: np.ndarray
+    sides: np.ndarray
     outward: np.ndarray
     distances: np.ndarray
     facets: np.ndarray
+    facet_of: np.ndarray
     members: np.ndarray
     first_members: np.ndarray
     vertices_of_facets: np.ndarray

@@ -129,11 +129,16 @@ class Neighbours:
             interferes[rows] = of_rows
         return interferes
 
-    def ways_out(self, X_BA: Float[Array, "n 12"]) -> WayOut:
-        """Return how bodies without deviations part at poses X_BA (n, 12) at which they interfere."""
+    def ways_out(self, X_BA: Float[Array, "n 12"], directions: Float[Array, "n 3"] | None = None) -> WayOut:
+        """Return how bodies without deviations part at poses X_BA (n, 12) at which they interfere.
+
+        directions   (n, 3), in the frame of B: where bodies lie in each other at several places, that one counts at which they
+                     part most nearly along these, or else the deepest one
+        """
         places, feet, normals = np.zeros((3, len(X_BA), 3))
         way = WayOut(places, feet, normals, np.zeros(len(X_BA)))
-        parting_kernel.ways_out(*self._nominal, np.ascontiguousarray(X_BA), sum(self.insets), *way)
+        given = np.zeros((len(X_BA), 3)) if directions is None else np.ascontiguousarray(directions)
+        parting_kernel.ways_out(*self._nominal, np.ascontiguousarray(X_BA), sum(self.insets), given, *way)
         return way
 
     def measured(self, X_BA: Float[Array, "n 12"], deviations: Float[Array, "n contributor"] | None = None) -> Interference:
@@ -188,11 +193,13 @@ def _side(
         faces=solid.faces,
         planes=planes,
         edges=np.ascontiguousarray(solid.edges[order]),
+        sides=np.ascontiguousarray(body.facet_of[solid.sides[order]]),
         outward=np.ascontiguousarray(solid.normals[solid.sides[order]].sum(axis=1)),
         distances=distances[order],
         facets=np.concatenate(
             [_boxes_of_facets(body, corners.min(axis=1), corners.max(axis=1)), _planes_of_facets(body, corners, planes)], axis=1
         ),
+        facet_of=body.facet_of,
         members=np.argsort(body.facet_of, kind="stable"),
         first_members=np.cumsum([0, *np.bincount(body.facet_of)]),
         vertices_of_facets=np.where(body.moves[body.first_of_facet][:, None], solid.faces[body.first_of_facet], -1),
