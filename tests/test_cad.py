@@ -19,7 +19,7 @@ from tolcontact.cli.app import app
 from tolcontact.discretization import discretize
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder, Plane, Sphere, Torus
-from tolcontact.geometry.files import BREP, SURFACES, ReadingLimits, read_files
+from tolcontact.geometry.files import BREP, STATED_FACES, ReadingLimits, read_files
 from tolcontact.geometry.files.product import rigid_motion
 from tolcontact.geometry.files.reading import usual_chord
 from tolcontact.geometry.files.step_surfaces import credible, onto
@@ -98,9 +98,9 @@ def test_surfaces_are_fitted_where_a_file_states_none():
 def test_vertices_of_a_step_file_lie_on_its_surfaces_in_double_precision():
     mesh = shape(tc.Mesh(COVER)).mesh
     brep = np.asarray(mesh.face_attributes[BREP])
-    for number, surface in enumerate(mesh.metadata[SURFACES]):
+    for number, face in enumerate(mesh.metadata[STATED_FACES]):
         own = mesh.vertices[np.unique(mesh.faces[brep == number])]
-        assert np.abs(surface.distance(own)[0]).max() < 1e-11
+        assert np.abs(face.surface.distance(own)[0]).max() < 1e-11
     assert mesh.is_watertight
 
 
@@ -372,7 +372,7 @@ def test_surfaces_have_the_numbers_of_the_file(name):
     placed = [axes[key] for key in re.findall(r"=PLANE\('[^']*',#(\d+)\)", text)]
     planes = np.array([[*directions[n], points[p] @ directions[n]] for p, n in placed])
     radii = np.array(re.findall(r"=CYLINDRICAL_SURFACE\('[^']*',#\d+,([^)]*)\)", text), dtype=float)
-    surfaces = shape(tc.Mesh(path)).mesh.metadata[SURFACES]
+    surfaces = [face.surface for face in shape(tc.Mesh(path)).mesh.metadata[STATED_FACES]]
     assert {surface.kind for surface in surfaces} == ({"plane", "cylinder"} if len(radii) else {"plane"})
     for surface in surfaces:
         if surface.kind == "cylinder":

@@ -8,7 +8,7 @@ import tolcontact as tc
 from tests.shapes import refusal
 from tests.step_files import Step, assembly, corners, step_block, step_of
 from tolcontact.geometry.faces import patch
-from tolcontact.geometry.files import SURFACES
+from tolcontact.geometry.files import STATED_FACES
 from tolcontact.geometry.shapes import shape
 
 SEVERAL = {
@@ -173,4 +173,4 @@ def test_a_face_on_a_part_of_a_spline_surface_is_read(tmp_path):
     (tmp_path / "block.step").write_text(str(step))
     mesh = shape(tc.Mesh(tmp_path / "block.step")).mesh
     assert mesh.volume == pytest.approx(6000)
-    assert [surface.kind for surface in mesh.metadata[SURFACES]] == ["plane"] * 6
+    assert [face.surface.kind for face in mesh.metadata[STATED_FACES]] == ["plane"] * 6

@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests.cases.stored import FAR, SCENES, ascii_stl, stored, stored_case
 from tests.helpers import FIXED, call, nightly
-from tolcontact.geometry.coordinate_error import coordinate_error
 from tolcontact.geometry.inset import inset
 from tolcontact.geometry.shapes import shape
+from tolcontact.geometry.triangle_mesh import coordinate_error
 from tolcontact.interference import Neighbours, deviating_solid, solid
 from tolcontact.poses import AT_REST
 from tolcontact.stored_coordinates import printed_spacing

@@ -27,12 +27,12 @@ from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.scenes import Scene
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation, Features
-from tolcontact.geometry.coordinate_error import coordinate_error
-from tolcontact.geometry.curvature import CHORD_SHARE, curvature_points, distinct, facet_error, is_flat, sampling_error
+from tolcontact.geometry.curvature import CHORD_SHARE, curvature_points, distinct, facet_error, sampling_error
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.overlap import overlap_corners, rim_points
 from tolcontact.geometry.spreading import distinct_vertices, spread
 from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.triangle_mesh import coordinate_error
 
 DEFAULT_REACH = 0.1  # of the moving part's size
 DEFAULT_POINTS = 200
@@ -104,7 +104,7 @@ def _spring_shares(points: ContactPoints) -> np.ndarray:
     assert points.moving_face is not None and points.reference_face is not None
     if points.round is not None:
         return np.where(points.round.points["axis"].any(axis=1), 0.5, 1.0)  # a shaft has two ends
-    if not (is_flat(points.moving_face) and is_flat(points.reference_face)):
+    if not (points.moving_face.is_flat and points.reference_face.is_flat):
         raise GeometryFault("it has a stiffness, which needs flat faces, or a ball or shaft against walls; leave stiffness out")
     return points.weights / len(points.P_m)
 
@@ -143,7 +143,7 @@ def _candidates(
     if lengths:
         check_resolved(points, mesh, lengths)
     P_m, finest = moving.placed(points), assembly.smallest_zone()
-    if is_flat(moving_face) and is_flat(reference_face):
+    if moving_face.is_flat and reference_face.is_flat:
         if _is_open(pair):
             P_m = np.concatenate([P_m, overlap_corners(moving_face, reference_face)])
             if lengths:
@@ -212,7 +212,7 @@ def _with_curvature(
     If their choice `is_open`, points are added that follow curvature, by CHORD_SHARE of the `finest` tolerance range.
     """
     dense = curvature_points(moving_face, reference_face, chord=CHORD_SHARE * finest, within=reach)
-    if is_flat(reference_face) and moving_face.curvature > 0:
+    if reference_face.is_flat and moving_face.curvature > 0:
         step = math.sqrt(8 * CHORD_SHARE * finest / moving_face.curvature)
         dense = np.concatenate([dense, rim_points(moving_face, reference_face, step, reach)])
     if is_open:

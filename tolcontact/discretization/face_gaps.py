@@ -6,7 +6,6 @@ from tolcontact.discretization.form_points import affordable_spacing, form_lengt
 from tolcontact.discretization.measured_geometry import FaceGap, MeasuredFace, MeasuredPoint
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.errors import GeometryFault
-from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.overlap import overlap_corners
 from tolcontact.geometry.spreading import spread
 
@@ -51,7 +50,7 @@ def _places(moving: MeasuredFace, reference: MeasuredFace) -> np.ndarray:
     if not lengths and share < 1:
         spacing *= max(share, MIN_SHARE) ** 0.5
         places = spread(surface.mesh, None, spacing)
-    if is_flat(surface) and is_flat(reference.surface):
+    if surface.is_flat and reference.surface.is_flat:
         places = np.concatenate([places, overlap_corners(surface, reference.surface)])
         reach = float(np.ptp(np.vstack([surface.mesh.bounds, reference.surface.mesh.bounds]), axis=0).sum())
         places = with_rims(places, surface, reference.surface, spacing, reach)

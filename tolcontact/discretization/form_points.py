@@ -8,11 +8,10 @@ from scipy.spatial import KDTree
 
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation
-from tolcontact.geometry.analytic_surfaces import Cylinder
-from tolcontact.geometry.curvature import is_flat
+from tolcontact.geometry.analytic_surfaces import Cylinder, axes_across
 from tolcontact.geometry.overlap import rim_points
-from tolcontact.geometry.subdivision import subdivided
 from tolcontact.geometry.surface import RIM_TOLERANCE, Surface
+from tolcontact.geometry.triangle_mesh import subdivided
 
 FACING = -0.99999  # cosine of the angle between the normals of planes that face each other
 MIN_RISE = 0.1  # per mm beside the rim of facets that face a plane: steeper facets touch it nowhere else, at usual tilts
@@ -49,7 +48,7 @@ def affordable_spacing(lengths: Sequence[float], area: float, count: int) -> flo
 def check_facing(moving: Surface, reference: Surface, deviating: Sequence[FaceDeviation | None]) -> None:
     """Raise GeometryFault for a plane with form and another plane that does not face it."""
     normals = [face.corner_normals[0, 0] for face in (moving, reference)]
-    if is_flat(moving) and is_flat(reference) and normals[0] @ normals[1] > FACING:
+    if moving.is_flat and reference.is_flat and normals[0] @ normals[1] > FACING:
         name = next(face.name for face in deviating if face is not None and face.form is not None)
         raise GeometryFault(
             f"the face of feature {name} has form, and its planes are not parallel; give its tolerance form=None, "
@@ -65,7 +64,7 @@ def facing_triangles(face: Surface, other: Surface, deviation: FaceDeviation | N
     """
     n, every = other.corner_normals[0, 0], np.arange(len(face.mesh.faces))
     is_facing = np.asarray(face.mesh.face_normals) @ n < FACING
-    if deviation is None or deviation.form is None or not is_flat(other) or is_facing.all() or not is_facing.any():
+    if deviation is None or deviation.form is None or not other.is_flat or is_facing.all() or not is_facing.any():
         return every
     heights = np.asarray(face.mesh.vertices) @ n
     tops = heights[np.asarray(face.mesh.faces)].max(axis=1)
@@ -89,7 +88,7 @@ def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[Face
         return None
     if np.linalg.norm(np.cross(shaft.axis, bore.axis)) > PARALLEL_TOLERANCE:
         return None
-    extents = [(np.asarray(face.mesh.vertices) - shaft.origin) @ shaft.axis for face in (moving, reference)]
+    extents = [shaft.along(np.asarray(face.mesh.vertices)) for face in (moving, reference)]
     start, end = max(extent.min() for extent in extents), min(extent.max() for extent in extents)
     if end <= start:
         return None
@@ -98,7 +97,7 @@ def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[Face
     inset = END_SHARE * (end - start)
     heights = np.linspace(start + inset, end - inset, int(np.ceil((end - start) / (ALONG_SHARE * along))) + 1)
     count = max(int(np.ceil(2 * np.pi * shaft.radius / (SPACING_SHARE * across))), MIN_AZIMUTHS)
-    u = np.linalg.svd(shaft.axis[None])[2][1]
+    u = axes_across(shaft.axis)[0]
     outward = [np.cos(turn) * u + np.sin(turn) * np.cross(shaft.axis, u) for turn in np.arange(count) * 2 * np.pi / count]
     points = shaft.origin + heights[:, None, None] * shaft.axis + shaft.radius * np.array(outward)
     points = points.reshape(-1, 3)

@@ -8,6 +8,7 @@ import numpy as np
 from tolcontact.declaration import Face
 from tolcontact.errors import GeometryFault
 from tolcontact.features import Placement
+from tolcontact.geometry.analytic_surfaces import axes_across
 from tolcontact.geometry.faces import Meshes, patch
 
 ROUNDING = 1e-6  # of a face's size
@@ -48,7 +49,7 @@ class LocatingFace:
     @property
     def axes(self) -> np.ndarray:
         """Two unit vectors (2, 3) at right angles to the outward normal."""
-        return np.linalg.svd(self.outward[None])[2][1:]
+        return axes_across(self.outward)
 
     @property
     def size(self) -> float:

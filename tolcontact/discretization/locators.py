@@ -12,8 +12,8 @@ from tolcontact.declaration.locator import BEST_FIT, FIRST_ORDER
 from tolcontact.discretization.locating_faces import LocatingFace
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation, Placement
-from tolcontact.geometry.coordinate_error import COORDINATE_SPACING
 from tolcontact.geometry.faces import Meshes
+from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING
 
 MAX_CONDITION = 1e8
 MIN_DETERMINANT = 0.1  # of the normals of three faces that count as independent

@@ -11,8 +11,6 @@ from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.errors import GeometryFault
 from tolcontact.features import AxisFeature, FaceDeviation, FeatureGeometry, FeatureOfSize, PlaneFeature, feature_geometry
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane
-from tolcontact.geometry.curvature import is_flat
-from tolcontact.geometry.edges import rim
 from tolcontact.geometry.nearest_elements import NearestElements
 from tolcontact.geometry.surface import Surface
 
@@ -28,7 +26,7 @@ class MeasuredFace:
 
     def wall(self, near: np.ndarray) -> "Wall":
         """Return the whole surface of the face, or if no analytic one is known its tangent plane nearest to a place (3,)."""
-        if is_flat(self.surface):
+        if self.surface.is_flat:
             return Wall(self.part, self.plane, 1.0, self.deviation)
         pieces = self.surface.pieces
         if len(pieces) == 1 and not len(self.surface.unknown.mesh.faces):
@@ -166,7 +164,7 @@ class Outline:
     @classmethod
     def of(cls, surface: Surface) -> "Outline":
         """Return the rim of a face."""
-        used, edges = np.unique(rim(np.asarray(surface.mesh.faces)), return_inverse=True)
+        used, edges = np.unique(surface.rim, return_inverse=True)
         return cls(np.asarray(surface.mesh.vertices)[used], edges.reshape(-1, 2))
 
 

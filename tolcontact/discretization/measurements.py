@@ -41,9 +41,7 @@ from tolcontact.discretization.nominal import Nominal
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.errors import GeometryFault, ModelError, designation
-from tolcontact.geometry.analytic_surfaces import Cylinder
-from tolcontact.geometry.curvature import is_flat
-from tolcontact.geometry.edges import rim
+from tolcontact.geometry.analytic_surfaces import Cylinder, axes_across
 from tolcontact.geometry.faces import patch
 from tolcontact.geometry.nearest_elements import nearest_elements
 from tolcontact.geometry.overlap import crossing_edges
@@ -138,7 +136,7 @@ def _clearance(clearance: Clearance, faces: MeasuredFaces) -> NominalMeasurement
                 f"the clearance of {face.face}, which has form, cannot be measured; measure the gaps of points with tc.Gap, "
                 "or what is left between the faces with tc.LargestGap, or give its tolerance of form form=None"
             )
-    if is_flat(moving.surface) and is_flat(reference.surface):
+    if moving.surface.is_flat and reference.surface.is_flat:
         return _clearance_of_planes(moving, reference)
     reach = float(np.ptp(np.vstack([moving.surface.mesh.bounds, reference.surface.mesh.bounds]), axis=0).sum())
     if points := round_points(moving.surface, reference.surface, reach):
@@ -178,7 +176,7 @@ def _clearance_of_planes(moving: MeasuredFace, reference: MeasuredFace) -> Heigh
         )
     points: list[tuple[MeasuredPoint, Wall]] = []
     for face, target in ((moving, reference), (reference, moving)):
-        corners = np.asarray(face.surface.mesh.vertices)[np.unique(rim(np.asarray(face.surface.mesh.faces)))]
+        corners = face.surface.rim_corners
         _, _, is_over = target.surface.project(corners)
         outward, wall = face.plane.axis, Wall(target.part, target.plane, 1.0, target.deviation)
         corners = _outline(corners[is_over], outward)
@@ -207,7 +205,7 @@ def _clearance_of_planes(moving: MeasuredFace, reference: MeasuredFace) -> Heigh
 def _outline(points: np.ndarray, n: np.ndarray) -> np.ndarray:
     """Return the corners of the convex hull of points (point, 3) of a plane with normal n (3,): no other can be the nearest."""
     try:
-        return points[ConvexHull(points @ np.linalg.svd(n[None])[2][1:].T).vertices] if len(points) > 3 else points
+        return points[ConvexHull(points @ axes_across(n).T).vertices] if len(points) > 3 else points
     except QhullError:  # the points lie on one line
         return points
 
@@ -268,7 +266,7 @@ def _is_outer_cylinder(face: MeasuredFace) -> bool:
 
 def _kind(face: MeasuredFace) -> str:
     kinds = dict.fromkeys(piece.surface.kind for piece in face.surface.pieces)
-    return f"{face.face} ({' and '.join(kinds) or ('plane' if is_flat(face.surface) else 'general surface')})"
+    return f"{face.face} ({' and '.join(kinds) or ('plane' if face.surface.is_flat else 'general surface')})"
 
 
 def _nearest_places(moving: np.ndarray, reference: np.ndarray) -> np.ndarray:

@@ -18,7 +18,6 @@ from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.features import Datum, FaceDeviation, Features, NominalFeature, NominalPattern
 from tolcontact.features.zone_kernel import sum_modes
-from tolcontact.geometry.curvature import chord_height, is_flat
 from tolcontact.geometry.face_pair import FacePair, body_face
 from tolcontact.geometry.faces import Meshes, triangles
 from tolcontact.geometry.overlap import points_on_rim
@@ -98,7 +97,7 @@ class ContactPoints:
         """The gap between contact points of two rigid planes with form; None for other pairs."""
         if not self.has_form or self.moving_face is None or self.reference_face is None or self.stiffness is not None:
             return None
-        if not (is_flat(self.moving_face) and is_flat(self.reference_face)):
+        if not (self.moving_face.is_flat and self.reference_face.is_flat):
             return None
         distance = np.quantile(KDTree(self.P_m).query(self.P_m, k=2)[0][:, 1], 0.9) if len(self.P_m) > 1 else 0.0
         reach = max(self.form_spacing / COVER_SHARE, float(distance))
@@ -163,7 +162,7 @@ class ContactPoints:
         """The largest height [mm] of round surfaces over the triangles that they were fitted to and replace."""
         faces = [face for face in (self.moving_face, self.reference_face) if face is not None]
         pieces = [piece.face for face in faces for piece in face.pieces if piece.surface.is_fitted]
-        return max(map(chord_height, pieces), default=0.0)
+        return max((piece.chord_height for piece in pieces), default=0.0)
 
     @property
     def in_words(self) -> str:

@@ -16,12 +16,12 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.features import FaceDeviation, FormField
 from tolcontact.geometry import height_kernel, minima_kernel
-from tolcontact.geometry.edges import on_rim
 from tolcontact.geometry.face_frame import face_frame
 from tolcontact.geometry.height_kernel import HeightSums, HeightTable, Plane
 from tolcontact.geometry.meeting import Places
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.surface import RIM_TOLERANCE, Surface
+from tolcontact.geometry.triangle_mesh import on_rim
 
 STEP_SHARE = 1 / 10  # of the length over which heights change: the distance of two nodes
 ROUGH_STEP_SHARE = 1 / 40  # the same for the covariance of fields that bend abruptly at stations

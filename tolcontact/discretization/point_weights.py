@@ -7,7 +7,6 @@ from scipy.spatial import KDTree
 
 from tolcontact.arrays import Array, Float
 from tolcontact.geometry.common_region import common_region
-from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.face_frame import face_frame
 from tolcontact.geometry.surface import Surface
 
@@ -31,7 +30,7 @@ def point_weights(P_m: Float[Array, "point 3"], distance: float, moving: Surface
     they have area and centre, or the area alone.
     """
     nearest = _elements(P_m, distance, moving, reference)
-    region = common_region(moving, reference) if is_flat(moving) and is_flat(reference) else None
+    region = common_region(moving, reference) if moving.is_flat and reference.is_flat else None
     # Areas of triangles that are cut along the reference face would depend on its tessellation; their moments do not.
     elements = nearest if region is None else _elements(P_m, distance, moving, reference, region, is_fine=nearest is None)
     if elements is None:

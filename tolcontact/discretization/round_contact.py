@@ -8,9 +8,8 @@ import trimesh
 
 from tolcontact.discretization.round_points import NotRoundError, RoundPoint, arc, tangent_directions
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, Plane, RoundSurface, Sphere
-from tolcontact.geometry.curvature import chord_height
-from tolcontact.geometry.edges import CREASE, rim
 from tolcontact.geometry.surface import Piece, Surface
+from tolcontact.geometry.triangle_mesh import CREASE
 
 MAX_POINTS = 40  # of a pair
 PARALLEL_TOLERANCE = 1e-3  # rad between the axis of a shaft and its wall
@@ -127,7 +126,7 @@ class _ContactLine:
         self._body, self._wall = body, wall
         # Near the rim of a flat triangle, points of the round face are shifted by a part of the height between the two.
         self._tolerances = [
-            PLACE_TOLERANCE * piece.face.mesh.scale + MAX_FACET_SINE * chord_height(piece.face) for piece in (body, wall)
+            PLACE_TOLERANCE * piece.face.mesh.scale + MAX_FACET_SINE * piece.face.chord_height for piece in (body, wall)
         ]
 
     def on_shaft(self, places: np.ndarray) -> np.ndarray:
@@ -148,7 +147,7 @@ class _ContactLine:
         """Return places from `start` to `end` that miss no part of the faces: even ones, all vertices, and middles."""
         shaft = self._body.surface
         vertices = [np.asarray(piece.face.mesh.vertices) for piece in (self._body, self._wall)]
-        of_vertices = np.concatenate([(points - shaft.origin) @ shaft.axis for points in vertices])
+        of_vertices = np.concatenate(list(map(shaft.along, vertices)))
         places = np.unique(np.concatenate([np.linspace(start, end, AXIS_PLACES + 1), of_vertices.clip(start, end)]))
         return np.unique(np.concatenate([places, (places[1:] + places[:-1]) / 2]))
 
@@ -232,16 +231,15 @@ def _shaft_in_hole(
 
 def _extent(face: Surface, shaft: AnalyticSurface) -> tuple[float, float]:
     """Return the first and the last place of a face along an axis [mm]."""
-    along = (np.asarray(face.mesh.vertices) - shaft.origin) @ shaft.axis
+    along = shaft.along(np.asarray(face.mesh.vertices))
     return float(along.min()), float(along.max())
 
 
 def _has_square_ends(piece: Piece) -> bool:
     """Return whether the rim of a cylinder lies in two planes across its axis."""
-    mesh = piece.face.mesh
-    along = (np.asarray(mesh.vertices)[np.unique(rim(mesh.faces))] - piece.surface.origin) @ piece.surface.axis
+    along = piece.surface.along(piece.face.rim_corners)
     distances = np.minimum(along - along.min(initial=np.inf), along.max(initial=-np.inf) - along)
-    return bool(along.size) and bool((distances < PLACE_TOLERANCE * mesh.scale + piece.surface.residual).all())
+    return bool(along.size) and bool((distances < PLACE_TOLERANCE * piece.face.mesh.scale + piece.surface.residual).all())
 
 
 def _contains(piece: Piece, point: np.ndarray) -> bool:
@@ -254,7 +252,7 @@ def _contains(piece: Piece, point: np.ndarray) -> bool:
 
 def _nearest_edge(face: Surface, point: np.ndarray) -> np.ndarray:
     """Return the ends (2, 3) of the edge of the rim that is nearest to a point (3,)."""
-    ends = np.asarray(face.mesh.vertices)[rim(face.mesh.faces)]
+    ends = face.rim_ends
     along = ends[:, 1] - ends[:, 0]
     share = (((point - ends[:, 0]) * along).sum(axis=1) / (along**2).sum(axis=1)).clip(0, 1)
     return ends[np.linalg.norm(ends[:, 0] + share[:, None] * along - point, axis=1).argmin()]

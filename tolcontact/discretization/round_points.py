@@ -10,7 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, Plane, Sphere, surface_arrays, surfaces_of
+from tolcontact.geometry.analytic_surfaces import (
+    AnalyticSurface,
+    Cone,
+    Cylinder,
+    Plane,
+    Sphere,
+    axes_across,
+    surface_arrays,
+    surfaces_of,
+)
 from tolcontact.geometry.surface import Piece
 
 TANGENTS = 5  # of a whole hollow wall, besides the nearest
@@ -36,7 +45,7 @@ def arc(wall: Piece) -> tuple[np.ndarray, float]:
     across -= (across @ axis)[:, None] * axis
     across = across[np.linalg.norm(across, axis=1) > RADIUS_TOLERANCE * wall.face.mesh.scale]
     if isinstance(wall.surface, Plane) or not len(across):
-        return np.linalg.svd(axis[None])[2][1], math.pi
+        return axes_across(axis)[0], math.pi
     x = across[0] / np.linalg.norm(across[0])
     y = np.cross(axis, x)
     azimuths = np.sort(np.arctan2(across @ y, across @ x))
@@ -56,7 +65,7 @@ def arc(wall: Piece) -> tuple[np.ndarray, float]:
 
 def _check_area(wall: Piece, opening: float) -> None:
     """Raise NotRoundError if a cylinder or cone has less area than its whole arc from end to end of its axis."""
-    along = (np.asarray(wall.face.mesh.vertices) - wall.surface.origin) @ wall.surface.axis
+    along = wall.surface.along(np.asarray(wall.face.mesh.vertices))
     if isinstance(wall.surface, Cylinder):
         expected = 2 * opening * wall.surface.radius * float(np.ptp(along))
     elif isinstance(wall.surface, Cone):

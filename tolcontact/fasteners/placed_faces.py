@@ -11,7 +11,6 @@ from tolcontact.declaration import Cylinder as CylinderSelection, Face, Geometry
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.analytic_surfaces import Cylinder
 from tolcontact.geometry.brep_face import describe_faces
-from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.files import Shape
 from tolcontact.geometry.shapes import shape
@@ -91,9 +90,7 @@ def placed_cylinder(face: Face) -> PlacedCylinder:
     surface = patch(face, meshes_of(face))
     pieces, rest = surface.pieces, len(surface.unknown.mesh.faces)
     if len(pieces) != 1 or rest or not isinstance(pieces[0].surface, Cylinder):
-        kinds = [piece.surface.kind for piece in pieces] + (
-            ["plane" if is_flat(surface) else "other triangles"] if rest else []
-        )
+        kinds = [piece.surface.kind for piece in pieces] + (["plane" if surface.is_flat else "other triangles"] if rest else [])
         raise GeometryFault(f"face {face} is {', '.join(dict.fromkeys(kinds))}; expected one cylinder")
     cylinder = pieces[0].surface
     stations = (np.asarray(surface.mesh.vertices) - cylinder.origin) @ cylinder.axis
@@ -105,7 +102,7 @@ def placed_cylinder(face: Face) -> PlacedCylinder:
 def placed_plane(face: Face) -> PlacedPlane:
     """Return a face that is flat. Raises GeometryFault for any other face."""
     surface = patch(face, meshes_of(face))
-    if not is_flat(surface):
+    if not surface.is_flat:
         raise GeometryFault(f"face {face} is not flat; expected the plane under the head")
     R, t = placement(face.part)
     normal = surface.mesh.area_faces @ surface.mesh.face_normals

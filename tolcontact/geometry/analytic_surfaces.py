@@ -78,6 +78,10 @@ class AnalyticSurface(ABC):
             points = points - value[:, None] * slope
         return points
 
+    def along(self, points: np.ndarray) -> np.ndarray:
+        """Return the coordinates (point,) [mm] of points (point, 3) along the axis, from the origin."""
+        return np.asarray((points - self.origin) @ self.axis)
+
     def _around_axis(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return distances (point,) from the axis, unit vectors (point, 3) away from it, and coordinates (point,) along it."""
         offset = points - self.origin
@@ -230,6 +234,11 @@ class Torus(AnalyticSurface):
         radial, outward, along = self._around_axis(points)
         tube, slope = _length_and_direction(self.from_circle(radial[:, None], outward, along[:, None], self.axis))
         return self.height(tube, along), slope
+
+
+def axes_across(direction: np.ndarray) -> np.ndarray:
+    """Return two unit vectors (2, 3) perpendicular to a direction (3,) and to each other."""
+    return np.asarray(np.linalg.svd(direction[None])[2][1:])
 
 
 ANALYTIC_SURFACES: dict[str, type[AnalyticSurface]] = {

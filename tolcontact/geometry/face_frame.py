@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import trimesh
 
-from tolcontact.geometry.edges import rim
-from tolcontact.geometry.subdivision import subdivided
+from tolcontact.geometry.triangle_mesh import rim, subdivided
 
 TIE = 1e-6  # relative difference of lengths that are equal except for rounding
 CELLS = 2.0**30  # in a length of about the face's size: coordinates are whole numbers of cells

@@ -13,14 +13,11 @@ from tolcontact.declaration import Brep, Cylinder, Face, Facing, Inside, Largest
 from tolcontact.declaration.selection import FACE_ANGLE
 from tolcontact.declaration.values import Vector
 from tolcontact.errors import GeometryFault, shown_name
-from tolcontact.geometry.boxes import overlaps
-from tolcontact.geometry.brep_face import describe_faces, faces_at, number_faces
-from tolcontact.geometry.face_groups import group_lines
-from tolcontact.geometry.face_in_file import FaceInFile
-from tolcontact.geometry.files import BREP, FACE_NAMES, SURFACES
-from tolcontact.geometry.subdivision import subdivided
+from tolcontact.geometry.brep_face import analytic_surfaces, describe_faces, faces_at, number_faces
+from tolcontact.geometry.face_in_file import FaceInFile, group_lines
+from tolcontact.geometry.files import BREP, STATED_FACES
 from tolcontact.geometry.surface import Surface
-from tolcontact.geometry.surface_recognition import analytic_surfaces
+from tolcontact.geometry.triangle_mesh import overlaps, subdivided
 
 NEAR_DIVISIONS = 100
 CUT = 4  # refinement factor of the pieces of triangles in one step
@@ -195,10 +192,10 @@ def _group(face: Face, faces: Sequence[FaceInFile], description: FaceInFile, who
 def _brep_numbers(face: Face, mesh: trimesh.Trimesh, which: int | str | Vector) -> np.ndarray:
     """Return the indices of the B-rep faces that a number from 1, a name or a point selects."""
     if isinstance(which, str):
-        return _by_name(face, mesh.metadata[FACE_NAMES], which)
+        return _by_name(face, [stated.name for stated in mesh.metadata[STATED_FACES]], which)
     if isinstance(which, tuple):
         return _by_point(face, mesh, which)
-    count = len(mesh.metadata[SURFACES])
+    count = len(mesh.metadata[STATED_FACES])
     if not 1 <= which <= count:
         raise GeometryFault(f"face {face}: the part has faces 1 to {count}; tolcontact faces lists them")
     return np.array([which - 1])

@@ -10,7 +10,7 @@ import trimesh
 
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.body_overlap import SolidBody
-from tolcontact.geometry.edges import edges
+from tolcontact.geometry.triangle_mesh import edges
 
 SPARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the smaller mesh's size: distance of the horizon beyond the least distance
 MIN_SPARE = 1e-3  # of this size: smallest permitted spare if there are too many elements

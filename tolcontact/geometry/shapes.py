@@ -8,13 +8,13 @@ import trimesh
 
 from tolcontact.declaration import Box, Geometry, Mesh, Pin
 from tolcontact.errors import GeometryFault
-from tolcontact.geometry.edges import distinct_triangles, edges
 from tolcontact.geometry.files.reading import Contents, Shape, read, read_files
-from tolcontact.geometry.pin_shape import pin_shape
-from tolcontact.geometry.subdivision import subdivided
+from tolcontact.geometry.triangle_mesh import distinct_triangles, edges, subdivided
 
 log = logging.getLogger(__name__)
 
+SECTIONS = 72  # triangles around a pin
+HEAD_WIDTH, HEAD_HEIGHT = 1.6, 0.65  # of a pin, times its diameter, as for hexagon head bolts to ISO 4014
 FIELD_DIVISIONS = 12  # number of edges across a part for showing its displacement field
 
 
@@ -26,7 +26,7 @@ def shape(geometry: Geometry, contents: Contents | None = None) -> Shape:
     if isinstance(geometry, Box):
         return Shape(trimesh.creation.box(bounds=[[0, 0, 0], [geometry.x, geometry.y, geometry.z]]))
     if isinstance(geometry, Pin):
-        return Shape(pin_shape(geometry))
+        return Shape(_pin(geometry))
     surface = read(geometry, read_files([geometry]) if contents is None else contents)
     mesh = surface.mesh
     if len(mesh.faces) == 0:
@@ -36,6 +36,17 @@ def shape(geometry: Geometry, contents: Contents | None = None) -> Shape:
     _leave_out_repetitions(mesh, geometry)
     _check_outward(mesh, geometry)
     return surface
+
+
+def _pin(pin: Pin) -> trimesh.Trimesh:
+    """Return the closed surface of a pin; a head is round."""
+    radius, profile = pin.diameter / 2, [(0.0, -pin.length), (pin.diameter / 2, -pin.length), (pin.diameter / 2, 0.0)]
+    if pin.head:
+        top = HEAD_HEIGHT * pin.diameter
+        profile += [(HEAD_WIDTH * radius, 0.0), (HEAD_WIDTH * radius, top), (0.0, top)]
+    else:
+        profile += [(0.0, 0.0)]
+    return trimesh.creation.revolve(profile, sections=SECTIONS)
 
 
 def _leave_out_repetitions(mesh: trimesh.Trimesh, geometry: Mesh) -> None:

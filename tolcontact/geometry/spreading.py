@@ -4,8 +4,8 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-from tolcontact.geometry.edges import rim
 from tolcontact.geometry.face_frame import FaceFrame, face_frame
+from tolcontact.geometry.triangle_mesh import rim
 
 PART_FRAME = FaceFrame(np.zeros(3), np.eye(3), 1.0, rounds=False)
 FLAT = 1e-6  # largest difference between the unit normals of a flat surface

@@ -9,14 +9,14 @@ import numpy as np
 import trimesh
 from scipy.sparse import csr_array
 
-from tolcontact.geometry.analytic_surfaces import AnalyticSurface
-from tolcontact.geometry.edges import CREASE, on_rim, rim
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface, axes_across
 from tolcontact.geometry.region_kernel import Region
-from tolcontact.geometry.triangle_tree import triangle_tree
+from tolcontact.geometry.triangle_mesh import CREASE, on_rim, rim, triangle_tree
 
 RIM_TOLERANCE = 1e-6  # of a face's size: largest overhang of a point that counts as over the face
 MAX_TURN = 0.3  # rad: between the normals of a triangle and of the analytic surface that it approximates
 MAX_BULGE = 0.05  # of a face's size: between a triangle and the analytic surface that it approximates
+FLATNESS = 1e-6  # of a face's size: largest difference in height between the vertices of a flat face
 FLAT_ANGLE = 1e-6  # rad: faces whose normals rotate by less from end to end are planes
 
 
@@ -126,15 +126,53 @@ class Surface:
         return on_rim(self._faces)
 
     @cached_property
+    def rim(self) -> np.ndarray:
+        """The vertex indices (edge, 2) of the edges on the rim."""
+        return rim(self._faces)
+
+    @property
+    def rim_ends(self) -> np.ndarray:
+        """The ends (edge, 2, 3) [mm] of the edges on the rim."""
+        return self._vertices[self.rim]
+
+    @property
+    def rim_corners(self) -> np.ndarray:
+        """The vertices (corner, 3) [mm] on the rim."""
+        return self._vertices[np.unique(self.rim)]
+
+    @cached_property
     def _rim_corners(self) -> np.ndarray:
         """Mask (face, corner) of the corners on the rim."""
-        return np.isin(self._faces, rim(self._faces))
+        return np.isin(self._faces, self.rim)
+
+    @cached_property
+    def is_flat(self) -> bool:
+        """Whether the whole surface lies in one plane."""
+        normals = self.corner_normals.reshape(-1, 3)
+        n = normals.mean(axis=0)
+        size = np.linalg.norm(n)
+        if size == 0:  # opposite normals cancel
+            return False
+        heights = self._vertices @ (n / size)
+        return bool(np.ptp(heights) < FLATNESS * self.mesh.scale and (normals @ n).min() > 0)
+
+    @cached_property
+    def chords(self) -> tuple[np.ndarray, np.ndarray]:
+        """The heights (face,) [mm] of the arcs over the edges of triangles, and the lengths (face,) [mm] of these edges."""
+        corners, normals = np.asarray(self.mesh.triangles), self.corner_normals
+        chord, turn = (np.roll(values, -1, axis=1) - values for values in (corners, normals))
+        return np.abs((chord * turn).sum(axis=2)).max(axis=1) / 8, np.linalg.norm(chord, axis=2).max(axis=1)
+
+    @property
+    def chord_height(self) -> float:
+        """The largest distance [mm] of the triangles from the round surface that they approximate."""
+        return float(self.chords[0].max(initial=0.0))
 
     @cached_property
     def region(self) -> Region:
         """A flat face, seen along its normal."""
-        axes = np.linalg.svd(self.corner_normals[0, 0][None])[2][1:]
-        edges = np.asarray(self.mesh.vertices)[rim(self._faces)] @ axes.T
+        axes = axes_across(self.corner_normals[0, 0])
+        edges = self.rim_ends @ axes.T
         return Region(np.ascontiguousarray(axes), np.ascontiguousarray(edges), RIM_TOLERANCE * float(self.mesh.scale))
 
     def nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -11,9 +11,9 @@ from tolcontact.geometry.brep_face import (
     faces_at,
     faces_on_surfaces,
 )
+from tolcontact.geometry.face_groups import FaceOnSurface
 from tolcontact.geometry.face_in_file import FaceInFile
 from tolcontact.geometry.files import STATED_FACES, Shape
-from tolcontact.geometry.interrupted_surfaces import FaceOnSurface
 
 MAX_OPPOSED_ERROR = 1e-3  # [rad] between two planes that count as parallel
 MAX_ANGLE = 0.01  # [rad] between directions of faces that may be parts of one surface: fitted ones differ by much less

@@ -6,6 +6,7 @@ faces have numbers, also those of which the kernel makes no triangles at some ch
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +16,7 @@ from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 MAX_LISTED = 12  # bodies that a message lists
 
 
-@dataclass(frozen=True, eq=False)
-class FaceMeasure:
+class FaceMeasure(NamedTuple):
     """The `area` of a face [mm2], a `point` (3,) on it [mm], and its outward `normal` (3,) there."""
 
     area: float
@@ -26,24 +26,26 @@ class FaceMeasure:
 
 @dataclass(frozen=True, eq=False)
 class StatedFace:
-    """A B-rep face.
+    """A B-rep face as a file states it.
 
+    surface  None for an unknown one
     name     "" for a face without a name
     records  numbers of its records in the file's text, its own first, then those of its copies; empty if it states no PMI
     copies   number of other faces that stand in the same place, and have no triangles of their own
-    measure  None if the kernel finds none, as for a face that the file states by triangles
+    measure  None if the kernel finds none, as for a face that the file states by triangles, and for faces from an archive
     """
 
+    surface: AnalyticSurface | None = None
     name: str = ""
     records: tuple[int, ...] = ()
     copies: int = 0
     measure: FaceMeasure | None = None
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "StatedFace":
-        """Return the face in a frame to which its own is turned by `R` (3, 3) and moved by `t` (3,) [mm]."""
-        if self.measure is None:
-            return self
-        return replace(self, measure=FaceMeasure(self.measure.area, R @ self.measure.point + t, R @ self.measure.normal))
+        """Return the face rotated by R (3, 3), then translated by t (3,) [mm]."""
+        surface = self.surface and self.surface.placed(R, t)
+        measure = self.measure and FaceMeasure(self.measure.area, R @ self.measure.point + t, R @ self.measure.normal)
+        return replace(self, surface=surface, measure=measure)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +56,6 @@ class StepShape:
     triangles    (triangle, 3)
     brep         (triangle,) the B-rep face of each triangle, from 0
     faces        the B-rep faces, in the file's order
-    surfaces     of the B-rep faces; None for an unknown one
     face_count   number of B-rep faces that the file states for a solid; 0 if it is no solid
     gap_count    number of edges that have a triangle on one side only
     """
@@ -63,7 +64,6 @@ class StepShape:
     triangles: np.ndarray
     brep: np.ndarray
     faces: tuple[StatedFace, ...]
-    surfaces: tuple[AnalyticSurface | None, ...]
     face_count: int
     gap_count: int
 

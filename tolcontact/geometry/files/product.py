@@ -15,10 +15,10 @@ import scipy.spatial
 import trimesh
 
 from tolcontact.errors import GeometryFault, nearest_name
-from tolcontact.geometry.edges import distinct_triangles, rim
 from tolcontact.geometry.files.bodies import Body, FaceMeasure, StatedFace, StepShape, listed, uniquely_named
 from tolcontact.geometry.files.step_surfaces import credible, onto, stated_surface
 from tolcontact.geometry.files.step_text import StepText
+from tolcontact.geometry.triangle_mesh import distinct_triangles, rim
 
 STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # largest distance [mm] and angle [rad] between triangles and true faces of a STEP file
 STEP_SHARE = 5e-6  # the chord of files larger than 0.4 m, as a share of their extent
@@ -28,8 +28,6 @@ MERGE_DISTANCE = 1e-7  # [mm], beyond 1 mm from the origin a share: vertices of 
 STRETCH_TOLERANCE = 1e-6  # relative, for a rigid motion
 MAX_OFFSET = 3.0  # in chords: vertices at a larger distance from the surface of their B-rep face are not moved onto it
 BREP = "brep_index"  # face attribute of a mesh: the B-rep face of each triangle
-SURFACES = "surfaces"  # in its metadata: the surface of each B-rep face, None if the file states none
-FACE_NAMES = "face_names"  # in its metadata: the name of each B-rep face; empty if the file names none
 STATED_FACES = "stated_faces"  # in its metadata: each B-rep face as the file states it
 
 log = logging.getLogger(__name__)
@@ -81,21 +79,19 @@ class Product:
     def part(self, selector: str | int | None) -> trimesh.Trimesh:
         """Return the mesh of a body: in its own frame if it is selected, in its place if `selector` is None.
 
-        The mesh carries BREP, whose numbers start from 0 in the file's order, SURFACES, FACE_NAMES and STATED_FACES.
+        The mesh has BREP, whose indices follow the file's order, and STATED_FACES.
         """
         body = self.body(selector)
         shape = body.shape
-        vertices, surfaces, faces = np.array(shape.vertices), list(shape.surfaces), shape.faces
+        vertices, faces = np.array(shape.vertices), shape.faces
         if selector is None and not np.array_equal(body.place, np.eye(4)):
             R, t = body.place[:3, :3], body.place[:3, 3]
             vertices = vertices @ R.T + t
-            surfaces = [None if surface is None else surface.placed(R, t) for surface in surfaces]
             faces = tuple(face.placed(R, t) for face in faces)
         mesh = trimesh.Trimesh(vertices, np.array(shape.triangles), process=False)
         mesh.units = "mm"
         mesh.face_attributes[BREP] = np.array(shape.brep)
-        names = tuple(face.name for face in faces)
-        mesh.metadata |= {SURFACES: surfaces, FACE_NAMES: names if any(names) else (), STATED_FACES: faces}
+        mesh.metadata[STATED_FACES] = faces
         if shape.face_count and len(self.bodies) == 1 and shape.gap_count:
             raise GeometryFault(
                 f'"{self.path}" holds a solid whose faces do not close ({shape.gap_count} edges have a triangle on one side '
@@ -173,13 +169,18 @@ def _shape(
         members = [place, *(member for member in np.flatnonzero(first == place) if member != place)]
         records = [int(numbers[entry["records"][member]]) for member in members] if entry["records"] else []
         measure = entry["measures"][place]
-        measured = None if measure is None else FaceMeasure(measure[0], np.array(measure[1]), np.array(measure[2]))
-        faces.append(StatedFace(entry["names"][place], tuple(filter(None, records)), len(members) - 1, measured))
-    stated = tuple(surfaces[place] for place in places)
-    gap_count = len(rim(triangles))
+        faces.append(
+            StatedFace(
+                surfaces[place],
+                entry["names"][place],
+                records=tuple(filter(None, records)),
+                copies=len(members) - 1,
+                measure=None if measure is None else FaceMeasure(measure[0], np.array(measure[1]), np.array(measure[2])),
+            )
+        )
     return StepShape(
-        vertices, triangles, np.searchsorted(places, brep), tuple(faces), stated, entry["face_count"], gap_count
-    )  # fmt: skip
+        vertices, triangles, np.searchsorted(places, brep), tuple(faces), entry["face_count"], gap_count=len(rim(triangles))
+    )
 
 
 def _proper_triangles(triangles: np.ndarray, omissions: Counter[str]) -> tuple[np.ndarray, np.ndarray]:

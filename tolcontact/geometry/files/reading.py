@@ -13,21 +13,19 @@ import trimesh
 from tolcontact.declaration import Geometry, Mesh
 from tolcontact.declaration.geometry import UNITS
 from tolcontact.errors import GeometryFault, clipped
-from tolcontact.geometry.coordinate_error import COORDINATE_SPACING
-from tolcontact.geometry.edges import rim
 from tolcontact.geometry.files import screening
 from tolcontact.geometry.files.product import (
     BREP,
-    FACE_NAMES,
+    STATED_FACES,
     STEP_ANGLE,
     STEP_CHORD,
-    SURFACES,
     Product,
     check_numbers,
     product,
     usual_chord,
 )
 from tolcontact.geometry.files.step_text import SOLIDS, USAGES, StepText
+from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING, rim
 from tolcontact.shape_worker import Job, UnfinishedRead, Worker, taken
 
 MAX_ANGLE = 0.5  # [rad] between triangles of round faces
@@ -193,7 +191,7 @@ def _in_memory(geometry: Mesh) -> trimesh.Trimesh:
     _state_spacing(mesh, scale * getattr(source, COORDINATE_SPACING, np.zeros(3)))  # from an archive
     if BREP in getattr(source, "face_attributes", {}):  # from an archive
         mesh.face_attributes[BREP] = source.face_attributes[BREP]
-        mesh.metadata |= {name: source.metadata[name] for name in (SURFACES, FACE_NAMES)}
+        mesh.metadata[STATED_FACES] = source.metadata[STATED_FACES]
     return mesh
 
 
