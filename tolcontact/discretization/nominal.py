@@ -82,6 +82,20 @@ class ContactPoints:
                 heights += face.heights(deviations)
         return heights
 
+    def counted(self, *, of_moving: bool) -> tuple[Float[Array, "point 3"], Float[Array, " point"]]:
+        """Return the points whose displacement an objective counts on one side, and the radii [mm] of spheres around them.
+
+        These are contact points, but the centres of round faces: a point on a round face would leave its part free to roll, so
+        that it could move aside at no cost until it is clear. In a hollow wall the tangent planes have contact points on all
+        sides, which is as good. An end of a shaft's axis has no radius, since the other end holds the shaft.
+        """
+        if self.round is None or not self.round.are_beside:
+            points = self.P_m if of_moving else self.P_r
+            return points, np.zeros(len(points))
+        centres, radii = zip(*(point.curvature(of_moving=of_moving) for point in self.round), strict=True)
+        is_end = self.round.points["axis"].any(axis=1) & (self.round.points["on_moving"] == of_moving)
+        return np.array(centres), np.where(is_end, 0.0, radii)
+
     @property
     def has_form(self) -> bool:
         """Whether one of the faces has form."""

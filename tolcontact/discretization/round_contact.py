@@ -6,7 +6,7 @@ import math
 import numpy as np
 import trimesh
 
-from tolcontact.discretization.round_points import NotRoundError, RoundPoint, arc, tangent_directions
+from tolcontact.discretization.round_points import NO_DIRECTION, NotRoundError, RoundPoint, arc, tangent_directions
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, Plane, RoundSurface, Sphere
 from tolcontact.geometry.surface import Piece, Surface
 from tolcontact.geometry.triangle_mesh import CREASE
@@ -107,16 +107,16 @@ def _ball_points(body: Piece, wall: Piece, reach: float, on_moving: bool) -> lis
         if not isinstance(wall.surface, RoundSurface) or (not isinstance(wall.surface, Cone) and r > wall.surface.radius):
             raise NotRoundError
         directions = tangent_directions(wall)
-        planes = [wall.surface.tangent(e) for e in directions]
         touches = [_contains(wall, wall.surface.touched(c, e)) for e in directions]
-        touches += [_contains(body, c - r * plane.axis) for plane in planes]
+        touches += [_contains(body, c - r * wall.surface.tangent(e).axis) for e in directions]
     else:
-        planes = []
+        directions = []
         touches = [_contains(wall, c - distance * slope), _contains(body, c - r * slope)]
     if not all(touches):
         return _no_points(wall, c[None], r + reach)
-    nearest = RoundPoint.ball(wall, body.surface, on_moving, *(arc(wall) if wall.is_hollow else ()))
-    return [nearest, *(RoundPoint.ball(Piece(plane, False, wall.face), body.surface, on_moving) for plane in planes)]
+    towards = arc(wall) if wall.is_hollow else ()
+    nearest = RoundPoint(wall.surface, wall.is_hollow, c, NO_DIRECTION, NO_DIRECTION, r, on_moving, *towards)
+    return [nearest, *nearest.tangents(directions)]
 
 
 class _ContactLine:
@@ -180,7 +180,7 @@ def _shaft_on_plane(body: Piece, shaft: Cylinder, wall: Piece, reach: float, on_
         return _no_points(wall, shaft.origin + places[:, None] * shaft.axis, shaft.radius + reach)
     points = []
     for number, outer, limit in ((touching[0], touching[0] - 1, start), (touching[-1], touching[-1] + 1, end)):
-        place, cut = float(places[number]), np.zeros(3)
+        place, cut = float(places[number]), NO_DIRECTION
         if 0 <= outer < len(places):
             inside, outside = line.bracket(place, float(places[outer]))
             if line.on_wall(np.array([outside]))[0] or not line.on_shaft(np.array([outside]))[0]:
@@ -189,7 +189,8 @@ def _shaft_on_plane(body: Piece, shaft: Cylinder, wall: Piece, reach: float, on_
             place, cut = _cut_by_edge(shaft, n, _nearest_edge(wall.face, foot))
         elif abs(place - limit) > PLACE_TOLERANCE * body.face.mesh.scale:
             raise NotRoundError
-        points.append(RoundPoint.end(wall, shaft, place, cut, on_moving))
+        centre = shaft.origin + place * shaft.axis
+        points.append(RoundPoint(wall.surface, wall.is_hollow, centre, shaft.axis, cut, shaft.radius, on_moving))
     return points
 
 
@@ -222,10 +223,9 @@ def _shaft_in_hole(
         raise NotRoundError
     points = []
     for place, shaft_ends in ends:
-        cut = np.zeros(3) if shaft_ends else hole.axis
-        points.append(RoundPoint.end(wall, shaft, place, cut, on_moving, towards, opening))
-        for e in tangent_directions(wall):
-            points.append(RoundPoint.end(Piece(hole.tangent(e), False, wall.face), shaft, place, cut, on_moving))
+        centre, cut = shaft.origin + place * shaft.axis, NO_DIRECTION if shaft_ends else hole.axis
+        nearest = RoundPoint(hole, True, centre, shaft.axis, cut, shaft.radius, on_moving, towards, opening)
+        points += [nearest, *nearest.tangents(tangent_directions(wall))]
     return points
 
 

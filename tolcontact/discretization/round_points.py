@@ -5,8 +5,7 @@ points are computed at every pose from a few numbers. They are exact; no point i
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
-from typing import NamedTuple
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from tolcontact.geometry.analytic_surfaces import (
     Cone,
     Cylinder,
     Plane,
+    RoundSurface,
     Sphere,
     axes_across,
     surface_arrays,
@@ -27,6 +27,8 @@ MAX_FACET_ANGLE = math.radians(31.0)  # between neighbouring vertices of a round
 MAX_MISSING_SHARE = 0.05  # of the area of a round face that its triangles leave out
 CAP_SHARE = 0.9  # of the angle to the rim of a cap, at which its tangent planes are
 RADIUS_TOLERANCE = 1e-6  # of a face's size
+NO_DIRECTION = np.zeros(3)
+X_AXIS = np.array([1.0, 0.0, 0.0])
 
 
 class NotRoundError(Exception):
@@ -121,10 +123,6 @@ def _directions_across(wall: Piece, x: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return y, np.cross(x, y)
 
 
-NO_DIRECTION = np.zeros(3)
-X_AXIS = np.array([1.0, 0.0, 0.0])
-
-
 @dataclass(frozen=True, eq=False)
 class RoundPoint:
     """A wall, and a ball or the place on a shaft's axis where the shaft or the wall ends.
@@ -147,31 +145,14 @@ class RoundPoint:
     cut: np.ndarray
     radius: float
     on_moving: bool
-    towards: np.ndarray
-    opening: float
+    towards: np.ndarray = field(default_factory=lambda: X_AXIS)
+    opening: float = math.pi
 
-    @classmethod
-    def ball(
-        cls, wall: Piece, ball: AnalyticSurface, on_moving: bool, towards: np.ndarray = X_AXIS, opening: float = math.pi
-    ) -> "RoundPoint":
-        """Return the point of a ball."""
-        axis = cut = NO_DIRECTION
-        return cls(wall.surface, wall.is_hollow, ball.origin, axis, cut, ball.radius, on_moving, towards, opening)
-
-    @classmethod
-    def end(
-        cls,
-        wall: Piece,
-        shaft: AnalyticSurface,
-        place: float,
-        cut: np.ndarray,
-        on_moving: bool,
-        towards: np.ndarray = X_AXIS,
-        opening: float = math.pi,
-    ) -> "RoundPoint":
-        """Return the point of a shaft at a place [mm] on its axis."""
-        centre = shaft.origin + place * shaft.axis
-        return cls(wall.surface, wall.is_hollow, centre, shaft.axis, cut, shaft.radius, on_moving, towards, opening)
+    def tangents(self, directions: Sequence[np.ndarray]) -> "list[RoundPoint]":
+        """Return points like this one at the tangent planes of its hollow wall in some directions (3,)."""
+        assert isinstance(self.wall, RoundSurface)
+        planes = [self.wall.tangent(direction) for direction in directions]
+        return [replace(self, wall=plane, is_hollow=False, towards=X_AXIS, opening=math.pi) for plane in planes]
 
     def nominal(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return P^m, P^r and n^r (3,): the nominal points of contact and the reference's normal.
@@ -186,26 +167,18 @@ class RoundPoint:
             on_body = on_wall = self.centre
         return (on_body, on_wall, n) if self.on_moving else (on_wall, on_body, -n)
 
-    def centres(self) -> tuple["Ball", "Ball"]:
-        """Return balls around the centres of curvature of the moving and the reference face, where they touch nominally.
+    def curvature(self, *, of_moving: bool) -> tuple[np.ndarray, float]:
+        """Return the centre of curvature (3,) and its radius [mm] of one of the faces, at the nominal contact point.
 
-        That of a plane is around the point of contact, and as large as the ball or shaft.
+        A plane is replaced by a sphere around the contact point that is as large as the ball or shaft.
         """
-        body, (on_moving, on_reference, _) = Ball(self.centre, self.radius), self.nominal()
-        on_wall = on_reference if self.on_moving else on_moving
+        if of_moving == self.on_moving:
+            return self.centre, self.radius
+        on_wall = self.nominal()[0 if of_moving else 1]
         if isinstance(self.wall, Plane):
-            wall = Ball(on_wall, self.radius)
-        else:
-            offset = self.wall.offset(on_wall)
-            wall = Ball(on_wall - offset, float(np.linalg.norm(offset)))
-        return (body, wall) if self.on_moving else (wall, body)
-
-
-class Ball(NamedTuple):
-    """A centre (3,) and a radius [mm]."""
-
-    centre: np.ndarray
-    radius: float
+            return on_wall, self.radius
+        offset = self.wall.offset(on_wall)
+        return on_wall - offset, float(np.linalg.norm(offset))
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +194,7 @@ class RoundPoints:
     @classmethod
     def of(cls, points: Sequence[RoundPoint]) -> "RoundPoints":
         """Return points as arrays."""
-        names = [field.name for field in fields(RoundPoint) if field.name != "wall"]
+        names = [entry.name for entry in fields(RoundPoint) if entry.name != "wall"]
         arrays = {name: np.array([getattr(point, name) for point in points]) for name in names}
         return cls(surface_arrays([point.wall for point in points]), arrays)
 
