@@ -32,13 +32,13 @@ from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.overlap import overlap_corners, rim_points
 from tolcontact.geometry.spreading import distinct_vertices, spread
 from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.tolerances import ROUNDING
 from tolcontact.geometry.triangle_mesh import coordinate_error
 
 DEFAULT_REACH = 0.1  # of the moving part's size
 DEFAULT_POINTS = 200
 FORM_POINTS = 10_000  # with form, if that resolves it
 DEFAULT_SPRINGS = 40  # all of which may carry at once, so that a QP has a row for each
-POINT_TOLERANCE = 1e-9  # of the part's size: points that are no farther apart are one point
 
 
 def contact_points(
@@ -150,7 +150,7 @@ def _candidates(
                 P_m = with_rims(P_m, moving_face, reference_face, form_spacing(lengths), reach)
     elif math.isfinite(finest):
         P_m, undetected = _with_curvature(moving_face, reference_face, P_m, finest, reach, is_open=_is_open(pair))
-    P_m = distinct(P_m, POINT_TOLERANCE * moving.mesh.scale)
+    P_m = distinct(P_m, ROUNDING * moving.mesh.scale)
     if moving_face.surfaces:
         P_m, _, _ = moving_face.project(P_m)
     return P_m, undetected

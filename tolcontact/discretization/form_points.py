@@ -10,17 +10,16 @@ from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation
 from tolcontact.geometry.analytic_surfaces import Cylinder, axes_across
 from tolcontact.geometry.overlap import rim_points
-from tolcontact.geometry.surface import RIM_TOLERANCE, Surface
+from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.tolerances import PARALLEL, SAME_PLACE
 from tolcontact.geometry.triangle_mesh import subdivided
 
 FACING = -0.99999  # cosine of the angle between the normals of planes that face each other
 MIN_RISE = 0.1  # per mm beside the rim of facets that face a plane: steeper facets touch it nowhere else, at usual tilts
-FLATNESS = 1e-6  # of a face's size: facets whose heights differ by less are one plane
 SPACING_SHARE = 1 / 5  # of the correlation length: the usual spacing
 ALONG_SHARE = 1 / 3  # of the correlation length: the same along the axis of cylinders, whose lines are straight
 MIN_AZIMUTHS = 48  # of a cylinder
 END_SHARE = 1e-6  # of the length: how far inside their ends the outermost points of cylinders are
-PARALLEL_TOLERANCE = 1e-3  # rad between the axes of cylinders
 MAX_SPACING_SHARE = 1 / 2
 WIDE_SPACING_SHARE = 2 / 5  # the usual spacing of many points: spreads leave some places farther away
 COVER_SHARE = 0.71  # of the spacing of a square grid: the distance of the middle of a square from the nearest point
@@ -68,13 +67,13 @@ def facing_triangles(face: Surface, other: Surface, deviation: FaceDeviation | N
         return every
     heights = np.asarray(face.mesh.vertices) @ n
     tops = heights[np.asarray(face.mesh.faces)].max(axis=1)
-    is_facing &= tops < tops[is_facing].min() + FLATNESS * face.mesh.scale
+    is_facing &= tops < tops[is_facing].min() + SAME_PLACE * face.mesh.scale
     part = face.part(np.flatnonzero(is_facing))
     level = np.asarray(part.mesh.vertices) @ n
     beside = np.setdiff1d(np.asarray(face.mesh.faces), np.asarray(face.mesh.faces)[is_facing])
     dropped = np.asarray(face.mesh.vertices)[beside] - (heights[beside] - level.min())[:, None] * n
     distance = np.linalg.norm(part.nearest(dropped)[1] - dropped, axis=1)
-    rises = heights[beside] - level.min() > np.maximum(MIN_RISE * distance, FLATNESS * face.mesh.scale)
+    rises = heights[beside] - level.min() > np.maximum(MIN_RISE * distance, SAME_PLACE * face.mesh.scale)
     return np.flatnonzero(is_facing) if rises.all() else every
 
 
@@ -86,7 +85,7 @@ def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[Face
     shaft, bore = (face.surfaces[0] if len(face.surfaces) == 1 else None for face in (moving, reference))
     if not (isinstance(shaft, Cylinder) and isinstance(bore, Cylinder)):
         return None
-    if np.linalg.norm(np.cross(shaft.axis, bore.axis)) > PARALLEL_TOLERANCE:
+    if np.linalg.norm(np.cross(shaft.axis, bore.axis)) > PARALLEL:
         return None
     extents = [shaft.along(np.asarray(face.mesh.vertices)) for face in (moving, reference)]
     start, end = max(extent.min() for extent in extents), min(extent.max() for extent in extents)
@@ -101,7 +100,7 @@ def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[Face
     outward = [np.cos(turn) * u + np.sin(turn) * np.cross(shaft.axis, u) for turn in np.arange(count) * 2 * np.pi / count]
     points = shaft.origin + heights[:, None, None] * shaft.axis + shaft.radius * np.array(outward)
     points = points.reshape(-1, 3)
-    return points[moving.overhang(points) <= RIM_TOLERANCE * moving.mesh.scale]
+    return points[moving.overhang(points) <= SAME_PLACE * moving.mesh.scale]
 
 
 def check_resolved(points: np.ndarray, face: trimesh.Trimesh, lengths: Sequence[float]) -> None:

@@ -10,8 +10,8 @@ from tolcontact.errors import GeometryFault
 from tolcontact.features import Placement
 from tolcontact.geometry.analytic_surfaces import axes_across
 from tolcontact.geometry.faces import Meshes, patch
+from tolcontact.geometry.tolerances import SAME_PLACE
 
-ROUNDING = 1e-6  # of a face's size
 CLOSE = 1e-3  # of a face's size: a point that lies no farther beside or above the material is on it
 DIVISIONS = 37  # places that are tried along each side of the bounding rectangle
 ROUNDS = 8  # of moves of each point
@@ -94,7 +94,7 @@ class LocatingFace:
         corners, levels = (self.vertices @ self.axes.T)[self.faces], (self.vertices @ self.outward)[self.faces]
         sides = np.roll(corners, -1, axis=1) - corners
         area = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
-        regular = np.abs(area) > (ROUNDING * self.size) ** 2
+        regular = np.abs(area) > (SAME_PLACE * self.size) ** 2
         corners, levels, sides, area = corners[regular], levels[regular], sides[regular], area[regular]
         heights = np.full(len(places), np.nan)
         lengths = np.linalg.norm(sides, axis=2)
@@ -114,14 +114,14 @@ class LocatingFace:
         lower, upper = flat.min(axis=0) + inset, flat.max(axis=0) - inset
         lattice = np.stack(np.meshgrid(*np.linspace(lower, upper, DIVISIONS).T), axis=-1).reshape(-1, 2)
         places = np.concatenate([flat, lattice])
-        heights = self._heights(places, ROUNDING * self.size)
+        heights = self._heights(places, SAME_PLACE * self.size)
         places, heights = places[~np.isnan(heights)], heights[~np.isnan(heights)]
-        distant = self._distances_from_edges(places) >= inset - ROUNDING * self.size
+        distant = self._distances_from_edges(places) >= inset - SAME_PLACE * self.size
         return places[distant] @ self.axes + heights[distant, None] * self.outward
 
     def _distances_from_edges(self, places: np.ndarray) -> np.ndarray:
         """Return the distances (n,) [mm] of places (n, 2) from the edges of the face."""
-        merged = np.unique(np.round(self.vertices / (ROUNDING * self.size)), axis=0, return_inverse=True)[1].ravel()
+        merged = np.unique(np.round(self.vertices / (SAME_PLACE * self.size)), axis=0, return_inverse=True)[1].ravel()
         pairs = np.sort(merged[self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)], axis=1)
         _, first, counts = np.unique(pairs, axis=0, return_index=True, return_counts=True)
         ends = (self.vertices @ self.axes.T)[self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)[first[counts == 1]]]

@@ -45,10 +45,9 @@ from tolcontact.geometry.analytic_surfaces import Cylinder, axes_across
 from tolcontact.geometry.faces import patch
 from tolcontact.geometry.nearest_elements import nearest_elements
 from tolcontact.geometry.overlap import crossing_edges
+from tolcontact.geometry.tolerances import OPPOSING_COSINE, PARALLEL
 
-MIN_SINE = 1e-3  # of the angle between directions that must not be parallel
 OBTUSE = -1e-9  # cosine of an angle that counts as more than a right one
-FACING = -0.5  # largest cosine between the outward normals of planes that face each other
 MAX_EDGE_PAIRS = 2500  # of two rims, between which crossings are found at every pose; more take longer than contact itself
 NO_LINES = np.zeros((0, 2, 3))
 
@@ -170,7 +169,7 @@ def _clearance_of_meshes(moving: MeasuredFace, reference: MeasuredFace) -> MeshC
 
 def _clearance_of_planes(moving: MeasuredFace, reference: MeasuredFace) -> Heights | PlaneClearance:
     """Return the clearance of planes that face each other, within the nominal overlap if their rims have too many edges."""
-    if not moving.plane.axis @ reference.plane.axis < FACING:
+    if not moving.plane.axis @ reference.plane.axis < OPPOSING_COSINE:
         raise GeometryFault(
             f"its planes {moving.face} and {reference.face} do not face each other; choose planes with material behind both"
         )
@@ -216,7 +215,7 @@ def _axis_distance(distance: AxisDistance, faces: MeasuredFaces) -> AxisPair:
     if distance.across is not None:
         n = np.array(distance.across)
         for axis, face in zip((moving, reference), distance.faces, strict=True):
-            if axis.direction.any() and abs(float(axis.direction @ n)) < MIN_SINE:
+            if axis.direction.any() and abs(float(axis.direction @ n)) < PARALLEL:
                 raise GeometryFault(
                     f"the axis of {face} is parallel to the plane that is to cut it; choose another direction across"
                 )
@@ -240,7 +239,7 @@ def _angle(angle: Angle, faces: MeasuredFaces) -> DirectionPair:
     about = None if angle.about is None else np.array(angle.about)
     across = [vector if about is None else vector - (vector @ about) * about for vector in (u, v)]
     for vector, face in zip(across, angle.faces, strict=True):
-        if np.linalg.norm(vector) < MIN_SINE:
+        if np.linalg.norm(vector) < PARALLEL:
             raise GeometryFault(f"the direction of {face} is parallel to the direction that the angle is about; choose another")
     if across[0] @ across[1] < OBTUSE * np.linalg.norm(across[0]) * np.linalg.norm(across[1]):
         v = -v

@@ -20,7 +20,8 @@ from tolcontact.geometry.face_frame import face_frame
 from tolcontact.geometry.height_kernel import HeightSums, HeightTable, Plane
 from tolcontact.geometry.meeting import Places
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
-from tolcontact.geometry.surface import RIM_TOLERANCE, Surface
+from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.tolerances import SAME_PLACE
 from tolcontact.geometry.triangle_mesh import on_rim
 
 STEP_SHARE = 1 / 10  # of the length over which heights change: the distance of two nodes
@@ -60,7 +61,7 @@ class PlaneMinima:
     ) -> "PlaneMinima":
         """Return the gap between a moving and a reference plane, whose contact points are `reach` [mm] apart."""
         planes = [_plane(face, deviation) for face, deviation in zip(faces, deviating, strict=True)]
-        return cls(deviating, planes[0], planes[1], reach, RIM_TOLERANCE * max(float(face.mesh.scale) for face in faces))
+        return cls(deviating, planes[0], planes[1], reach, SAME_PLACE * max(float(face.mesh.scale) for face in faces))
 
     def heights(
         self,

@@ -9,15 +9,14 @@ import trimesh
 from tolcontact.discretization.round_points import NO_DIRECTION, NotRoundError, RoundPoint, arc, tangent_directions
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, Plane, RoundSurface, Sphere
 from tolcontact.geometry.surface import Piece, Surface
+from tolcontact.geometry.tolerances import PARALLEL, SAME_PLACE
 from tolcontact.geometry.triangle_mesh import CREASE
 
 MAX_POINTS = 40  # of a pair
-PARALLEL_TOLERANCE = 1e-3  # rad between the axis of a shaft and its wall
 ARC_MARGIN = math.radians(5.0)  # between the line of contact and the ends of a shaft's arc
 AXIS_PLACES = 200  # places along an axis that are examined
 BISECTIONS = 40
 MAX_FACET_SINE = 0.3  # of half the angle between facets
-PLACE_TOLERANCE = 1e-6  # of a face's size
 NORMAL_TOLERANCE = 1e-7  # between the normals of neighbouring triangles of one plane
 
 
@@ -78,10 +77,10 @@ def _points_between(moving: Piece, reference: Piece, reach: float) -> list[Round
             return _ball_points(body, wall, reach, on_moving)
     for body, wall, on_moving in sides:
         if isinstance(body.surface, Cylinder) and not body.is_hollow:
-            if isinstance(wall.surface, Plane) and abs(float(body.surface.axis @ wall.surface.axis)) < PARALLEL_TOLERANCE:
+            if isinstance(wall.surface, Plane) and abs(float(body.surface.axis @ wall.surface.axis)) < PARALLEL:
                 return _shaft_on_plane(body, body.surface, wall, reach, on_moving)
             sine = float(np.linalg.norm(np.cross(body.surface.axis, wall.surface.axis)))
-            if isinstance(wall.surface, Cylinder) and wall.is_hollow and sine < PARALLEL_TOLERANCE:
+            if isinstance(wall.surface, Cylinder) and wall.is_hollow and sine < PARALLEL:
                 return _shaft_in_hole(body, body.surface, wall, wall.surface, reach, on_moving)
     raise NotRoundError
 
@@ -126,7 +125,7 @@ class _ContactLine:
         self._body, self._wall = body, wall
         # Near the rim of a flat triangle, points of the round face are shifted by a part of the height between the two.
         self._tolerances = [
-            PLACE_TOLERANCE * piece.face.mesh.scale + MAX_FACET_SINE * piece.face.chord_height for piece in (body, wall)
+            SAME_PLACE * piece.face.mesh.scale + MAX_FACET_SINE * piece.face.chord_height for piece in (body, wall)
         ]
 
     def on_shaft(self, places: np.ndarray) -> np.ndarray:
@@ -187,7 +186,7 @@ def _shaft_on_plane(body: Piece, shaft: Cylinder, wall: Piece, reach: float, on_
                 raise NotRoundError  # the shaft's end is not square to its axis
             foot = shaft.origin + inside * shaft.axis - (height + shaft.radius) * n
             place, cut = _cut_by_edge(shaft, n, _nearest_edge(wall.face, foot))
-        elif abs(place - limit) > PLACE_TOLERANCE * body.face.mesh.scale:
+        elif abs(place - limit) > SAME_PLACE * body.face.mesh.scale:
             raise NotRoundError
         centre = shaft.origin + place * shaft.axis
         points.append(RoundPoint(wall.surface, wall.is_hollow, centre, shaft.axis, cut, shaft.radius, on_moving))
@@ -198,7 +197,7 @@ def _cut_by_edge(shaft: Cylinder, n: np.ndarray, edge: np.ndarray) -> tuple[floa
     """Return the place [mm] on the axis, and the unit normal (3,), where the plane along n through an edge (2, 3) cuts it."""
     cut = np.cross(n, edge[1] - edge[0])
     cut /= np.linalg.norm(cut)
-    if abs(cut @ shaft.axis) < PARALLEL_TOLERANCE:
+    if abs(cut @ shaft.axis) < PARALLEL:
         raise NotRoundError
     return float((edge[0] - shaft.origin) @ cut / (shaft.axis @ cut)), cut
 
@@ -208,7 +207,7 @@ def _shaft_in_hole(
 ) -> list[RoundPoint]:
     """Return the points of a shaft in a parallel hole: at the first end of either, the nearest and the tangent planes."""
     (start, end), (lower, upper) = (_extent(piece.face, shaft) for piece in (body, wall))
-    tolerance = PLACE_TOLERANCE * max(body.face.mesh.scale, wall.face.mesh.scale)
+    tolerance = SAME_PLACE * max(body.face.mesh.scale, wall.face.mesh.scale)
     ends = ((max(start, lower), start >= lower - tolerance), (min(end, upper), end <= upper + tolerance))
     offsets = [shaft.origin + place * shaft.axis - hole.origin for place, _ in ends]
     clearances = [
@@ -239,12 +238,12 @@ def _has_square_ends(piece: Piece) -> bool:
     """Return whether the rim of a cylinder lies in two planes across its axis."""
     along = piece.surface.along(piece.face.rim_corners)
     distances = np.minimum(along - along.min(initial=np.inf), along.max(initial=-np.inf) - along)
-    return bool(along.size) and bool((distances < PLACE_TOLERANCE * piece.face.mesh.scale + piece.surface.residual).all())
+    return bool(along.size) and bool((distances < SAME_PLACE * piece.face.mesh.scale + piece.surface.residual).all())
 
 
 def _contains(piece: Piece, point: np.ndarray) -> bool:
     """Return whether a point (3,) of a piece's surface is on its face."""
-    tolerance = PLACE_TOLERANCE * piece.face.mesh.scale
+    tolerance = SAME_PLACE * piece.face.mesh.scale
     return bool(piece.face.overhang(point[None])[0] <= tolerance) and bool(
         np.linalg.norm(piece.face.project(point[None])[0][0] - point) <= tolerance
     )

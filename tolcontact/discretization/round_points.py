@@ -21,12 +21,12 @@ from tolcontact.geometry.analytic_surfaces import (
     surfaces_of,
 )
 from tolcontact.geometry.surface import Piece
+from tolcontact.geometry.tolerances import SAME_PLACE
 
 TANGENTS = 5  # of a whole hollow wall, besides the nearest
 MAX_FACET_ANGLE = math.radians(31.0)  # between neighbouring vertices of a round face: a wider gap is a gap of the face
 MAX_MISSING_SHARE = 0.05  # of the area of a round face that its triangles leave out
 CAP_SHARE = 0.9  # of the angle to the rim of a cap, at which its tangent planes are
-RADIUS_TOLERANCE = 1e-6  # of a face's size
 NO_DIRECTION = np.zeros(3)
 X_AXIS = np.array([1.0, 0.0, 0.0])
 
@@ -45,7 +45,7 @@ def arc(wall: Piece) -> tuple[np.ndarray, float]:
     vertices, axis = np.asarray(wall.face.mesh.vertices), wall.surface.axis
     across = vertices - wall.surface.origin
     across -= (across @ axis)[:, None] * axis
-    across = across[np.linalg.norm(across, axis=1) > RADIUS_TOLERANCE * wall.face.mesh.scale]
+    across = across[np.linalg.norm(across, axis=1) > SAME_PLACE * wall.face.mesh.scale]
     if isinstance(wall.surface, Plane) or not len(across):
         return axes_across(axis)[0], math.pi
     x = across[0] / np.linalg.norm(across[0])

@@ -14,11 +14,11 @@ from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
 from tolcontact.geometry.files import BREP, STATED_FACES
 from tolcontact.geometry.files.bodies import FaceMeasure, StatedFace
 from tolcontact.geometry.fitting import fit_surface
+from tolcontact.geometry.tolerances import ROUNDING
 from tolcontact.geometry.triangle_mesh import smooth_pieces
 
 FIT_TOLERANCE = 1e-3  # [mm] largest distance of the vertices of a face from its surface
 RESIDUAL_FACTOR = 10  # times the residuals of two faces: largest distance between parts of one surface
-POSITION_TOLERANCE = 1e-9  # of a part's size: distance between faces of one surface
 PIECES = "pieces"
 DESCRIPTIONS = "descriptions"
 ON_SURFACES = "on_surfaces"
@@ -70,7 +70,7 @@ def faces_at(mesh: trimesh.Trimesh, point: Vector) -> tuple[list[int], float]:
     face_of, _ = number_faces(mesh)
     copies = np.tile(point, (len(face_of), 1))
     distances = np.linalg.norm(trimesh.triangles.closest_point(mesh.triangles, copies) - copies, axis=1)
-    nearest = np.unique(face_of[distances < distances.min() + POSITION_TOLERANCE * mesh.scale])
+    nearest = np.unique(face_of[distances < distances.min() + ROUNDING * mesh.scale])
     return [int(number) + 1 for number in nearest], float(distances.min())
 
 
@@ -119,7 +119,7 @@ def are_one_surface(mesh: trimesh.Trimesh, face: FaceOnSurface, neighbour: FaceO
         return False
     vertices = np.asarray(mesh.vertices)[np.unique(np.asarray(mesh.faces)[next_triangles])]
     distance = float(np.abs(surface.distance(vertices)[0]).max())
-    return distance <= RESIDUAL_FACTOR * (surface.residual + next_surface.residual) + POSITION_TOLERANCE * float(mesh.scale)
+    return distance <= RESIDUAL_FACTOR * (surface.residual + next_surface.residual) + ROUNDING * float(mesh.scale)
 
 
 def _is_outside(mesh: trimesh.Trimesh, surface: AnalyticSurface, triangles: np.ndarray) -> bool:

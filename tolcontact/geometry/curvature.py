@@ -8,6 +8,7 @@ is deepest below the line between its ends, as seen from the reference face, unt
 import numpy as np
 
 from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.tolerances import ROUNDING
 
 CHORD_SHARE = 5e-4  # of the smallest tolerance range: permitted penetration between points
 MAX_HALVINGS = 40
@@ -25,7 +26,7 @@ def curvature_points(face: Surface, target: Surface, *, chord: float, within: fl
     Only points within `within` [mm] of the target are returned, at most MAX_POINTS. If there are more, the deepest points after
     random displacements are used; the seed is fixed.
     """
-    points = distinct(_refined(face, target, chord, within).reshape(-1, 3), 1e-9 * face.mesh.scale)
+    points = distinct(_refined(face, target, chord, within).reshape(-1, 3), ROUNDING * face.mesh.scale)
     projections, normals, is_over = target.project(points)
     reached = is_over & (np.linalg.norm(points - projections, axis=1) <= within)
     points, projections, normals = points[reached], projections[reached], normals[reached]

@@ -19,6 +19,7 @@ import trimesh
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, axes_across
 from tolcontact.geometry.body_overlap import SolidBody
 from tolcontact.geometry.face_in_file import FaceInFile
+from tolcontact.geometry.tolerances import SAME_PLACE
 
 MAX_TILT = 1e-4  # [rad] between directions that count as parallel
 MARGIN = 1e-5  # of a part's size: difference of lengths that count as equal
@@ -26,7 +27,6 @@ RESIDUAL_FACTOR = 10  # times the residual of a fitted cylinder: the same
 MAX_HOLE_GAP = 3.0  # [rad] around the axis: the end of a slot has a gap of pi
 MIN_COMMON_SHARE = 0.5  # of the shorter face of an interrupted surface along the axis
 DIRECTIONS = 360  # samples around the axis
-COINCIDENCE = 1e-6  # of a part's size
 CHORD_FACTOR = 2.0  # times the height of the surface over its triangles
 
 FaceOnSurface = tuple[AnalyticSurface | None, np.ndarray]  # a surface, if one is known, and the triangles (face,) on it
@@ -46,7 +46,7 @@ def interruptions(
     candidates = [(number, faces[number][0]) for number in firsts if len(faces[number][1])]
     round_faces = [(number, surface) for number, surface in candidates if isinstance(surface, Cylinder | Cone)]
     body = SolidBody(mesh)
-    margin = COINCIDENCE * float(mesh.scale)
+    margin = SAME_PLACE * float(mesh.scale)
     for (first, surface), (second, neighbour) in itertools.combinations(round_faces, 2):
         if _may_be_one(surface, neighbour, margin) and is_same(faces[first], faces[second]) and body.is_closed:
             parts = [

@@ -5,10 +5,10 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from tolcontact.geometry.face_frame import FaceFrame, face_frame
+from tolcontact.geometry.tolerances import SAME_DIRECTION
 from tolcontact.geometry.triangle_mesh import rim
 
 PART_FRAME = FaceFrame(np.zeros(3), np.eye(3), 1.0, rounds=False)
-FLAT = 1e-6  # largest difference between the unit normals of a flat surface
 CANDIDATES_PER_SPACING = 2.0
 MAX_CANDIDATES_PER_POINT = 50  # above this, candidates are thinned out
 BLOCK_CANDIDATES = 512
@@ -43,7 +43,7 @@ def spread(surface: trimesh.Trimesh, count: int | None, spacing: float | None) -
 
 
 def _is_flat(surface: trimesh.Trimesh) -> bool:
-    return bool(np.ptp(np.asarray(surface.face_normals), axis=0).max() < FLAT)
+    return bool(np.ptp(np.asarray(surface.face_normals), axis=0).max() < SAME_DIRECTION)
 
 
 def _farthest(candidates: np.ndarray, numbers: list[int], count: int | None, spacing: float | None) -> list[int]:

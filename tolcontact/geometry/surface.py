@@ -11,13 +11,11 @@ from scipy.sparse import csr_array
 
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, axes_across
 from tolcontact.geometry.region_kernel import Region
+from tolcontact.geometry.tolerances import SAME_DIRECTION, SAME_PLACE
 from tolcontact.geometry.triangle_mesh import CREASE, on_rim, rim, triangle_tree
 
-RIM_TOLERANCE = 1e-6  # of a face's size: largest overhang of a point that counts as over the face
 MAX_TURN = 0.3  # rad: between the normals of a triangle and of the analytic surface that it approximates
 MAX_BULGE = 0.05  # of a face's size: between a triangle and the analytic surface that it approximates
-FLATNESS = 1e-6  # of a face's size: largest difference in height between the vertices of a flat face
-FLAT_ANGLE = 1e-6  # rad: faces whose normals rotate by less from end to end are planes
 
 
 class Approximation(NamedTuple):
@@ -114,7 +112,7 @@ class Surface:
         order = np.argsort(rate)
         middle = np.searchsorted(np.cumsum(self.mesh.area_faces[order]), self.mesh.area / 2)
         median = float(rate[order[min(middle, len(order) - 1)]])
-        return median if median * self.mesh.scale > FLAT_ANGLE else 0.0
+        return median if median * self.mesh.scale > SAME_DIRECTION else 0.0
 
     @cached_property
     def _tree(self) -> igl.AABB:
@@ -154,7 +152,7 @@ class Surface:
         if size == 0:  # opposite normals cancel
             return False
         heights = self._vertices @ (n / size)
-        return bool(np.ptp(heights) < FLATNESS * self.mesh.scale and (normals @ n).min() > 0)
+        return bool(np.ptp(heights) < SAME_PLACE * self.mesh.scale and (normals @ n).min() > 0)
 
     @cached_property
     def chords(self) -> tuple[np.ndarray, np.ndarray]:
@@ -173,7 +171,7 @@ class Surface:
         """A flat face, seen along its normal."""
         axes = axes_across(self.corner_normals[0, 0])
         edges = self.rim_ends @ axes.T
-        return Region(np.ascontiguousarray(axes), np.ascontiguousarray(edges), RIM_TOLERANCE * float(self.mesh.scale))
+        return Region(np.ascontiguousarray(axes), np.ascontiguousarray(edges), SAME_PLACE * float(self.mesh.scale))
 
     def nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the triangle (point,), and the point on it (point, 3) [mm], nearest to each of `points` (point, 3) [mm]."""
@@ -229,7 +227,7 @@ class Surface:
         """Return the nearest triangles (point,), and the nearest points and the mask that `project` returns."""
         triangle, nearest = self.nearest(points)
         lateral, at_rim = self._lateral_distances(points, triangle, nearest)
-        is_over = ~at_rim | (lateral <= max(margin, RIM_TOLERANCE * self.mesh.scale))
+        is_over = ~at_rim | (lateral <= max(margin, SAME_PLACE * self.mesh.scale))
         projections = np.array(nearest)
         for surface, rows, _ in self._approximating_points(triangle):
             nearby, direct = surface.project(nearest[rows]), surface.project(points[rows])
@@ -251,7 +249,7 @@ class Surface:
             distance[rows] = np.abs(height[rows])
         behind = np.flatnonzero(height < 0)
         lateral, at_rim = self._lateral_distances(points[behind], triangle[behind], nearest[behind])
-        is_over = ~at_rim | (lateral <= RIM_TOLERANCE * self.mesh.scale)
+        is_over = ~at_rim | (lateral <= SAME_PLACE * self.mesh.scale)
         depth = np.zeros(len(points))
         depth[behind[is_over]] = distance[behind[is_over]]
         return depth
