@@ -74,9 +74,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
         placements = {part.part: part.placement for part in parts if part is not None}
         parts = [
             replace(
-                _on_ground(
-                    _on_features(part, features, meshes, faults), scene.assembly.location_of(part.part), features, placements
-                ),
+                _on_features(part, scene.assembly.location_of(part.part), features, meshes, placements, faults),
                 carried=carried(scenes, scene, part.part),
             )
             for (scene, _), part in zip(entries, parts, strict=True)
@@ -87,7 +85,8 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
         log.warning("%d contact pairs: to prepare them takes about a tenth of a second each", len(assembly.pairs))
     pairs = [
         faults.attempt(designation("contact pair", pair), contact_points, scene, pair, placed, meshes, features)
-        for scene, placed in [(scene, _placed(nominal_parts, scene)) for scene in scenes]
+        for scene in scenes
+        for placed in [{nominal.part: nominal for nominal in nominal_parts if nominal.station == scene.station}]
         for pair in scene.assembly.pairs
         if not any(pair.faults()) and all(part in placed for part in (*pair.moving.parts, *pair.reference.parts))
     ]
@@ -124,11 +123,6 @@ def _nominal(
     return Nominal(assembly, parts, pairs, measures, features, measurements, tuple(models))
 
 
-def _placed(parts: Sequence[NominalPart], scene: Scene) -> dict[Part, NominalPart]:
-    """Return the parts of a scene by their declarations."""
-    return {nominal.part: nominal for nominal in parts if nominal.station == scene.station}
-
-
 def _shapes(assembly: Assembly, faults: _Faults) -> dict[Part, Shape]:
     """Return the shapes of the parts that can be read."""
     readable = [part for part in assembly.parts if not any(part.geometry.faults())]
@@ -156,34 +150,34 @@ def _add_features(assembly: Assembly, indices: Mapping[Part, int], meshes: Meshe
             )
 
 
-def _on_features(part: NominalPart, features: Features, meshes: Meshes, faults: _Faults) -> NominalPart:
-    """Return the part with the faces of features that its locators stand against."""
-    scheme = part.scheme
-    if scheme is None:
-        return part
-    sides: Sequence[Face | Locator] = scheme.faces if isinstance(scheme, ThreeTwoOne) else scheme
-    if not any((side.part or part.part).features for side in sides):
-        return part
-    if isinstance(scheme, ThreeTwoOne):
-        place = designation("part", part.part)
-        deviations = [faults.attempt(place, features.face_at, face, meshes, placement_of(face.part)) for face in scheme.faces]
-        faces = tuple(deviations[k] for k in FACES_OF_SCHEME)
-    else:
-        faces = tuple(
-            locator.on and features.face_of(locator.on, np.array(locator.point), placement_of(locator.part or part.part))
-            for locator in scheme
-        )
-    return replace(part, locators=replace(part.locators, faces=faces))
-
-
-def _on_ground(
-    part: NominalPart, location: Location | None, features: Features, placements: Mapping[Part, Placement]
+def _on_features(
+    part: NominalPart,
+    location: Location | None,
+    features: Features,
+    meshes: Meshes,
+    placements: Mapping[Part, Placement],
+    faults: _Faults,
 ) -> NominalPart:
-    """Return the part with the feature of another part that its locators are on."""
-    if location is None or not isinstance(location.on, Feature):
-        return part
-    ground = features.middle_of(location.on, placements[location.on.part])
-    return replace(part, locators=replace(part.locators, grounds=(ground,) * len(part.locators)))
+    """Return the part with the faces of features that its locators touch, and the feature of another part that they are on."""
+    scheme, locators = part.scheme, part.locators
+    sides: Sequence[Face | Locator] = scheme.faces if isinstance(scheme, ThreeTwoOne) else scheme or ()
+    if any((side.part or part.part).features for side in sides):
+        if isinstance(scheme, ThreeTwoOne):
+            place = designation("part", part.part)
+            deviations = [
+                faults.attempt(place, features.face_at, face, meshes, placement_of(face.part)) for face in scheme.faces
+            ]
+            faces = tuple(deviations[k] for k in FACES_OF_SCHEME)
+        else:
+            faces = tuple(
+                locator.on and features.face_of(locator.on, np.array(locator.point), placement_of(locator.part or part.part))
+                for locator in scheme or ()
+            )
+        locators = replace(locators, faces=faces)
+    if location is not None and isinstance(location.on, Feature):
+        ground = features.middle_of(location.on, placements[location.on.part])
+        locators = replace(locators, grounds=(ground,) * len(locators))
+    return replace(part, locators=locators)
 
 
 def _repeated_labels(labels: Sequence[str]) -> Iterator[str]:

@@ -125,6 +125,14 @@ class NominalMeasurement:
 
 
 @dataclass(frozen=True, eq=False)
+class FaceMeasurement(NominalMeasurement):
+    """A measurement between a moving and a reference face."""
+
+    moving: MeasuredFace
+    reference: MeasuredFace
+
+
+@dataclass(frozen=True, eq=False)
 class Crossing:
     """An edge (end, 3) [mm] of a moving face that crosses one of a reference face, seen along its outward normal.
 
@@ -169,31 +177,25 @@ class Outline:
 
 
 @dataclass(frozen=True, eq=False)
-class PlaneClearance(NominalMeasurement):
+class PlaneClearance(FaceMeasurement):
     """The least height of two planes in the region in which they overlap; `heights` if they overlap nowhere at a pose."""
 
-    moving: MeasuredFace
-    reference: MeasuredFace
     planes: tuple[Plane, Plane]
     outlines: tuple[Outline, Outline]
     heights: Heights
 
 
 @dataclass(frozen=True, eq=False)
-class RoundClearance(NominalMeasurement):
-    """The least gap of balls and shafts beside walls, of a moving and a reference face."""
+class RoundClearance(FaceMeasurement):
+    """The least gap between balls or shafts and walls."""
 
-    moving: MeasuredFace
-    reference: MeasuredFace
     points: RoundPoints
 
 
 @dataclass(frozen=True, eq=False)
-class MeshClearance(NominalMeasurement):
+class MeshClearance(FaceMeasurement):
     """The least distance of two faces by their triangles. `box` (corner, 3) [mm] is around the moving one."""
 
-    moving: MeasuredFace
-    reference: MeasuredFace
     elements: NearestElements
     box: np.ndarray
 
@@ -210,11 +212,9 @@ class AxisPair(NominalMeasurement):
 
 
 @dataclass(frozen=True, eq=False)
-class DirectionPair(NominalMeasurement):
-    """The angle of two directions (3,) of faces, about a direction (3,) or in space."""
+class DirectionPair(FaceMeasurement):
+    """The angle between two directions (3,) of faces, about a direction (3,) or in space."""
 
-    moving: MeasuredFace
-    reference: MeasuredFace
     directions: tuple[np.ndarray, np.ndarray]
     about: np.ndarray | None
 

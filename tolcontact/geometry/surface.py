@@ -1,6 +1,6 @@
 """Faces as surfaces: nearest points and normals (paper, 2.2)."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -14,16 +14,9 @@ from tolcontact.geometry.region_kernel import Region
 from tolcontact.geometry.tolerances import SAME_DIRECTION, SAME_PLACE
 from tolcontact.geometry.triangle_mesh import CREASE, on_rim, rim, triangle_tree
 
+EVERY = slice(None)
 MAX_TURN = 0.3  # rad: between the normals of a triangle and of the analytic surface that it approximates
 MAX_BULGE = 0.05  # of a face's size: between a triangle and the analytic surface that it approximates
-
-
-class Approximation(NamedTuple):
-    """The rows (triangles or points) that approximate an analytic surface; `side` is 1, or -1 if the triangles are hollow."""
-
-    surface: AnalyticSurface
-    rows: np.ndarray
-    side: float
 
 
 class Surface:
@@ -57,27 +50,32 @@ class Surface:
     def corner_normals(self) -> np.ndarray:
         """Outward unit normals at the corners of each triangle (face, 3, 3)."""
         normals = np.array(_corner_normals(self.mesh) if self._stated_normals is None else self._stated_normals)
-        for surface, rows, side in self._approximations:
+        for surface, rows, side in self._rows_on_surfaces():
             corners = np.asarray(self.mesh.triangles)[rows].reshape(-1, 3)
             normals[rows] = _normals_of(surface, side, corners, normals[rows].reshape(-1, 3)).reshape(-1, 3, 3)
         return normals
 
     @cached_property
-    def _approximations(self) -> list[Approximation]:
-        """The triangles that approximate each analytic surface."""
+    def _sides(self) -> np.ndarray:
+        """A sign (surface,) for each analytic surface: 1, or -1 if its triangles are hollow."""
         centres, facets = np.asarray(self.mesh.triangles_center), np.asarray(self.mesh.face_normals)
-        approximations = []
+        rows = [np.flatnonzero(self.surface_numbers == number) for number in range(len(self.surfaces))]
+        slopes = [surface.distance(centres[of_surface])[1] for surface, of_surface in zip(self.surfaces, rows, strict=True)]
+        outward = [(slope * facets[of_surface]).sum() > 0 for slope, of_surface in zip(slopes, rows, strict=True)]
+        return np.where(outward, 1.0, -1.0)
+
+    def _rows_on_surfaces(self, triangle: np.ndarray | slice = EVERY) -> Iterator[tuple[AnalyticSurface, np.ndarray, float]]:
+        """Yield each analytic surface, the rows of `triangle` (point,) that approximate it, and its side."""
+        numbers = self.surface_numbers[triangle] if self.surfaces else np.zeros(0, dtype=int)
         for number, surface in enumerate(self.surfaces):
-            rows = np.flatnonzero(self.surface_numbers == number)
+            rows = np.flatnonzero(numbers == number)
             if rows.size:
-                _, slope = surface.distance(centres[rows])
-                approximations.append(Approximation(surface, rows, 1.0 if (slope * facets[rows]).sum() > 0 else -1.0))
-        return approximations
+                yield surface, rows, float(self._sides[number])
 
     @property
     def pieces(self) -> "list[Piece]":
         """The parts of the face that lie on its analytic surfaces."""
-        return [Piece(surface, side < 0, self.part(rows)) for surface, rows, side in self._approximations]
+        return [Piece(surface, side < 0, self.part(rows)) for surface, rows, side in self._rows_on_surfaces()]
 
     @cached_property
     def bulge(self) -> float:
@@ -87,7 +85,7 @@ class Surface:
         return max(
             (
                 float(np.abs(surface.distance(midpoints[rows].reshape(-1, 3))[0]).max())
-                for surface, rows, _ in self._approximations
+                for surface, rows, _ in self._rows_on_surfaces()
             ),
             default=0.0,
         )
@@ -184,19 +182,9 @@ class Surface:
         barycentric = self._barycentric(triangle, points)
         normals = (barycentric[..., None] * self.corner_normals[triangle]).sum(axis=1)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        for surface, rows, side in self._approximating_points(triangle):
+        for surface, rows, side in self._rows_on_surfaces(triangle):
             normals[rows] = _normals_of(surface, side, points[rows], normals[rows])
         return normals
-
-    def _approximating_points(self, triangle: np.ndarray) -> list[Approximation]:
-        """Return, for each analytic surface, the points on `triangle` (point,) that belong to it."""
-        if not self.surfaces:
-            return []
-        numbers = self.surface_numbers[triangle]
-        return [
-            approximation._replace(rows=np.flatnonzero(numbers == self.surface_numbers[approximation.rows[0]]))
-            for approximation in self._approximations
-        ]
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "Surface":
         """Return the surface rotated by R (3, 3), then translated by t (3,) [mm]."""
@@ -229,7 +217,7 @@ class Surface:
         lateral, at_rim = self._lateral_distances(points, triangle, nearest)
         is_over = ~at_rim | (lateral <= max(margin, SAME_PLACE * self.mesh.scale))
         projections = np.array(nearest)
-        for surface, rows, _ in self._approximating_points(triangle):
+        for surface, rows, _ in self._rows_on_surfaces(triangle):
             nearby, direct = surface.project(nearest[rows]), surface.project(points[rows])
             shift = np.linalg.norm(direct - nearest[rows], axis=1)
             height = np.linalg.norm(points[rows] - nearest[rows], axis=1)
@@ -244,7 +232,7 @@ class Surface:
         offset = nearest - points
         height = -(offset * np.asarray(self.mesh.face_normals)[triangle]).sum(axis=1)
         distance = np.linalg.norm(offset, axis=1)
-        for surface, rows, side in self._approximating_points(triangle):
+        for surface, rows, side in self._rows_on_surfaces(triangle):
             height[rows] = side * surface.distance(points[rows])[0]
             distance[rows] = np.abs(height[rows])
         behind = np.flatnonzero(height < 0)
@@ -264,7 +252,7 @@ class Surface:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return lateral distances (point,) [mm] from the nearest points, and a mask of the nearest points on the rim."""
         normal = np.array(np.asarray(self.mesh.face_normals)[triangle])
-        for surface, rows, _ in self._approximating_points(triangle):
+        for surface, rows, _ in self._rows_on_surfaces(triangle):
             normal[rows] = surface.distance(nearest[rows])[1]
         offset = points - nearest
         lateral = np.linalg.norm(offset - (offset * normal).sum(axis=1, keepdims=True) * normal, axis=1)
