@@ -41,7 +41,7 @@ def test_areas_are_integrals_around_the_edges_in_the_text():
 
 
 def test_points_lie_on_their_faces():
-    mesh = shape(tc.Mesh(COVER)).mesh
+    mesh = shape(tc.Mesh(COVER))
     for face, stated in zip(tc.faces_in(COVER), mesh.metadata[STATED_FACES], strict=True):
         assert abs(stated.surface.distance(np.array([face.point]))[0][0]) < 1e-12
         assert triangles(tc.Brep(face.point)) == triangles(tc.Brep(face.number))
@@ -49,7 +49,7 @@ def test_points_lie_on_their_faces():
 
 @pytest.mark.parametrize("body", ["nut_1", "plate_1"])
 def test_a_listing_with_few_triangles_says_what_many_would(body):
-    mesh = shape(tc.Mesh(AS1, body=body)).mesh.copy()
+    mesh = shape(tc.Mesh(AS1, body=body)).copy()
     mesh.metadata.pop(DESCRIPTIONS, None)
     mesh.metadata[STATED_FACES] = [replace(face, measure=None) for face in mesh.metadata[STATED_FACES]]
     for face, drawn in zip(tc.faces_in(AS1, body), describe_faces(mesh), strict=True):

@@ -220,11 +220,6 @@ def _with_curvature(
     return P_m, sampling_error(P_m, dense, reference_face, unit=finest, within=reach)
 
 
-def supports_name(scene: Scene, part: Part) -> str:
-    """Return the name of the pair of the one-sided locators of a part."""
-    return f"supports of {part.name}" + (f" in {scene.station}" if scene.station else "")
-
-
 def support_pairs(parts: tuple[NominalPart, ...], scenes: Sequence[Scene]) -> Iterator[ContactPoints]:
     """Yield the one-sided locators of each free part, or of each part of a free joint, as a contact pair; then its springs."""
     start = 0
@@ -235,7 +230,7 @@ def support_pairs(parts: tuple[NominalPart, ...], scenes: Sequence[Scene]) -> It
             P, n = part.locators.points[supports], part.locators.directions[supports]
             offsets = _support_offsets(part.locators, start, supports)
             scene = next(scene for scene in scenes if scene.station == part.station)
-            name = supports_name(scene, parts[owner].part)
+            name = scene.supports_name(parts[owner].part)
             stiffness = np.where(part.locators.springy, part.locators.stiffness, np.inf)[supports]
             numbers = start + supports
             yield ContactPoints(name, int(owner), part.parent, P, P, n, offsets, locators=numbers, stiffness=stiffness)

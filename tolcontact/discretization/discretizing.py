@@ -21,11 +21,11 @@ from tolcontact.declaration import (
     Tolerance,
 )
 from tolcontact.declaration.locator import FIRST_ORDER, USUAL_STIFFNESS
-from tolcontact.discretization.contact_points import contact_points, support_pairs, supports_name
+from tolcontact.discretization.contact_points import contact_points, support_pairs
 from tolcontact.discretization.locators import FACES_OF_SCHEME, Locators, NominalPart, scheme_locators
 from tolcontact.discretization.measurements import nominal_measurements
 from tolcontact.discretization.nominal import ContactPoints, Nominal
-from tolcontact.discretization.scenes import Scene, carried, has_supports, is_free, scenes_of
+from tolcontact.discretization.scenes import Scene, carried, scenes_of
 from tolcontact.errors import GeometryFault, ModelError, designation
 from tolcontact.features import Features, Placement, datum_order
 from tolcontact.geometry.faces import Meshes
@@ -61,8 +61,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
     faults = _Faults(fault for fault in assembly.faults() if fault not in omissions)
     is_sound = not faults
     assembly = assembly.in_station_order if is_sound else assembly
-    shapes = _shapes(assembly, faults)
-    meshes = {part: read.mesh for part, read in shapes.items()}
+    meshes = _shapes(assembly, faults)
     presses = (assembly.method or Method()).minimizes.presses if presses is None else presses
     scenes = scenes_of(assembly, presses=presses) if is_sound or not assembly.stations else ()
     entries = [(scene, part) for scene in scenes for part in scene.assembly.parts]
@@ -214,7 +213,8 @@ def _contributor_faults(assembly: Assembly, labels: Sequence[str], shifts: Set[s
 
 def _reserved_names(scene: Scene) -> Iterator[str]:
     assembly = scene.assembly
-    reserved = {supports_name(scene, part) for part in assembly.parts if has_supports(assembly, part, springs=False)}
+    rigid = replace(scene, presses=False)
+    reserved = {scene.supports_name(part) for part in assembly.parts if rigid.has_supports(part)}
     for pair in assembly.pairs:
         if pair.name in reserved:
             place = designation("contact pair", pair)
@@ -255,7 +255,7 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> 
         locators=nominal,
         scheme=location.scheme if len(nominal) and location is not None else None,
         parent=scene.parent(part),
-        free=is_free(scene.assembly, part, springs=scene.presses),
+        free=scene.is_free(part),
         located=scene.label(location.name if location else part.name),
         movers=scene.movers(part),
         station=scene.station,

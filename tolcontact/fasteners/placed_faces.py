@@ -111,7 +111,7 @@ def placed_plane(face: Face) -> PlacedPlane:
 
 def outer_cylinders(part: Part) -> Iterator[PlacedCylinder]:
     """Yield the outer cylinders of a part by radius, the largest first; several of one radius are left out."""
-    descriptions = describe_faces(shape_of(part.geometry).mesh)
+    descriptions = describe_faces(shape_of(part.geometry))
     radii = {face.radius for face in descriptions if face.kind == "cylinder" and face.radius and not face.is_inner}
     for radius in sorted(radii, reverse=True):
         try:
@@ -129,7 +129,7 @@ def meshes_of(face: Face) -> Meshes:
     """Return the meshes of the parts that a face refers to. Raises GeometryFault for the first fault of the face or a part."""
     for fault in (*face.faults(), *(fault for part in face.parts for fault in (*part.faults(), *part.geometry.faults()))):
         raise GeometryFault(fault)
-    return {part: shape_of(part.geometry).mesh for part in face.parts}
+    return {part: shape_of(part.geometry) for part in face.parts}
 
 
 @lru_cache(SHAPES)

@@ -44,7 +44,7 @@ def preview(part: Part) -> PartPreview | None:
     if any(part.faults()):
         return None
     try:
-        mesh = shape(part.geometry).mesh
+        mesh = shape(part.geometry)
     except GeometryFault:
         return None
     R = Rotation.from_rotvec(part.rotation).as_matrix()

@@ -24,18 +24,17 @@ def shape(geometry: Geometry, contents: Contents | None = None) -> Shape:
     Raises GeometryFault if a mesh cannot be read, is empty, or its outside is undefined.
     """
     if isinstance(geometry, Box):
-        return Shape(trimesh.creation.box(bounds=[[0, 0, 0], [geometry.x, geometry.y, geometry.z]]))
+        return trimesh.creation.box(bounds=[[0, 0, 0], [geometry.x, geometry.y, geometry.z]])
     if isinstance(geometry, Pin):
-        return Shape(_pin(geometry))
-    surface = read(geometry, read_files([geometry]) if contents is None else contents)
-    mesh = surface.mesh
+        return _pin(geometry)
+    mesh = read(geometry, read_files([geometry]) if contents is None else contents)
     if len(mesh.faces) == 0:
         raise GeometryFault(f"{geometry} has no triangles; expected a triangle surface")
     if not mesh.area > 0:
         raise GeometryFault(f"{geometry} has no area: all its triangles are degenerate")
     _leave_out_repetitions(mesh, geometry)
     _check_outward(mesh, geometry)
-    return surface
+    return mesh
 
 
 def _pin(pin: Pin) -> trimesh.Trimesh:

@@ -27,8 +27,8 @@ class TolerancedSurfaces:
     faces   the faces of the part, by their numbers less 1
     """
 
-    def __init__(self, shape: Shape) -> None:
-        self._mesh = mesh = shape.mesh
+    def __init__(self, mesh: Shape) -> None:
+        self._mesh = mesh
         self._numbers = {
             record: number for number, face in enumerate(mesh.metadata[STATED_FACES], start=1) for record in face.records
         }

@@ -36,13 +36,6 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Shape:
-    """The surface of a part in mm."""
-
-    mesh: trimesh.Trimesh
-
-
-@dataclass(frozen=True)
 class ReadingLimits:
     """The limits for reading a file: processor time, memory [byte] and number of triangles.
 
@@ -57,6 +50,7 @@ class ReadingLimits:
 
 
 DEFAULT_LIMITS = ReadingLimits()
+Shape = trimesh.Trimesh  # the surface of a part in mm
 Key = tuple[Path, float | None]  # a file and its required chord
 Content = Product | Mapping[str, np.ndarray]  # of a STEP file, and of a mesh file as `worker` reads it
 Contents = Mapping[Key, Content | GeometryFault]
@@ -162,19 +156,19 @@ def read(geometry: Mesh, contents: Contents) -> Shape:
     """
     source = geometry.source
     if not isinstance(source, str | Path):
-        return Shape(_in_memory(geometry))
+        return _in_memory(geometry)
     content = contents[key_of(geometry)]
     if isinstance(content, GeometryFault):
         raise content
     if isinstance(content, Product):
-        return Shape(content.part(geometry.body))
+        return content.part(geometry.body)
     mesh = trimesh.Trimesh(content["vertices"], content["faces"], process=False)
     scale = _scale(geometry, str(content["units"]) or None)
     mesh.apply_scale(scale)
     check_numbers(mesh.vertices, str(geometry))
     merged = _merge_vertices(mesh, content["piece"])
     _state_spacing(merged, scale * content["spacing"])
-    return Shape(merged)
+    return merged
 
 
 def _in_memory(geometry: Mesh) -> trimesh.Trimesh:
