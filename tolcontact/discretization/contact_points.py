@@ -1,4 +1,4 @@
-"""Contact points: of the moving face of a pair with their feet on the reference face, and locators as pairs of their own."""
+"""Contact points: points of the moving face of a pair, projected onto the reference face; and locators as pairs."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -38,15 +38,15 @@ from tolcontact.geometry.triangle_mesh import coordinate_error
 DEFAULT_REACH = 0.1  # of the moving part's size
 DEFAULT_POINTS = 200
 FORM_POINTS = 10_000  # with form, if that resolves it
-DEFAULT_SPRINGS = 40  # all of which may carry at once, so that a QP has a row for each
+DEFAULT_SPRINGS = 40  # which may all be active at once, so that a QP has a row for each
 
 
 def contact_points(
     scene: Scene, pair: ContactPair, placed: Mapping[Part, NominalPart], meshes: Meshes, features: Features
 ) -> ContactPoints:
-    """Return the contact points of a declared pair of a scene, between the parts as `placed`.
+    """Return the contact points of a declared pair of a scene, between the parts in `placed`.
 
-    Raises GeometryFault if its faces are nowhere within reach, or point the same way.
+    Raises GeometryFault if its faces are nowhere within reach, or have the same direction.
     """
     moving, reference = placed[pair.moving.part], placed[pair.reference.part]
     unplaced = patch(pair.moving, meshes)
@@ -99,7 +99,7 @@ def contact_points(
 def _spring_shares(points: ContactPoints) -> np.ndarray:
     """Return the share (point,) of each contact point in the stiffness of its pair.
 
-    Raises GeometryFault for a curved face, whose region of contact no nominal area states.
+    Raises GeometryFault for a curved face, which has no nominal area of contact.
     """
     assert points.moving_face is not None and points.reference_face is not None
     if points.round is not None:
@@ -125,8 +125,8 @@ def _candidates(
 ) -> tuple[np.ndarray, float | None]:
     """Return points (point, 3) of the moving face that become contact points if they lie over the reference face.
 
-    With them comes the penetration [mm] that they may leave undetected on curved faces; None for flat ones. `mesh` is the
-    moving face in its part's own frame, `faces` are both faces in their nominal places, `lengths` are those of their forms.
+    The second result is the penetration [mm] that they may leave undetected on curved faces; None for flat ones. `mesh` is the
+    moving face in its part's own frame, `faces` are both faces in their nominal poses, `lengths` their correlation lengths.
     """
     moving_face, reference_face = faces
     undetected = None
@@ -186,7 +186,7 @@ def _deviation(face: Face, part: NominalPart, meshes: Meshes, features: Features
 
 
 def _height_offsets(points: ContactPoints) -> Offsets:
-    """Return the heights of points as faces grow, the moving one as far as they are parallel, and those of their forms."""
+    """Return the heights of the points from sizes and forms; those of the moving face count along the reference normal."""
     offsets, facing = list[Offsets](), points.facing
     for face, share, P in zip(points.deviating, (facing, np.ones_like(facing)), (points.P_m, points.P_r), strict=True):
         if face is not None and face.grows:
@@ -240,7 +240,7 @@ def support_pairs(parts: tuple[NominalPart, ...], scenes: Sequence[Scene]) -> It
 
 
 def _spring_pair(part: NominalPart, owner: int, start: int, number: int) -> ContactPoints:
-    """Return a two-sided locator that gives way, as the pair of a spring that pushes and one that pulls, at the same point."""
+    """Return a compliant two-sided locator as a pair: a spring that pushes and one that pulls, at the same point."""
     locators, twice = part.locators, np.array([number, number])
     P, signs = locators.points[twice], np.array([1.0, -1.0])
     heights = _support_offsets(locators, start, twice[:1])
@@ -252,7 +252,7 @@ def _spring_pair(part: NominalPart, owner: int, start: int, number: int) -> Cont
 
 
 def _support_offsets(locators: Locators, start: int, supports: np.ndarray) -> Offsets:
-    """Return the heights of supports: their own deviations, columns `start` on, and those of the faces they stand against."""
+    """Return the heights of supports: their own deviations, columns `start` on, and deviations of the faces they touch."""
     offsets = [Offsets(start + supports, np.eye(len(supports)))]
     for place, number in enumerate(supports):
         columns, factors = locators.pushes(number)

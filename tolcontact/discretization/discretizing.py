@@ -54,7 +54,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
     """Return the nominal model of an assembly.
 
     An `incomplete` model may lack what only a run needs: measures, and locations of parts. Two-sided locators with a stiffness
-    give way if the objective `presses`, by default that of the assembly's own method.
+    are compliant if the objective `presses`, by default the objective of the assembly's own method.
     Raises ModelError with every fault of the declaration and of its geometry.
     """
     omissions = tuple(assembly.omissions()) if incomplete else ()
@@ -110,7 +110,7 @@ def _nominal(
     pairs: tuple[ContactPoints, ...],
     features: Features,
 ) -> Nominal:
-    """Return the nominal model with its measurements; with stations those of all of them, station by station."""
+    """Return the nominal model with its measurements, station by station."""
     models = [
         Nominal(scene.assembly, parts, pairs, scene.assembly.measures, features, station=scene.station) for scene in scenes
     ]
@@ -222,7 +222,7 @@ def _reserved_names(scene: Scene) -> Iterator[str]:
 
 
 def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> NominalPart | None:
-    """Return a part in its nominal place with its locators; None if it has no shape or is badly declared."""
+    """Return a part in its nominal pose with its locators; None if it has no shape or is badly declared."""
     if part not in meshes or any(part.faults()):
         return None
     mesh = meshes[part]
@@ -264,7 +264,7 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> 
 
 
 def _middle(mesh: Any) -> np.ndarray:
-    """Return the middle (3,) of a mesh's surface."""
+    """Return the centroid (3,) of a mesh's surface."""
     return mesh.area_faces @ mesh.triangles_center / mesh.area
 
 

@@ -25,7 +25,7 @@ class MeasuredFace:
     deviation: FaceDeviation | None
 
     def wall(self, near: np.ndarray) -> "Wall":
-        """Return the whole surface of the face, or if no analytic one is known its tangent plane nearest to a place (3,)."""
+        """Return the whole surface of the face; without an analytic one, its tangent plane nearest to a point (3,)."""
         if self.surface.is_flat:
             return Wall(self.part, self.plane, 1.0, self.deviation)
         pieces = self.surface.pieces
@@ -94,7 +94,7 @@ class Wall:
     deviation: FaceDeviation | None
 
     def foot(self, place: np.ndarray) -> np.ndarray:
-        """Return the place on the surface (3,) nearest to a place (3,)."""
+        """Return the point of the surface (3,) nearest to a point (3,)."""
         return np.asarray(self.surface.project(place[None])[0])
 
 
@@ -110,7 +110,7 @@ class Axis:
 
     @property
     def middle(self) -> np.ndarray:
-        """The middle (3,) between the ends."""
+        """The midpoint (3,) between the ends."""
         return np.asarray(self.ends.mean(axis=0))
 
 
@@ -118,7 +118,7 @@ class Axis:
 class NominalMeasurement:
     """A measurement with numbers.
 
-    lines   (line, 2, 3) [mm] the ends of the lines as which it is drawn
+    lines   (line, 2, 3) [mm] the ends of the lines that show it
     """
 
     lines: np.ndarray
@@ -147,7 +147,7 @@ class Crossing:
 
 @dataclass(frozen=True, eq=False)
 class Heights(NominalMeasurement):
-    """The least height of points over walls, and of edges over edges that they cross."""
+    """The least height of points over walls, and of edges over the edges that they cross."""
 
     points: Sequence[tuple[MeasuredPoint, Wall]]
     crossings: Sequence[Crossing] = ()
@@ -155,7 +155,7 @@ class Heights(NominalMeasurement):
 
 @dataclass(frozen=True, eq=False)
 class FaceGap(NominalMeasurement):
-    """The largest or the mean height of points all over a face, each over its wall; `weights` are shares of the area."""
+    """The largest or the mean height of points of a face, each over its own wall; `weights` are shares of the area."""
 
     points: Sequence[tuple[MeasuredPoint, Wall]]
     weights: np.ndarray
@@ -164,7 +164,7 @@ class FaceGap(NominalMeasurement):
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """The rim of a plane face: its corners (corner, 3) [mm], and the edges (edge, 2) between them by number."""
+    """The rim of a plane face: its corners (corner, 3) [mm], and edges (edge, 2) as indices of corners."""
 
     vertices: np.ndarray
     edges: np.ndarray
@@ -178,7 +178,7 @@ class Outline:
 
 @dataclass(frozen=True, eq=False)
 class PlaneClearance(FaceMeasurement):
-    """The least height of two planes in the region in which they overlap; `heights` if they overlap nowhere at a pose."""
+    """The least height between two planes where they overlap; `heights` applies at poses without an overlap."""
 
     planes: tuple[Plane, Plane]
     outlines: tuple[Outline, Outline]
@@ -202,7 +202,7 @@ class MeshClearance(FaceMeasurement):
 
 @dataclass(frozen=True, eq=False)
 class AxisPair(NominalMeasurement):
-    """The distance of two axes; `across` and `along` (3,) as AxisDistance has them, less `radii` [mm]."""
+    """The distance between two axes; `across` and `along` (3,) as for an AxisDistance."""
 
     moving: Axis
     reference: Axis
@@ -221,7 +221,7 @@ class DirectionPair(FaceMeasurement):
 
 @dataclass(frozen=True, eq=False)
 class Combined(NominalMeasurement):
-    """A combination of a kind; operands are numbers of measures, or measurements."""
+    """A combination of a kind; operands are indices of measures, or measurements."""
 
     kind: str
     operands: Sequence[int | NominalMeasurement]

@@ -1,4 +1,4 @@
-"""Measurements get numbers: faces become walls, axes and directions, and combinations refer to measures by number."""
+"""Nominal measurements: faces become walls, axes and directions, and combinations refer to measures by index."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -60,7 +60,7 @@ class MeasuredFaces:
         self._faces: dict[tuple[Any, ...], MeasuredFace] = {}
 
     def __getitem__(self, face: Face) -> MeasuredFace:
-        """Return a declared face. Raises GeometryFault if it has no triangles, or is partly that of a feature."""
+        """Return a declared face. Raises GeometryFault if it has no triangles, or belongs to a feature only in part."""
         key = (face.part, *face.selections)
         if key not in self._faces:
             part = self.nominal.part_index(face.part)
@@ -110,7 +110,7 @@ def _with_numbers(
 
 
 def _lines(nominal: Nominal, number: int, measurements: Mapping[str, NominalMeasurement | None]) -> np.ndarray:
-    """Return the lines (line, 2, 3) that show a measure: of points one from the first to the last, which may be the same."""
+    """Return the lines (line, 2, 3) that show a measure; for points, the line from the first to the last."""
     measure = nominal.measures[number]
     if (measurement := measurements[measure.name]) is not None:
         return measurement.lines
@@ -149,7 +149,7 @@ def _clearance(clearance: Clearance, faces: MeasuredFaces) -> NominalMeasurement
 
 
 def _clearance_of_meshes(moving: MeasuredFace, reference: MeasuredFace) -> MeshClearance:
-    """Return the clearance by triangles. Raises GeometryFault if too many of them are near each other."""
+    """Return the clearance between triangles. Raises GeometryFault if too many of them are near each other."""
     distances = [
         np.linalg.norm(target.surface.nearest(corners)[1] - corners, axis=1).min()
         for target, corners in (
@@ -202,7 +202,7 @@ def _clearance_of_planes(moving: MeasuredFace, reference: MeasuredFace) -> Heigh
 
 
 def _outline(points: np.ndarray, n: np.ndarray) -> np.ndarray:
-    """Return the corners of the convex hull of points (point, 3) of a plane with normal n (3,): no other can be the nearest."""
+    """Return the corners of the convex hull of points (point, 3) of a plane with normal n (3,): the nearest is among them."""
     try:
         return points[ConvexHull(points @ axes_across(n).T).vertices] if len(points) > 3 else points
     except QhullError:  # the points lie on one line
@@ -228,7 +228,7 @@ def _axis_distance(distance: AxisDistance, faces: MeasuredFaces) -> AxisPair:
 
 
 def _slide(axis: Axis, n: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Return the vector (3,) along an axis from its middle to the plane across n (3,) through a place; of a centre along n."""
+    """Return the vector (3,) along an axis, or for a centre along n, to the plane across n through a point (3,)."""
     direction = axis.direction if axis.direction.any() else n
     return np.asarray(direction * float((place - axis.middle) @ n) / float(direction @ n))
 
@@ -269,7 +269,7 @@ def _kind(face: MeasuredFace) -> str:
 
 
 def _nearest_places(moving: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Return the nearest places (2, 3) of two segments, given by their ends (2, 3); of parallel ones, any that are nearest."""
+    """Return the nearest points (2, 3) of two segments, given by their ends (2, 3); any of them if segments are parallel."""
     p, q = moving[1] - moving[0], reference[1] - reference[0]
     nearest = scipy.optimize.lsq_linear(np.column_stack([p, -q]), reference[0] - moving[0], bounds=(0, 1))
     return np.array([moving[0] + nearest.x[0] * p, reference[0] + nearest.x[1] * q])

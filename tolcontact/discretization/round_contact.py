@@ -1,4 +1,4 @@
-"""Contact of round faces: a ball or a shaft of one part beside walls of the other. Nominal assembly frame, mm."""
+"""Contact of round faces: a ball or shaft of one part against walls of the other. Nominal assembly frame, mm."""
 
 import itertools
 import math
@@ -21,7 +21,7 @@ NORMAL_TOLERANCE = 1e-7  # between the normals of neighbouring triangles of one 
 
 
 def round_points(moving: Surface, reference: Surface, reach: float) -> list[RoundPoint]:
-    """Return the contact points of two faces that touch as balls or shafts beside walls; none if they may touch otherwise.
+    """Return the contact points of two faces that touch as balls or shafts and walls; none if they may touch otherwise.
 
     Walls at a distance above `reach` [mm] have no points.
     """
@@ -69,7 +69,7 @@ def _with_outward_normal(piece: Piece) -> Piece:
 def _points_between(moving: Piece, reference: Piece, reach: float) -> list[RoundPoint]:
     """Return the points between two pieces; none if they are too far apart.
 
-    Raises NotRoundError if neither piece is a ball or shaft that touches the other as a wall beside it.
+    Raises NotRoundError if neither piece is a ball or shaft that touches the other as a wall.
     """
     sides = ((moving, reference, True), (reference, moving, False))
     for body, wall, on_moving in sides:
@@ -94,7 +94,7 @@ def _no_points(wall: Piece, places: np.ndarray, reach: float) -> list[RoundPoint
 
 
 def _ball_points(body: Piece, wall: Piece, reach: float, on_moving: bool) -> list[RoundPoint]:
-    """Return the points of a ball beside a wall: the nearest, and on a hollow wall also its tangent planes."""
+    """Return the points of a ball against a wall: the nearest, and on a hollow wall also its tangent planes."""
     c, r = body.surface.origin, body.surface.radius
     side = -1.0 if wall.is_hollow else 1.0
     distances, slopes = wall.surface.distance(c[None])
@@ -119,7 +119,7 @@ def _ball_points(body: Piece, wall: Piece, reach: float, on_moving: bool) -> lis
 
 
 class _ContactLine:
-    """The line on which a shaft and a plane may touch, by places [mm] along the shaft's axis."""
+    """The line of contact of a shaft and a plane; its places are coordinates [mm] along the shaft's axis."""
 
     def __init__(self, body: Piece, wall: Piece) -> None:
         self._body, self._wall = body, wall
@@ -143,7 +143,7 @@ class _ContactLine:
         return self.on_shaft(places) & self.on_wall(places)
 
     def places(self, start: float, end: float) -> np.ndarray:
-        """Return places from `start` to `end` that miss no part of the faces: even ones, all vertices, and middles."""
+        """Return places from `start` to `end` that miss no part of the faces: even ones, all vertices, and midpoints."""
         shaft = self._body.surface
         vertices = [np.asarray(piece.face.mesh.vertices) for piece in (self._body, self._wall)]
         of_vertices = np.concatenate(list(map(shaft.along, vertices)))
@@ -170,7 +170,7 @@ def _shaft_on_plane(body: Piece, shaft: Cylinder, wall: Piece, reach: float, on_
         return []
     towards, opening = arc(body)
     if opening < math.pi and -n @ towards < math.cos(max(opening - ARC_MARGIN, 0)):
-        raise NotRoundError  # after a small turn the shaft's edge touches, or the face beside it
+        raise NotRoundError  # after a small rotation the shaft's edge touches, or the face next to it
     line = _ContactLine(body, wall)
     start, end = _extent(body.face, shaft)
     places = line.places(start, end)

@@ -1,7 +1,8 @@
-"""Contact points of round faces: a ball or a shaft of one part beside a wall of the other. Nominal assembly frame, mm.
+"""Contact points of round faces: a ball or shaft of one part against a wall of the other. Nominal assembly frame, mm.
 
 A ball touches where its centre is nearest to the wall, a shaft at the rim of one of its ends or of an end of the wall. These
-points are computed at every pose from a few numbers. They are exact; no point is sampled."""
+points are computed at every pose from a few numbers, so they are exact; none is sampled.
+"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,7 +24,7 @@ from tolcontact.geometry.analytic_surfaces import (
 from tolcontact.geometry.surface import Piece
 from tolcontact.geometry.tolerances import SAME_PLACE
 
-TANGENTS = 5  # of a whole hollow wall, besides the nearest
+TANGENTS = 5  # of a whole hollow wall, in addition to the nearest point
 MAX_FACET_ANGLE = math.radians(31.0)  # between neighbouring vertices of a round face: a wider gap is a gap of the face
 MAX_MISSING_SHARE = 0.05  # of the area of a round face that its triangles leave out
 CAP_SHARE = 0.9  # of the angle to the rim of a cap, at which its tangent planes are
@@ -32,11 +33,11 @@ X_AXIS = np.array([1.0, 0.0, 0.0])
 
 
 class NotRoundError(Exception):
-    """Two faces do not touch as a ball or a shaft beside walls do."""
+    """Two faces do not touch as a ball or a shaft and walls do."""
 
 
 def arc(wall: Piece) -> tuple[np.ndarray, float]:
-    """Return the unit vector (3,) from the axis to the middle of a round face, and half its arc's angle [rad], pi if whole.
+    """Return the unit vector (3,) from the axis to the centre of a round face, and half its arc's angle [rad], pi if whole.
 
     Raises NotRoundError if a part of the face is missing within the arc.
     """
@@ -95,16 +96,16 @@ def _cap(wall: Piece, sphere: Sphere) -> tuple[np.ndarray, float]:
 
 
 def tangent_directions(wall: Piece) -> Sequence[np.ndarray]:
-    """Return unit vectors (3,) from the axis to the tangent planes that a hollow wall has besides the nearest.
+    """Return unit vectors (3,) from the axis to the tangent planes of a hollow wall.
 
-    They are counted from a vertex, so they turn with the part.
+    They start from a vertex, so they rotate with the part.
     """
     x, opening = arc(wall)
     if isinstance(wall.surface, Sphere):
         y, z = _directions_across(wall, x)
-        lean, azimuths = min(CAP_SHARE * opening, math.pi / 2), np.arange(TANGENTS - 1) * 2 * math.pi / (TANGENTS - 1)
+        tilt, azimuths = min(CAP_SHARE * opening, math.pi / 2), np.arange(TANGENTS - 1) * 2 * math.pi / (TANGENTS - 1)
         sideways = [math.cos(azimuth) * y + math.sin(azimuth) * z for azimuth in azimuths]
-        directions = [x, *(math.cos(lean) * x + math.sin(lean) * across for across in sideways)]
+        directions = [x, *(math.cos(tilt) * x + math.sin(tilt) * across for across in sideways)]
         return [*directions, -x] if opening == math.pi else directions
     y = np.cross(wall.surface.axis, x)
     if opening == math.pi:
@@ -115,7 +116,7 @@ def tangent_directions(wall: Piece) -> Sequence[np.ndarray]:
 
 
 def _directions_across(wall: Piece, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return two unit vectors across x (3,) and each other; the first points to the vertex farthest from the line along x."""
+    """Return two unit vectors across x (3,) and each other; the first towards the vertex most distant from x."""
     across = np.asarray(wall.face.mesh.vertices) - wall.surface.origin
     across -= (across @ x)[:, None] * x
     y = across[np.linalg.norm(across, axis=1).argmax()]
@@ -125,16 +126,16 @@ def _directions_across(wall: Piece, x: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 @dataclass(frozen=True, eq=False)
 class RoundPoint:
-    """A wall, and a ball or the place on a shaft's axis where the shaft or the wall ends.
+    """A wall, and a ball or the point on a shaft's axis where the shaft or the wall ends.
 
     wall        the surface that the ball or shaft may touch
     is_hollow   whether the wall is around the ball or shaft: the free side of the surface is inside
-    centre      (3,) [mm] of the ball, or the place on the axis
+    centre      (3,) [mm] of the ball, or the point on the axis
     axis        (3,) unit vector of the shaft; 0 for a ball
-    cut         (3,) unit normal of the plane in which the wall ends, which moves with the wall; 0 where the shaft itself ends
+    cut         (3,) unit normal of the plane where the wall ends, which moves with the wall; 0 where the shaft itself ends
     radius      [mm] of the ball or shaft
     on_moving   whether the ball or shaft belongs to the moving part; else the wall does
-    towards     (3,) unit vector from the axis of a hollow cylinder or cone to the middle of its arc
+    towards     (3,) unit vector from the axis of a hollow cylinder or cone to the centre of its arc
     opening     [rad] half the angle of that arc; pi if it is whole
     """
 
@@ -157,7 +158,7 @@ class RoundPoint:
     def nominal(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return P^m, P^r and n^r (3,): the nominal points of contact and the reference's normal.
 
-        In a hollow wall no side is nearest, so both points are the centre.
+        In a hollow wall no direction is nearest, so both points are the centre.
         """
         distances, slopes = self.wall.distance(self.centre[None])
         distance, slope = distances[0], slopes[0]
@@ -200,7 +201,7 @@ class RoundPoints:
 
     @property
     def are_beside(self) -> bool:
-        """Whether no wall is around a ball or shaft."""
+        """Whether no wall surrounds its ball or shaft."""
         return not bool(self.points["is_hollow"].any())
 
     def __iter__(self) -> Iterator[RoundPoint]:

@@ -13,7 +13,7 @@ class Scene:
     assembly   what it declares
     station    its name; empty for an assembly without stations
     first      index of its first part among the parts of all scenes
-    presses    whether forces press the parts, so that two-sided locators with a stiffness give way
+    presses    whether forces press the parts, so that two-sided locators with a stiffness are compliant
     """
 
     assembly: Assembly
@@ -26,7 +26,7 @@ class Scene:
         return self.first + self.assembly.parts.index(part)
 
     def parent(self, part: Part) -> int | None:
-        """Return the index of the part that carries a part, or that it is located on; None on the ground."""
+        """Return the index of the part that a part is located on, or of the first part of its joint; None on the ground."""
         carrier = self.assembly.body_of(part)[0]
         location = self.assembly.location_of(part)
         parent = carrier if carrier is not part else location.parent if location else None
@@ -70,7 +70,7 @@ class Scene:
         return f"supports of {part.name}" + (f" in {self.station}" if self.station else "")
 
     def label(self, name: str) -> str:
-        """Return the name of something in this scene that is declared again in each station."""
+        """Return a name that is unique although each station declares it again."""
         return f"{self.station}.{name}" if self.station else name
 
 
@@ -83,7 +83,7 @@ def scenes_of(assembly: Assembly, *, presses: bool) -> tuple[Scene, ...]:
 
 
 def carried(scenes: Sequence[Scene], scene: Scene, part: Part) -> tuple[int, int] | None:
-    """Return the indices of the part that carries a part, and of itself, in the station that joined them; None by itself."""
+    """Return the indices of the first part of a joint and of another part of it, in the station that joined them; else None."""
     joint = next((joint for joint in scene.assembly.joints if part in joint.members[1:]), None)
     if joint is None:
         return None
