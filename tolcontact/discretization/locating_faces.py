@@ -11,6 +11,7 @@ from tolcontact.features import Placement
 from tolcontact.geometry.analytic_surfaces import axes_across
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.tolerances import SAME_PLACE
+from tolcontact.geometry.triangle_mesh import rim
 
 CLOSE = 1e-3  # of a face's size: points that are closer to the material are on it
 DIVISIONS = 37  # candidates along each side of the bounding rectangle
@@ -121,10 +122,9 @@ class LocatingFace:
 
     def _distances_from_edges(self, places: np.ndarray) -> np.ndarray:
         """Return the distances (n,) [mm] of places (n, 2) from the edges of the face."""
-        merged = np.unique(np.round(self.vertices / (SAME_PLACE * self.size)), axis=0, return_inverse=True)[1].ravel()
-        pairs = np.sort(merged[self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)], axis=1)
-        _, first, counts = np.unique(pairs, axis=0, return_index=True, return_counts=True)
-        ends = (self.vertices @ self.axes.T)[self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)[first[counts == 1]]]
+        cells = np.round(self.vertices / (SAME_PLACE * self.size))
+        _, vertex, merged = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+        ends = (self.vertices @ self.axes.T)[vertex[rim(merged.ravel()[self.faces])]]
         distances = np.full(len(places), np.inf)
         for start, end in ends:
             side = end - start

@@ -28,9 +28,8 @@ class MeasuredFace:
         """Return the whole surface of the face; without an analytic one, its tangent plane nearest to a point (3,)."""
         if self.surface.is_flat:
             return Wall(self.part, self.plane, 1.0, self.deviation)
-        pieces = self.surface.pieces
-        if len(pieces) == 1 and not len(self.surface.unknown.mesh.faces):
-            return Wall(self.part, pieces[0].surface, -1.0 if pieces[0].is_hollow else 1.0, self.deviation)
+        if piece := self.surface.only_piece:
+            return Wall(self.part, piece.surface, -1.0 if piece.is_hollow else 1.0, self.deviation)
         feet, normals, _ = self.surface.project(near[None])
         return Wall(self.part, Plane(feet[0], normals[0]), 1.0, self.deviation)
 

@@ -259,8 +259,8 @@ def _check_varies(parts: Iterable[Any], deviations: Iterable[Any]) -> None:
 
 
 def _is_outer_cylinder(face: MeasuredFace) -> bool:
-    pieces, is_whole = face.surface.pieces, not len(face.surface.unknown.mesh.faces)
-    return is_whole and len(pieces) == 1 and isinstance(pieces[0].surface, Cylinder) and not pieces[0].is_hollow
+    piece = face.surface.only_piece
+    return piece is not None and isinstance(piece.surface, Cylinder) and not piece.is_hollow
 
 
 def _kind(face: MeasuredFace) -> str:

@@ -115,10 +115,6 @@ class Plane(AnalyticSurface):
         """Return heights (point,) [mm] over the plane, and its normal (point, 3)."""
         return (points - self.origin) @ self.axis, np.broadcast_to(self.axis, points.shape)
 
-    def offset(self, point: np.ndarray) -> np.ndarray:
-        """Return the component of the offset along the normal."""
-        return float((point - self.origin) @ self.axis) * self.axis
-
 
 @dataclass(frozen=True, eq=False)
 class Cylinder(RoundSurface):

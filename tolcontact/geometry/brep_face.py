@@ -27,7 +27,7 @@ ON_SURFACES = "on_surfaces"
 def number_faces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, Sequence[StatedFace]]:
     """Return the index of each triangle's face (face,), and the faces as a STEP file states them.
 
-    The faces of other meshes are their smooth pieces, of which nothing is stated; the mesh caches them.
+    The faces of other meshes are their smooth pieces, which the mesh caches.
     """
     if BREP in mesh.face_attributes:
         return np.asarray(mesh.face_attributes[BREP]).ravel(), mesh.metadata[STATED_FACES]

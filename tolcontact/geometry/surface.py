@@ -77,6 +77,12 @@ class Surface:
         """The parts of the face that lie on its analytic surfaces."""
         return [Piece(surface, side < 0, self.part(rows)) for surface, rows, side in self._rows_on_surfaces()]
 
+    @property
+    def only_piece(self) -> "Piece | None":
+        """The face as a piece; None if it spans several surfaces, or has triangles that approximate none."""
+        numbers = np.unique(self.surface_numbers)
+        return self.pieces[0] if len(numbers) == 1 and numbers[0] >= 0 else None
+
     @cached_property
     def bulge(self) -> float:
         """The largest distance [mm] of triangles, at their centroids and edge midpoints, from their analytic surfaces."""

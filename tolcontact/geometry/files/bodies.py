@@ -1,7 +1,7 @@
 """The bodies of a STEP file: their shapes, their B-rep faces and their places. A part is one body. Lengths in mm.
 
-A face may stand in its shell a second time. Its triangles then repeat those of the first one, which counts for both. All other
-faces have numbers, also those of which the kernel makes no triangles at some chord: numbers do not depend on it.
+A face may occur in its shell a second time. Its triangles then repeat the triangles of the first one, which counts for both.
+All other faces have numbers, even if the kernel makes no triangles of them at some chord: numbers do not depend on the chord.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,8 +30,8 @@ class StatedFace:
 
     surface  None for an unknown one
     name     "" for a face without a name
-    records  numbers of its records in the file's text, its own first, then those of its copies; empty if it states no PMI
-    copies   number of other faces that stand in the same place, and have no triangles of their own
+    records  numbers of its records in the file's text, its own first, then the records of its copies; empty if it states no PMI
+    copies   number of other faces in the same place, and have no triangles of their own
     measure  None if the kernel finds none, as for a face that the file states by triangles, and for faces from an archive
     """
 

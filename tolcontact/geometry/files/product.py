@@ -150,7 +150,7 @@ def _shape(
     entry            what the kernel reads
     numbers          (record + 1,) numbers of all records in the file's text, after a 0
     merge_distance   [mm] between vertices that are one
-    max_offset       [mm] by which a vertex may be moved onto the surfaces of its faces
+    max_offset       [mm] largest displacement of a vertex onto the surfaces of its faces
     omissions        counts of triangles by the reason for which they are left out
     """
     vertices, triangles = _merge_vertices(entry["vertices"], entry["triangles"], merge_distance)
@@ -160,7 +160,7 @@ def _shape(
     vertices, triangles = vertices[corners], triangles.reshape(-1, 3)
     surfaces = credible(vertices, triangles, brep, list(map(stated_surface, entry["surfaces"])), max_offset)
     vertices = onto(vertices, triangles, brep, surfaces, max_offset)
-    # Of each face, the face of which it is a copy, or itself.
+    # The original of each face: itself, unless it is a copy.
     first = np.arange(len(surfaces))
     first[entry["brep"][repeated[::-1, 0]]] = entry["brep"][repeated[::-1, 1]]
     first[brep] = brep

@@ -209,7 +209,7 @@ def _scale(geometry: Mesh, source_unit: str | None) -> float:
 
 
 def _merge_vertices(mesh: trimesh.Trimesh, piece: np.ndarray) -> trimesh.Trimesh:
-    """Return a mesh whose neighbouring triangles share vertices, from which rims, smooth normals and bodies follow.
+    """Return a mesh whose neighbouring triangles share vertices: rims, smooth normals and bodies depend on this.
 
     Each closed piece (face,) is a body and shares no vertices with the pieces that it touches. Open pieces may be parts of one
     body.

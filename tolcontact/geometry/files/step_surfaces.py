@@ -26,7 +26,7 @@ def credible(
     surfaces: Sequence[AnalyticSurface | None],
     max_distance: float,
 ) -> list[AnalyticSurface | None]:
-    """Return the surfaces of B-rep faces; None for one from which a vertex of its face is farther than `max_distance` [mm]."""
+    """Return the surfaces of B-rep faces; None if a vertex of the face is more than `max_distance` [mm] off."""
     checked = list(surfaces)
     for number, surface in enumerate(surfaces):
         corners = np.unique(faces[brep == number]) if surface is not None else ()
