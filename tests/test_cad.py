@@ -22,7 +22,7 @@ from tolcontact.geometry.analytic_surfaces import Cone, Cylinder, Plane, Sphere,
 from tolcontact.geometry.files import BREP, STATED_FACES, ReadingLimits, read_files
 from tolcontact.geometry.files.product import rigid_motion
 from tolcontact.geometry.files.reading import usual_chord
-from tolcontact.geometry.files.step_surfaces import credible, onto
+from tolcontact.geometry.files.step_shapes import credible, onto
 from tolcontact.geometry.files.step_text import StepText
 from tolcontact.geometry.fitting import fit_surface
 from tolcontact.geometry.shapes import shape

@@ -16,10 +16,10 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.features import FaceDeviation, FormField
 from tolcontact.geometry import height_kernel, minima_kernel
-from tolcontact.geometry.face_frame import face_frame
 from tolcontact.geometry.height_kernel import HeightSums, HeightTable, Plane
 from tolcontact.geometry.meeting import Places
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
+from tolcontact.geometry.spreading import face_frame
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.tolerances import SAME_PLACE
 from tolcontact.geometry.triangle_mesh import on_rim

@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 
 from tolcontact.arrays import Array, Float
 from tolcontact.geometry.common_region import common_region
-from tolcontact.geometry.face_frame import face_frame
+from tolcontact.geometry.spreading import face_frame
 from tolcontact.geometry.surface import Surface
 
 ELEMENTS_PER_POINT = 16

@@ -12,7 +12,7 @@ from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere
 from tolcontact.geometry.face_groups import FaceOnSurface, hollow_cylinders, interruptions, patterns, slots
 from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
 from tolcontact.geometry.files import BREP, STATED_FACES
-from tolcontact.geometry.files.bodies import FaceMeasure, StatedFace
+from tolcontact.geometry.files.step_shapes import FaceMeasure, StatedFace
 from tolcontact.geometry.fitting import fit_surface
 from tolcontact.geometry.tolerances import ROUNDING
 from tolcontact.geometry.triangle_mesh import smooth_pieces

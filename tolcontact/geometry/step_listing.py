@@ -17,8 +17,7 @@ from tolcontact.errors import CONTROL_CHARACTERS, GeometryFault, ModelError, Opt
 from tolcontact.geometry.brep_face import describe_faces, plain_vector
 from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
 from tolcontact.geometry.files import STATED_FACES, key_of, read_files
-from tolcontact.geometry.files.bodies import MAX_LISTED
-from tolcontact.geometry.files.product import Product
+from tolcontact.geometry.files.product import MAX_LISTED, Product
 from tolcontact.readable import Readable
 from tolcontact.shape_worker import UnfinishedRead
 
