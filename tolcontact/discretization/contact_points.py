@@ -30,7 +30,7 @@ from tolcontact.features import FaceDeviation, Features
 from tolcontact.geometry.curvature import CHORD_SHARE, curvature_points, distinct, facet_error, sampling_error
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.overlap import overlap_corners, rim_points
-from tolcontact.geometry.spreading import distinct_vertices, spread
+from tolcontact.geometry.spreading import spread, unique_points
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.tolerances import ROUNDING
 from tolcontact.geometry.triangle_mesh import coordinate_error
@@ -131,7 +131,7 @@ def _candidates(
     moving_face, reference_face = faces
     undetected = None
     if isinstance(pair.points, str):
-        points = distinct_vertices(mesh)
+        points = unique_points(np.asarray(mesh.vertices))
     else:
         is_fine = lengths and _is_open(pair)
         spacing = affordable_spacing(lengths, float(mesh.area), FORM_POINTS) if is_fine else pair.spacing

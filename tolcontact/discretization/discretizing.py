@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import (
     Assembly,
@@ -30,7 +29,7 @@ from tolcontact.errors import GeometryFault, ModelError, designation
 from tolcontact.features import Features, Placement, datum_order
 from tolcontact.geometry.faces import Meshes
 from tolcontact.geometry.files.reading import Shape, read_files
-from tolcontact.geometry.shapes import field_surface, shape
+from tolcontact.geometry.shapes import field_surface, placement_of, shape
 from tolcontact.method import Method
 
 log = logging.getLogger(__name__)
@@ -266,11 +265,6 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> 
 def _middle(mesh: Any) -> np.ndarray:
     """Return the centroid (3,) of a mesh's surface."""
     return mesh.area_faces @ mesh.triangles_center / mesh.area
-
-
-def placement_of(part: Part) -> Placement:
-    """Return R (3, 3) and t (3,) [mm] of a part in the nominal assembly."""
-    return Rotation.from_rotvec(part.rotation).as_matrix(), np.array(part.at)
 
 
 def _locators(

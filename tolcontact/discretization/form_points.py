@@ -88,8 +88,8 @@ def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[Face
         return None
     if np.linalg.norm(np.cross(shaft.axis, bore.axis)) > PARALLEL:
         return None
-    extents = [shaft.along(np.asarray(face.mesh.vertices)) for face in (moving, reference)]
-    start, end = max(extent.min() for extent in extents), min(extent.max() for extent in extents)
+    lows, highs = zip(*(shaft.extent(np.asarray(face.mesh.vertices)) for face in (moving, reference)), strict=True)
+    start, end = max(lows), min(highs)
     if end <= start:
         return None
     lengths = [face.form.scales for face in deviating if face is not None and face.form is not None]

@@ -7,7 +7,7 @@ import numpy as np
 import trimesh
 
 from tolcontact.discretization.round_points import NO_DIRECTION, NotRoundError, RoundPoint, arc, tangent_directions
-from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, Plane, RoundSurface, Sphere
+from tolcontact.geometry.analytic_surfaces import Cone, Cylinder, Plane, RoundSurface, Sphere
 from tolcontact.geometry.surface import Piece, Surface
 from tolcontact.geometry.tolerances import PARALLEL, SAME_PLACE
 from tolcontact.geometry.triangle_mesh import CREASE
@@ -172,7 +172,7 @@ def _shaft_on_plane(body: Piece, shaft: Cylinder, wall: Piece, reach: float, on_
     if opening < math.pi and -n @ towards < math.cos(max(opening - ARC_MARGIN, 0)):
         raise NotRoundError  # after a small rotation the shaft's edge touches, or the face next to it
     line = _ContactLine(body, wall)
-    start, end = _extent(body.face, shaft)
+    start, end = shaft.extent(np.asarray(body.face.mesh.vertices))
     places = line.places(start, end)
     touching = np.flatnonzero(line.is_touching(places))
     if not touching.size or height <= -shaft.radius:
@@ -206,7 +206,7 @@ def _shaft_in_hole(
     body: Piece, shaft: Cylinder, wall: Piece, hole: Cylinder, reach: float, on_moving: bool
 ) -> list[RoundPoint]:
     """Return the points of a shaft in a parallel hole: at the first end of either, the nearest and the tangent planes."""
-    (start, end), (lower, upper) = (_extent(piece.face, shaft) for piece in (body, wall))
+    (start, end), (lower, upper) = (shaft.extent(np.asarray(piece.face.mesh.vertices)) for piece in (body, wall))
     tolerance = SAME_PLACE * max(body.face.mesh.scale, wall.face.mesh.scale)
     ends = ((max(start, lower), start >= lower - tolerance), (min(end, upper), end <= upper + tolerance))
     offsets = [shaft.origin + place * shaft.axis - hole.origin for place, _ in ends]
@@ -226,12 +226,6 @@ def _shaft_in_hole(
         nearest = RoundPoint(hole, True, centre, shaft.axis, cut, shaft.radius, on_moving, towards, opening)
         points += [nearest, *nearest.tangents(tangent_directions(wall))]
     return points
-
-
-def _extent(face: Surface, shaft: AnalyticSurface) -> tuple[float, float]:
-    """Return the first and the last place of a face along an axis [mm]."""
-    along = shaft.along(np.asarray(face.mesh.vertices))
-    return float(along.min()), float(along.max())
 
 
 def _has_square_ends(piece: Piece) -> bool:

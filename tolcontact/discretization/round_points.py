@@ -18,6 +18,7 @@ from tolcontact.geometry.analytic_surfaces import (
     RoundSurface,
     Sphere,
     axes_across,
+    azimuths,
     surface_arrays,
     surfaces_of,
 )
@@ -51,8 +52,7 @@ def arc(wall: Piece) -> tuple[np.ndarray, float]:
         return axes_across(axis)[0], math.pi
     x = across[0] / np.linalg.norm(across[0])
     y = np.cross(axis, x)
-    azimuths = np.sort(np.arctan2(across @ y, across @ x))
-    gaps = np.diff(azimuths, append=azimuths[0] + 2 * math.pi)
+    angles, gaps = azimuths(across, x, y)
     if (gaps > MAX_FACET_ANGLE).sum() > 1:
         raise NotRoundError
     widest = int(gaps.argmax())
@@ -60,7 +60,7 @@ def arc(wall: Piece) -> tuple[np.ndarray, float]:
         middle, opening = x, math.pi
     else:
         opening = math.pi - float(gaps[widest]) / 2
-        azimuth = float(azimuths[widest] + gaps[widest]) + opening
+        azimuth = float(angles[widest] + gaps[widest]) + opening
         middle = math.cos(azimuth) * x + math.sin(azimuth) * y
     _check_area(wall, opening)
     return middle, opening
@@ -103,16 +103,16 @@ def tangent_directions(wall: Piece) -> Sequence[np.ndarray]:
     x, opening = arc(wall)
     if isinstance(wall.surface, Sphere):
         y, z = _directions_across(wall, x)
-        tilt, azimuths = min(CAP_SHARE * opening, math.pi / 2), np.arange(TANGENTS - 1) * 2 * math.pi / (TANGENTS - 1)
-        sideways = [math.cos(azimuth) * y + math.sin(azimuth) * z for azimuth in azimuths]
+        tilt, angles = min(CAP_SHARE * opening, math.pi / 2), np.arange(TANGENTS - 1) * 2 * math.pi / (TANGENTS - 1)
+        sideways = [math.cos(azimuth) * y + math.sin(azimuth) * z for azimuth in angles]
         directions = [x, *(math.cos(tilt) * x + math.sin(tilt) * across for across in sideways)]
         return [*directions, -x] if opening == math.pi else directions
     y = np.cross(wall.surface.axis, x)
     if opening == math.pi:
-        azimuths = np.arange(TANGENTS) * 2 * math.pi / TANGENTS
+        angles = np.arange(TANGENTS) * 2 * math.pi / TANGENTS
     else:
-        azimuths = np.linspace(-opening, opening, max(math.ceil(opening / math.pi * TANGENTS), 1) + 1)
-    return [math.cos(azimuth) * x + math.sin(azimuth) * y for azimuth in azimuths]
+        angles = np.linspace(-opening, opening, max(math.ceil(opening / math.pi * TANGENTS), 1) + 1)
+    return [math.cos(azimuth) * x + math.sin(azimuth) * y for azimuth in angles]
 
 
 def _directions_across(wall: Piece, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

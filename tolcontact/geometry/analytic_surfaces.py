@@ -82,6 +82,11 @@ class AnalyticSurface(ABC):
         """Return the coordinates (point,) [mm] of points (point, 3) along the axis, from the origin."""
         return np.asarray((points - self.origin) @ self.axis)
 
+    def extent(self, points: np.ndarray) -> tuple[float, float]:
+        """Return the least and the largest coordinate [mm] of points (point, 3) along the axis, from the origin."""
+        along = self.along(points)
+        return float(along.min()), float(along.max())
+
     def _around_axis(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return distances (point,) from the axis, unit vectors (point, 3) away from it, and coordinates (point,) along it."""
         offset = points - self.origin
@@ -235,6 +240,12 @@ class Torus(AnalyticSurface):
 def axes_across(direction: np.ndarray) -> np.ndarray:
     """Return two unit vectors (2, 3) perpendicular to a direction (3,) and to each other."""
     return np.asarray(np.linalg.svd(direction[None])[2][1:])
+
+
+def azimuths(offsets: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the sorted azimuths (point,) [rad] of offsets (point, 3), from x (3,) to y (3,), and the gaps after them."""
+    angles = np.sort(np.arctan2(offsets @ y, offsets @ x))
+    return angles, np.diff(angles, append=angles[0] + 2 * np.pi)
 
 
 ANALYTIC_SURFACES: dict[str, type[AnalyticSurface]] = {

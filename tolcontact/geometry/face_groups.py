@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 import trimesh
 
-from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, axes_across
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, axes_across, azimuths
 from tolcontact.geometry.body_overlap import SolidBody
 from tolcontact.geometry.face_in_file import FaceInFile
 from tolcontact.geometry.tolerances import SAME_PLACE
@@ -67,9 +67,9 @@ def _may_be_one(surface: AnalyticSurface, neighbour: AnalyticSurface, margin: fl
 def _is_interrupted(body: SolidBody, surface: Cylinder | Cone, parts: Sequence[np.ndarray], margin: float) -> bool:
     """Return whether two parts of a surface, the triangles (face,) of each, overlap along its axis without material between."""
     corners = [np.asarray(body.mesh.triangles)[triangles].reshape(-1, 3) for triangles in parts]
-    along = list(map(surface.along, corners))
-    lower, upper = max(coordinates.min() for coordinates in along), min(coordinates.max() for coordinates in along)
-    if upper - lower < MIN_COMMON_SHARE * min(float(np.ptp(coordinates)) for coordinates in along):
+    (start, end), (next_start, next_end) = map(surface.extent, corners)
+    lower, upper = max(start, next_start), min(end, next_end)
+    if upper - lower < MIN_COMMON_SHARE * min(end - start, next_end - next_start):
         return False
     middle = (lower + upper) / 2
     radius = surface.radius if isinstance(surface, Cylinder) else abs(middle) * np.tan(surface.angle)
@@ -100,10 +100,8 @@ class HollowCylinder:
     @cached_property
     def is_hole(self) -> bool:
         """Whether it spans more than half a turn around its axis."""
-        x, y = axes_across(self.surface.axis)
-        offsets = self.vertices - self.surface.origin
-        azimuths = np.sort(np.arctan2(offsets @ y, offsets @ x))
-        return bool(np.diff(azimuths, append=azimuths[0] + 2 * np.pi).max() < MAX_HOLE_GAP)
+        _, gaps = azimuths(self.vertices - self.surface.origin, *axes_across(self.surface.axis))
+        return bool(gaps.max() < MAX_HOLE_GAP)
 
     def equals(self, neighbour: "HollowCylinder") -> bool:
         """Return whether another one has the same radius, and an axis parallel to this one."""

@@ -15,7 +15,7 @@ import numpy as np
 import trimesh
 
 from tolcontact import poses as pose
-from tolcontact.geometry.spreading import distinct
+from tolcontact.geometry.spreading import unique_points
 from tolcontact.geometry.surface import Piece, Surface
 from tolcontact.geometry.triangle_mesh import rim, subdivided
 from tolcontact.vocabulary import ROUNDED
@@ -229,7 +229,7 @@ def body_face(face: Surface, body: trimesh.Trimesh, contacts: int) -> BodyFace:
     """Return a face and its body, for a pair with `contacts` contact points."""
     count = min(max(MIN_POINTS, contacts * DENSITY**2), MAX_POINTS)
     step = float(np.sqrt(face.mesh.area / count))
-    points = distinct(_spread(face.mesh, step, count))
+    points = unique_points(_spread(face.mesh, step, count))
     if len(points) > MAX_POINTS:
         points = points[np.random.default_rng(0).choice(len(points), MAX_POINTS, replace=False)]
     flat = _plane_of(face)

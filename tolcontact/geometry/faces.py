@@ -7,7 +7,6 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 import trimesh
-from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Brep, Cylinder, Face, Facing, Inside, Largest, Near, Part, Picked, Triangles
 from tolcontact.declaration.selection import FACE_ANGLE
@@ -16,6 +15,7 @@ from tolcontact.errors import GeometryFault, shown_name
 from tolcontact.geometry.brep_face import analytic_surfaces, describe_faces, faces_at, number_faces
 from tolcontact.geometry.face_in_file import FaceInFile, group_lines
 from tolcontact.geometry.files import BREP, STATED_FACES
+from tolcontact.geometry.shapes import placement_of
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.tolerances import OPPOSING_COSINE, ROUNDING
 from tolcontact.geometry.triangle_mesh import overlaps, subdivided
@@ -306,8 +306,8 @@ def _facing_pieces(
 
 
 def _in_place(part: Part, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    R = Rotation.from_rotvec(part.rotation).as_matrix()
-    return trimesh.Trimesh(np.asarray(mesh.vertices) @ R.T + np.array(part.at), mesh.faces, process=False)
+    R, t = placement_of(part)
+    return trimesh.Trimesh(np.asarray(mesh.vertices) @ R.T + t, mesh.faces, process=False)
 
 
 def _cut(surface: Surface, box: Inside, margin: float) -> Surface:

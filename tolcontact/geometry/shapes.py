@@ -5,8 +5,9 @@ import logging
 import igl
 import numpy as np
 import trimesh
+from scipy.spatial.transform import Rotation
 
-from tolcontact.declaration import Box, Geometry, Mesh, Pin
+from tolcontact.declaration import Box, Geometry, Mesh, Part, Pin
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.files.reading import Contents, Shape, read, read_files
 from tolcontact.geometry.triangle_mesh import distinct_triangles, edges, subdivided
@@ -106,6 +107,11 @@ def _per_body(limit: np.ufunc, corners: np.ndarray, body: np.ndarray, count: int
     extremes = np.full((count, 3), -limit.reduce(np.array([-np.inf, np.inf])))
     limit.at(extremes, body, limit.reduce(corners, axis=1))
     return extremes
+
+
+def placement_of(part: Part) -> tuple[np.ndarray, np.ndarray]:
+    """Return R (3, 3) and t (3,) [mm] of a part in the nominal assembly."""
+    return Rotation.from_rotvec(part.rotation).as_matrix(), np.array(part.at)
 
 
 def field_surface(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:

@@ -161,12 +161,7 @@ def _are_corners(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.asarray((rims == 2) & (np.linalg.norm(turn, axis=1) > 2 * np.sin(CORNER_ANGLE / 2)))
 
 
-def distinct_vertices(surface: trimesh.Trimesh) -> np.ndarray:
-    """Return the vertices of the surface's triangles, each once, shape (point, 3) [mm]."""
-    return distinct(np.asarray(surface.vertices))
-
-
-def distinct(points: np.ndarray) -> np.ndarray:
+def unique_points(points: np.ndarray) -> np.ndarray:
     """Return points (point, 3), each once, sorted by their coordinates. NumPy's `unique` takes several times as long."""
     points = points[np.lexsort(points.T[::-1])]
     is_new = np.append(True, (points[1:] != points[:-1]).any(axis=1))[: len(points)]
