@@ -240,7 +240,7 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> 
     common = location.tolerance if location else None
     nominal = _locators(scene, location, locators, common, part)
     if location is not None and location.floating:
-        nominal = replace(nominal, floating=(_middle(mesh) @ R_WP.T + t_WP, float(mesh.scale)))
+        nominal = replace(nominal, floating=(_centroid(mesh) @ R_WP.T + t_WP, float(mesh.scale)))
     if len(nominal):
         place = designation("joint", location) if location and location.joint else designation("part", part)
         faults.attempt(place, nominal.check_independent)
@@ -262,7 +262,7 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> 
     )
 
 
-def _middle(mesh: Any) -> np.ndarray:
+def _centroid(mesh: Any) -> np.ndarray:
     """Return the centroid (3,) of a mesh's surface."""
     return mesh.area_faces @ mesh.triangles_center / mesh.area
 

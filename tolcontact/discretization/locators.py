@@ -180,16 +180,16 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
     edges /= np.linalg.norm(edges, axis=1, keepdims=True)
     a, b, c = edges
     primary, secondary, tertiary = (face.vertices for face in faces)
-    near_c, far_c = _support_places(primary, c, scheme.inset)
-    near_b, far_b = _support_places(primary, b, scheme.inset)
-    side_near, side_far = _support_places(secondary, c, scheme.inset)
+    near_c, far_c = _support_coordinates(primary, c, scheme.inset)
+    near_b, far_b = _support_coordinates(primary, b, scheme.inset)
+    side_near, side_far = _support_coordinates(secondary, c, scheme.inset)
     rectangular = [
         _place(edges, outward, primary, 0, {1: near_b, 2: near_c}),
         _place(edges, outward, primary, 0, {1: near_b, 2: far_c}),
         _place(edges, outward, primary, 0, {1: far_b, 2: (near_c + far_c) / 2}),
-        _place(edges, outward, secondary, 1, {0: _middle(secondary, a), 2: side_near}),
-        _place(edges, outward, secondary, 1, {0: _middle(secondary, a), 2: side_far}),
-        _place(edges, outward, tertiary, 2, {0: _middle(tertiary, a), 1: _middle(tertiary, b)}),
+        _place(edges, outward, secondary, 1, {0: _midpoint(secondary, a), 2: side_near}),
+        _place(edges, outward, secondary, 1, {0: _midpoint(secondary, a), 2: side_far}),
+        _place(edges, outward, tertiary, 2, {0: _midpoint(tertiary, a), 1: _midpoint(tertiary, b)}),
     ]
     sides = ((0, slice(0, 3), None), (1, slice(3, 5), c), (2, slice(5, 6), None))  # face, its points, what spreads them
     points = np.vstack([faces[k].on_material(np.array(rectangular[rows]), scheme.inset, along) for k, rows, along in sides])
@@ -202,8 +202,8 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
     )
 
 
-def _support_places(points: np.ndarray, along: np.ndarray, inset: float) -> tuple[float, float]:
-    """Return the places [mm] along a direction at an inset from both ends of a face."""
+def _support_coordinates(points: np.ndarray, along: np.ndarray, inset: float) -> tuple[float, float]:
+    """Return the coordinates [mm] along a direction at an inset from both ends of a face."""
     places = points @ along
     lower, upper = places.min() + inset, places.max() - inset
     if not lower < upper:
@@ -212,7 +212,7 @@ def _support_places(points: np.ndarray, along: np.ndarray, inset: float) -> tupl
     return lower, upper
 
 
-def _middle(points: np.ndarray, along: np.ndarray) -> float:
+def _midpoint(points: np.ndarray, along: np.ndarray) -> float:
     places = points @ along
     return float(places.min() + places.max()) / 2
 

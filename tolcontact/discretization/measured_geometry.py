@@ -108,7 +108,7 @@ class Axis:
     deviation: FaceDeviation | None
 
     @property
-    def middle(self) -> np.ndarray:
+    def midpoint(self) -> np.ndarray:
         """The midpoint (3,) between the ends."""
         return np.asarray(self.ends.mean(axis=0))
 

@@ -219,18 +219,18 @@ def _axis_distance(distance: AxisDistance, faces: MeasuredFaces) -> AxisPair:
                 raise GeometryFault(
                     f"the axis of {face} is parallel to the plane that is to cut it; choose another direction across"
                 )
-        foot = reference.middle + _slide(reference, n, moving.middle)
-        return AxisPair(np.concatenate([lines, [[moving.middle, foot]]]), moving, reference, across=n)
+        foot = reference.midpoint + _slide(reference, n, moving.midpoint)
+        return AxisPair(np.concatenate([lines, [[moving.midpoint, foot]]]), moving, reference, across=n)
     if distance.along is not None:
-        foot = reference.middle + ((moving.middle - reference.middle) @ reference.direction) * reference.direction
-        return AxisPair(np.concatenate([lines, [[moving.middle, foot]]]), moving, reference, along=np.array(distance.along))
+        foot = reference.midpoint + ((moving.midpoint - reference.midpoint) @ reference.direction) * reference.direction
+        return AxisPair(np.concatenate([lines, [[moving.midpoint, foot]]]), moving, reference, along=np.array(distance.along))
     return AxisPair(np.concatenate([lines, [_nearest_places(moving.ends, reference.ends)]]), moving, reference)
 
 
 def _slide(axis: Axis, n: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Return the vector (3,) along an axis, or for a centre along n, to the plane across n through a point (3,)."""
     direction = axis.direction if axis.direction.any() else n
-    return np.asarray(direction * float((place - axis.middle) @ n) / float(direction @ n))
+    return np.asarray(direction * float((place - axis.midpoint) @ n) / float(direction @ n))
 
 
 def _angle(angle: Angle, faces: MeasuredFaces) -> DirectionPair:
