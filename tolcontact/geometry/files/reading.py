@@ -155,44 +155,32 @@ def read(geometry: Mesh, contents: Contents) -> Shape:
     too large, or if its units are unknown.
     """
     source = geometry.source
-    if not isinstance(source, str | Path):
-        return _in_memory(geometry)
-    content = contents[key_of(geometry)]
-    if isinstance(content, GeometryFault):
-        raise content
-    if isinstance(content, Product):
-        return content.part(geometry.body)
-    mesh = trimesh.Trimesh(content["vertices"], content["faces"], process=False)
-    scale = _scale(geometry, str(content["units"]) or None)
+    if isinstance(source, str | Path):
+        content = contents[key_of(geometry)]
+        if isinstance(content, GeometryFault):
+            raise content
+        if isinstance(content, Product):
+            return content.part(geometry.body)
+        mesh = trimesh.Trimesh(content["vertices"], content["faces"], process=False)
+        piece, unit, spacing = content["piece"], str(content["units"]) or None, content["spacing"]
+    else:
+        mesh = trimesh.Trimesh(source.vertices, source.faces, process=False)
+        if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
+            raise GeometryFault(f"{geometry}: its triangles refer to vertices beyond the {len(mesh.vertices)} that it has")
+        if len(mesh.faces) > DEFAULT_LIMITS.triangles:
+            raise GeometryFault(screening.too_many(geometry, len(mesh.faces), DEFAULT_LIMITS.triangles))
+        piece, unit = np.zeros(len(mesh.faces), dtype=np.int64), getattr(source, "units", None)
+        spacing = getattr(source, COORDINATE_SPACING, np.zeros(3))  # from an archive
+    scale = _scale(geometry, unit)
     mesh.apply_scale(scale)
     check_numbers(mesh.vertices, str(geometry))
-    merged = _merge_vertices(mesh, content["piece"])
-    _state_spacing(merged, scale * content["spacing"])
-    return merged
-
-
-def _in_memory(geometry: Mesh) -> trimesh.Trimesh:
-    source = geometry.source
-    mesh = trimesh.Trimesh(source.vertices, source.faces, process=False)
-    if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
-        raise GeometryFault(f"{geometry}: its triangles refer to vertices beyond the {len(mesh.vertices)} that it has")
-    if len(mesh.faces) > DEFAULT_LIMITS.triangles:
-        raise GeometryFault(screening.too_many(geometry, len(mesh.faces), DEFAULT_LIMITS.triangles))
-    scale = _scale(geometry, getattr(source, "units", None))
-    mesh.apply_scale(scale)
-    check_numbers(mesh.vertices, str(geometry))
-    mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    _state_spacing(mesh, scale * getattr(source, COORDINATE_SPACING, np.zeros(3)))  # from an archive
+    mesh = _merge_vertices(mesh, piece)
+    if spacing.any():  # otherwise coordinates are exact
+        mesh.metadata[COORDINATE_SPACING] = scale * spacing
     if BREP in getattr(source, "face_attributes", {}):  # from an archive
         mesh.face_attributes[BREP] = source.face_attributes[BREP]
         mesh.metadata[STATED_FACES] = source.metadata[STATED_FACES]
     return mesh
-
-
-def _state_spacing(mesh: trimesh.Trimesh, spacing: np.ndarray) -> None:
-    """Add the spacing (3,) [mm] of stored coordinates to a mesh, unless they are exact."""
-    if spacing.any():
-        mesh.metadata[COORDINATE_SPACING] = spacing
 
 
 def _scale(geometry: Mesh, source_unit: str | None) -> float:
