@@ -66,13 +66,13 @@ def facing_triangles(face: Surface, other: Surface, deviation: FaceDeviation | N
     is_facing = np.asarray(face.mesh.face_normals) @ n < FACING
     if deviation is None or deviation.form is None or not other.is_flat or is_facing.all() or not is_facing.any():
         return every
-    heights = np.asarray(face.mesh.vertices) @ n
-    tops = heights[np.asarray(face.mesh.faces)].max(axis=1)
+    heights = face.vertices @ n
+    tops = heights[face.faces].max(axis=1)
     is_facing &= tops < tops[is_facing].min() + SAME_PLACE * face.mesh.scale
     part = face.part(np.flatnonzero(is_facing))
-    level = np.asarray(part.mesh.vertices) @ n
-    neighbours = np.setdiff1d(np.asarray(face.mesh.faces), np.asarray(face.mesh.faces)[is_facing])
-    dropped = np.asarray(face.mesh.vertices)[neighbours] - (heights[neighbours] - level.min())[:, None] * n
+    level = part.vertices @ n
+    neighbours = np.setdiff1d(face.faces, face.faces[is_facing])
+    dropped = face.vertices[neighbours] - (heights[neighbours] - level.min())[:, None] * n
     distance = np.linalg.norm(part.nearest(dropped)[1] - dropped, axis=1)
     rises = heights[neighbours] - level.min() > np.maximum(MIN_RISE * distance, SAME_PLACE * face.mesh.scale)
     return np.flatnonzero(is_facing) if rises.all() else every
@@ -88,7 +88,7 @@ def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[Face
         return None
     if np.linalg.norm(np.cross(shaft.axis, bore.axis)) > PARALLEL:
         return None
-    lows, highs = zip(*(shaft.extent(np.asarray(face.mesh.vertices)) for face in (moving, reference)), strict=True)
+    lows, highs = zip(*(shaft.extent(face.vertices) for face in (moving, reference)), strict=True)
     start, end = max(lows), min(highs)
     if end <= start:
         return None

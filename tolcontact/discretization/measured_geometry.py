@@ -172,7 +172,7 @@ class Outline:
     def of(cls, surface: Surface) -> "Outline":
         """Return the rim of a face."""
         used, edges = np.unique(surface.rim, return_inverse=True)
-        return cls(np.asarray(surface.mesh.vertices)[used], edges.reshape(-1, 2))
+        return cls(surface.vertices[used], edges.reshape(-1, 2))
 
 
 @dataclass(frozen=True, eq=False)

@@ -153,8 +153,8 @@ def _clearance_of_meshes(moving: MeasuredFace, reference: MeasuredFace) -> MeshC
     distances = [
         np.linalg.norm(target.surface.nearest(corners)[1] - corners, axis=1).min()
         for target, corners in (
-            (reference, np.asarray(moving.surface.mesh.vertices)),
-            (moving, np.asarray(reference.surface.mesh.vertices)),
+            (reference, moving.surface.vertices),
+            (moving, reference.surface.vertices),
         )
     ]
     try:

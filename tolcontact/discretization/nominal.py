@@ -129,7 +129,7 @@ class ContactPoints:
     def moving_plane(self) -> tuple[np.ndarray, np.ndarray]:
         """The normal (3,) of a flat moving face, and a point (3,) [mm] of it."""
         assert self.moving_face is not None
-        return self.moving_face.corner_normals[0, 0], np.asarray(self.moving_face.mesh.vertices)[0]
+        return self.moving_face.corner_normals[0, 0], self.moving_face.vertices[0]
 
     def form(self, deviations: np.ndarray) -> PairForm:
         """Return the forms of both faces for deviations (row, contributor)."""

@@ -200,7 +200,7 @@ def _plane(face: Surface, deviation: FaceDeviation | None) -> Plane:
     """Return a flat face with the table of its form."""
     frame = face_frame(face.mesh)
     axes, origin = np.ascontiguousarray(frame.axes[:, :2].T), np.asarray(frame.centre)
-    vertices = (np.asarray(face.mesh.vertices) - origin) @ axes.T
+    vertices = (face.vertices - origin) @ axes.T
     corners = np.array([vertices.min(axis=0), vertices.max(axis=0)])
     form = None if deviation is None else deviation.form
     no_table = HeightTable(np.zeros(2), 1.0, np.zeros((0, 0, 0)))
@@ -210,7 +210,7 @@ def _plane(face: Surface, deviation: FaceDeviation | None) -> Plane:
 
 def _edges(face: Surface, vertices: np.ndarray) -> np.ndarray:
     """Return the edges (edge, 7) of the rim of a flat face, see Plane; `vertices` (vertex, 2) [mm] are its coordinates."""
-    faces = np.asarray(face.mesh.faces)
+    faces = face.faces
     triangle, first = np.nonzero(on_rim(faces))
     start, end, opposite = (vertices[faces[triangle, (first + k) % 3]] for k in range(3))
     length = np.linalg.norm(end - start, axis=1, keepdims=True)

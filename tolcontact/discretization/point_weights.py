@@ -104,7 +104,7 @@ def _elements(
     is_fine   whether elements are also small where a whole region counts
     """
     size = max(moving.mesh.area / min(ELEMENTS_PER_POINT * len(P_m), MAX_ELEMENTS), 0.0) ** 0.5
-    vertices, faces = np.asarray(moving.mesh.vertices), np.asarray(moving.mesh.faces)
+    vertices, faces = moving.vertices, moving.faces
     if region is not None:
         vertices, faces = region.reshape(-1, 3), np.arange(3 * len(region)).reshape(-1, 3)
     if not len(faces):
@@ -125,7 +125,7 @@ def _elements(
 def _is_within(points: np.ndarray, reference: Surface, distance: float) -> bool:
     """Return whether the convex hull of points (point, 3) over a flat reference face is within a distance [mm] of it."""
     n = reference.corner_normals.reshape(-1, 3).mean(axis=0)
-    heights, levels = points @ n, np.asarray(reference.mesh.vertices) @ n
+    heights, levels = points @ n, reference.vertices @ n
     return bool(max(heights.max() - levels.min(), levels.max() - heights.min()) <= distance * np.linalg.norm(n))
 
 

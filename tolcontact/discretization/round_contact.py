@@ -55,7 +55,7 @@ def _pieces(face: Surface) -> list[Piece]:
     for number in range(label.max() + 1):
         flat = remainder.part(np.flatnonzero(label == number))
         n = (np.asarray(flat.mesh.face_normals) * np.asarray(flat.mesh.area_faces)[:, None]).sum(axis=0)
-        pieces.append(Piece(Plane(np.asarray(flat.mesh.vertices)[0], n / np.linalg.norm(n)), False, flat))
+        pieces.append(Piece(Plane(flat.vertices[0], n / np.linalg.norm(n)), False, flat))
     return pieces
 
 
@@ -145,7 +145,7 @@ class _ContactLine:
     def places(self, start: float, end: float) -> np.ndarray:
         """Return places from `start` to `end` that miss no part of the faces: even ones, all vertices, and midpoints."""
         shaft = self._body.surface
-        vertices = [np.asarray(piece.face.mesh.vertices) for piece in (self._body, self._wall)]
+        vertices = [piece.face.vertices for piece in (self._body, self._wall)]
         of_vertices = np.concatenate(list(map(shaft.along, vertices)))
         places = np.unique(np.concatenate([np.linspace(start, end, AXIS_PLACES + 1), of_vertices.clip(start, end)]))
         return np.unique(np.concatenate([places, (places[1:] + places[:-1]) / 2]))
@@ -172,7 +172,7 @@ def _shaft_on_plane(body: Piece, shaft: Cylinder, wall: Piece, reach: float, on_
     if opening < math.pi and -n @ towards < math.cos(max(opening - ARC_MARGIN, 0)):
         raise NotRoundError  # after a small rotation the shaft's edge touches, or the face next to it
     line = _ContactLine(body, wall)
-    start, end = shaft.extent(np.asarray(body.face.mesh.vertices))
+    start, end = shaft.extent(body.face.vertices)
     places = line.places(start, end)
     touching = np.flatnonzero(line.is_touching(places))
     if not touching.size or height <= -shaft.radius:
@@ -206,7 +206,7 @@ def _shaft_in_hole(
     body: Piece, shaft: Cylinder, wall: Piece, hole: Cylinder, reach: float, on_moving: bool
 ) -> list[RoundPoint]:
     """Return the points of a shaft in a parallel hole: at the first end of either, the nearest and the tangent planes."""
-    (start, end), (lower, upper) = (shaft.extent(np.asarray(piece.face.mesh.vertices)) for piece in (body, wall))
+    (start, end), (lower, upper) = (shaft.extent(piece.face.vertices) for piece in (body, wall))
     tolerance = SAME_PLACE * max(body.face.mesh.scale, wall.face.mesh.scale)
     ends = ((max(start, lower), start >= lower - tolerance), (min(end, upper), end <= upper + tolerance))
     offsets = [shaft.origin + place * shaft.axis - hole.origin for place, _ in ends]

@@ -44,7 +44,7 @@ def arc(wall: Piece) -> tuple[np.ndarray, float]:
     """
     if isinstance(wall.surface, Sphere):
         return _cap(wall, wall.surface)
-    vertices, axis = np.asarray(wall.face.mesh.vertices), wall.surface.axis
+    vertices, axis = wall.face.vertices, wall.surface.axis
     across = vertices - wall.surface.origin
     across -= (across @ axis)[:, None] * axis
     across = across[np.linalg.norm(across, axis=1) > SAME_PLACE * wall.face.mesh.scale]
@@ -68,7 +68,7 @@ def arc(wall: Piece) -> tuple[np.ndarray, float]:
 
 def _check_area(wall: Piece, opening: float) -> None:
     """Raise NotRoundError if a cylinder or cone has less area than its whole arc from end to end of its axis."""
-    along = wall.surface.along(np.asarray(wall.face.mesh.vertices))
+    along = wall.surface.along(wall.face.vertices)
     if isinstance(wall.surface, Cylinder):
         expected = 2 * opening * wall.surface.radius * float(np.ptp(along))
     elif isinstance(wall.surface, Cone):
@@ -117,7 +117,7 @@ def tangent_directions(wall: Piece) -> Sequence[np.ndarray]:
 
 def _directions_across(wall: Piece, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return two unit vectors across x (3,) and each other; the first towards the vertex most distant from x."""
-    across = np.asarray(wall.face.mesh.vertices) - wall.surface.origin
+    across = wall.face.vertices - wall.surface.origin
     across -= (across @ x)[:, None] * x
     y = across[np.linalg.norm(across, axis=1).argmax()]
     y /= np.linalg.norm(y)

@@ -311,7 +311,7 @@ def _in_place(part: Part, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def _cut(surface: Surface, box: Inside, margin: float) -> Surface:
-    vertices, faces = _sliced(np.asarray(surface.mesh.vertices), np.asarray(surface.mesh.faces), box, margin)
+    vertices, faces = _sliced(surface.vertices, surface.faces, box, margin)
     cut = trimesh.Trimesh(vertices, faces, process=False)
     cut.merge_vertices()
     cut.update_faces(cut.area_faces > 0)

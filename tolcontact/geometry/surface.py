@@ -22,6 +22,7 @@ MAX_BULGE = 0.05  # of a face's size: between a triangle and the analytic surfac
 class Surface:
     """The triangles of a face, with a search tree for nearest points.
 
+    vertices, faces  (vertex, 3) [mm] and (face, 3), both contiguous
     corner_normals   (face, 3, 3): outward unit normals at the corners of each triangle, interpolated inside the triangle; by
                      default they follow from the neighbouring facets
     surfaces         analytic surfaces; where a triangle approximates one, projections and normals refer to that surface
@@ -39,8 +40,8 @@ class Surface:
         self.surfaces = tuple(surfaces)
         self.surface_numbers = np.full(len(mesh.faces), -1) if surface_numbers is None else surface_numbers
         self._stated_normals = corner_normals
-        self._vertices = np.ascontiguousarray(mesh.vertices, dtype=np.float64)
-        self._faces = np.ascontiguousarray(mesh.faces, dtype=np.int64)
+        self.vertices = np.ascontiguousarray(mesh.vertices, dtype=np.float64)
+        self.faces = np.ascontiguousarray(mesh.faces, dtype=np.int64)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state for other processes, which build their own search tree."""
@@ -103,8 +104,8 @@ class Surface:
 
     def part(self, faces: np.ndarray) -> "Surface":
         """Return the surface of a subset of the triangles (face,)."""
-        used, renumbered = np.unique(self._faces[faces], return_inverse=True)
-        mesh = trimesh.Trimesh(self._vertices[used], renumbered.reshape(-1, 3), process=False)
+        used, renumbered = np.unique(self.faces[faces], return_inverse=True)
+        mesh = trimesh.Trimesh(self.vertices[used], renumbered.reshape(-1, 3), process=False)
         return Surface(mesh, self.corner_normals[faces], self.surfaces, self.surface_numbers[faces])
 
     @cached_property
@@ -120,32 +121,32 @@ class Surface:
 
     @cached_property
     def _tree(self) -> igl.AABB:
-        return triangle_tree(self._vertices, self._faces)
+        return triangle_tree(self.vertices, self.faces)
 
     @cached_property
     def _rim_edges(self) -> np.ndarray:
         """Mask (face, edge) of the edges on the rim."""
-        return on_rim(self._faces)
+        return on_rim(self.faces)
 
     @cached_property
     def rim(self) -> np.ndarray:
         """The vertex indices (edge, 2) of the edges on the rim."""
-        return rim(self._faces)
+        return rim(self.faces)
 
     @property
     def rim_ends(self) -> np.ndarray:
         """The ends (edge, 2, 3) [mm] of the edges on the rim."""
-        return self._vertices[self.rim]
+        return self.vertices[self.rim]
 
     @property
     def rim_corners(self) -> np.ndarray:
         """The vertices (corner, 3) [mm] on the rim."""
-        return self._vertices[np.unique(self.rim)]
+        return self.vertices[np.unique(self.rim)]
 
     @cached_property
     def _rim_corners(self) -> np.ndarray:
         """Mask (face, corner) of the corners on the rim."""
-        return np.isin(self._faces, self.rim)
+        return np.isin(self.faces, self.rim)
 
     @cached_property
     def is_flat(self) -> bool:
@@ -155,7 +156,7 @@ class Surface:
         size = np.linalg.norm(n)
         if size == 0:  # opposite normals cancel
             return False
-        heights = self._vertices @ (n / size)
+        heights = self.vertices @ (n / size)
         return bool(np.ptp(heights) < SAME_PLACE * self.mesh.scale and (normals @ n).min() > 0)
 
     @cached_property
@@ -180,7 +181,7 @@ class Surface:
     def nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the triangle (point,), and the point on it (point, 3) [mm], nearest to each of `points` (point, 3) [mm]."""
         points = np.ascontiguousarray(points, dtype=np.float64)
-        _, triangle, nearest = self._tree.squared_distance(self._vertices, self._faces, points)
+        _, triangle, nearest = self._tree.squared_distance(self.vertices, self.faces, points)
         return triangle, nearest
 
     def normals(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -194,7 +195,7 @@ class Surface:
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "Surface":
         """Return the surface rotated by R (3, 3), then translated by t (3,) [mm]."""
-        mesh = trimesh.Trimesh(np.asarray(self.mesh.vertices) @ R.T + t, self.mesh.faces, process=False)
+        mesh = trimesh.Trimesh(self.vertices @ R.T + t, self.mesh.faces, process=False)
         surfaces = [surface.placed(R, t) for surface in self.surfaces]
         return Surface(mesh, self.corner_normals @ R.T, surfaces, self.surface_numbers)
 
