@@ -80,7 +80,7 @@ def contact_points(
         P_m=P_m,
         P_r=P_r - rounding * n_r if rounding else P_r,
         n_r=n_r,
-        offsets=Offsets.none(len(P_m)),
+        offsets=Offsets.joined([], len(P_m)),
         reference_face=reference_face,
         moving_face=moving_face,
         coordinate_error=rounding,
@@ -193,7 +193,7 @@ def _height_offsets(points: ContactPoints) -> Offsets:
             offsets.append(Offsets(face.columns[face.height != 0], np.outer(face.height[face.height != 0], share)))
         if face is not None and face.form is not None:
             offsets.append(Offsets(face.form_columns, face.form.heights(P).T * share))
-    return Offsets.joined(offsets, len(facing)) if offsets else Offsets.none(len(facing))
+    return Offsets.joined(offsets, len(facing))
 
 
 def _check_number(points: float, subject: str) -> None:
@@ -260,4 +260,4 @@ def _support_offsets(locators: Locators, start: int, supports: np.ndarray) -> Of
             matrix = np.zeros((len(columns), len(supports)))
             matrix[:, place] = factors
             offsets.append(Offsets(columns, matrix))
-    return Offsets.joined(offsets, len(supports)) if len(offsets) > 1 else offsets[0]
+    return Offsets.joined(offsets, len(supports))

@@ -77,7 +77,9 @@ class RimPoints(NamedTuple):
 
 def rim_points(pair: ContactPoints, X_RM: Float[Array, "n 12"]) -> RimPoints:
     """Return the rim points of the reference plane of a pair at X_RM (n, 12)."""
-    rim, n, (m, corner) = pair.reference_rim, pair.n_r[0], pair.moving_plane
+    assert pair.moving_face is not None
+    rim, n = pair.reference_rim, pair.n_r[0]
+    m, corner = pair.moving_face.corner_normals[0, 0], pair.moving_face.vertices[0]
     back, along = pose.apply(pose.inverse(X_RM), rim), n @ pose.rotation(X_RM)  # (n, rim point, 3), (n, 3)
     heights = ((corner - back) @ m) / (along @ m)[:, None]
     return RimPoints(back + heights[..., None] * along[:, None], rim, heights)

@@ -125,12 +125,6 @@ class ContactPoints:
         distance = np.linalg.norm(self.moving_face.nearest(points)[1] - points, axis=1)
         return points[distance < RIM_REACH * self.moving_face.mesh.scale]
 
-    @cached_property
-    def moving_plane(self) -> tuple[np.ndarray, np.ndarray]:
-        """The normal (3,) of a flat moving face, and a point (3,) [mm] of it."""
-        assert self.moving_face is not None
-        return self.moving_face.corner_normals[0, 0], self.moving_face.vertices[0]
-
     def form(self, deviations: np.ndarray) -> PairForm:
         """Return the forms of both faces for deviations (row, contributor)."""
         return PairForm(self.deviating, deviations)

@@ -23,13 +23,8 @@ class Offsets:
     matrix: np.ndarray
 
     @classmethod
-    def none(cls, points: int) -> "Offsets":
-        """Return the offsets of points whose heights do not vary."""
-        return cls(np.zeros(0, dtype=int), np.zeros((0, points)))
-
-    @classmethod
     def joined(cls, terms: "Sequence[Offsets]", points: int) -> "Offsets":
-        """Return the sum of several offsets of the same points."""
+        """Return the sum of offsets of the same points; without terms, heights do not vary."""
         columns = np.unique(np.concatenate([np.zeros(0, dtype=int), *(term.columns for term in terms)]))
         matrix = np.zeros((len(columns), points))
         for term in terms:

@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import trimesh
@@ -50,7 +50,7 @@ class ReadingLimits:
 
 
 DEFAULT_LIMITS = ReadingLimits()
-Shape = trimesh.Trimesh  # the surface of a part in mm
+Shape: TypeAlias = trimesh.Trimesh  # the surface of a part in mm
 Key = tuple[Path, float | None]  # a file and its required chord
 Content = Product | Mapping[str, np.ndarray]  # of a STEP file, and of a mesh file as `worker` reads it
 Contents = Mapping[Key, Content | GeometryFault]
