@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import trimesh
@@ -109,13 +110,14 @@ def _ball_points(body: Piece, wall: Piece, reach: float, on_moving: bool) -> lis
         touches = [_contains(wall, wall.surface.touched(c, e)) for e in directions]
         touches += [_contains(body, c - r * wall.surface.tangent(e).axis) for e in directions]
     else:
-        directions = []
         touches = [_contains(wall, c - distance * slope), _contains(body, c - r * slope)]
     if not all(touches):
         return _no_points(wall, c[None], r + reach)
-    towards = arc(wall) if wall.is_hollow else ()
-    nearest = RoundPoint(wall.surface, wall.is_hollow, c, NO_DIRECTION, NO_DIRECTION, r, on_moving, *towards)
-    return [nearest, *nearest.tangents(directions)]
+    nearest = RoundPoint(wall.surface, wall.is_hollow, c, NO_DIRECTION, NO_DIRECTION, r, on_moving)
+    if not wall.is_hollow:
+        return [nearest]
+    towards, opening = arc(wall)
+    return [replace(nearest, towards=towards, opening=opening), *nearest.tangents(directions)]
 
 
 class _ContactLine:

@@ -178,7 +178,9 @@ class RoundPoint:
         on_wall = self.nominal()[0 if of_moving else 1]
         if isinstance(self.wall, Plane):
             return on_wall, self.radius
-        offset = self.wall.offset(on_wall)
+        offset = on_wall - self.wall.origin
+        if isinstance(self.wall, Cylinder | Cone):  # whose origin is anywhere on the axis
+            offset = offset - float(offset @ self.wall.axis) * self.wall.axis
         return on_wall - offset, float(np.linalg.norm(offset))
 
 

@@ -63,10 +63,6 @@ class AnalyticSurface(ABC):
         Where the nearest point is not unique (on an axis) the gradient is 0.
         """
 
-    def offset(self, point: np.ndarray) -> np.ndarray:
-        """Return the vector (3,) from the origin to a point (3,), without the arbitrary components of the origin."""
-        return point - self.origin
-
     def placed(self, R: np.ndarray, t: np.ndarray) -> Self:
         """Return the surface rotated by R (3, 3), then translated by t (3,) [mm]."""
         return replace(self, origin=R @ self.origin + t, axis=R @ self.axis)
@@ -137,10 +133,6 @@ class Cylinder(RoundSurface):
         radial, outward, along = self._around_axis(points)
         return self.height(radial, along), outward
 
-    def offset(self, point: np.ndarray) -> np.ndarray:
-        """Return the component of the offset perpendicular to the axis."""
-        return _across(point - self.origin, self.axis)
-
     def touched(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """Return the nearest point of the generator in a direction from the axis."""
         return self.origin + ((point - self.origin) @ self.axis) * self.axis + self.radius * direction
@@ -167,10 +159,6 @@ class Cone(RoundSurface):
         side = np.where(along < 0, -1.0, 1.0)  # the nappes meet in one line through the apex
         slope = np.cos(self.angle) * outward - (side * np.sin(self.angle))[:, None] * self.axis
         return self.height(radial, side * along), slope
-
-    def offset(self, point: np.ndarray) -> np.ndarray:
-        """Return the component of the offset perpendicular to the axis: files place cones anywhere along it."""
-        return _across(point - self.origin, self.axis)
 
     def tangent(self, direction: np.ndarray) -> Plane:
         """Return the tangent plane in a direction (3,) from the axis; its normal points inward."""
@@ -270,10 +258,6 @@ def surfaces_of(arrays: Mapping[str, np.ndarray]) -> list[AnalyticSurface | None
         None if kind < 0 else ANALYTIC_SURFACES[SURFACE_KINDS[kind]].of({name: arrays[name][number] for name in _NUMBERS})
         for number, kind in enumerate(arrays["kind"])
     ]
-
-
-def _across(vector: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    return vector - float(vector @ axis) * axis
 
 
 def _length_and_direction(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
