@@ -11,13 +11,12 @@ import trimesh
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.body_overlap import SolidBody
 from tolcontact.geometry.tolerances import ROUNDING, SAME_DIRECTION
-from tolcontact.geometry.triangle_mesh import edges
+from tolcontact.geometry.triangle_mesh import blocks, edges
 
 SPARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the smaller mesh's size: distance of the horizon beyond the least distance
 MIN_SPARE = 1e-3  # of this size: smallest permitted spare if there are too many elements
 MAX_ELEMENTS = (500, 500, 200)  # pairs of a corner and a triangle (both ways), and pairs of edges
 MAX_COMPARISONS = 30_000_000  # of triangles with triangles
-CHUNK = 1_000_000
 TINY = 1e-300
 
 
@@ -145,12 +144,11 @@ def _near_triangles(A: np.ndarray, B: np.ndarray, horizon: float) -> np.ndarray:
             "parts with a larger chord"
         )
     (lower, upper), (other_lower, other_upper) = ((low[row], up[row]) for (low, up), row in zip(boxes, rows, strict=True))
-    step = max(1, CHUNK // max(1, len(rows[1])))
     pairs = [np.zeros((0, 2), dtype=np.int64)]
-    for start in range(0, len(rows[0]), step):
-        gaps = np.maximum(other_lower - upper[start : start + step, None], lower[start : start + step, None] - other_upper)
+    for block in blocks(len(rows[0]), len(rows[1])):
+        gaps = np.maximum(other_lower - upper[block, None], lower[block, None] - other_upper)
         nearby = np.argwhere((np.maximum(gaps, 0) ** 2).sum(axis=2) <= horizon**2)
-        pairs.append(np.column_stack([rows[0][nearby[:, 0] + start], rows[1][nearby[:, 1]]]))
+        pairs.append(np.column_stack([rows[0][block][nearby[:, 0]], rows[1][nearby[:, 1]]]))
     return np.concatenate(pairs)
 
 
