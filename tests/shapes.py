@@ -16,7 +16,7 @@ BLOCK = trimesh.creation.box(bounds=[[0, 0, 0], [10, 20, 30]])
 
 def face_of(mesh, *selections):
     part = tc.Assembly("faces").part("part", tc.Mesh(mesh))
-    return patch(part.face(*selections), {part: shape(part.geometry).mesh})
+    return patch(part.face(*selections), {part: shape(part.geometry)})
 
 
 def refusal(path, content=None):

@@ -19,10 +19,10 @@ from tolcontact.cli.app import app
 from tolcontact.discretization import discretize
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder, Plane, Sphere, Torus
-from tolcontact.geometry.files import BREP, SURFACES, ReadingLimits, read_files
+from tolcontact.geometry.files import BREP, STATED_FACES, ReadingLimits, read_files
 from tolcontact.geometry.files.product import rigid_motion
 from tolcontact.geometry.files.reading import usual_chord
-from tolcontact.geometry.files.step_surfaces import credible, onto
+from tolcontact.geometry.files.step_shapes import credible, onto
 from tolcontact.geometry.files.step_text import StepText
 from tolcontact.geometry.fitting import fit_surface
 from tolcontact.geometry.shapes import shape
@@ -96,11 +96,11 @@ def test_surfaces_are_fitted_where_a_file_states_none():
 
 
 def test_vertices_of_a_step_file_lie_on_its_surfaces_in_double_precision():
-    mesh = shape(tc.Mesh(COVER)).mesh
+    mesh = shape(tc.Mesh(COVER))
     brep = np.asarray(mesh.face_attributes[BREP])
-    for number, surface in enumerate(mesh.metadata[SURFACES]):
+    for number, face in enumerate(mesh.metadata[STATED_FACES]):
         own = mesh.vertices[np.unique(mesh.faces[brep == number])]
-        assert np.abs(surface.distance(own)[0]).max() < 1e-11
+        assert np.abs(face.surface.distance(own)[0]).max() < 1e-11
     assert mesh.is_watertight
 
 
@@ -147,9 +147,9 @@ def test_bodies_of_an_assembly_have_names_places_and_sizes(file):
         found[4].at == (0, 0, 5) and found[4].lower == pytest.approx((0, 0, 5)) and found[4].upper == pytest.approx((5, 5, 10))
     )
     assert found[2].lower == pytest.approx((110, 0, 0)) and found[3].faces == 12  # with its cavity
-    own = shape(tc.Mesh(file, body="use 2")).mesh
+    own = shape(tc.Mesh(file, body="use 2"))
     assert own.bounds == pytest.approx(np.array([[0, 0, 0], [5, 5, 5]]))  # in the frame of its product
-    assert shape(tc.Mesh(file, body=5)).mesh.vertices == pytest.approx(own.vertices)
+    assert shape(tc.Mesh(file, body=5)).vertices == pytest.approx(own.vertices)
 
 
 @pytest.mark.slow
@@ -276,9 +276,9 @@ def test_a_wrong_body_has_a_message_that_lists_the_bodies(file):
 
 @pytest.mark.slow
 def test_a_file_that_would_be_too_fine_is_cut_more_coarsely(caplog):
-    whole = len(shape(tc.Mesh(COVER)).mesh.faces)
+    whole = len(shape(tc.Mesh(COVER)).faces)
     with caplog.at_level(logging.WARNING):
-        coarse = shape(tc.Mesh(COVER), read_files([tc.Mesh(COVER)], ReadingLimits(triangles=whole - 1))).mesh
+        coarse = shape(tc.Mesh(COVER), read_files([tc.Mesh(COVER)], ReadingLimits(triangles=whole - 1)))
     assert len(coarse.faces) < whole / 2 and coarse.is_watertight
     assert "triangles within 0.06 mm, since finer ones are too many" in caplog.text
     with pytest.raises(GeometryFault, match="more than the limit of 10"):
@@ -288,8 +288,8 @@ def test_a_file_that_would_be_too_fine_is_cut_more_coarsely(caplog):
 @pytest.mark.slow
 def test_one_body_alone_stands_where_its_file_puts_it(tmp_path):
     (tmp_path / "one.step").write_text(assembly(("pin", (7, 0, 0))))
-    assert shape(tc.Mesh(tmp_path / "one.step")).mesh.bounds == pytest.approx(np.array([[7, 0, 0], [12, 5, 5]]))
-    assert shape(tc.Mesh(tmp_path / "one.step", body=1)).mesh.bounds == pytest.approx(np.array([[0, 0, 0], [5, 5, 5]]))
+    assert shape(tc.Mesh(tmp_path / "one.step")).bounds == pytest.approx(np.array([[7, 0, 0], [12, 5, 5]]))
+    assert shape(tc.Mesh(tmp_path / "one.step", body=1)).bounds == pytest.approx(np.array([[0, 0, 0], [5, 5, 5]]))
     (tmp_path / "block.step").write_text(step_block())
     assert tc.bodies_in(tmp_path / "block.step")[0].at == (0, 0, 0)
 
@@ -372,7 +372,7 @@ def test_surfaces_have_the_numbers_of_the_file(name):
     placed = [axes[key] for key in re.findall(r"=PLANE\('[^']*',#(\d+)\)", text)]
     planes = np.array([[*directions[n], points[p] @ directions[n]] for p, n in placed])
     radii = np.array(re.findall(r"=CYLINDRICAL_SURFACE\('[^']*',#\d+,([^)]*)\)", text), dtype=float)
-    surfaces = shape(tc.Mesh(path)).mesh.metadata[SURFACES]
+    surfaces = [face.surface for face in shape(tc.Mesh(path)).metadata[STATED_FACES]]
     assert {surface.kind for surface in surfaces} == ({"plane", "cylinder"} if len(radii) else {"plane"})
     for surface in surfaces:
         if surface.kind == "cylinder":

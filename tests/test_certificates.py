@@ -219,7 +219,7 @@ def test_flat_faces_have_points_where_their_rims_cross():
 
 
 def _patch_of(part, direction):
-    mesh = shape(part.geometry).mesh
+    mesh = shape(part.geometry)
     return patch(part.face(direction), {part: mesh}).placed(np.eye(3), np.array(part.at))
 
 

@@ -63,7 +63,7 @@ def test_the_face_near_another_part_is_the_one_that_looks_at_it():
     a = tc.Assembly("near")
     table = a.part("table", tc.Box(50, 50, 10), at=(0, 0, -10), fixed=True)
     block = a.part("block", tc.Mesh(BLOCK), at=(30, 5, 0.2), rotation=(0, 0, np.pi / 2))
-    meshes = {part: shape(part.geometry).mesh for part in (table, block)}
+    meshes = {part: shape(part.geometry) for part in (table, block)}
     assert patch(block.face(tc.Near(table, 0.3)), meshes).mesh.area == pytest.approx(200)
     assert patch(table.face(tc.Near(block, 0.3)), meshes).mesh.area == pytest.approx(2500)
     with pytest.raises(GeometryFault, match="no triangles"):
@@ -97,7 +97,7 @@ def test_a_small_part_is_near_a_large_one_wherever_it_stands(at):
     a = tc.Assembly("pads")
     plate = a.part("plate", tc.Box(1000, 700, 2), fixed=True)
     pad = a.part("pad", tc.Box(4, 4, 2), at=(*at, 2.05))
-    meshes = {part: shape(part.geometry).mesh for part in (plate, pad)}
+    meshes = {part: shape(part.geometry) for part in (plate, pad)}
     assert patch(plate.face(tc.Near(pad, 0.1)), meshes).mesh.area == pytest.approx(700_000)
     assert patch(pad.face(tc.Near(plate, 0.1)), meshes).mesh.area == pytest.approx(16)
 
@@ -107,7 +107,7 @@ def test_what_is_near_on_a_large_barrel_is_not_the_whole_barrel():
     a = tc.Assembly("barrel")
     barrel = a.part("barrel", tc.Mesh(trimesh.creation.cylinder(200, 10, sections=700)), fixed=True)
     block = a.part("block", tc.Box(10, 10, 10), at=(200.1, -5, -5))
-    meshes = {part: shape(part.geometry).mesh for part in (barrel, block)}
+    meshes = {part: shape(part.geometry) for part in (barrel, block)}
     near = patch(barrel.face(tc.Near(block, 0.5)), meshes).mesh
     assert near.bounds[0, 0] > 199
     assert 100 < near.area < 400
@@ -119,7 +119,7 @@ def test_what_is_near_on_a_ball_are_its_lowest_triangles():
     a = tc.Assembly("ball")
     table = a.part("table", tc.Box(100, 100, 10), at=(-50, -50, -30.5), fixed=True)
     part = a.part("ball", tc.Mesh(ball))
-    meshes = {part: shape(part.geometry).mesh for part in (table, part)}
+    meshes = {part: shape(part.geometry) for part in (table, part)}
     for within in (0.55, 1.0, 3.0):
         near = patch(part.face(tc.Near(table, within)), meshes).mesh
         heights = np.asarray(near.triangles)[:, :, 2] + 20.5

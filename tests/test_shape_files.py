@@ -85,7 +85,7 @@ def test_a_gltf_file_finds_its_numbers_beside_it(tmp_path):
     for name, content in BLOCK.export(file_type="gltf").items():
         (tmp_path / name).write_bytes(content)
     (tmp_path / "model.gltf").rename(tmp_path / "block.gltf")
-    assert shape(tc.Mesh(tmp_path / "block.gltf", units="mm")).mesh.volume == pytest.approx(6000)
+    assert shape(tc.Mesh(tmp_path / "block.gltf", units="mm")).volume == pytest.approx(6000)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a pipe with a name")
@@ -93,7 +93,7 @@ def test_materials_of_an_obj_file_are_left_alone(tmp_path):
     os.mkfifo(tmp_path / "endless.mtl")
     named = b"mtllib endless.mtl\nmtllib /etc/hostname\no Geh\xe4use\nusemtl a\n" + OBJ
     (tmp_path / "block.obj").write_bytes(named)
-    assert shape(tc.Mesh(tmp_path / "block.obj")).mesh.volume == pytest.approx(6000)
+    assert shape(tc.Mesh(tmp_path / "block.obj")).volume == pytest.approx(6000)
 
 
 @pytest.mark.slow
@@ -103,7 +103,7 @@ def test_bodies_that_touch_in_one_mesh_file_are_read(suffix, tmp_path):
     for at in ((0, 0, 0), (10, 0, 0), (0, 0, -30), (10, 20, 0)):
         scene.add_geometry(BLOCK, transform=trimesh.transformations.translation_matrix(at))
     scene.export(tmp_path / f"touching.{suffix}")
-    mesh = shape(tc.Mesh(tmp_path / f"touching.{suffix}", units="mm")).mesh
+    mesh = shape(tc.Mesh(tmp_path / f"touching.{suffix}", units="mm"))
     assert mesh.volume == pytest.approx(4 * 6000)
     assert suffix == "stl" or mesh.body_count == 4
 
@@ -114,7 +114,7 @@ def test_colours_do_not_part_a_body(tmp_path):
         half = trimesh.Trimesh(BLOCK.vertices, BLOCK.faces[(BLOCK.face_normals[:, 2] > 0.5) == side])
         scene.add_geometry(half)
     scene.export(tmp_path / "coloured.glb")
-    mesh = shape(tc.Mesh(tmp_path / "coloured.glb", units="mm")).mesh
+    mesh = shape(tc.Mesh(tmp_path / "coloured.glb", units="mm"))
     assert mesh.is_watertight and len(mesh.vertices) == 8
 
 
@@ -145,7 +145,7 @@ def test_words_in_a_ply_header_are_not_its_counts(tmp_path):
         "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
     )
     (tmp_path / "one.ply").write_text(text)
-    assert len(shape(tc.Mesh(tmp_path / "one.ply")).mesh.faces) == 1
+    assert len(shape(tc.Mesh(tmp_path / "one.ply")).faces) == 1
 
 
 def test_the_bodies_of_a_scene_stand_in_their_places(tmp_path):
@@ -153,7 +153,7 @@ def test_the_bodies_of_a_scene_stand_in_their_places(tmp_path):
     for k in range(3):
         scene.add_geometry(BLOCK, transform=trimesh.transformations.translation_matrix((20 * k, 0, 5 * k)))
     scene.export(tmp_path / "three.glb")
-    mesh = shape(tc.Mesh(tmp_path / "three.glb", units="mm")).mesh
+    mesh = shape(tc.Mesh(tmp_path / "three.glb", units="mm"))
     assert mesh.body_count == 3
     assert mesh.bounds.tolist() == [[0, 0, 0], [50, 20, 40]]
     assert mesh.volume == pytest.approx(3 * BLOCK.volume)

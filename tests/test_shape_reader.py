@@ -69,7 +69,7 @@ def test_numbers_that_are_not_finite_are_named(tmp_path):
         said = refusal(tmp_path / "endless.step", content)
         assert f"holds the number {number}, which is not finite" in said and "export it again" in said
     (tmp_path / "named.step").write_text(step_block().replace("'part'", "'(inf)'"))
-    assert shape(tc.Mesh(tmp_path / "named.step")).mesh.is_watertight
+    assert shape(tc.Mesh(tmp_path / "named.step")).is_watertight
 
 
 @pytest.mark.slow
@@ -163,7 +163,7 @@ def test_a_new_process_reads_the_files_if_the_early_one_is_gone(tmp_path, early_
     early_process.kill()
     early_process.wait()
     (tmp_path / "block.step").write_text(step_block())
-    assert shape(tc.Mesh(tmp_path / "block.step")).mesh.is_watertight
+    assert shape(tc.Mesh(tmp_path / "block.step")).is_watertight
 
 
 def test_a_process_that_nobody_needs_ends_with_its_parent(early_process):
@@ -203,4 +203,4 @@ def test_nothing_is_printed_and_nothing_left_behind(tmp_path, capfd, monkeypatch
     refusal(tmp_path / "rotten.step", step_block().replace("VERTEX_POINT", "VERTEX_PINT"))
     assert capfd.readouterr() == ("", "")
     assert [path.name for path in tmp_path.iterdir()] == ["rotten.step"]
-    assert np.isfinite(shape(tc.Mesh(BLOCK)).mesh.vertices).all()
+    assert np.isfinite(shape(tc.Mesh(BLOCK)).vertices).all()

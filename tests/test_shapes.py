@@ -17,17 +17,17 @@ from tolcontact.geometry.shapes import shape
 def test_meshes_are_read_in_the_units_of_their_kind(suffix, tmp_path):
     path = tmp_path / f"block.{suffix}"
     BLOCK.copy().apply_scale(1e-3 if suffix == "glb" else 1).export(path)
-    mesh = shape(tc.Mesh(path)).mesh
+    mesh = shape(tc.Mesh(path))
     assert mesh.extents == pytest.approx([10, 20, 30], rel=1e-6)
     assert mesh.is_watertight and len(mesh.vertices) == 8
-    assert shape(tc.Mesh(path, units="in")).mesh.extents[0] == pytest.approx(254 if suffix != "glb" else 0.254, rel=1e-6)
+    assert shape(tc.Mesh(path, units="in")).extents[0] == pytest.approx(254 if suffix != "glb" else 0.254, rel=1e-6)
 
 
 def test_a_trimesh_is_taken_in_its_own_units_and_stays_as_it_was():
     own = BLOCK.copy()
     own.units = "inches"
-    assert shape(tc.Mesh(own)).mesh.extents == pytest.approx([254, 508, 762])
-    assert shape(tc.Mesh(own, units="mm")).mesh.extents == pytest.approx([10, 20, 30])
+    assert shape(tc.Mesh(own)).extents == pytest.approx([254, 508, 762])
+    assert shape(tc.Mesh(own, units="mm")).extents == pytest.approx([10, 20, 30])
     assert own.extents == pytest.approx([10, 20, 30])
     own.units = "furlong"
     with pytest.raises(GeometryFault, match="furlong"):
@@ -35,7 +35,7 @@ def test_a_trimesh_is_taken_in_its_own_units_and_stays_as_it_was():
 
 
 def test_step_comes_in_mm_with_flat_faces_where_they_were_drawn():
-    mesh = shape(tc.Mesh(HOUSING)).mesh
+    mesh = shape(tc.Mesh(HOUSING))
     assert mesh.is_watertight
     assert mesh.bounds.tolist() == [[0, 0, 0], [120, 80, 40]]
     top = mesh.triangles[mesh.face_normals[:, 2] > 0.999]

@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 from tests import cases
 from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.discretization import discretize
-from tolcontact.discretization.scenes import movers
 from tolcontact.statistics import DisplacementFields, intervals
 from tolcontact.statistics.sample import Sample
 
@@ -120,7 +119,7 @@ def test_fields_equal_the_plain_sums_over_realizations(magnitudes):
         fields.merge(fields.sums(poses[first:last], first))
     for index, (part, field) in enumerate(zip(nominal.parts, fields.fields(), strict=True)):
         assert field[terms.FIELD_REALIZATIONS] == 700 and field[terms.MAGNITUDE_REALIZATIONS] == magnitudes
-        for state in (0, 1) if movers(nominal.assembly, part.part, springs=False) else (0,):
+        for state in (0, 1) if part.movers else (0,):
             u = displacements(part, poses[:, state, index])
             few = u[:magnitudes, :, 3]
             assert np.abs(field[terms.FIELD_MEAN][state, :, :3] - u[..., :3].mean(axis=0)).max() < 1e-9

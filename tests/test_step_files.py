@@ -8,7 +8,7 @@ import tolcontact as tc
 from tests.shapes import refusal
 from tests.step_files import Step, assembly, corners, step_block, step_of
 from tolcontact.geometry.faces import patch
-from tolcontact.geometry.files import SURFACES
+from tolcontact.geometry.files import STATED_FACES
 from tolcontact.geometry.shapes import shape
 
 SEVERAL = {
@@ -84,7 +84,7 @@ ONE = {
 def test_one_body_is_read_whatever_it_consists_of(kind, tmp_path):
     content, volume, closed = ONE[kind]
     (tmp_path / "one.step").write_text(content)
-    mesh = shape(tc.Mesh(tmp_path / "one.step")).mesh
+    mesh = shape(tc.Mesh(tmp_path / "one.step"))
     assert mesh.is_watertight == closed
     assert volume is None or mesh.volume == pytest.approx(volume)
 
@@ -96,7 +96,7 @@ def test_edges_shorter_than_can_be_resolved_do_no_harm(tmp_path):
     cornered, faces = cut_corner(size, cut)
     made.product("cut", [made.add(f"MANIFOLD_SOLID_BREP('',#{made.shell(cornered, faces=faces)})")])
     (tmp_path / "cut.step").write_text(str(made))
-    mesh = shape(tc.Mesh(tmp_path / "cut.step")).mesh
+    mesh = shape(tc.Mesh(tmp_path / "cut.step"))
     assert mesh.is_watertight and mesh.volume == pytest.approx(size**3)
     assert (mesh.area_faces > 0).all()
 
@@ -133,7 +133,7 @@ def test_shapes_in_other_files_are_named(tmp_path):
     drawing = external("drawing.pdf")
     drawing.product("part", [drawing.solid((0, 0, 0), (10, 10, 10))])
     (tmp_path / "drawn.step").write_text(str(drawing))
-    assert shape(tc.Mesh(tmp_path / "drawn.step")).mesh.is_watertight
+    assert shape(tc.Mesh(tmp_path / "drawn.step")).is_watertight
 
 
 def test_coloured_faces_of_a_step_file_are_still_faces(tmp_path):
@@ -143,7 +143,7 @@ def test_coloured_faces_of_a_step_file_are_still_faces(tmp_path):
     made.paint(shell, red=1.0)
     (tmp_path / "painted.step").write_text(str(made))
     part = tc.Assembly("painted").part("block", tc.Mesh(tmp_path / "painted.step"))
-    meshes = {part: shape(part.geometry).mesh}
+    meshes = {part: shape(part.geometry)}
     for at, area in (((5, 10, 0), 200), ((5, 10, 30), 200), ((0, 10, 15), 600), ((5, 0, 15), 300)):
         assert patch(part.face(tc.Brep(at)), meshes).mesh.area == pytest.approx(area)
 
@@ -155,7 +155,7 @@ def test_a_face_that_stands_twice_counts_once(tmp_path, caplog):
     made.product("twice", [made.add(f"MANIFOLD_SOLID_BREP('',#{shell})")])
     (tmp_path / "twice.step").write_text(str(made))
     with caplog.at_level("INFO"):
-        mesh = shape(tc.Mesh(tmp_path / "twice.step")).mesh
+        mesh = shape(tc.Mesh(tmp_path / "twice.step"))
     assert mesh.is_watertight and mesh.volume == pytest.approx(6000) and len(tc.faces_in(tmp_path / "twice.step")) == 6
     assert "2 triangles that stand twice are left out" in caplog.text
 
@@ -171,6 +171,6 @@ def test_a_face_on_a_part_of_a_spline_surface_is_read(tmp_path):
     step.lines[plane] = f"RECTANGULAR_TRIMMED_SURFACE('',#{spline},0.1,0.9,0.1,0.9,.T.,.T.)"
     step.product("block", [block])
     (tmp_path / "block.step").write_text(str(step))
-    mesh = shape(tc.Mesh(tmp_path / "block.step")).mesh
+    mesh = shape(tc.Mesh(tmp_path / "block.step"))
     assert mesh.volume == pytest.approx(6000)
-    assert [surface.kind for surface in mesh.metadata[SURFACES]] == ["plane"] * 6
+    assert [face.surface.kind for face in mesh.metadata[STATED_FACES]] == ["plane"] * 6

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from tolcontact.geometry.subdivision import subdivided
+from tolcontact.geometry.triangle_mesh import subdivided
 
 MESHES = {
     "box": trimesh.creation.box((100, 20, 3)),

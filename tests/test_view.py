@@ -20,7 +20,7 @@ from tolcontact.report import write_view
 def chosen(part, words):
     """The triangles that the words of a face choose."""
     face = eval(f"part.{words}", {"part": part, "tc": tc})
-    return triangles(face, {part: shape(part.geometry).mesh})
+    return triangles(face, {part: shape(part.geometry)})
 
 
 GEOMETRIES = {
@@ -46,7 +46,7 @@ def test_words_choose_the_face_that_they_are_of(name):
     for face, words in zip(found.descriptions, found.snippets, strict=True):
         own = np.flatnonzero(found.face_of == face.number - 1)
         if "tc.Inside" in words:  # boxes cut: what they leave has the same area
-            mesh = shape(part.geometry).mesh
+            mesh = shape(part.geometry)
             area = patch(eval(f"part.{words}", {"part": part, "tc": tc}), {part: mesh}).mesh.area
             assert area == pytest.approx(mesh.area_faces[own].sum(), rel=1e-4)
         else:

@@ -212,7 +212,7 @@ def test_holes_by_hand_are_the_patterns_of_an_assembly():
 
 def test_a_slot_is_chosen_by_any_of_its_faces():
     part = tc.Assembly("cover").part("cover", tc.Mesh(MODELS / "cover.step"))
-    meshes = {part: shape(part.geometry).mesh}
+    meshes = {part: shape(part.geometry)}
     slot = [12, 13, 14, 15]
     selections = [tc.Brep(*slot), *(tc.Brep(number, whole="slot") for number in slot)]
     masks = {tuple(triangles(part.face(selection), meshes)) for selection in selections}

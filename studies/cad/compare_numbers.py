@@ -54,7 +54,7 @@ def main() -> None:
             continue
         files += 1
         stated[:, 3:], radii = stated[:, 3:] * size, radii * size
-        for surface in (surface for shape in content.shapes for surface in shape.surfaces if surface is not None):
+        for surface in (face.surface for shape in content.shapes for face in shape.faces if face.surface is not None):
             if surface.kind == "plane":
                 own = np.array([*surface.axis, surface.axis @ surface.origin])
                 off = min(np.abs((stated - sign * own) * [FAR, FAR, FAR, 1]).max(axis=1).min() for sign in (1, -1))

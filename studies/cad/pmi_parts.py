@@ -69,7 +69,7 @@ def contributors(declared: DeclaredFile) -> int:
     """Return the number of contributors of all parts, each held by six points that do not vary."""
     model = tc.Assembly("parts").replaced(parts=declared.parts)
     for part in declared.parts:
-        low, high = shape(part.geometry).mesh.bounds
+        low, high = shape(part.geometry).bounds
         x, y, _ = low + np.eye(3) * (high - low).max()
         points = {"z1": low, "z2": x, "z3": y, "y1": low, "y2": x, "x1": low}
         model.locate(part, [tc.Locator(name, point, name[0], 0.0) for name, point in points.items()])

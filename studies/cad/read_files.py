@@ -24,7 +24,7 @@ def off(product: Product) -> dict[str, float]:
     """How far vertices lie off the surfaces that the file states, by their kind [mm]."""
     worst: dict[str, float] = {}
     for shape in product.shapes:
-        for number, surface in enumerate(shape.surfaces):
+        for number, surface in enumerate(face.surface for face in shape.faces):
             vertices = shape.vertices[np.unique(shape.triangles[shape.brep == number])]
             if surface is not None and len(vertices):
                 worst[surface.kind] = max(worst.get(surface.kind, 0.0), float(np.abs(surface.distance(vertices)[0]).max()))
@@ -42,7 +42,7 @@ def read(path: Path) -> dict:
     return record | {
         "bodies": len(content.bodies),
         "faces": sum(len(np.unique(body.shape.brep)) for body in content.bodies),
-        "analytic": sum(surface is not None for shape in content.shapes for surface in shape.surfaces),
+        "analytic": sum(face.surface is not None for shape in content.shapes for face in shape.faces),
         "of": content.face_count,
         "triangles": sum(len(shape.triangles) for shape in content.shapes),
         "off": off(content),

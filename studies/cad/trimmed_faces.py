@@ -20,10 +20,10 @@ import tolcontact as tc
 from studies.cad.exact_edges import Curve, FaceInText, Missing, Surface, Text
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface
-from tolcontact.geometry.edges import rim
-from tolcontact.geometry.files import BREP, STATED_FACES, SURFACES, read_files
+from tolcontact.geometry.files import BREP, STATED_FACES, read_files
 from tolcontact.geometry.files.product import Product
 from tolcontact.geometry.files.step_text import StepText
+from tolcontact.geometry.triangle_mesh import rim
 
 CHORD = 0.02  # [mm]
 WITH_RECORDS = b"#999999999=GEOMETRIC_ITEM_SPECIFIC_USAGE('','',$,$,$);"  # for which the reader looks for the records of faces
@@ -172,11 +172,11 @@ def faces_of(path: Path) -> Iterator[ReadFace]:
     for number in range(1, len(product.bodies) + 1):
         mesh = product.part(number)
         brep, triangles = np.asarray(mesh.face_attributes[BREP]), np.asarray(mesh.triangles)
-        for k, (face, surface) in enumerate(zip(mesh.metadata[STATED_FACES], mesh.metadata[SURFACES], strict=True)):
+        for k, face in enumerate(mesh.metadata[STATED_FACES]):
             record = face.records[0]
             if record not in visited and face.measure is not None:
                 visited.add(record)
-                yield ReadFace(record, surface, face.measure.area, triangles[brep == k], unit, float(mesh.scale))
+                yield ReadFace(record, face.surface, face.measure.area, triangles[brep == k], unit, float(mesh.scale))
 
 
 def main() -> None:

@@ -17,7 +17,6 @@ import tolcontact as tc
 from studies.certificates.scenes import scene
 from tolcontact.compilation import Program
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
-from tolcontact.geometry.curvature import chord_height
 from tolcontact.simulation import Block, simulate_blocks
 from tolcontact.testing.referee import ArchivedPoint
 from tolcontact.vocabulary import CORRECTED, RAW, Status
@@ -78,8 +77,8 @@ def contradictions(program: tc.Program, run: dict[str, np.ndarray]) -> collectio
                     limit = (
                         0.01 * nominal.assembly.smallest_zone()
                         + pair.facets
-                        + chord_height(pair.moving_face)
-                        + chord_height(pair.reference_face)
+                        + pair.moving_face.chord_height
+                        + pair.reference_face.chord_height
                         + 1e-6 * size
                         + shifted(sides, pair)
                     )

@@ -19,7 +19,7 @@ from tolcontact.declaration import Mesh
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.features import FaceDeviation
 from tolcontact.geometry import known_surfaces, surface_arrays
-from tolcontact.geometry.coordinate_error import COORDINATE_SPACING, coordinate_spacing
+from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING, coordinate_spacing
 from tolcontact.vocabulary import ArchiveVariable
 
 

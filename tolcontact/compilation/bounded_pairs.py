@@ -10,7 +10,6 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.discretization import ContactPoints, Nominal, raised_places
 from tolcontact.errors import ContactWarning, ModelError, shown
-from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.meeting import Meeting, Reach, meeting
 from tolcontact.interference import Watch
 
@@ -67,7 +66,7 @@ def bounded_pair(
     nothing = None, Trial(np.nan, np.nan)
     if pair.moving_face is None or pair.reference_face is None or pair.reference is None or pair.round is not None:
         return nothing
-    is_smooth = not pair.has_form or (is_flat(pair.moving_face) and is_flat(pair.reference_face))
+    is_smooth = not pair.has_form or (pair.moving_face.is_flat and pair.reference_face.is_flat)
     if pair.is_springy or not np.isfinite(smallest) or not is_smooth:
         return nothing
     highest = float(np.abs(pair.heights(deviations)).max())

@@ -4,7 +4,6 @@
 """
 
 from tolcontact.discretization.coordinates_in_words import coordinates_in_words
-from tolcontact.discretization.counted_points import counted_points
 from tolcontact.discretization.discretizing import discretize
 from tolcontact.discretization.form_places import FIRST_POINT, raised_places, rim_points
 from tolcontact.discretization.locators import Locators, NominalPart
@@ -14,5 +13,5 @@ from tolcontact.discretization.round_points import RoundPoint, RoundPoints
 
 __all__ = [
     "FIRST_POINT", "ContactPoints", "Locators", "Nominal", "NominalPart", "Offsets", "RoundPoint",
-    "RoundPoints", "coordinates_in_words", "counted_points", "discretize", "raised_places", "rim_points",
+    "RoundPoints", "coordinates_in_words", "discretize", "raised_places", "rim_points",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Contact points: of the moving face of a pair with their feet on the reference face, and locators as pairs of their own."""
+"""Contact points: points of the moving face of a pair, projected onto the reference face; and locators as pairs."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,26 +27,26 @@ from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.scenes import Scene
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation, Features
-from tolcontact.geometry.coordinate_error import coordinate_error
-from tolcontact.geometry.curvature import CHORD_SHARE, curvature_points, distinct, facet_error, is_flat, sampling_error
+from tolcontact.geometry.curvature import CHORD_SHARE, curvature_points, distinct, facet_error, sampling_error
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.overlap import overlap_corners, rim_points
-from tolcontact.geometry.spreading import distinct_vertices, spread
+from tolcontact.geometry.spreading import spread, unique_points
 from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.tolerances import ROUNDING
+from tolcontact.geometry.triangle_mesh import coordinate_error
 
 DEFAULT_REACH = 0.1  # of the moving part's size
 DEFAULT_POINTS = 200
 FORM_POINTS = 10_000  # with form, if that resolves it
-DEFAULT_SPRINGS = 40  # all of which may carry at once, so that a QP has a row for each
-POINT_TOLERANCE = 1e-9  # of the part's size: points that are no farther apart are one point
+DEFAULT_SPRINGS = 40  # which may all be active at once, so that a QP has a row for each
 
 
 def contact_points(
     scene: Scene, pair: ContactPair, placed: Mapping[Part, NominalPart], meshes: Meshes, features: Features
 ) -> ContactPoints:
-    """Return the contact points of a declared pair of a scene, between the parts as `placed`.
+    """Return the contact points of a declared pair of a scene, between the parts in `placed`.
 
-    Raises GeometryFault if its faces are nowhere within reach, or point the same way.
+    Raises GeometryFault if its faces are nowhere within reach, or have the same direction.
     """
     moving, reference = placed[pair.moving.part], placed[pair.reference.part]
     unplaced = patch(pair.moving, meshes)
@@ -80,7 +80,7 @@ def contact_points(
         P_m=P_m,
         P_r=P_r - rounding * n_r if rounding else P_r,
         n_r=n_r,
-        offsets=Offsets.none(len(P_m)),
+        offsets=Offsets.joined([], len(P_m)),
         reference_face=reference_face,
         moving_face=moving_face,
         coordinate_error=rounding,
@@ -99,12 +99,12 @@ def contact_points(
 def _spring_shares(points: ContactPoints) -> np.ndarray:
     """Return the share (point,) of each contact point in the stiffness of its pair.
 
-    Raises GeometryFault for a curved face, whose region of contact no nominal area states.
+    Raises GeometryFault for a curved face, which has no nominal area of contact.
     """
     assert points.moving_face is not None and points.reference_face is not None
     if points.round is not None:
         return np.where(points.round.points["axis"].any(axis=1), 0.5, 1.0)  # a shaft has two ends
-    if not (is_flat(points.moving_face) and is_flat(points.reference_face)):
+    if not (points.moving_face.is_flat and points.reference_face.is_flat):
         raise GeometryFault("it has a stiffness, which needs flat faces, or a ball or shaft against walls; leave stiffness out")
     return points.weights / len(points.P_m)
 
@@ -125,13 +125,13 @@ def _candidates(
 ) -> tuple[np.ndarray, float | None]:
     """Return points (point, 3) of the moving face that become contact points if they lie over the reference face.
 
-    With them comes the penetration [mm] that they may leave undetected on curved faces; None for flat ones. `mesh` is the
-    moving face in its part's own frame, `faces` are both faces in their nominal places, `lengths` are those of their forms.
+    The second result is the penetration [mm] that they may leave undetected on curved faces; None for flat ones. `mesh` is the
+    moving face in its part's own frame, `faces` are both faces in their nominal poses, `lengths` their correlation lengths.
     """
     moving_face, reference_face = faces
     undetected = None
     if isinstance(pair.points, str):
-        points = distinct_vertices(mesh)
+        points = unique_points(np.asarray(mesh.vertices))
     else:
         is_fine = lengths and _is_open(pair)
         spacing = affordable_spacing(lengths, float(mesh.area), FORM_POINTS) if is_fine else pair.spacing
@@ -143,14 +143,14 @@ def _candidates(
     if lengths:
         check_resolved(points, mesh, lengths)
     P_m, finest = moving.placed(points), assembly.smallest_zone()
-    if is_flat(moving_face) and is_flat(reference_face):
+    if moving_face.is_flat and reference_face.is_flat:
         if _is_open(pair):
             P_m = np.concatenate([P_m, overlap_corners(moving_face, reference_face)])
             if lengths:
                 P_m = with_rims(P_m, moving_face, reference_face, form_spacing(lengths), reach)
     elif math.isfinite(finest):
         P_m, undetected = _with_curvature(moving_face, reference_face, P_m, finest, reach, is_open=_is_open(pair))
-    P_m = distinct(P_m, POINT_TOLERANCE * moving.mesh.scale)
+    P_m = distinct(P_m, ROUNDING * moving.mesh.scale)
     if moving_face.surfaces:
         P_m, _, _ = moving_face.project(P_m)
     return P_m, undetected
@@ -186,14 +186,14 @@ def _deviation(face: Face, part: NominalPart, meshes: Meshes, features: Features
 
 
 def _height_offsets(points: ContactPoints) -> Offsets:
-    """Return the heights of points as faces grow, the moving one as far as they are parallel, and those of their forms."""
+    """Return the heights of the points from sizes and forms; those of the moving face count along the reference normal."""
     offsets, facing = list[Offsets](), points.facing
     for face, share, P in zip(points.deviating, (facing, np.ones_like(facing)), (points.P_m, points.P_r), strict=True):
         if face is not None and face.grows:
             offsets.append(Offsets(face.columns[face.height != 0], np.outer(face.height[face.height != 0], share)))
         if face is not None and face.form is not None:
             offsets.append(Offsets(face.form_columns, face.form.heights(P).T * share))
-    return Offsets.joined(offsets, len(facing)) if offsets else Offsets.none(len(facing))
+    return Offsets.joined(offsets, len(facing))
 
 
 def _check_number(points: float, subject: str) -> None:
@@ -212,17 +212,12 @@ def _with_curvature(
     If their choice `is_open`, points are added that follow curvature, by CHORD_SHARE of the `finest` tolerance range.
     """
     dense = curvature_points(moving_face, reference_face, chord=CHORD_SHARE * finest, within=reach)
-    if is_flat(reference_face) and moving_face.curvature > 0:
+    if reference_face.is_flat and moving_face.curvature > 0:
         step = math.sqrt(8 * CHORD_SHARE * finest / moving_face.curvature)
         dense = np.concatenate([dense, rim_points(moving_face, reference_face, step, reach)])
     if is_open:
         P_m = np.concatenate([P_m, dense])
     return P_m, sampling_error(P_m, dense, reference_face, unit=finest, within=reach)
-
-
-def supports_name(scene: Scene, part: Part) -> str:
-    """Return the name of the pair of the one-sided locators of a part."""
-    return f"supports of {part.name}" + (f" in {scene.station}" if scene.station else "")
 
 
 def support_pairs(parts: tuple[NominalPart, ...], scenes: Sequence[Scene]) -> Iterator[ContactPoints]:
@@ -235,7 +230,7 @@ def support_pairs(parts: tuple[NominalPart, ...], scenes: Sequence[Scene]) -> It
             P, n = part.locators.points[supports], part.locators.directions[supports]
             offsets = _support_offsets(part.locators, start, supports)
             scene = next(scene for scene in scenes if scene.station == part.station)
-            name = supports_name(scene, parts[owner].part)
+            name = scene.supports_name(parts[owner].part)
             stiffness = np.where(part.locators.springy, part.locators.stiffness, np.inf)[supports]
             numbers = start + supports
             yield ContactPoints(name, int(owner), part.parent, P, P, n, offsets, locators=numbers, stiffness=stiffness)
@@ -245,7 +240,7 @@ def support_pairs(parts: tuple[NominalPart, ...], scenes: Sequence[Scene]) -> It
 
 
 def _spring_pair(part: NominalPart, owner: int, start: int, number: int) -> ContactPoints:
-    """Return a two-sided locator that gives way, as the pair of a spring that pushes and one that pulls, at the same point."""
+    """Return a compliant two-sided locator as a pair: a spring that pushes and one that pulls, at the same point."""
     locators, twice = part.locators, np.array([number, number])
     P, signs = locators.points[twice], np.array([1.0, -1.0])
     heights = _support_offsets(locators, start, twice[:1])
@@ -257,7 +252,7 @@ def _spring_pair(part: NominalPart, owner: int, start: int, number: int) -> Cont
 
 
 def _support_offsets(locators: Locators, start: int, supports: np.ndarray) -> Offsets:
-    """Return the heights of supports: their own deviations, columns `start` on, and those of the faces they stand against."""
+    """Return the heights of supports: their own deviations, columns `start` on, and deviations of the faces they touch."""
     offsets = [Offsets(start + supports, np.eye(len(supports)))]
     for place, number in enumerate(supports):
         columns, factors = locators.pushes(number)
@@ -265,4 +260,4 @@ def _support_offsets(locators: Locators, start: int, supports: np.ndarray) -> Of
             matrix = np.zeros((len(columns), len(supports)))
             matrix[:, place] = factors
             offsets.append(Offsets(columns, matrix))
-    return Offsets.joined(offsets, len(supports)) if len(offsets) > 1 else offsets[0]
+    return Offsets.joined(offsets, len(supports))

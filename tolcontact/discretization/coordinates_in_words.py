@@ -1,10 +1,10 @@
-"""What is said about parts whose files round coordinates, and what contact allows for it."""
+"""A sentence about parts whose files round coordinates, and the allowance of contact for it."""
 
 import numpy as np
 
 from tolcontact.discretization.nominal import Nominal
 from tolcontact.errors import shown
-from tolcontact.geometry.coordinate_error import coordinate_error, coordinate_spacing
+from tolcontact.geometry.triangle_mesh import coordinate_error, coordinate_spacing
 from tolcontact.vocabulary import STATED_ERROR_SHARE
 
 NOTICED_SHARE = 0.01  # of the error of a pair: a smaller error of one of its parts is not stated
@@ -12,7 +12,7 @@ MAX_NAMES = 6  # of parts; how many there are beyond is a number
 
 
 def coordinates_in_words(nominal: Nominal) -> str:
-    """Return how exactly files store parts in contact, and how much contact allows for that; empty if it hardly matters."""
+    """Return the coordinate spacing of parts in contact, and the allowance of contact for it; empty if it hardly matters."""
     least = STATED_ERROR_SHARE * nominal.assembly.smallest_zone()
     stated = [pair for pair in nominal.pairs if pair.coordinate_error > least]
     if not stated:

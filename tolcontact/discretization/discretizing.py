@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import (
     Assembly,
@@ -21,16 +20,16 @@ from tolcontact.declaration import (
     Tolerance,
 )
 from tolcontact.declaration.locator import FIRST_ORDER, USUAL_STIFFNESS
-from tolcontact.discretization.contact_points import contact_points, support_pairs, supports_name
+from tolcontact.discretization.contact_points import contact_points, support_pairs
 from tolcontact.discretization.locators import FACES_OF_SCHEME, Locators, NominalPart, scheme_locators
 from tolcontact.discretization.measurements import nominal_measurements
 from tolcontact.discretization.nominal import ContactPoints, Nominal
-from tolcontact.discretization.scenes import Scene, carried, has_supports, is_free, scenes_of
+from tolcontact.discretization.scenes import Scene, carried, scenes_of
 from tolcontact.errors import GeometryFault, ModelError, designation
 from tolcontact.features import Features, Placement, datum_order
 from tolcontact.geometry.faces import Meshes
 from tolcontact.geometry.files.reading import Shape, read_files
-from tolcontact.geometry.shapes import field_surface, shape
+from tolcontact.geometry.shapes import field_surface, placement_of, shape
 from tolcontact.method import Method
 
 log = logging.getLogger(__name__)
@@ -54,15 +53,14 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
     """Return the nominal model of an assembly.
 
     An `incomplete` model may lack what only a run needs: measures, and locations of parts. Two-sided locators with a stiffness
-    give way if the objective `presses`, by default that of the assembly's own method.
+    are compliant if the objective `presses`, by default the objective of the assembly's own method.
     Raises ModelError with every fault of the declaration and of its geometry.
     """
     omissions = tuple(assembly.omissions()) if incomplete else ()
     faults = _Faults(fault for fault in assembly.faults() if fault not in omissions)
     is_sound = not faults
     assembly = assembly.in_station_order if is_sound else assembly
-    shapes = _shapes(assembly, faults)
-    meshes = {part: read.mesh for part, read in shapes.items()}
+    meshes = _shapes(assembly, faults)
     presses = (assembly.method or Method()).minimizes.presses if presses is None else presses
     scenes = scenes_of(assembly, presses=presses) if is_sound or not assembly.stations else ()
     entries = [(scene, part) for scene in scenes for part in scene.assembly.parts]
@@ -74,9 +72,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
         placements = {part.part: part.placement for part in parts if part is not None}
         parts = [
             replace(
-                _on_ground(
-                    _on_features(part, features, meshes, faults), scene.assembly.location_of(part.part), features, placements
-                ),
+                _on_features(part, scene.assembly.location_of(part.part), features, meshes, placements, faults),
                 carried=carried(scenes, scene, part.part),
             )
             for (scene, _), part in zip(entries, parts, strict=True)
@@ -87,7 +83,8 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
         log.warning("%d contact pairs: to prepare them takes about a tenth of a second each", len(assembly.pairs))
     pairs = [
         faults.attempt(designation("contact pair", pair), contact_points, scene, pair, placed, meshes, features)
-        for scene, placed in [(scene, _placed(nominal_parts, scene)) for scene in scenes]
+        for scene in scenes
+        for placed in [{nominal.part: nominal for nominal in nominal_parts if nominal.station == scene.station}]
         for pair in scene.assembly.pairs
         if not any(pair.faults()) and all(part in placed for part in (*pair.moving.parts, *pair.reference.parts))
     ]
@@ -112,7 +109,7 @@ def _nominal(
     pairs: tuple[ContactPoints, ...],
     features: Features,
 ) -> Nominal:
-    """Return the nominal model with its measurements; with stations those of all of them, station by station."""
+    """Return the nominal model with its measurements, station by station."""
     models = [
         Nominal(scene.assembly, parts, pairs, scene.assembly.measures, features, station=scene.station) for scene in scenes
     ]
@@ -122,11 +119,6 @@ def _nominal(
     measures = tuple(measure for model in models for measure in model.measures)
     measurements = tuple(measurement for model in models for measurement in model.measurements)
     return Nominal(assembly, parts, pairs, measures, features, measurements, tuple(models))
-
-
-def _placed(parts: Sequence[NominalPart], scene: Scene) -> dict[Part, NominalPart]:
-    """Return the parts of a scene by their declarations."""
-    return {nominal.part: nominal for nominal in parts if nominal.station == scene.station}
 
 
 def _shapes(assembly: Assembly, faults: _Faults) -> dict[Part, Shape]:
@@ -156,34 +148,34 @@ def _add_features(assembly: Assembly, indices: Mapping[Part, int], meshes: Meshe
             )
 
 
-def _on_features(part: NominalPart, features: Features, meshes: Meshes, faults: _Faults) -> NominalPart:
-    """Return the part with the faces of features that its locators stand against."""
-    scheme = part.scheme
-    if scheme is None:
-        return part
-    sides: Sequence[Face | Locator] = scheme.faces if isinstance(scheme, ThreeTwoOne) else scheme
-    if not any((side.part or part.part).features for side in sides):
-        return part
-    if isinstance(scheme, ThreeTwoOne):
-        place = designation("part", part.part)
-        deviations = [faults.attempt(place, features.face_at, face, meshes, placement_of(face.part)) for face in scheme.faces]
-        faces = tuple(deviations[k] for k in FACES_OF_SCHEME)
-    else:
-        faces = tuple(
-            locator.on and features.face_of(locator.on, np.array(locator.point), placement_of(locator.part or part.part))
-            for locator in scheme
-        )
-    return replace(part, locators=replace(part.locators, faces=faces))
-
-
-def _on_ground(
-    part: NominalPart, location: Location | None, features: Features, placements: Mapping[Part, Placement]
+def _on_features(
+    part: NominalPart,
+    location: Location | None,
+    features: Features,
+    meshes: Meshes,
+    placements: Mapping[Part, Placement],
+    faults: _Faults,
 ) -> NominalPart:
-    """Return the part with the feature of another part that its locators are on."""
-    if location is None or not isinstance(location.on, Feature):
-        return part
-    ground = features.middle_of(location.on, placements[location.on.part])
-    return replace(part, locators=replace(part.locators, grounds=(ground,) * len(part.locators)))
+    """Return the part with the faces of features that its locators touch, and the feature of another part that they are on."""
+    scheme, locators = part.scheme, part.locators
+    sides: Sequence[Face | Locator] = scheme.faces if isinstance(scheme, ThreeTwoOne) else scheme or ()
+    if any((side.part or part.part).features for side in sides):
+        if isinstance(scheme, ThreeTwoOne):
+            place = designation("part", part.part)
+            deviations = [
+                faults.attempt(place, features.face_at, face, meshes, placement_of(face.part)) for face in scheme.faces
+            ]
+            faces = tuple(deviations[k] for k in FACES_OF_SCHEME)
+        else:
+            faces = tuple(
+                locator.on and features.face_of(locator.on, np.array(locator.point), placement_of(locator.part or part.part))
+                for locator in scheme or ()
+            )
+        locators = replace(locators, faces=faces)
+    if location is not None and isinstance(location.on, Feature):
+        ground = features.middle_of(location.on, placements[location.on.part])
+        locators = replace(locators, grounds=(ground,) * len(locators))
+    return replace(part, locators=locators)
 
 
 def _repeated_labels(labels: Sequence[str]) -> Iterator[str]:
@@ -220,7 +212,8 @@ def _contributor_faults(assembly: Assembly, labels: Sequence[str], shifts: Set[s
 
 def _reserved_names(scene: Scene) -> Iterator[str]:
     assembly = scene.assembly
-    reserved = {supports_name(scene, part) for part in assembly.parts if has_supports(assembly, part, springs=False)}
+    rigid = replace(scene, presses=False)
+    reserved = {scene.supports_name(part) for part in assembly.parts if rigid.has_supports(part)}
     for pair in assembly.pairs:
         if pair.name in reserved:
             place = designation("contact pair", pair)
@@ -228,7 +221,7 @@ def _reserved_names(scene: Scene) -> Iterator[str]:
 
 
 def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> NominalPart | None:
-    """Return a part in its nominal place with its locators; None if it has no shape or is badly declared."""
+    """Return a part in its nominal pose with its locators; None if it has no shape or is badly declared."""
     if part not in meshes or any(part.faults()):
         return None
     mesh = meshes[part]
@@ -247,7 +240,7 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> 
     common = location.tolerance if location else None
     nominal = _locators(scene, location, locators, common, part)
     if location is not None and location.floating:
-        nominal = replace(nominal, floating=(_middle(mesh) @ R_WP.T + t_WP, float(mesh.scale)))
+        nominal = replace(nominal, floating=(_centroid(mesh) @ R_WP.T + t_WP, float(mesh.scale)))
     if len(nominal):
         place = designation("joint", location) if location and location.joint else designation("part", part)
         faults.attempt(place, nominal.check_independent)
@@ -261,7 +254,7 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> 
         locators=nominal,
         scheme=location.scheme if len(nominal) and location is not None else None,
         parent=scene.parent(part),
-        free=is_free(scene.assembly, part, springs=scene.presses),
+        free=scene.is_free(part),
         located=scene.label(location.name if location else part.name),
         movers=scene.movers(part),
         station=scene.station,
@@ -269,14 +262,9 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> 
     )
 
 
-def _middle(mesh: Any) -> np.ndarray:
-    """Return the middle (3,) of a mesh's surface."""
+def _centroid(mesh: Any) -> np.ndarray:
+    """Return the centroid (3,) of a mesh's surface."""
     return mesh.area_faces @ mesh.triangles_center / mesh.area
-
-
-def placement_of(part: Part) -> Placement:
-    """Return R (3, 3) and t (3,) [mm] of a part in the nominal assembly."""
-    return Rotation.from_rotvec(part.rotation).as_matrix(), np.array(part.at)
 
 
 def _locators(

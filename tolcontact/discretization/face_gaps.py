@@ -1,4 +1,4 @@
-"""Gaps between two faces as measurements: the places at which they are measured, and the areas that these stand for."""
+"""Gaps between two faces as measurements: the measured points, and the areas that these represent."""
 
 import numpy as np
 
@@ -6,12 +6,11 @@ from tolcontact.discretization.form_points import affordable_spacing, form_lengt
 from tolcontact.discretization.measured_geometry import FaceGap, MeasuredFace, MeasuredPoint
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.errors import GeometryFault
-from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.overlap import overlap_corners
 from tolcontact.geometry.spreading import spread
 
 DEFAULT_PLACES, FORM_PLACES, MAX_PLACES = 200, 600, 4000  # by default, of a face with form if that resolves it, at all
-MIN_SHARE = 0.04  # of a face, over which the other one is: smaller regions have fewer places
+MIN_SHARE = 0.04  # of a face, under the other one: smaller regions have fewer points
 MAX_FACING = 0.0  # cosine between the normals of faces that do not face each other
 
 
@@ -41,7 +40,7 @@ def face_gap(moving: MeasuredFace, reference: MeasuredFace, is_largest: bool) ->
 
 
 def _places(moving: MeasuredFace, reference: MeasuredFace) -> np.ndarray:
-    """Return places (place, 3) of the moving face over the reference face, also along the rim of the region that they cover."""
+    """Return points (place, 3) of the moving face over the reference face, including the rim of the common region."""
     surface, lengths = moving.surface, form_lengths([moving.deviation, reference.deviation])
     spacing = (
         affordable_spacing(lengths, surface.mesh.area, FORM_PLACES) if lengths else (surface.mesh.area / DEFAULT_PLACES) ** 0.5
@@ -51,13 +50,13 @@ def _places(moving: MeasuredFace, reference: MeasuredFace) -> np.ndarray:
     if not lengths and share < 1:
         spacing *= max(share, MIN_SHARE) ** 0.5
         places = spread(surface.mesh, None, spacing)
-    if is_flat(surface) and is_flat(reference.surface):
+    if surface.is_flat and reference.surface.is_flat:
         places = np.concatenate([places, overlap_corners(surface, reference.surface)])
         reach = float(np.ptp(np.vstack([surface.mesh.bounds, reference.surface.mesh.bounds]), axis=0).sum())
         places = with_rims(places, surface, reference.surface, spacing, reach)
     places = places[reference.surface.project(places)[2]]
     if len(places) and surface.surfaces:
-        places, _, _ = surface.project(places)  # from triangles onto the round face that they stand for
+        places, _, _ = surface.project(places)  # from triangles onto the round face that they approximate
     if len(places) > MAX_PLACES:
         raise GeometryFault(
             f"the gap between {moving.face} and {reference.face} needs {len(places)} places, by the correlation length of "

@@ -1,8 +1,8 @@
-"""Places at which faces that end can touch, with the heights of their forms there.
+"""Candidate contacts of bounded faces, with the heights of their form deviations there.
 
-Planes that end touch at the corners of their overlap. With form they also touch between these, so that contact points over the
-reference face are places, too, and so are minima of the gap between them. A height is that of the point of a face which lies
-over the other face's point at the pose.
+Bounded planes touch at the corners of their overlap. With form they also touch between these, so contact points over the
+reference face are candidates, too, and so are minima of the gap between them. The height of a face refers to its point over the
+other face's point at the pose.
 """
 
 from typing import NamedTuple
@@ -17,20 +17,20 @@ from tolcontact.geometry import region_kernel
 from tolcontact.geometry.meeting import NEARNESS, Meeting, Places
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
 
-FIRST_POINT = 1 << 40  # number of the first contact point among the labels of places
-EXACT_SHARE = 0.1  # of how far the gap may fall between points: heights in smaller gaps are exact, others those of splines
+FIRST_POINT = 1 << 40  # label of the first contact point
+EXACT_SHARE = 0.1  # of the largest dip of the gap between points: heights in smaller gaps are exact, others from splines
 POINT_GROUPS = 12  # of neighbouring contact points; the lowest of each group counts
 
 
 class RaisedPlaces(NamedTuple):
-    """Places, and the heights (n, place) [mm] by which gaps there are smaller than those of nominal faces."""
+    """Candidate contacts, and the heights (n, place) [mm] of both faces there, which reduce the nominal gaps."""
 
     places: Places
     heights: Float[Array, "n p"]
 
     @property
     def gaps(self) -> Float[Array, "n p"]:
-        """The gaps (n, place) [mm] of the faces as they are, infinite where there is no place."""
+        """The gaps (n, place) [mm] of the actual faces, infinite where there is no candidate."""
         return np.asarray(self.places.gaps - self.heights)
 
 
@@ -44,7 +44,7 @@ def raised_places(
     nearness: float = NEARNESS,
     depth: float = np.inf,
 ) -> RaisedPlaces:
-    """Return the places at which a pair can touch at X_RM (n, 12), see Meeting.at, for deviations (n, contributor).
+    """Return the candidate contacts of a pair at X_RM (n, 12), see Meeting.at, for deviations (n, contributor).
 
     Minima of the gap between contact points are among them if they are deeper than `depth` [mm].
     """
@@ -77,7 +77,9 @@ class RimPoints(NamedTuple):
 
 def rim_points(pair: ContactPoints, X_RM: Float[Array, "n 12"]) -> RimPoints:
     """Return the rim points of the reference plane of a pair at X_RM (n, 12)."""
-    rim, n, (m, corner) = pair.reference_rim, pair.n_r[0], pair.moving_plane
+    assert pair.moving_face is not None
+    rim, n = pair.reference_rim, pair.n_r[0]
+    m, corner = pair.moving_face.corner_normals[0, 0], pair.moving_face.vertices[0]
     back, along = pose.apply(pose.inverse(X_RM), rim), n @ pose.rotation(X_RM)  # (n, rim point, 3), (n, 3)
     heights = ((corner - back) @ m) / (along @ m)[:, None]
     return RimPoints(back + heights[..., None] * along[:, None], rim, heights)
@@ -86,7 +88,7 @@ def rim_points(pair: ContactPoints, X_RM: Float[Array, "n 12"]) -> RimPoints:
 def _points(
     pair: ContactPoints, X_RM: np.ndarray, deviations: np.ndarray, retained: np.ndarray | None, depth: float
 ) -> tuple[Places, np.ndarray, Places, np.ndarray]:
-    """Return points between the ends of the faces as places, and the heights (n, place) [mm] of the forms there.
+    """Return points inside the rims of the faces as candidates, and the heights (n, place) [mm] of the forms there.
 
     These are the `retained` ones, and the lowest of each group: contact points, and after these points of the rim. The minima
     of the gap between them that are deeper than `depth` [mm] follow, and their heights.
@@ -106,7 +108,7 @@ def _points(
         kept = np.where(is_point, retained - FIRST_POINT, -1)[:, is_point.any(axis=0)]
         between = np.where(retained >= FIRST_PLACE, retained, -1)
         region_kernel.keep_over(poses, P_m, feet, *regions, kept)
-    bounds = np.stack([minima.error_beside(poses, deviations), minima.bound(deviations)], axis=1)
+    bounds = np.stack([minima.projection_error(poses, deviations), minima.bound(deviations)], axis=1)
     is_promising = np.zeros(gaps.shape, dtype=bool)
     region_kernel.write_promising(poses, P_m, feet, gaps - heights, bounds, groups, *regions, kept, is_promising)
     if bounds[:, 0].any():
@@ -142,7 +144,7 @@ def _points(
 
 
 def _exact(gaps: np.ndarray, bulge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return row and place (k,) of gaps (n, place) [mm] that may touch, or be the least: their heights have to be exact."""
+    """Return the row and place (k,) of gaps (n, place) [mm] that may close or be the least: their heights must be exact."""
     least = np.maximum(gaps.min(axis=1, initial=np.inf), 0)
     row, place = np.nonzero((gaps <= (least + EXACT_SHARE * bulge)[:, None]) & np.isfinite(gaps))
     return row, place

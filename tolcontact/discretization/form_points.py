@@ -1,4 +1,4 @@
-"""Contact points of faces with form: how close they must be, and which faces they can be between."""
+"""Contact points of faces with form: their spacing, and the faces that can have them."""
 
 from collections.abc import Sequence
 
@@ -8,40 +8,38 @@ from scipy.spatial import KDTree
 
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation
-from tolcontact.geometry.analytic_surfaces import Cylinder
-from tolcontact.geometry.curvature import is_flat
+from tolcontact.geometry.analytic_surfaces import Cylinder, axes_across
 from tolcontact.geometry.overlap import rim_points
-from tolcontact.geometry.subdivision import subdivided
-from tolcontact.geometry.surface import RIM_TOLERANCE, Surface
+from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.tolerances import PARALLEL, SAME_PLACE
+from tolcontact.geometry.triangle_mesh import subdivided
 
 FACING = -0.99999  # cosine of the angle between the normals of planes that face each other
-MIN_RISE = 0.1  # per mm beside the rim of facets that face a plane: steeper facets touch it nowhere else, at usual tilts
-FLATNESS = 1e-6  # of a face's size: facets whose heights differ by less are one plane
+MIN_RISE = 0.1  # per mm from the rim of facets that face a plane: steeper facets touch it only at that rim, at usual tilts
 SPACING_SHARE = 1 / 5  # of the correlation length: the usual spacing
 ALONG_SHARE = 1 / 3  # of the correlation length: the same along the axis of cylinders, whose lines are straight
 MIN_AZIMUTHS = 48  # of a cylinder
 END_SHARE = 1e-6  # of the length: how far inside their ends the outermost points of cylinders are
-PARALLEL_TOLERANCE = 1e-3  # rad between the axes of cylinders
 MAX_SPACING_SHARE = 1 / 2
-WIDE_SPACING_SHARE = 2 / 5  # the usual spacing of many points: spreads leave some places farther away
-COVER_SHARE = 0.71  # of the spacing of a square grid: the distance of the middle of a square from the nearest point
-SQUARE_SHARE = 1.25  # of the area of a square of the grid: what a point of a spread covers, at least
+WIDE_SPACING_SHARE = 2 / 5  # the usual spacing of many points: a spread leaves some points of the face further away
+COVER_SHARE = 0.71  # of the spacing of a square grid: the distance from the centre of a square to the nearest point
+SQUARE_SHARE = 1.25  # of the area of a grid square: the least area that a point of a spread covers
 MIN_DISTANCE_SHARE = 1 / 4  # of the spacing: points of a rim that are nearer to others are left out
 EDGES = 8  # of the triangles whose corners are compared with contact points, in a correlation length
 
 
 def form_lengths(deviating: Sequence[FaceDeviation | None]) -> list[float]:
-    """Return the lengths [mm] over which the heights of the faces that have form change."""
+    """Return the correlation lengths [mm] of the faces that have form."""
     return [min(face.form.scales) for face in deviating if face is not None and face.form is not None]
 
 
 def form_spacing(lengths: Sequence[float]) -> float:
-    """Return the usual distance [mm] within which every place of a face has a contact point, for correlation lengths."""
+    """Return the usual largest distance [mm] from a point of a face to a contact point, for correlation lengths."""
     return COVER_SHARE * SPACING_SHARE * min(lengths)
 
 
 def affordable_spacing(lengths: Sequence[float], area: float, count: int) -> float:
-    """Return the same for an area [mm2] that should have at most a number of points: wider, but no wider than is resolved."""
+    """Return this distance for an area [mm2] and a limited number of points: larger, but small enough to resolve the form."""
     affordable = COVER_SHARE * (SQUARE_SHARE * area / count) ** 0.5
     return min(max(form_spacing(lengths), affordable), COVER_SHARE * WIDE_SPACING_SHARE * min(lengths))
 
@@ -49,7 +47,7 @@ def affordable_spacing(lengths: Sequence[float], area: float, count: int) -> flo
 def check_facing(moving: Surface, reference: Surface, deviating: Sequence[FaceDeviation | None]) -> None:
     """Raise GeometryFault for a plane with form and another plane that does not face it."""
     normals = [face.corner_normals[0, 0] for face in (moving, reference)]
-    if is_flat(moving) and is_flat(reference) and normals[0] @ normals[1] > FACING:
+    if moving.is_flat and reference.is_flat and normals[0] @ normals[1] > FACING:
         name = next(face.name for face in deviating if face is not None and face.form is not None)
         raise GeometryFault(
             f"the face of feature {name} has form, and its planes are not parallel; give its tolerance form=None, "
@@ -60,37 +58,38 @@ def check_facing(moving: Surface, reference: Surface, deviating: Sequence[FaceDe
 def facing_triangles(face: Surface, other: Surface, deviation: FaceDeviation | None) -> np.ndarray:
     """Return the indices (triangle,) of the triangles of a face that can touch another one, with its deviation.
 
-    Of a body on a plane with form, these are the nearest facets that face the plane, if all others rise from their plane: what
-    else ends at their rim, or stands farther off, touches nothing before the rim does. Else all triangles can touch it.
+    If the other face is a plane with form, these are the nearest facets that face it, provided that all other facets rise from
+    the plane of these: facets that end at the rim, or are further away, do not touch before the rim does. Otherwise all
+    triangles can touch it.
     """
     n, every = other.corner_normals[0, 0], np.arange(len(face.mesh.faces))
     is_facing = np.asarray(face.mesh.face_normals) @ n < FACING
-    if deviation is None or deviation.form is None or not is_flat(other) or is_facing.all() or not is_facing.any():
+    if deviation is None or deviation.form is None or not other.is_flat or is_facing.all() or not is_facing.any():
         return every
-    heights = np.asarray(face.mesh.vertices) @ n
-    tops = heights[np.asarray(face.mesh.faces)].max(axis=1)
-    is_facing &= tops < tops[is_facing].min() + FLATNESS * face.mesh.scale
+    heights = face.vertices @ n
+    tops = heights[face.faces].max(axis=1)
+    is_facing &= tops < tops[is_facing].min() + SAME_PLACE * face.mesh.scale
     part = face.part(np.flatnonzero(is_facing))
-    level = np.asarray(part.mesh.vertices) @ n
-    beside = np.setdiff1d(np.asarray(face.mesh.faces), np.asarray(face.mesh.faces)[is_facing])
-    dropped = np.asarray(face.mesh.vertices)[beside] - (heights[beside] - level.min())[:, None] * n
+    level = part.vertices @ n
+    neighbours = np.setdiff1d(face.faces, face.faces[is_facing])
+    dropped = face.vertices[neighbours] - (heights[neighbours] - level.min())[:, None] * n
     distance = np.linalg.norm(part.nearest(dropped)[1] - dropped, axis=1)
-    rises = heights[beside] - level.min() > np.maximum(MIN_RISE * distance, FLATNESS * face.mesh.scale)
+    rises = heights[neighbours] - level.min() > np.maximum(MIN_RISE * distance, SAME_PLACE * face.mesh.scale)
     return np.flatnonzero(is_facing) if rises.all() else every
 
 
 def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[FaceDeviation | None]) -> np.ndarray | None:
-    """Return points (point, 3) [mm] of a cylinder inside or around a parallel one, with form; None of other faces.
+    """Return points (point, 3) [mm] of a cylinder inside or around a parallel one, with form; None for other faces.
 
-    They are a grid, of azimuths and of heights from the first end of either face to the last.
+    They form a grid of azimuths, and of coordinates along the axis where both faces are.
     """
     shaft, bore = (face.surfaces[0] if len(face.surfaces) == 1 else None for face in (moving, reference))
     if not (isinstance(shaft, Cylinder) and isinstance(bore, Cylinder)):
         return None
-    if np.linalg.norm(np.cross(shaft.axis, bore.axis)) > PARALLEL_TOLERANCE:
+    if np.linalg.norm(np.cross(shaft.axis, bore.axis)) > PARALLEL:
         return None
-    extents = [(np.asarray(face.mesh.vertices) - shaft.origin) @ shaft.axis for face in (moving, reference)]
-    start, end = max(extent.min() for extent in extents), min(extent.max() for extent in extents)
+    lows, highs = zip(*(shaft.extent(face.vertices) for face in (moving, reference)), strict=True)
+    start, end = max(lows), min(highs)
     if end <= start:
         return None
     lengths = [face.form.scales for face in deviating if face is not None and face.form is not None]
@@ -98,11 +97,11 @@ def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[Face
     inset = END_SHARE * (end - start)
     heights = np.linspace(start + inset, end - inset, int(np.ceil((end - start) / (ALONG_SHARE * along))) + 1)
     count = max(int(np.ceil(2 * np.pi * shaft.radius / (SPACING_SHARE * across))), MIN_AZIMUTHS)
-    u = np.linalg.svd(shaft.axis[None])[2][1]
+    u = axes_across(shaft.axis)[0]
     outward = [np.cos(turn) * u + np.sin(turn) * np.cross(shaft.axis, u) for turn in np.arange(count) * 2 * np.pi / count]
     points = shaft.origin + heights[:, None, None] * shaft.axis + shaft.radius * np.array(outward)
     points = points.reshape(-1, 3)
-    return points[moving.overhang(points) <= RIM_TOLERANCE * moving.mesh.scale]
+    return points[moving.overhang(points) <= SAME_PLACE * moving.mesh.scale]
 
 
 def check_resolved(points: np.ndarray, face: trimesh.Trimesh, lengths: Sequence[float]) -> None:
@@ -119,7 +118,7 @@ def check_resolved(points: np.ndarray, face: trimesh.Trimesh, lengths: Sequence[
 
 
 def with_rims(P_m: np.ndarray, moving: Surface, reference: Surface, spacing: float, reach: float) -> np.ndarray:
-    """Return points P_m (point, 3) of the moving plane, with others over the rim of the reference plane and along its own.
+    """Return points P_m (point, 3) of the moving plane, and others over the rim of the reference plane and along its own rim.
 
     Tilted faces touch along rims. Corners alone would do for flat ones.
     """

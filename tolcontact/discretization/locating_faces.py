@@ -1,4 +1,4 @@
-"""Faces that a 3-2-1 scheme locates a part by, and the places on their material for its points."""
+"""The faces of a 3-2-1 scheme, and points on their material for its locators."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,11 +8,13 @@ import numpy as np
 from tolcontact.declaration import Face
 from tolcontact.errors import GeometryFault
 from tolcontact.features import Placement
+from tolcontact.geometry.analytic_surfaces import axes_across
 from tolcontact.geometry.faces import Meshes, patch
+from tolcontact.geometry.tolerances import SAME_PLACE
+from tolcontact.geometry.triangle_mesh import rim
 
-ROUNDING = 1e-6  # of a face's size
-CLOSE = 1e-3  # of a face's size: a point that lies no farther beside or above the material is on it
-DIVISIONS = 37  # places that are tried along each side of the bounding rectangle
+CLOSE = 1e-3  # of a face's size: points that are closer to the material are on it
+DIVISIONS = 37  # candidates along each side of the bounding rectangle
 ROUNDS = 8  # of moves of each point
 TIE = 1e-9  # of the widest support
 MAX_PAIRS = 1 << 21  # of points and triangles that are compared at once
@@ -20,11 +22,11 @@ MAX_PAIRS = 1 << 21  # of points and triangles that are compared at once
 
 @dataclass(frozen=True, eq=False)
 class LocatingFace:
-    """A face as its outward normal sees it.
+    """A face seen along its outward normal.
 
     name      of the face
     vertices  (vertex, 3) [mm]
-    faces     (triangle, 3) numbers of vertices
+    faces     (triangle, 3) vertex indices
     outward   (3,): the mean outward normal
     """
 
@@ -47,8 +49,8 @@ class LocatingFace:
 
     @property
     def axes(self) -> np.ndarray:
-        """Two unit vectors (2, 3) at right angles to the outward normal."""
-        return np.linalg.svd(self.outward[None])[2][1:]
+        """Two unit vectors (2, 3) perpendicular to the outward normal."""
+        return axes_across(self.outward)
 
     @property
     def size(self) -> float:
@@ -59,28 +61,28 @@ class LocatingFace:
         """Return points (k, 3) [mm] of the bounding rectangle on the material of the face.
 
         A point that has material below it moves along the outward normal alone. Any other moves to where the support is
-        widest, at least `inset` from all edges: three points span the largest triangle, two lie farthest apart `along` an edge
-        (3,), one lies nearest to where it was, as all of them do among places of equal width. Raises GeometryFault if there is
-        no place.
+        widest, at least `inset` from all edges: three points span the largest triangle, two have the largest distance `along`
+        an edge (3,), one stays as close as possible, which also decides between supports of equal width. Raises GeometryFault
+        if there is no such point.
         """
         heights = self._heights(points @ self.axes.T, CLOSE * self.size)
-        beside = np.flatnonzero(np.isnan(heights))
+        outside = np.flatnonzero(np.isnan(heights))
         places = points.copy()
-        if len(beside):
+        if len(outside):
             candidates = self._candidates(inset)
             if not len(candidates):
                 raise GeometryFault(
-                    f"{len(beside)} of {len(points)} points of its 3-2-1 scheme lie beside the material of face {self.name}, "
+                    f"{len(outside)} of {len(points)} points of its 3-2-1 scheme lie beside the material of face {self.name}, "
                     f"and no place on the face is {inset:g} mm from its edges; make the inset smaller, or state the locators"
                 )
-            places = _spread(places, beside, candidates, lambda support: self._width(support, along))
-            heights[beside] = self._heights(places[beside] @ self.axes.T, CLOSE * self.size)
+            places = _spread(places, outside, candidates, lambda support: self._width(support, along))
+            heights[outside] = self._heights(places[outside] @ self.axes.T, CLOSE * self.size)
         lifts = heights - places @ self.outward
         lifts[np.abs(lifts) <= CLOSE * self.size] = 0.0
         return np.asarray(places + lifts[:, None] * self.outward)
 
     def _width(self, support: np.ndarray, along: np.ndarray | None) -> np.ndarray:
-        """Return the widths (n,) of supports (n, k, 3): twice the area of triangles, lengths along an edge, 0 for one point."""
+        """Return the widths (n,) of supports (n, k, 3): twice the area of a triangle, a length, or 0 for one point."""
         if along is not None:
             return np.asarray(np.abs((support[:, 1] - support[:, 0]) @ along))
         if support.shape[1] == 1:
@@ -89,11 +91,11 @@ class LocatingFace:
         return np.asarray(np.abs(np.cross(sides[:, 0], sides[:, 1]) @ self.outward))
 
     def _heights(self, places: np.ndarray, margin: float) -> np.ndarray:
-        """Return the heights (n,) [mm] of the outermost material at places (n, 2) on the axes; NaN beside the material."""
+        """Return the heights (n,) [mm] of the outermost material at places (n, 2) on the axes; NaN outside the material."""
         corners, levels = (self.vertices @ self.axes.T)[self.faces], (self.vertices @ self.outward)[self.faces]
         sides = np.roll(corners, -1, axis=1) - corners
         area = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
-        regular = np.abs(area) > (ROUNDING * self.size) ** 2
+        regular = np.abs(area) > (SAME_PLACE * self.size) ** 2
         corners, levels, sides, area = corners[regular], levels[regular], sides[regular], area[regular]
         heights = np.full(len(places), np.nan)
         lengths = np.linalg.norm(sides, axis=2)
@@ -113,17 +115,16 @@ class LocatingFace:
         lower, upper = flat.min(axis=0) + inset, flat.max(axis=0) - inset
         lattice = np.stack(np.meshgrid(*np.linspace(lower, upper, DIVISIONS).T), axis=-1).reshape(-1, 2)
         places = np.concatenate([flat, lattice])
-        heights = self._heights(places, ROUNDING * self.size)
+        heights = self._heights(places, SAME_PLACE * self.size)
         places, heights = places[~np.isnan(heights)], heights[~np.isnan(heights)]
-        distant = self._distances_from_edges(places) >= inset - ROUNDING * self.size
+        distant = self._distances_from_edges(places) >= inset - SAME_PLACE * self.size
         return places[distant] @ self.axes + heights[distant, None] * self.outward
 
     def _distances_from_edges(self, places: np.ndarray) -> np.ndarray:
         """Return the distances (n,) [mm] of places (n, 2) from the edges of the face."""
-        merged = np.unique(np.round(self.vertices / (ROUNDING * self.size)), axis=0, return_inverse=True)[1].ravel()
-        pairs = np.sort(merged[self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)], axis=1)
-        _, first, counts = np.unique(pairs, axis=0, return_index=True, return_counts=True)
-        ends = (self.vertices @ self.axes.T)[self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)[first[counts == 1]]]
+        cells = np.round(self.vertices / (SAME_PLACE * self.size))
+        _, vertex, merged = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+        ends = (self.vertices @ self.axes.T)[vertex[rim(merged.ravel()[self.faces])]]
         distances = np.full(len(places), np.inf)
         for start, end in ends:
             side = end - start
@@ -133,13 +134,13 @@ class LocatingFace:
 
 
 def _spread(
-    points: np.ndarray, beside: np.ndarray, candidates: np.ndarray, width: Callable[[np.ndarray], np.ndarray]
+    points: np.ndarray, outside: np.ndarray, candidates: np.ndarray, width: Callable[[np.ndarray], np.ndarray]
 ) -> np.ndarray:
-    """Return points (k, 3), those beside the material moved to the candidates (n, 3) of the widest support, one at a time."""
+    """Return points (k, 3); those outside the material move to the candidates (n, 3) of the widest support, one at a time."""
     places = points.copy()
     for _ in range(ROUNDS):
         before = places.copy()
-        for number in beside:
+        for number in outside:
             supports = np.repeat(places[None], len(candidates), axis=0)
             supports[:, number] = candidates
             widths = width(supports)

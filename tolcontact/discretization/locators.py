@@ -1,4 +1,4 @@
-"""Parts in their nominal places, their locators with numbers, and the locator matrix by which these place their part."""
+"""Parts in their nominal poses, and their locators with the locator matrix, which determines the pose of a part."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ from tolcontact.declaration.locator import BEST_FIT, FIRST_ORDER
 from tolcontact.discretization.locating_faces import LocatingFace
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation, Placement
-from tolcontact.geometry.coordinate_error import COORDINATE_SPACING
 from tolcontact.geometry.faces import Meshes
+from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING
 
 MAX_CONDITION = 1e8
 MIN_DETERMINANT = 0.1  # of the normals of three faces that count as independent
@@ -31,10 +31,10 @@ class Locators:
     tolerances   one for each locator
     stiffness    (locator,) [N/mm]
     one_sided    (locator,) bool: supports that the part may lift off
-    springy      (locator,) bool: locators that give way by their stiffness
-    faces        for each locator the face of a feature that it stands against; None for a nominal face
+    springy      (locator,) bool: locators that are compliant, by their stiffness
+    faces        for each locator the face of a feature that it touches; None for a nominal face
     grounds      for each locator the feature of another part that it is on; None if it is on no feature
-    floating     middle (3,) and size [mm] of a floating part; None for a part that its locators fix
+    floating     centre (3,) and size [mm] of a floating part; None for a part that its locators fix
     placing      how the pose follows from them: one of PLACINGS
     """
 
@@ -71,13 +71,13 @@ class Locators:
 
     @property
     def exact(self) -> np.ndarray:
-        """Whether locators hold both ways, and do not give way (locator,)."""
+        """Whether locators are two-sided and rigid (locator,)."""
         return ~self.one_sided & ~self.springy
 
     def pushes(self, locator: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the columns (k,) of deviations by which features push the part at a locator, and how far for 1 (k,).
+        """Return the columns (k,) of the deviations of features that displace a locator, and its displacements (k,) per unit.
 
-        These are the face of the part itself, as it moves out of the part, and the feature of another part that it is on.
+        The features are the face of the part, which moves out of it, and the feature of another part that the locator is on.
         """
         point, into_part = self.points[locator, None], self.directions[locator, None]
         features = [(self.faces[locator], -into_part), (self.grounds[locator], into_part)]
@@ -87,13 +87,13 @@ class Locators:
 
     @property
     def matrix(self) -> tuple[np.ndarray, np.ndarray]:
-        """The rows [n', (p - c) x n)'] of the locator matrix J (locator, 6), and the centroid c (3,) about which they turn."""
+        """The rows [n', (p - c) x n)'] of the locator matrix J (locator, 6), and their centroid c (3,)."""
         centre = self.points.mean(axis=0) if self.floating is None else self.floating[0]
         return np.hstack([self.directions, np.cross(self.points - centre, self.directions)]), centre
 
     @property
     def placing_matrix(self) -> tuple[np.ndarray, np.ndarray]:
-        """The matrix M (6, locator) of q = M d, and the centroid c (3,) about which the part turns.
+        """The matrix M (6, locator) of q = M d, and the centroid c (3,), the centre of rotation.
 
         A floating part moves as little as possible. Six locators give M = J^-1. With more than six the two-sided locators are
         kept exactly, and the one-sided locators by least squares.
@@ -113,7 +113,7 @@ class Locators:
         return M, centre
 
     def _least_motion(self, J: np.ndarray, size: float) -> np.ndarray:
-        """Return M (6, locator) of the least motion that keeps two-sided locators exactly, and one-sided ones by least squares.
+        """Return M (6, locator) of the least motion that keeps two-sided locators exactly and one-sided ones by least squares.
 
         Rotations [rad] are weighed by the part's `size` [mm].
         """
@@ -137,7 +137,7 @@ class Locators:
         return ", ".join(str(name) for name in names[share > 1e-6 * share.max()])
 
     def check_independent(self) -> None:
-        """Raise GeometryFault if the locators do not fix their part, or if those of a floating part contradict each other."""
+        """Raise GeometryFault if the locators do not fix their part, or if two-sided ones contradict each other."""
         J, centre = self.matrix
         if self.floating is not None:
             scaled = J / np.array([1, 1, 1, *[self.floating[1]] * 3])
@@ -164,7 +164,7 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
     Each face of a joint belongs to a part of its own, with these `placements`; so do its locators.
 
     Each face is taken as its bounding rectangle along the edges that it shares with the other two. A point of it that lies
-    beside the material of the face moves to where the support is widest (see LocatingFace). Raises GeometryFault if the three
+    outside the material of the face moves to where the support is widest (see LocatingFace). Raises GeometryFault if the three
     faces are not independent, or the inset leaves no room.
     """
     faces = [LocatingFace.of(face, meshes) for face in scheme.faces]
@@ -180,16 +180,16 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
     edges /= np.linalg.norm(edges, axis=1, keepdims=True)
     a, b, c = edges
     primary, secondary, tertiary = (face.vertices for face in faces)
-    near_c, far_c = _support_places(primary, c, scheme.inset)
-    near_b, far_b = _support_places(primary, b, scheme.inset)
-    side_near, side_far = _support_places(secondary, c, scheme.inset)
+    near_c, far_c = _support_coordinates(primary, c, scheme.inset)
+    near_b, far_b = _support_coordinates(primary, b, scheme.inset)
+    side_near, side_far = _support_coordinates(secondary, c, scheme.inset)
     rectangular = [
         _place(edges, outward, primary, 0, {1: near_b, 2: near_c}),
         _place(edges, outward, primary, 0, {1: near_b, 2: far_c}),
         _place(edges, outward, primary, 0, {1: far_b, 2: (near_c + far_c) / 2}),
-        _place(edges, outward, secondary, 1, {0: _middle(secondary, a), 2: side_near}),
-        _place(edges, outward, secondary, 1, {0: _middle(secondary, a), 2: side_far}),
-        _place(edges, outward, tertiary, 2, {0: _middle(tertiary, a), 1: _middle(tertiary, b)}),
+        _place(edges, outward, secondary, 1, {0: _midpoint(secondary, a), 2: side_near}),
+        _place(edges, outward, secondary, 1, {0: _midpoint(secondary, a), 2: side_far}),
+        _place(edges, outward, tertiary, 2, {0: _midpoint(tertiary, a), 1: _midpoint(tertiary, b)}),
     ]
     sides = ((0, slice(0, 3), None), (1, slice(3, 5), c), (2, slice(5, 6), None))  # face, its points, what spreads them
     points = np.vstack([faces[k].on_material(np.array(rectangular[rows]), scheme.inset, along) for k, rows, along in sides])
@@ -202,8 +202,8 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
     )
 
 
-def _support_places(points: np.ndarray, along: np.ndarray, inset: float) -> tuple[float, float]:
-    """Return the places [mm] along a direction at an inset from both ends of a face."""
+def _support_coordinates(points: np.ndarray, along: np.ndarray, inset: float) -> tuple[float, float]:
+    """Return the coordinates [mm] along a direction at an inset from both ends of a face."""
     places = points @ along
     lower, upper = places.min() + inset, places.max() - inset
     if not lower < upper:
@@ -212,7 +212,7 @@ def _support_places(points: np.ndarray, along: np.ndarray, inset: float) -> tupl
     return lower, upper
 
 
-def _middle(points: np.ndarray, along: np.ndarray) -> float:
+def _midpoint(points: np.ndarray, along: np.ndarray) -> float:
     places = points @ along
     return float(places.min() + places.max()) / 2
 
@@ -225,16 +225,16 @@ def _place(edges: np.ndarray, outward: np.ndarray, points: np.ndarray, face: int
 
 @dataclass(frozen=True, eq=False)
 class NominalPart:
-    """A part in its nominal place.
+    """A part in its nominal pose.
 
     vertices, faces      its surface (vertex, 3) [mm], (face, 3), fine enough to show displacement fields
     locators             as `scheme` declares them; none if the part is fixed
-    parent               index of the part that it is located on, or that carries it in a joint; None for the ground
+    parent               index of the part that it is located on, or of the first part of its joint; None for the ground
     located              name of what its locators locate: its own, or "station.part" or "station.joint"
     movers               indices of the free parts whose corrections move it: parts that it is located on come first
     station              name of the station; empty in an assembly without stations
-    carried              indices of the part that carries it and of itself in the station that joined them; None if it is not
-                         carried
+    carried              indices of the first part of its joint and of itself, in the station that joined them; None without a
+                         joint
     owners               indices of the parts at whose points its locators are, if it is the first part of a joint
     """
 
@@ -256,7 +256,7 @@ class NominalPart:
 
     @cached_property
     def body(self) -> trimesh.Trimesh:
-        """The mesh in its nominal place."""
+        """The mesh in its nominal pose."""
         body = trimesh.Trimesh(self.placed(np.asarray(self.mesh.vertices)), self.mesh.faces, process=False)
         body.metadata |= {name: self.mesh.metadata[name] for name in (COORDINATE_SPACING,) if name in self.mesh.metadata}
         return body

@@ -11,8 +11,6 @@ from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.errors import GeometryFault
 from tolcontact.features import AxisFeature, FaceDeviation, FeatureGeometry, FeatureOfSize, PlaneFeature, feature_geometry
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane
-from tolcontact.geometry.curvature import is_flat
-from tolcontact.geometry.edges import rim
 from tolcontact.geometry.nearest_elements import NearestElements
 from tolcontact.geometry.surface import Surface
 
@@ -27,12 +25,11 @@ class MeasuredFace:
     deviation: FaceDeviation | None
 
     def wall(self, near: np.ndarray) -> "Wall":
-        """Return the whole surface of the face, or if no analytic one is known its tangent plane nearest to a place (3,)."""
-        if is_flat(self.surface):
+        """Return the whole surface of the face; without an analytic one, its tangent plane nearest to a point (3,)."""
+        if self.surface.is_flat:
             return Wall(self.part, self.plane, 1.0, self.deviation)
-        pieces = self.surface.pieces
-        if len(pieces) == 1 and not len(self.surface.unknown.mesh.faces):
-            return Wall(self.part, pieces[0].surface, -1.0 if pieces[0].is_hollow else 1.0, self.deviation)
+        if piece := self.surface.only_piece:
+            return Wall(self.part, piece.surface, -1.0 if piece.is_hollow else 1.0, self.deviation)
         feet, normals, _ = self.surface.project(near[None])
         return Wall(self.part, Plane(feet[0], normals[0]), 1.0, self.deviation)
 
@@ -96,7 +93,7 @@ class Wall:
     deviation: FaceDeviation | None
 
     def foot(self, place: np.ndarray) -> np.ndarray:
-        """Return the place on the surface (3,) nearest to a place (3,)."""
+        """Return the point of the surface (3,) nearest to a point (3,)."""
         return np.asarray(self.surface.project(place[None])[0])
 
 
@@ -111,8 +108,8 @@ class Axis:
     deviation: FaceDeviation | None
 
     @property
-    def middle(self) -> np.ndarray:
-        """The middle (3,) between the ends."""
+    def midpoint(self) -> np.ndarray:
+        """The midpoint (3,) between the ends."""
         return np.asarray(self.ends.mean(axis=0))
 
 
@@ -120,10 +117,18 @@ class Axis:
 class NominalMeasurement:
     """A measurement with numbers.
 
-    lines   (line, 2, 3) [mm] the ends of the lines as which it is drawn
+    lines   (line, 2, 3) [mm] the ends of the lines that show it
     """
 
     lines: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class FaceMeasurement(NominalMeasurement):
+    """A measurement between a moving and a reference face."""
+
+    moving: MeasuredFace
+    reference: MeasuredFace
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +146,7 @@ class Crossing:
 
 @dataclass(frozen=True, eq=False)
 class Heights(NominalMeasurement):
-    """The least height of points over walls, and of edges over edges that they cross."""
+    """The least height of points over walls, and of edges over the edges that they cross."""
 
     points: Sequence[tuple[MeasuredPoint, Wall]]
     crossings: Sequence[Crossing] = ()
@@ -149,7 +154,7 @@ class Heights(NominalMeasurement):
 
 @dataclass(frozen=True, eq=False)
 class FaceGap(NominalMeasurement):
-    """The largest or the mean height of points all over a face, each over its wall; `weights` are shares of the area."""
+    """The largest or the mean height of points of a face, each over its own wall; `weights` are shares of the area."""
 
     points: Sequence[tuple[MeasuredPoint, Wall]]
     weights: np.ndarray
@@ -158,7 +163,7 @@ class FaceGap(NominalMeasurement):
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """The rim of a plane face: its corners (corner, 3) [mm], and the edges (edge, 2) between them by number."""
+    """The rim of a plane face: its corners (corner, 3) [mm], and edges (edge, 2) as indices of corners."""
 
     vertices: np.ndarray
     edges: np.ndarray
@@ -166,43 +171,37 @@ class Outline:
     @classmethod
     def of(cls, surface: Surface) -> "Outline":
         """Return the rim of a face."""
-        used, edges = np.unique(rim(np.asarray(surface.mesh.faces)), return_inverse=True)
-        return cls(np.asarray(surface.mesh.vertices)[used], edges.reshape(-1, 2))
+        used, edges = np.unique(surface.rim, return_inverse=True)
+        return cls(surface.vertices[used], edges.reshape(-1, 2))
 
 
 @dataclass(frozen=True, eq=False)
-class PlaneClearance(NominalMeasurement):
-    """The least height of two planes in the region in which they overlap; `heights` if they overlap nowhere at a pose."""
+class PlaneClearance(FaceMeasurement):
+    """The least height between two planes where they overlap; `heights` applies at poses without an overlap."""
 
-    moving: MeasuredFace
-    reference: MeasuredFace
     planes: tuple[Plane, Plane]
     outlines: tuple[Outline, Outline]
     heights: Heights
 
 
 @dataclass(frozen=True, eq=False)
-class RoundClearance(NominalMeasurement):
-    """The least gap of balls and shafts beside walls, of a moving and a reference face."""
+class RoundClearance(FaceMeasurement):
+    """The least gap between balls or shafts and walls."""
 
-    moving: MeasuredFace
-    reference: MeasuredFace
     points: RoundPoints
 
 
 @dataclass(frozen=True, eq=False)
-class MeshClearance(NominalMeasurement):
+class MeshClearance(FaceMeasurement):
     """The least distance of two faces by their triangles. `box` (corner, 3) [mm] is around the moving one."""
 
-    moving: MeasuredFace
-    reference: MeasuredFace
     elements: NearestElements
     box: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
 class AxisPair(NominalMeasurement):
-    """The distance of two axes; `across` and `along` (3,) as AxisDistance has them, less `radii` [mm]."""
+    """The distance between two axes; `across` and `along` (3,) as for an AxisDistance."""
 
     moving: Axis
     reference: Axis
@@ -212,18 +211,16 @@ class AxisPair(NominalMeasurement):
 
 
 @dataclass(frozen=True, eq=False)
-class DirectionPair(NominalMeasurement):
-    """The angle of two directions (3,) of faces, about a direction (3,) or in space."""
+class DirectionPair(FaceMeasurement):
+    """The angle between two directions (3,) of faces, about a direction (3,) or in space."""
 
-    moving: MeasuredFace
-    reference: MeasuredFace
     directions: tuple[np.ndarray, np.ndarray]
     about: np.ndarray | None
 
 
 @dataclass(frozen=True, eq=False)
 class Combined(NominalMeasurement):
-    """A combination of a kind; operands are numbers of measures, or measurements."""
+    """A combination of a kind; operands are indices of measures, or measurements."""
 
     kind: str
     operands: Sequence[int | NominalMeasurement]

@@ -1,4 +1,4 @@
-"""Measurements get numbers: faces become walls, axes and directions, and combinations refer to measures by number."""
+"""Nominal measurements: faces become walls, axes and directions, and combinations refer to measures by index."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -41,16 +41,13 @@ from tolcontact.discretization.nominal import Nominal
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.errors import GeometryFault, ModelError, designation
-from tolcontact.geometry.analytic_surfaces import Cylinder
-from tolcontact.geometry.curvature import is_flat
-from tolcontact.geometry.edges import rim
+from tolcontact.geometry.analytic_surfaces import Cylinder, axes_across
 from tolcontact.geometry.faces import patch
 from tolcontact.geometry.nearest_elements import nearest_elements
 from tolcontact.geometry.overlap import crossing_edges
+from tolcontact.geometry.tolerances import OPPOSING_COSINE, PARALLEL
 
-MIN_SINE = 1e-3  # of the angle between directions that must not be parallel
 OBTUSE = -1e-9  # cosine of an angle that counts as more than a right one
-FACING = -0.5  # largest cosine between the outward normals of planes that face each other
 MAX_EDGE_PAIRS = 2500  # of two rims, between which crossings are found at every pose; more take longer than contact itself
 NO_LINES = np.zeros((0, 2, 3))
 
@@ -63,7 +60,7 @@ class MeasuredFaces:
         self._faces: dict[tuple[Any, ...], MeasuredFace] = {}
 
     def __getitem__(self, face: Face) -> MeasuredFace:
-        """Return a declared face. Raises GeometryFault if it has no triangles, or is partly that of a feature."""
+        """Return a declared face. Raises GeometryFault if it has no triangles, or belongs to a feature only in part."""
         key = (face.part, *face.selections)
         if key not in self._faces:
             part = self.nominal.part_index(face.part)
@@ -113,7 +110,7 @@ def _with_numbers(
 
 
 def _lines(nominal: Nominal, number: int, measurements: Mapping[str, NominalMeasurement | None]) -> np.ndarray:
-    """Return the lines (line, 2, 3) that show a measure: of points one from the first to the last, which may be the same."""
+    """Return the lines (line, 2, 3) that show a measure; for points, the line from the first to the last."""
     measure = nominal.measures[number]
     if (measurement := measurements[measure.name]) is not None:
         return measurement.lines
@@ -138,7 +135,7 @@ def _clearance(clearance: Clearance, faces: MeasuredFaces) -> NominalMeasurement
                 f"the clearance of {face.face}, which has form, cannot be measured; measure the gaps of points with tc.Gap, "
                 "or what is left between the faces with tc.LargestGap, or give its tolerance of form form=None"
             )
-    if is_flat(moving.surface) and is_flat(reference.surface):
+    if moving.surface.is_flat and reference.surface.is_flat:
         return _clearance_of_planes(moving, reference)
     reach = float(np.ptp(np.vstack([moving.surface.mesh.bounds, reference.surface.mesh.bounds]), axis=0).sum())
     if points := round_points(moving.surface, reference.surface, reach):
@@ -152,12 +149,12 @@ def _clearance(clearance: Clearance, faces: MeasuredFaces) -> NominalMeasurement
 
 
 def _clearance_of_meshes(moving: MeasuredFace, reference: MeasuredFace) -> MeshClearance:
-    """Return the clearance by triangles. Raises GeometryFault if too many of them are near each other."""
+    """Return the clearance between triangles. Raises GeometryFault if too many of them are near each other."""
     distances = [
         np.linalg.norm(target.surface.nearest(corners)[1] - corners, axis=1).min()
         for target, corners in (
-            (reference, np.asarray(moving.surface.mesh.vertices)),
-            (moving, np.asarray(reference.surface.mesh.vertices)),
+            (reference, moving.surface.vertices),
+            (moving, reference.surface.vertices),
         )
     ]
     try:
@@ -172,13 +169,13 @@ def _clearance_of_meshes(moving: MeasuredFace, reference: MeasuredFace) -> MeshC
 
 def _clearance_of_planes(moving: MeasuredFace, reference: MeasuredFace) -> Heights | PlaneClearance:
     """Return the clearance of planes that face each other, within the nominal overlap if their rims have too many edges."""
-    if not moving.plane.axis @ reference.plane.axis < FACING:
+    if not moving.plane.axis @ reference.plane.axis < OPPOSING_COSINE:
         raise GeometryFault(
             f"its planes {moving.face} and {reference.face} do not face each other; choose planes with material behind both"
         )
     points: list[tuple[MeasuredPoint, Wall]] = []
     for face, target in ((moving, reference), (reference, moving)):
-        corners = np.asarray(face.surface.mesh.vertices)[np.unique(rim(np.asarray(face.surface.mesh.faces)))]
+        corners = face.surface.rim_corners
         _, _, is_over = target.surface.project(corners)
         outward, wall = face.plane.axis, Wall(target.part, target.plane, 1.0, target.deviation)
         corners = _outline(corners[is_over], outward)
@@ -205,9 +202,9 @@ def _clearance_of_planes(moving: MeasuredFace, reference: MeasuredFace) -> Heigh
 
 
 def _outline(points: np.ndarray, n: np.ndarray) -> np.ndarray:
-    """Return the corners of the convex hull of points (point, 3) of a plane with normal n (3,): no other can be the nearest."""
+    """Return the corners of the convex hull of points (point, 3) of a plane with normal n (3,): the nearest is among them."""
     try:
-        return points[ConvexHull(points @ np.linalg.svd(n[None])[2][1:].T).vertices] if len(points) > 3 else points
+        return points[ConvexHull(points @ axes_across(n).T).vertices] if len(points) > 3 else points
     except QhullError:  # the points lie on one line
         return points
 
@@ -218,22 +215,22 @@ def _axis_distance(distance: AxisDistance, faces: MeasuredFaces) -> AxisPair:
     if distance.across is not None:
         n = np.array(distance.across)
         for axis, face in zip((moving, reference), distance.faces, strict=True):
-            if axis.direction.any() and abs(float(axis.direction @ n)) < MIN_SINE:
+            if axis.direction.any() and abs(float(axis.direction @ n)) < PARALLEL:
                 raise GeometryFault(
                     f"the axis of {face} is parallel to the plane that is to cut it; choose another direction across"
                 )
-        foot = reference.middle + _slide(reference, n, moving.middle)
-        return AxisPair(np.concatenate([lines, [[moving.middle, foot]]]), moving, reference, across=n)
+        foot = reference.midpoint + _slide(reference, n, moving.midpoint)
+        return AxisPair(np.concatenate([lines, [[moving.midpoint, foot]]]), moving, reference, across=n)
     if distance.along is not None:
-        foot = reference.middle + ((moving.middle - reference.middle) @ reference.direction) * reference.direction
-        return AxisPair(np.concatenate([lines, [[moving.middle, foot]]]), moving, reference, along=np.array(distance.along))
+        foot = reference.midpoint + ((moving.midpoint - reference.midpoint) @ reference.direction) * reference.direction
+        return AxisPair(np.concatenate([lines, [[moving.midpoint, foot]]]), moving, reference, along=np.array(distance.along))
     return AxisPair(np.concatenate([lines, [_nearest_places(moving.ends, reference.ends)]]), moving, reference)
 
 
 def _slide(axis: Axis, n: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Return the vector (3,) along an axis from its middle to the plane across n (3,) through a place; of a centre along n."""
+    """Return the vector (3,) along an axis, or for a centre along n, to the plane across n through a point (3,)."""
     direction = axis.direction if axis.direction.any() else n
-    return np.asarray(direction * float((place - axis.middle) @ n) / float(direction @ n))
+    return np.asarray(direction * float((place - axis.midpoint) @ n) / float(direction @ n))
 
 
 def _angle(angle: Angle, faces: MeasuredFaces) -> DirectionPair:
@@ -242,7 +239,7 @@ def _angle(angle: Angle, faces: MeasuredFaces) -> DirectionPair:
     about = None if angle.about is None else np.array(angle.about)
     across = [vector if about is None else vector - (vector @ about) * about for vector in (u, v)]
     for vector, face in zip(across, angle.faces, strict=True):
-        if np.linalg.norm(vector) < MIN_SINE:
+        if np.linalg.norm(vector) < PARALLEL:
             raise GeometryFault(f"the direction of {face} is parallel to the direction that the angle is about; choose another")
     if across[0] @ across[1] < OBTUSE * np.linalg.norm(across[0]) * np.linalg.norm(across[1]):
         v = -v
@@ -262,17 +259,17 @@ def _check_varies(parts: Iterable[Any], deviations: Iterable[Any]) -> None:
 
 
 def _is_outer_cylinder(face: MeasuredFace) -> bool:
-    pieces, is_whole = face.surface.pieces, not len(face.surface.unknown.mesh.faces)
-    return is_whole and len(pieces) == 1 and isinstance(pieces[0].surface, Cylinder) and not pieces[0].is_hollow
+    piece = face.surface.only_piece
+    return piece is not None and isinstance(piece.surface, Cylinder) and not piece.is_hollow
 
 
 def _kind(face: MeasuredFace) -> str:
     kinds = dict.fromkeys(piece.surface.kind for piece in face.surface.pieces)
-    return f"{face.face} ({' and '.join(kinds) or ('plane' if is_flat(face.surface) else 'general surface')})"
+    return f"{face.face} ({' and '.join(kinds) or ('plane' if face.surface.is_flat else 'general surface')})"
 
 
 def _nearest_places(moving: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Return the nearest places (2, 3) of two segments, given by their ends (2, 3); of parallel ones, any that are nearest."""
+    """Return the nearest points (2, 3) of two segments, given by their ends (2, 3); any of them if segments are parallel."""
     p, q = moving[1] - moving[0], reference[1] - reference[0]
     nearest = scipy.optimize.lsq_linear(np.column_stack([p, -q]), reference[0] - moving[0], bounds=(0, 1))
     return np.array([moving[0] + nearest.x[0] * p, reference[0] + nearest.x[1] * q])

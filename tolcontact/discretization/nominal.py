@@ -18,7 +18,6 @@ from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.features import Datum, FaceDeviation, Features, NominalFeature, NominalPattern
 from tolcontact.features.zone_kernel import sum_modes
-from tolcontact.geometry.curvature import chord_height, is_flat
 from tolcontact.geometry.face_pair import FacePair, body_face
 from tolcontact.geometry.faces import Meshes, triangles
 from tolcontact.geometry.overlap import points_on_rim
@@ -26,7 +25,7 @@ from tolcontact.geometry.surface import Surface
 
 EVERY_POINT = slice(None)
 RIM_REACH = 0.1  # of the size of the moving face: how far from it, nominally, rim points of the other face count
-FITTED_ERRORS = 2.0  # errors of coordinates, by which triangles lie beyond the planes that are fitted to them, and inset
+FITTED_ERRORS = 2.0  # coordinate errors: largest distance of triangles from the planes fitted to them, and from their inset
 GAPS_TOGETHER = 1 << 20  # that are computed at once
 
 
@@ -34,19 +33,19 @@ GAPS_TOGETHER = 1 << 20  # that are computed at once
 class ContactPoints:
     """Contact points of one pair, fixed for all realizations: P^m, P^r, n^r of the paper, each (point, 3).
 
-    The one-sided locators of a part are a pair of this kind, too, and so is each two-sided locator that gives way. Their
-    reference is the part that they are on, or None for the ground. They have no faces; their offsets are the deviations.
+    The one-sided locators of a part are also a pair of this kind, and so is each compliant two-sided locator. Their reference
+    is the part that they are on, or None for the ground. They have no faces; their offsets are the deviations.
 
-    moving_face, reference_face   in their nominal places
+    moving_face, reference_face   in their nominal poses
     coordinate_error   [mm] of both bodies, as their files store them: P_r lie below the reference face by it
     facets      [mm] largest distance between their triangles and the round faces that these approximate
     sampling_error   [mm] that bodies may penetrate undetected between points of curved faces; None for other points
-    round       the balls and shafts beside walls from which gaps follow at any pose; None if the contact points are fixed
+    round       balls and shafts against walls, whose gaps are known at any pose; None if the contact points are fixed
     deviating   deviations of the moving and the reference face, if these belong to features; their heights at fixed points are
                 among the offsets
-    locators    (point,) numbers of the one-sided locators
+    locators    (point,) indices of the one-sided locators
     stiffness   (point,) [N/mm] of springs, infinite for rigid one-sided locators; None for rigid faces
-    pulls       (point,): whether the spring at a point pulls, of a two-sided locator; None if none does
+    pulls       (point,): whether the spring of a two-sided locator pulls at a point; None if none does
     """
 
     name: str
@@ -69,19 +68,33 @@ class ContactPoints:
 
     @cached_property
     def facing(self) -> np.ndarray:
-        """The share -n^m . n^r (point,) of the moving face's height by which gaps shrink."""
+        """The decrease -n^m . n^r (point,) of gaps per unit height of the moving face."""
         if self.moving_face is None or self.round:
             return np.ones(len(self.P_m))
         triangle, nearest = self.moving_face.nearest(self.P_m)
         return -(self.moving_face.normals(triangle, nearest) * self.n_r).sum(axis=1)
 
     def heights(self, deviations: np.ndarray) -> np.ndarray:
-        """Return the sum by which both faces have grown (row,) [mm] for deviations (row, contributor), without their forms."""
+        """Return the sum of the outward offsets of both faces (row,) [mm] for deviations (row, contributor), without form."""
         heights = np.zeros(len(deviations))
         for face in self.deviating:
             if face is not None and face.grows:
                 heights += face.heights(deviations)
         return heights
+
+    def counted(self, *, of_moving: bool) -> tuple[Float[Array, "point 3"], Float[Array, " point"]]:
+        """Return the points whose displacement an objective counts on one side, and the radii [mm] of spheres around them.
+
+        These are contact points, but the centres of round faces: a point on a round face would leave its part free to roll, so
+        that it could move aside at no cost until it is clear. In a hollow wall the tangent planes have contact points on all
+        sides, which is as good. An end of a shaft's axis has no radius, since the other end holds the shaft.
+        """
+        if self.round is None or not self.round.are_beside:
+            points = self.P_m if of_moving else self.P_r
+            return points, np.zeros(len(points))
+        centres, radii = zip(*(point.curvature(of_moving=of_moving) for point in self.round), strict=True)
+        is_end = self.round.points["axis"].any(axis=1) & (self.round.points["on_moving"] == of_moving)
+        return np.array(centres), np.where(is_end, 0.0, radii)
 
     @property
     def has_form(self) -> bool:
@@ -98,7 +111,7 @@ class ContactPoints:
         """The gap between contact points of two rigid planes with form; None for other pairs."""
         if not self.has_form or self.moving_face is None or self.reference_face is None or self.stiffness is not None:
             return None
-        if not (is_flat(self.moving_face) and is_flat(self.reference_face)):
+        if not (self.moving_face.is_flat and self.reference_face.is_flat):
             return None
         distance = np.quantile(KDTree(self.P_m).query(self.P_m, k=2)[0][:, 1], 0.9) if len(self.P_m) > 1 else 0.0
         reach = max(self.form_spacing / COVER_SHARE, float(distance))
@@ -111,12 +124,6 @@ class ContactPoints:
         points = points_on_rim(self.reference_face, self.form_spacing)
         distance = np.linalg.norm(self.moving_face.nearest(points)[1] - points, axis=1)
         return points[distance < RIM_REACH * self.moving_face.mesh.scale]
-
-    @cached_property
-    def moving_plane(self) -> tuple[np.ndarray, np.ndarray]:
-        """The normal (3,) of a flat moving face, and a point (3,) [mm] of it."""
-        assert self.moving_face is not None
-        return self.moving_face.corner_normals[0, 0], np.asarray(self.moving_face.mesh.vertices)[0]
 
     def form(self, deviations: np.ndarray) -> PairForm:
         """Return the forms of both faces for deviations (row, contributor)."""
@@ -131,7 +138,7 @@ class ContactPoints:
 
     @cached_property
     def _modes(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The columns (mode,) of the forms of both faces, and their heights (mode, point) at the points for deviations of 1."""
+        """The columns (mode,) of the forms of both faces, and their heights (mode, point) at the points per unit deviation."""
         sides = zip(self.deviating, (self.P_m, self.P_r), (self.facing, np.ones(len(self.P_m))), strict=True)
         return [
             (face.form_columns, np.ascontiguousarray((face.form.heights(P) * share[:, None]).T))
@@ -152,7 +159,7 @@ class ContactPoints:
 
     @cached_property
     def weights(self) -> Float[Array, " point"]:
-        """The weights of the points (point,), by the areas that they stand for; equal ones without sampled faces."""
+        """The weights of the points (point,), by the areas that they represent; equal ones without sampled faces."""
         if self.moving_face is None or self.reference_face is None or self.round is not None:
             return np.ones(len(self.P_m))
         distance = float(np.linalg.norm(self.P_m - self.P_r, axis=1).max())
@@ -163,7 +170,7 @@ class ContactPoints:
         """The largest height [mm] of round surfaces over the triangles that they were fitted to and replace."""
         faces = [face for face in (self.moving_face, self.reference_face) if face is not None]
         pieces = [piece.face for face in faces for piece in face.pieces if piece.surface.is_fitted]
-        return max(map(chord_height, pieces), default=0.0)
+        return max((piece.chord_height for piece in pieces), default=0.0)
 
     @property
     def in_words(self) -> str:
@@ -173,7 +180,7 @@ class ContactPoints:
 
     @property
     def is_springy(self) -> bool:
-        """Whether some of the points give way."""
+        """Whether some of the points are compliant."""
         return self.stiffness is not None and bool(np.isfinite(self.stiffness).any())
 
     @property
@@ -186,7 +193,7 @@ class ContactPoints:
 class Nominal:
     """An assembly with numbers.
 
-    measurements   of each measure; None for those of points and expressions
+    measurements   of each measure; None if it measures points or an expression
     scenes         the models of the stations, which share the parts: each has its own measures; none without stations
     station        the name of the station, in the model of one
 
@@ -228,7 +235,7 @@ class Nominal:
 
     @property
     def patterns(self) -> tuple[NominalPattern, ...]:
-        """The features that are toleranced together, of all parts; a feature by itself is a pattern of one member."""
+        """The features that are toleranced together, of all parts; a single feature is a pattern of one member."""
         return tuple(self._features.patterns)
 
     def datums(self, part: int) -> dict[str | None, tuple[Datum, ...]]:
@@ -265,11 +272,11 @@ class Nominal:
         return np.array([self._indices[part, ""] for part in self.assembly.parts], dtype=int)
 
     def number(self, index: int) -> int:
-        """Return the number of a part of a station among the parts of the assembly."""
+        """Return the index of a part of a station among the parts of the assembly."""
         return self.assembly.parts.index(self.parts[index].part)
 
     def may_differ(self, index: int) -> bool:
-        """Return whether contact may move a part: in its own station, or in an earlier one, which a joint hands on."""
+        """Return whether contact may move a part in its own station, or moved it in an earlier one that joined it."""
         part = self.parts[index]
         return bool(part.movers) or (bool(self.scenes) and part.station != self.scenes[0].station)
 
@@ -305,7 +312,7 @@ class Nominal:
         return self.parts[self.part_index(point.part)].placed(position)
 
     def face_at(self, point: Point) -> FaceDeviation | None:
-        """Return the face of a feature that a declared point moves with, or the middle of two; None for other points."""
+        """Return the face of a feature that a declared point moves with, or the median of two; None for other points."""
         if point.on is None:
             return None
         feature = self._features.nominal(point.on)

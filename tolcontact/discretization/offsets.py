@@ -1,4 +1,4 @@
-"""Heights of the faces of a pair: those linear in the deviations at its contact points, and forms at any of their places."""
+"""Heights of the faces of a pair: at its contact points, linear in the deviations, and of form at any point."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.features import FaceDeviation
 
-MARGIN_SHARE = 0.05  # of the range of heights at many places: what others may stand higher
+MARGIN_SHARE = 0.05  # of the range of heights at many points: how much higher others may be
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,20 +16,15 @@ class Offsets:
     """Heights of the contact points of a pair along n^r, linear in the deviations. Gaps are smaller by these heights.
 
     columns   (contributor,): columns of the deviations
-    matrix    (contributor, point): height of each point for a deviation of 1
+    matrix    (contributor, point): height of each point per unit deviation
     """
 
     columns: np.ndarray
     matrix: np.ndarray
 
     @classmethod
-    def none(cls, points: int) -> "Offsets":
-        """Return the offsets of points whose heights do not vary."""
-        return cls(np.zeros(0, dtype=int), np.zeros((0, points)))
-
-    @classmethod
     def joined(cls, terms: "Sequence[Offsets]", points: int) -> "Offsets":
-        """Return the sum of several offsets of the same points."""
+        """Return the sum of offsets of the same points; without terms, heights do not vary."""
         columns = np.unique(np.concatenate([np.zeros(0, dtype=int), *(term.columns for term in terms)]))
         matrix = np.zeros((len(columns), points))
         for term in terms:
@@ -60,18 +55,18 @@ class PairForm:
         return PairForm(self.deviating, self.deviations[rows])
 
     def at(self, row: Int[Array, " k"], P_m: Float[Array, "k 3"], P_r: Float[Array, "k 3"]) -> Float[Array, " k"]:
-        """Return the sum of both heights (k,) [mm] at places P_m, P_r (k, 3) of the nominal faces, each of its own row (k,)."""
+        """Return the sum of both heights (k,) [mm] at points P_m, P_r (k, 3) of the nominal faces, each of its own row (k,)."""
         return np.add(*(self.at_face(k, row, places) for k, places in enumerate((P_m, P_r))))
 
     def at_face(self, k: int, row: Int[Array, " k"], places: Float[Array, "k 3"]) -> Float[Array, " k"]:
-        """Return the heights (k,) [mm] of one face at its `places` (k, 3), each of its own row; face 0 is the moving one."""
+        """Return the heights (k,) [mm] of one face at points `places` (k, 3), each of its own row; face 0 is the moving one."""
         face = self.deviating[k]
         if face is None or face.form is None:
             return np.zeros(len(row))
         return face.form.sums(places, row, self.deviations[:, face.form_columns])
 
     def highest(self) -> Float[Array, "face row"]:
-        """Return bounds [mm] of the heights of the moving and the reference face, from the heights at many places of each."""
+        """Return bounds [mm] of the heights of the moving and the reference face, from the heights at many points of each."""
         bounds = np.zeros((2, len(self.deviations)))
         for k, face in enumerate(self.deviating):
             if face is not None and face.form is not None:

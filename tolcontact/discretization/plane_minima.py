@@ -1,9 +1,9 @@
 """Local minima of the gap between two planes with form: where they touch between their contact points.
 
-Contact points of faces with form are a share of the correlation length apart, and between them the faces bulge. At a given pose
-the gap is a smooth function of place on the moving plane, whose minima over both faces Newton steps find: inside of the faces,
-along their rims, and at corners. The heights follow from splines. A minimum is named by its place on the moving plane, so that
-its label alone tells where it is.
+The spacing of contact points on faces with form is a share of the correlation length, and the faces bulge between them. At a
+given pose the gap is a smooth function of position on the moving plane. Newton steps find its minima over both faces: inside
+the faces, along their rims, and at corners. Heights are evaluated from splines. The label of a minimum is its position on the
+moving plane.
 """
 
 from collections.abc import Sequence
@@ -16,36 +16,37 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.features import FaceDeviation, FormField
 from tolcontact.geometry import height_kernel, minima_kernel
-from tolcontact.geometry.edges import on_rim
-from tolcontact.geometry.face_frame import face_frame
 from tolcontact.geometry.height_kernel import HeightSums, HeightTable, Plane
 from tolcontact.geometry.meeting import Places
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
-from tolcontact.geometry.surface import RIM_TOLERANCE, Surface
+from tolcontact.geometry.spreading import face_frame
+from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.tolerances import SAME_PLACE
+from tolcontact.geometry.triangle_mesh import on_rim
 
-STEP_SHARE = 1 / 10  # of the length over which heights change: the distance of two nodes
-ROUGH_STEP_SHARE = 1 / 40  # the same for the covariance of fields that bend abruptly at stations
+STEP_SHARE = 1 / 10  # of the correlation length: the distance between two nodes
+ROUGH_STEP_SHARE = 1 / 40  # the same for a covariance whose fields have kinks at stations
 ROUGH = "matern 3/2"
-PADDING = 10  # nodes around a face, beyond which the ends of splines are not felt
+PADDING = 10  # nodes around a face, which keep the ends of splines from affecting it
 MAX_NODES = 60_000
 MAX_STARTS = 16  # of searches at a pose
-STEP_DISTANCE = 1.6  # times the reach: how far starts are from each other in steps, of smooth fields
+STEP_DISTANCE = 1.6  # times the reach: distance between starts for a first search in smooth fields
 SMOOTH = "squared exponential"
-START_DISTANCE = 0.9  # times the reach: how far starts are from each other
+START_DISTANCE = 0.9  # times the reach: distance between starts
 MAX_MINIMA = 6  # of a pair that are added at a pose
-MAX_FORMER = 24  # that stay from one pose to the next
-BEND_FACTOR = 1.6  # times the root mean square second difference over the reach: how far gaps fall between points
-EXTREME = 5.0  # times the root mean square height: the largest height, and over the length of its changes the largest slope
+MAX_FORMER = 24  # that are kept from one pose to the next
+BEND_FACTOR = 1.6  # times the root mean square second difference over the reach: largest dip of a gap between points
+EXTREME = 5.0  # times the root mean square height: the largest height, and divided by the correlation length the largest slope
 
 
 @dataclass(frozen=True, eq=False)
 class PlaneMinima:
-    """The gap between two planes that face each other, at any of their places.
+    """The gap between two planes that face each other, at any of their points.
 
     deviating           deviations of the moving and the reference face, if these belong to features
     moving, reference   the planes
-    reach               [mm] of a step of the search: the distance of contact points
-    slack               [mm] by which places may stand beside a rim
+    reach               [mm] of a search step: the contact-point spacing
+    slack               [mm] by which positions may overhang a rim
     """
 
     deviating: tuple[FaceDeviation | None, FaceDeviation | None]
@@ -60,7 +61,7 @@ class PlaneMinima:
     ) -> "PlaneMinima":
         """Return the gap between a moving and a reference plane, whose contact points are `reach` [mm] apart."""
         planes = [_plane(face, deviation) for face, deviation in zip(faces, deviating, strict=True)]
-        return cls(deviating, planes[0], planes[1], reach, RIM_TOLERANCE * max(float(face.mesh.scale) for face in faces))
+        return cls(deviating, planes[0], planes[1], reach, SAME_PLACE * max(float(face.mesh.scale) for face in faces))
 
     def heights(
         self,
@@ -69,24 +70,24 @@ class PlaneMinima:
         P_m: Float[Array, "m point 3"],
         is_required: Bool[Array, "n point"],
     ) -> Float[Array, "n point"]:
-        """Return the sums of both heights [mm] at points P_m of the moving plane and their feet at X_RM; 0 if not required.
+        """Return the sums of both heights [mm] at points P_m of the moving plane and their projections at X_RM.
 
-        P_m are those of each pose, or the same of all poses (m = 1).
+        P_m differ from pose to pose, or are the same for all poses (m = 1). Heights that are not required are 0.
         """
         heights = np.zeros(is_required.shape)
         height_kernel.write_heights(*self._inputs(X_RM, deviations), np.ascontiguousarray(P_m), is_required, heights)
         return heights
 
     def bulge(self, deviations: Float[Array, "n contributor"]) -> Float[Array, " n"]:
-        """Return how far [mm] the gap may fall between contact points, at most."""
+        """Return the largest dip [mm] of the gap between contact points."""
         return BEND_FACTOR * self._root_sums(self._bends, deviations).sum(axis=0)
 
     def bound(self, deviations: Float[Array, "n contributor"]) -> Float[Array, " n"]:
-        """Return a bound [mm] of the sum of both heights, up or down."""
+        """Return a bound [mm] of the absolute sum of both heights."""
         return EXTREME * self._root_sums(self._squares, deviations).sum(axis=0)
 
-    def error_beside(self, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"]) -> Float[Array, " n"]:
-        """Return a bound [mm] of the error of heights at nominal feet: a slope times how far feet are from these at X_RM."""
+    def projection_error(self, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"]) -> Float[Array, " n"]:
+        """Return a bound [mm] of the error of heights at nominal projections: a slope times their displacement at X_RM."""
         reference = self.deviating[1]
         if reference is None or reference.form is None:
             return np.zeros(len(X_RM))
@@ -144,10 +145,10 @@ class PlaneMinima:
     ) -> Int[Array, "n minimum"]:
         """Return the labels of the minima at X_RM that are deeper than `depth` [mm], the deepest first; -1 for none.
 
-        grown    [mm] by which both faces have grown
-        P_m      points [mm] of the moving plane, of each pose or the same of all poses (m = 1): from those with the least
-                 `gaps` [mm], below `limits` [mm], minima are searched
-        in_steps whether answers are searched more closely afterwards
+        grown    [mm] outward offset of both faces
+        P_m      points [mm] of the moving plane, for each pose or the same for all poses (m = 1): the search starts from points
+                 with the least `gaps` [mm], below `limits` [mm]
+        in_steps whether a closer search follows
         """
         points = np.ascontiguousarray(P_m)
         starts, labels = (np.empty((len(X_RM), count), dtype=np.int64) for count in (MAX_STARTS, MAX_MINIMA))
@@ -160,7 +161,7 @@ class PlaneMinima:
     def at(
         self, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"], labels: Int[Array, "n place"]
     ) -> tuple[Places, Float[Array, "n place"]]:
-        """Return the places with labels at X_RM, -1 for none, and the sums of both heights [mm] there."""
+        """Return the candidates with labels at X_RM, -1 for none, and the sums of both heights [mm] there."""
         P_m, P_r = np.zeros((2, *labels.shape, 3))
         gaps, heights = np.empty((2, *labels.shape))
         inputs = self._inputs(X_RM, deviations)
@@ -169,13 +170,13 @@ class PlaneMinima:
         return Places(np.where(np.isfinite(gaps), labels, -1), gaps, P_m, P_r, n_r), heights
 
     def points(self, labels: Int[Array, " place"]) -> Float[Array, "place 3"]:
-        """Return the nominal places [mm] of labels on the moving plane."""
+        """Return the nominal positions [mm] of labels on the moving plane."""
         plane, cell = self.moving, labels - FIRST_PLACE
         shares = (np.stack([cell // minima_kernel.CELLS, cell % minima_kernel.CELLS], axis=-1) + 0.5) / minima_kernel.CELLS
         return np.asarray(plane.origin + (plane.corners[0] + shares * (plane.corners[1] - plane.corners[0])) @ plane.axes)
 
     def _inputs(self, X_RM: np.ndarray, deviations: np.ndarray) -> tuple[Plane, Plane, np.ndarray, HeightSums, HeightSums]:
-        """Return the planes, the poses, and the factors of the modes of both, as compiled passes take them."""
+        """Return the planes, the poses, and the factors of the modes of both, for compiled functions."""
         factors = [
             np.ascontiguousarray(deviations[:, face.form_columns])
             if face is not None and face.form is not None
@@ -189,7 +190,7 @@ class PlaneMinima:
 
 
 def with_former(labels: Int[Array, "n a"], former: Int[Array, "n b"]) -> Int[Array, "n c"]:
-    """Return labels of minima, and after them the labels of former ones, as many as fit; -1 for none."""
+    """Return labels of minima, followed by labels of former ones up to MAX_FORMER; -1 for none."""
     joined = np.empty((len(labels), min(labels.shape[1] + former.shape[1], MAX_FORMER)), dtype=np.int64)
     width = minima_kernel.join(labels, np.ascontiguousarray(former), joined)
     return np.ascontiguousarray(joined[:, :width])
@@ -199,7 +200,7 @@ def _plane(face: Surface, deviation: FaceDeviation | None) -> Plane:
     """Return a flat face with the table of its form."""
     frame = face_frame(face.mesh)
     axes, origin = np.ascontiguousarray(frame.axes[:, :2].T), np.asarray(frame.centre)
-    vertices = (np.asarray(face.mesh.vertices) - origin) @ axes.T
+    vertices = (face.vertices - origin) @ axes.T
     corners = np.array([vertices.min(axis=0), vertices.max(axis=0)])
     form = None if deviation is None else deviation.form
     no_table = HeightTable(np.zeros(2), 1.0, np.zeros((0, 0, 0)))
@@ -209,7 +210,7 @@ def _plane(face: Surface, deviation: FaceDeviation | None) -> Plane:
 
 def _edges(face: Surface, vertices: np.ndarray) -> np.ndarray:
     """Return the edges (edge, 7) of the rim of a flat face, see Plane; `vertices` (vertex, 2) [mm] are its coordinates."""
-    faces = np.asarray(face.mesh.faces)
+    faces = face.faces
     triangle, first = np.nonzero(on_rim(faces))
     start, end, opposite = (vertices[faces[triangle, (first + k) % 3]] for k in range(3))
     length = np.linalg.norm(end - start, axis=1, keepdims=True)
@@ -229,8 +230,8 @@ def _table(form: FormField, origin: np.ndarray, axes: np.ndarray, corners: np.nd
     u, v = np.meshgrid(*along, indexing="ij")
     nodes = form.heights(origin + u[..., None] * axes[0] + v[..., None] * axes[1])
     for axis, count in enumerate(counts):
-        beside = np.full(count - 1, 1 / 6)
-        splines = np.diag(np.full(count, 2 / 3)) + np.diag(beside, 1) + np.diag(beside, -1)
+        off_diagonal = np.full(count - 1, 1 / 6)
+        splines = np.diag(np.full(count, 2 / 3)) + np.diag(off_diagonal, 1) + np.diag(off_diagonal, -1)
         nodes = np.moveaxis(np.tensordot(np.linalg.inv(splines), nodes, axes=(1, axis)), 0, axis)
     kept = slice(PADDING - 2, 1 - PADDING)  # a node before and two after each interval
     return HeightTable(corners[0] - step, step, np.ascontiguousarray(nodes[kept, kept]))

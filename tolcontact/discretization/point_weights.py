@@ -1,4 +1,4 @@
-"""Weights of contact points: the areas that they stand for, with the moments of the face."""
+"""Weights of contact points: the areas that they represent, with the moments of the face."""
 
 from typing import NamedTuple
 
@@ -7,8 +7,7 @@ from scipy.spatial import KDTree
 
 from tolcontact.arrays import Array, Float
 from tolcontact.geometry.common_region import common_region
-from tolcontact.geometry.curvature import is_flat
-from tolcontact.geometry.face_frame import face_frame
+from tolcontact.geometry.spreading import face_frame
 from tolcontact.geometry.surface import Surface
 
 ELEMENTS_PER_POINT = 16
@@ -16,7 +15,7 @@ MAX_ELEMENTS = 200_000
 EDGE = 2.0137  # of the largest edge of an element, in its size: no edge of a model is just as long as that
 NEIGHBOURS = 8  # at most, which share an element that is equally near to them
 TIE = 1e-6  # of the size of an element
-LEAST_FACTOR = 0.1  # by which moments may change the weight of a point
+LEAST_FACTOR = 0.1  # smallest ratio of a weight to the area that the point represents
 MOMENT_TOLERANCE = 1e-11  # of the moments of weights of mean 1, in the size of the face
 MAX_STEPS = 60
 CONDITIONS = (10, 4)  # moments of the orders 0 to 2, or of 0 and 1
@@ -25,19 +24,19 @@ CONDITIONS = (10, 4)  # moments of the orders 0 to 2, or of 0 and 1
 def point_weights(P_m: Float[Array, "point 3"], distance: float, moving: Surface, reference: Surface) -> Float[Array, " point"]:
     """Return weights (point,) in proportion to the area of the moving face that is nearest to each point; their mean is 1.
 
-    Only that part of the face counts that lies over the reference face, no farther away than `distance` [mm]. Weights have the
-    moments of this part: its area, its centre, and its second moments. They are as close as possible to the areas that are
-    nearest, by the sum of (w - a)^2 / a, and none is less than a tenth of that. Few points may not allow all of this: then
-    they have area and centre, or the area alone.
+    Only the part of the face over the reference face counts, up to a `distance` [mm]. Weights have the moments of this part:
+    its area, its centre, and its second moments. They are as close as possible to the nearest areas a, by the sum of
+    (w - a)^2 / a, and each is at least a tenth of its area. With few points this may be impossible: then they have area and
+    centre, or the area alone.
     """
     nearest = _elements(P_m, distance, moving, reference)
-    region = common_region(moving, reference) if is_flat(moving) and is_flat(reference) else None
+    region = common_region(moving, reference) if moving.is_flat and reference.is_flat else None
     # Areas of triangles that are cut along the reference face would depend on its tessellation; their moments do not.
     elements = nearest if region is None else _elements(P_m, distance, moving, reference, region, is_fine=nearest is None)
     if elements is None:
         return np.ones(len(P_m))
     areas = _nearest_areas(P_m, nearest or elements)
-    # The middles of the edges of triangles integrate quadratic functions exactly.
+    # The midpoints of the edges of triangles integrate quadratic functions exactly.
     places = (elements.corners + np.roll(elements.corners, 1, axis=1)).reshape(-1, 3) / 2
     if moving.surfaces:
         places, _ = moving.projections(places)
@@ -83,7 +82,7 @@ def _with_moments(areas: np.ndarray, functions: np.ndarray, moments: np.ndarray)
 
 
 class _Elements(NamedTuple):
-    """Triangles of a face: corners (element, 3, 3), and areas (element,), whose sum is given."""
+    """Triangles of a face: corners (element, 3, 3), areas (element,) whose mean per contact point is 1, and their size [mm]."""
 
     corners: np.ndarray
     areas: np.ndarray
@@ -99,13 +98,13 @@ def _elements(
     *,
     is_fine: bool = True,
 ) -> _Elements | None:
-    """Return the elements of the part of the moving face that counts, in areas of 1 for each point; None without any.
+    """Return the elements of the part of the moving face that counts; None if there are none.
 
     region    triangles (triangle, 3, 3) of the face over the reference face; without them each element is over it or not
-    is_fine   whether elements are small also where all of a region counts
+    is_fine   whether elements are also small where a whole region counts
     """
     size = max(moving.mesh.area / min(ELEMENTS_PER_POINT * len(P_m), MAX_ELEMENTS), 0.0) ** 0.5
-    vertices, faces = np.asarray(moving.mesh.vertices), np.asarray(moving.mesh.faces)
+    vertices, faces = moving.vertices, moving.faces
     if region is not None:
         vertices, faces = region.reshape(-1, 3), np.arange(3 * len(region)).reshape(-1, 3)
     if not len(faces):
@@ -124,16 +123,16 @@ def _elements(
 
 
 def _is_within(points: np.ndarray, reference: Surface, distance: float) -> bool:
-    """Return whether all places between points (point, 3) over a flat reference face are within a distance [mm] of it."""
+    """Return whether the convex hull of points (point, 3) over a flat reference face is within a distance [mm] of it."""
     n = reference.corner_normals.reshape(-1, 3).mean(axis=0)
-    heights, levels = points @ n, np.asarray(reference.mesh.vertices) @ n
+    heights, levels = points @ n, reference.vertices @ n
     return bool(max(heights.max() - levels.min(), levels.max() - heights.min()) <= distance * np.linalg.norm(n))
 
 
 def _nearest_areas(P_m: np.ndarray, elements: _Elements) -> np.ndarray:
     """Return the area (point,) that is nearest to each point."""
     distances, nearest = KDTree(P_m).query(elements.corners.mean(axis=1), k=np.arange(1, min(len(P_m), NEIGHBOURS) + 1))
-    # What is equally near to several points is shared, so that rounding in another frame changes nothing.
+    # An element equally near to several points is shared, so that rounding in another frame changes nothing.
     ties = distances <= distances[:, :1] + TIE * elements.size
     shares = ties * (elements.areas / ties.sum(axis=1))[:, None]
     return np.bincount(nearest.ravel(), weights=shares.ravel(), minlength=len(P_m))

@@ -1,29 +1,28 @@
-"""Contact of round faces: a ball or a shaft of one part beside walls of the other. Nominal assembly frame, mm."""
+"""Contact of round faces: a ball or shaft of one part against walls of the other. Nominal assembly frame, mm."""
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import trimesh
 
-from tolcontact.discretization.round_points import NotRoundError, RoundPoint, arc, tangent_directions
-from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, Plane, RoundSurface, Sphere
-from tolcontact.geometry.curvature import chord_height
-from tolcontact.geometry.edges import CREASE, rim
+from tolcontact.discretization.round_points import NO_DIRECTION, NotRoundError, RoundPoint, arc, tangent_directions
+from tolcontact.geometry.analytic_surfaces import Cone, Cylinder, Plane, RoundSurface, Sphere
 from tolcontact.geometry.surface import Piece, Surface
+from tolcontact.geometry.tolerances import PARALLEL, SAME_PLACE
+from tolcontact.geometry.triangle_mesh import CREASE
 
 MAX_POINTS = 40  # of a pair
-PARALLEL_TOLERANCE = 1e-3  # rad between the axis of a shaft and its wall
 ARC_MARGIN = math.radians(5.0)  # between the line of contact and the ends of a shaft's arc
 AXIS_PLACES = 200  # places along an axis that are examined
 BISECTIONS = 40
 MAX_FACET_SINE = 0.3  # of half the angle between facets
-PLACE_TOLERANCE = 1e-6  # of a face's size
 NORMAL_TOLERANCE = 1e-7  # between the normals of neighbouring triangles of one plane
 
 
 def round_points(moving: Surface, reference: Surface, reach: float) -> list[RoundPoint]:
-    """Return the contact points of two faces that touch as balls or shafts beside walls; none if they may touch otherwise.
+    """Return the contact points of two faces that touch as balls or shafts and walls; none if they may touch otherwise.
 
     Walls at a distance above `reach` [mm] have no points.
     """
@@ -57,7 +56,7 @@ def _pieces(face: Surface) -> list[Piece]:
     for number in range(label.max() + 1):
         flat = remainder.part(np.flatnonzero(label == number))
         n = (np.asarray(flat.mesh.face_normals) * np.asarray(flat.mesh.area_faces)[:, None]).sum(axis=0)
-        pieces.append(Piece(Plane(np.asarray(flat.mesh.vertices)[0], n / np.linalg.norm(n)), False, flat))
+        pieces.append(Piece(Plane(flat.vertices[0], n / np.linalg.norm(n)), False, flat))
     return pieces
 
 
@@ -71,7 +70,7 @@ def _with_outward_normal(piece: Piece) -> Piece:
 def _points_between(moving: Piece, reference: Piece, reach: float) -> list[RoundPoint]:
     """Return the points between two pieces; none if they are too far apart.
 
-    Raises NotRoundError if neither piece is a ball or shaft that touches the other as a wall beside it.
+    Raises NotRoundError if neither piece is a ball or shaft that touches the other as a wall.
     """
     sides = ((moving, reference, True), (reference, moving, False))
     for body, wall, on_moving in sides:
@@ -79,10 +78,10 @@ def _points_between(moving: Piece, reference: Piece, reach: float) -> list[Round
             return _ball_points(body, wall, reach, on_moving)
     for body, wall, on_moving in sides:
         if isinstance(body.surface, Cylinder) and not body.is_hollow:
-            if isinstance(wall.surface, Plane) and abs(float(body.surface.axis @ wall.surface.axis)) < PARALLEL_TOLERANCE:
+            if isinstance(wall.surface, Plane) and abs(float(body.surface.axis @ wall.surface.axis)) < PARALLEL:
                 return _shaft_on_plane(body, body.surface, wall, reach, on_moving)
             sine = float(np.linalg.norm(np.cross(body.surface.axis, wall.surface.axis)))
-            if isinstance(wall.surface, Cylinder) and wall.is_hollow and sine < PARALLEL_TOLERANCE:
+            if isinstance(wall.surface, Cylinder) and wall.is_hollow and sine < PARALLEL:
                 return _shaft_in_hole(body, body.surface, wall, wall.surface, reach, on_moving)
     raise NotRoundError
 
@@ -96,7 +95,7 @@ def _no_points(wall: Piece, places: np.ndarray, reach: float) -> list[RoundPoint
 
 
 def _ball_points(body: Piece, wall: Piece, reach: float, on_moving: bool) -> list[RoundPoint]:
-    """Return the points of a ball beside a wall: the nearest, and on a hollow wall also its tangent planes."""
+    """Return the points of a ball against a wall: the nearest, and on a hollow wall also its tangent planes."""
     c, r = body.surface.origin, body.surface.radius
     side = -1.0 if wall.is_hollow else 1.0
     distances, slopes = wall.surface.distance(c[None])
@@ -108,26 +107,27 @@ def _ball_points(body: Piece, wall: Piece, reach: float, on_moving: bool) -> lis
         if not isinstance(wall.surface, RoundSurface) or (not isinstance(wall.surface, Cone) and r > wall.surface.radius):
             raise NotRoundError
         directions = tangent_directions(wall)
-        planes = [wall.surface.tangent(e) for e in directions]
         touches = [_contains(wall, wall.surface.touched(c, e)) for e in directions]
-        touches += [_contains(body, c - r * plane.axis) for plane in planes]
+        touches += [_contains(body, c - r * wall.surface.tangent(e).axis) for e in directions]
     else:
-        planes = []
         touches = [_contains(wall, c - distance * slope), _contains(body, c - r * slope)]
     if not all(touches):
         return _no_points(wall, c[None], r + reach)
-    nearest = RoundPoint.ball(wall, body.surface, on_moving, *(arc(wall) if wall.is_hollow else ()))
-    return [nearest, *(RoundPoint.ball(Piece(plane, False, wall.face), body.surface, on_moving) for plane in planes)]
+    nearest = RoundPoint(wall.surface, wall.is_hollow, c, NO_DIRECTION, NO_DIRECTION, r, on_moving)
+    if not wall.is_hollow:
+        return [nearest]
+    towards, opening = arc(wall)
+    return [replace(nearest, towards=towards, opening=opening), *nearest.tangents(directions)]
 
 
 class _ContactLine:
-    """The line on which a shaft and a plane may touch, by places [mm] along the shaft's axis."""
+    """The line of contact of a shaft and a plane; its places are coordinates [mm] along the shaft's axis."""
 
     def __init__(self, body: Piece, wall: Piece) -> None:
         self._body, self._wall = body, wall
         # Near the rim of a flat triangle, points of the round face are shifted by a part of the height between the two.
         self._tolerances = [
-            PLACE_TOLERANCE * piece.face.mesh.scale + MAX_FACET_SINE * chord_height(piece.face) for piece in (body, wall)
+            SAME_PLACE * piece.face.mesh.scale + MAX_FACET_SINE * piece.face.chord_height for piece in (body, wall)
         ]
 
     def on_shaft(self, places: np.ndarray) -> np.ndarray:
@@ -145,10 +145,10 @@ class _ContactLine:
         return self.on_shaft(places) & self.on_wall(places)
 
     def places(self, start: float, end: float) -> np.ndarray:
-        """Return places from `start` to `end` that miss no part of the faces: even ones, all vertices, and middles."""
+        """Return places from `start` to `end` that miss no part of the faces: even ones, all vertices, and midpoints."""
         shaft = self._body.surface
-        vertices = [np.asarray(piece.face.mesh.vertices) for piece in (self._body, self._wall)]
-        of_vertices = np.concatenate([(points - shaft.origin) @ shaft.axis for points in vertices])
+        vertices = [piece.face.vertices for piece in (self._body, self._wall)]
+        of_vertices = np.concatenate(list(map(shaft.along, vertices)))
         places = np.unique(np.concatenate([np.linspace(start, end, AXIS_PLACES + 1), of_vertices.clip(start, end)]))
         return np.unique(np.concatenate([places, (places[1:] + places[:-1]) / 2]))
 
@@ -172,25 +172,26 @@ def _shaft_on_plane(body: Piece, shaft: Cylinder, wall: Piece, reach: float, on_
         return []
     towards, opening = arc(body)
     if opening < math.pi and -n @ towards < math.cos(max(opening - ARC_MARGIN, 0)):
-        raise NotRoundError  # after a small turn the shaft's edge touches, or the face beside it
+        raise NotRoundError  # after a small rotation the shaft's edge touches, or the face next to it
     line = _ContactLine(body, wall)
-    start, end = _extent(body.face, shaft)
+    start, end = shaft.extent(body.face.vertices)
     places = line.places(start, end)
     touching = np.flatnonzero(line.is_touching(places))
     if not touching.size or height <= -shaft.radius:
         return _no_points(wall, shaft.origin + places[:, None] * shaft.axis, shaft.radius + reach)
     points = []
     for number, outer, limit in ((touching[0], touching[0] - 1, start), (touching[-1], touching[-1] + 1, end)):
-        place, cut = float(places[number]), np.zeros(3)
+        place, cut = float(places[number]), NO_DIRECTION
         if 0 <= outer < len(places):
             inside, outside = line.bracket(place, float(places[outer]))
             if line.on_wall(np.array([outside]))[0] or not line.on_shaft(np.array([outside]))[0]:
                 raise NotRoundError  # the shaft's end is not square to its axis
             foot = shaft.origin + inside * shaft.axis - (height + shaft.radius) * n
             place, cut = _cut_by_edge(shaft, n, _nearest_edge(wall.face, foot))
-        elif abs(place - limit) > PLACE_TOLERANCE * body.face.mesh.scale:
+        elif abs(place - limit) > SAME_PLACE * body.face.mesh.scale:
             raise NotRoundError
-        points.append(RoundPoint.end(wall, shaft, place, cut, on_moving))
+        centre = shaft.origin + place * shaft.axis
+        points.append(RoundPoint(wall.surface, wall.is_hollow, centre, shaft.axis, cut, shaft.radius, on_moving))
     return points
 
 
@@ -198,7 +199,7 @@ def _cut_by_edge(shaft: Cylinder, n: np.ndarray, edge: np.ndarray) -> tuple[floa
     """Return the place [mm] on the axis, and the unit normal (3,), where the plane along n through an edge (2, 3) cuts it."""
     cut = np.cross(n, edge[1] - edge[0])
     cut /= np.linalg.norm(cut)
-    if abs(cut @ shaft.axis) < PARALLEL_TOLERANCE:
+    if abs(cut @ shaft.axis) < PARALLEL:
         raise NotRoundError
     return float((edge[0] - shaft.origin) @ cut / (shaft.axis @ cut)), cut
 
@@ -207,8 +208,8 @@ def _shaft_in_hole(
     body: Piece, shaft: Cylinder, wall: Piece, hole: Cylinder, reach: float, on_moving: bool
 ) -> list[RoundPoint]:
     """Return the points of a shaft in a parallel hole: at the first end of either, the nearest and the tangent planes."""
-    (start, end), (lower, upper) = (_extent(piece.face, shaft) for piece in (body, wall))
-    tolerance = PLACE_TOLERANCE * max(body.face.mesh.scale, wall.face.mesh.scale)
+    (start, end), (lower, upper) = (shaft.extent(piece.face.vertices) for piece in (body, wall))
+    tolerance = SAME_PLACE * max(body.face.mesh.scale, wall.face.mesh.scale)
     ends = ((max(start, lower), start >= lower - tolerance), (min(end, upper), end <= upper + tolerance))
     offsets = [shaft.origin + place * shaft.axis - hole.origin for place, _ in ends]
     clearances = [
@@ -223,30 +224,22 @@ def _shaft_in_hole(
         raise NotRoundError
     points = []
     for place, shaft_ends in ends:
-        cut = np.zeros(3) if shaft_ends else hole.axis
-        points.append(RoundPoint.end(wall, shaft, place, cut, on_moving, towards, opening))
-        for e in tangent_directions(wall):
-            points.append(RoundPoint.end(Piece(hole.tangent(e), False, wall.face), shaft, place, cut, on_moving))
+        centre, cut = shaft.origin + place * shaft.axis, NO_DIRECTION if shaft_ends else hole.axis
+        nearest = RoundPoint(hole, True, centre, shaft.axis, cut, shaft.radius, on_moving, towards, opening)
+        points += [nearest, *nearest.tangents(tangent_directions(wall))]
     return points
-
-
-def _extent(face: Surface, shaft: AnalyticSurface) -> tuple[float, float]:
-    """Return the first and the last place of a face along an axis [mm]."""
-    along = (np.asarray(face.mesh.vertices) - shaft.origin) @ shaft.axis
-    return float(along.min()), float(along.max())
 
 
 def _has_square_ends(piece: Piece) -> bool:
     """Return whether the rim of a cylinder lies in two planes across its axis."""
-    mesh = piece.face.mesh
-    along = (np.asarray(mesh.vertices)[np.unique(rim(mesh.faces))] - piece.surface.origin) @ piece.surface.axis
+    along = piece.surface.along(piece.face.rim_corners)
     distances = np.minimum(along - along.min(initial=np.inf), along.max(initial=-np.inf) - along)
-    return bool(along.size) and bool((distances < PLACE_TOLERANCE * mesh.scale + piece.surface.residual).all())
+    return bool(along.size) and bool((distances < SAME_PLACE * piece.face.mesh.scale + piece.surface.residual).all())
 
 
 def _contains(piece: Piece, point: np.ndarray) -> bool:
     """Return whether a point (3,) of a piece's surface is on its face."""
-    tolerance = PLACE_TOLERANCE * piece.face.mesh.scale
+    tolerance = SAME_PLACE * piece.face.mesh.scale
     return bool(piece.face.overhang(point[None])[0] <= tolerance) and bool(
         np.linalg.norm(piece.face.project(point[None])[0][0] - point) <= tolerance
     )
@@ -254,7 +247,7 @@ def _contains(piece: Piece, point: np.ndarray) -> bool:
 
 def _nearest_edge(face: Surface, point: np.ndarray) -> np.ndarray:
     """Return the ends (2, 3) of the edge of the rim that is nearest to a point (3,)."""
-    ends = np.asarray(face.mesh.vertices)[rim(face.mesh.faces)]
+    ends = face.rim_ends
     along = ends[:, 1] - ends[:, 0]
     share = (((point - ends[:, 0]) * along).sum(axis=1) / (along**2).sum(axis=1)).clip(0, 1)
     return ends[np.linalg.norm(ends[:, 0] + share[:, None] * along - point, axis=1).argmin()]

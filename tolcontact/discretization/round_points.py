@@ -1,46 +1,58 @@
-"""Contact points of round faces: a ball or a shaft of one part beside a wall of the other. Nominal assembly frame, mm.
+"""Contact points of round faces: a ball or shaft of one part against a wall of the other. Nominal assembly frame, mm.
 
 A ball touches where its centre is nearest to the wall, a shaft at the rim of one of its ends or of an end of the wall. These
-points are computed at every pose from a few numbers. They are exact; no point is sampled."""
+points are computed at every pose from a few numbers, so they are exact; none is sampled.
+"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
-from typing import NamedTuple
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, Plane, Sphere, surface_arrays, surfaces_of
+from tolcontact.geometry.analytic_surfaces import (
+    AnalyticSurface,
+    Cone,
+    Cylinder,
+    Plane,
+    RoundSurface,
+    Sphere,
+    axes_across,
+    azimuths,
+    surface_arrays,
+    surfaces_of,
+)
 from tolcontact.geometry.surface import Piece
+from tolcontact.geometry.tolerances import SAME_PLACE
 
-TANGENTS = 5  # of a whole hollow wall, besides the nearest
+TANGENTS = 5  # of a whole hollow wall, in addition to the nearest point
 MAX_FACET_ANGLE = math.radians(31.0)  # between neighbouring vertices of a round face: a wider gap is a gap of the face
 MAX_MISSING_SHARE = 0.05  # of the area of a round face that its triangles leave out
 CAP_SHARE = 0.9  # of the angle to the rim of a cap, at which its tangent planes are
-RADIUS_TOLERANCE = 1e-6  # of a face's size
+NO_DIRECTION = np.zeros(3)
+X_AXIS = np.array([1.0, 0.0, 0.0])
 
 
 class NotRoundError(Exception):
-    """Two faces do not touch as a ball or a shaft beside walls do."""
+    """Two faces do not touch as a ball or a shaft and walls do."""
 
 
 def arc(wall: Piece) -> tuple[np.ndarray, float]:
-    """Return the unit vector (3,) from the axis to the middle of a round face, and half its arc's angle [rad], pi if whole.
+    """Return the unit vector (3,) from the axis to the centre of a round face, and half its arc's angle [rad], pi if whole.
 
     Raises NotRoundError if a part of the face is missing within the arc.
     """
     if isinstance(wall.surface, Sphere):
         return _cap(wall, wall.surface)
-    vertices, axis = np.asarray(wall.face.mesh.vertices), wall.surface.axis
+    vertices, axis = wall.face.vertices, wall.surface.axis
     across = vertices - wall.surface.origin
     across -= (across @ axis)[:, None] * axis
-    across = across[np.linalg.norm(across, axis=1) > RADIUS_TOLERANCE * wall.face.mesh.scale]
+    across = across[np.linalg.norm(across, axis=1) > SAME_PLACE * wall.face.mesh.scale]
     if isinstance(wall.surface, Plane) or not len(across):
-        return np.linalg.svd(axis[None])[2][1], math.pi
+        return axes_across(axis)[0], math.pi
     x = across[0] / np.linalg.norm(across[0])
     y = np.cross(axis, x)
-    azimuths = np.sort(np.arctan2(across @ y, across @ x))
-    gaps = np.diff(azimuths, append=azimuths[0] + 2 * math.pi)
+    angles, gaps = azimuths(across, x, y)
     if (gaps > MAX_FACET_ANGLE).sum() > 1:
         raise NotRoundError
     widest = int(gaps.argmax())
@@ -48,7 +60,7 @@ def arc(wall: Piece) -> tuple[np.ndarray, float]:
         middle, opening = x, math.pi
     else:
         opening = math.pi - float(gaps[widest]) / 2
-        azimuth = float(azimuths[widest] + gaps[widest]) + opening
+        azimuth = float(angles[widest] + gaps[widest]) + opening
         middle = math.cos(azimuth) * x + math.sin(azimuth) * y
     _check_area(wall, opening)
     return middle, opening
@@ -56,7 +68,7 @@ def arc(wall: Piece) -> tuple[np.ndarray, float]:
 
 def _check_area(wall: Piece, opening: float) -> None:
     """Raise NotRoundError if a cylinder or cone has less area than its whole arc from end to end of its axis."""
-    along = (np.asarray(wall.face.mesh.vertices) - wall.surface.origin) @ wall.surface.axis
+    along = wall.surface.along(wall.face.vertices)
     if isinstance(wall.surface, Cylinder):
         expected = 2 * opening * wall.surface.radius * float(np.ptp(along))
     elif isinstance(wall.surface, Cone):
@@ -84,50 +96,46 @@ def _cap(wall: Piece, sphere: Sphere) -> tuple[np.ndarray, float]:
 
 
 def tangent_directions(wall: Piece) -> Sequence[np.ndarray]:
-    """Return unit vectors (3,) from the axis to the tangent planes that a hollow wall has besides the nearest.
+    """Return unit vectors (3,) from the axis to the tangent planes of a hollow wall.
 
-    They are counted from a vertex, so they turn with the part.
+    They start from a vertex, so they rotate with the part.
     """
     x, opening = arc(wall)
     if isinstance(wall.surface, Sphere):
         y, z = _directions_across(wall, x)
-        lean, azimuths = min(CAP_SHARE * opening, math.pi / 2), np.arange(TANGENTS - 1) * 2 * math.pi / (TANGENTS - 1)
-        sideways = [math.cos(azimuth) * y + math.sin(azimuth) * z for azimuth in azimuths]
-        directions = [x, *(math.cos(lean) * x + math.sin(lean) * across for across in sideways)]
+        tilt, angles = min(CAP_SHARE * opening, math.pi / 2), np.arange(TANGENTS - 1) * 2 * math.pi / (TANGENTS - 1)
+        sideways = [math.cos(azimuth) * y + math.sin(azimuth) * z for azimuth in angles]
+        directions = [x, *(math.cos(tilt) * x + math.sin(tilt) * across for across in sideways)]
         return [*directions, -x] if opening == math.pi else directions
     y = np.cross(wall.surface.axis, x)
     if opening == math.pi:
-        azimuths = np.arange(TANGENTS) * 2 * math.pi / TANGENTS
+        angles = np.arange(TANGENTS) * 2 * math.pi / TANGENTS
     else:
-        azimuths = np.linspace(-opening, opening, max(math.ceil(opening / math.pi * TANGENTS), 1) + 1)
-    return [math.cos(azimuth) * x + math.sin(azimuth) * y for azimuth in azimuths]
+        angles = np.linspace(-opening, opening, max(math.ceil(opening / math.pi * TANGENTS), 1) + 1)
+    return [math.cos(azimuth) * x + math.sin(azimuth) * y for azimuth in angles]
 
 
 def _directions_across(wall: Piece, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return two unit vectors across x (3,) and each other; the first points to the vertex farthest from the line along x."""
-    across = np.asarray(wall.face.mesh.vertices) - wall.surface.origin
+    """Return two unit vectors across x (3,) and each other; the first towards the vertex most distant from x."""
+    across = wall.face.vertices - wall.surface.origin
     across -= (across @ x)[:, None] * x
     y = across[np.linalg.norm(across, axis=1).argmax()]
     y /= np.linalg.norm(y)
     return y, np.cross(x, y)
 
 
-NO_DIRECTION = np.zeros(3)
-X_AXIS = np.array([1.0, 0.0, 0.0])
-
-
 @dataclass(frozen=True, eq=False)
 class RoundPoint:
-    """A wall, and a ball or the place on a shaft's axis where the shaft or the wall ends.
+    """A wall, and a ball or the point on a shaft's axis where the shaft or the wall ends.
 
     wall        the surface that the ball or shaft may touch
     is_hollow   whether the wall is around the ball or shaft: the free side of the surface is inside
-    centre      (3,) [mm] of the ball, or the place on the axis
+    centre      (3,) [mm] of the ball, or the point on the axis
     axis        (3,) unit vector of the shaft; 0 for a ball
-    cut         (3,) unit normal of the plane in which the wall ends, which moves with the wall; 0 where the shaft itself ends
+    cut         (3,) unit normal of the plane where the wall ends, which moves with the wall; 0 where the shaft itself ends
     radius      [mm] of the ball or shaft
     on_moving   whether the ball or shaft belongs to the moving part; else the wall does
-    towards     (3,) unit vector from the axis of a hollow cylinder or cone to the middle of its arc
+    towards     (3,) unit vector from the axis of a hollow cylinder or cone to the centre of its arc
     opening     [rad] half the angle of that arc; pi if it is whole
     """
 
@@ -138,36 +146,19 @@ class RoundPoint:
     cut: np.ndarray
     radius: float
     on_moving: bool
-    towards: np.ndarray
-    opening: float
+    towards: np.ndarray = field(default_factory=lambda: X_AXIS)
+    opening: float = math.pi
 
-    @classmethod
-    def ball(
-        cls, wall: Piece, ball: AnalyticSurface, on_moving: bool, towards: np.ndarray = X_AXIS, opening: float = math.pi
-    ) -> "RoundPoint":
-        """Return the point of a ball."""
-        axis = cut = NO_DIRECTION
-        return cls(wall.surface, wall.is_hollow, ball.origin, axis, cut, ball.radius, on_moving, towards, opening)
-
-    @classmethod
-    def end(
-        cls,
-        wall: Piece,
-        shaft: AnalyticSurface,
-        place: float,
-        cut: np.ndarray,
-        on_moving: bool,
-        towards: np.ndarray = X_AXIS,
-        opening: float = math.pi,
-    ) -> "RoundPoint":
-        """Return the point of a shaft at a place [mm] on its axis."""
-        centre = shaft.origin + place * shaft.axis
-        return cls(wall.surface, wall.is_hollow, centre, shaft.axis, cut, shaft.radius, on_moving, towards, opening)
+    def tangents(self, directions: Sequence[np.ndarray]) -> "list[RoundPoint]":
+        """Return points like this one at the tangent planes of its hollow wall in some directions (3,)."""
+        assert isinstance(self.wall, RoundSurface)
+        planes = [self.wall.tangent(direction) for direction in directions]
+        return [replace(self, wall=plane, is_hollow=False, towards=X_AXIS, opening=math.pi) for plane in planes]
 
     def nominal(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return P^m, P^r and n^r (3,): the nominal points of contact and the reference's normal.
 
-        In a hollow wall no side is nearest, so both points are the centre.
+        In a hollow wall no direction is nearest, so both points are the centre.
         """
         distances, slopes = self.wall.distance(self.centre[None])
         distance, slope = distances[0], slopes[0]
@@ -177,26 +168,20 @@ class RoundPoint:
             on_body = on_wall = self.centre
         return (on_body, on_wall, n) if self.on_moving else (on_wall, on_body, -n)
 
-    def centres(self) -> tuple["Ball", "Ball"]:
-        """Return balls around the centres of curvature of the moving and the reference face, where they touch nominally.
+    def curvature(self, *, of_moving: bool) -> tuple[np.ndarray, float]:
+        """Return the centre of curvature (3,) and its radius [mm] of one of the faces, at the nominal contact point.
 
-        That of a plane is around the point of contact, and as large as the ball or shaft.
+        A plane is replaced by a sphere around the contact point that is as large as the ball or shaft.
         """
-        body, (on_moving, on_reference, _) = Ball(self.centre, self.radius), self.nominal()
-        on_wall = on_reference if self.on_moving else on_moving
+        if of_moving == self.on_moving:
+            return self.centre, self.radius
+        on_wall = self.nominal()[0 if of_moving else 1]
         if isinstance(self.wall, Plane):
-            wall = Ball(on_wall, self.radius)
-        else:
-            offset = self.wall.offset(on_wall)
-            wall = Ball(on_wall - offset, float(np.linalg.norm(offset)))
-        return (body, wall) if self.on_moving else (wall, body)
-
-
-class Ball(NamedTuple):
-    """A centre (3,) and a radius [mm]."""
-
-    centre: np.ndarray
-    radius: float
+            return on_wall, self.radius
+        offset = on_wall - self.wall.origin
+        if isinstance(self.wall, Cylinder | Cone):  # whose origin is anywhere on the axis
+            offset = offset - float(offset @ self.wall.axis) * self.wall.axis
+        return on_wall - offset, float(np.linalg.norm(offset))
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,13 +197,13 @@ class RoundPoints:
     @classmethod
     def of(cls, points: Sequence[RoundPoint]) -> "RoundPoints":
         """Return points as arrays."""
-        names = [field.name for field in fields(RoundPoint) if field.name != "wall"]
+        names = [entry.name for entry in fields(RoundPoint) if entry.name != "wall"]
         arrays = {name: np.array([getattr(point, name) for point in points]) for name in names}
         return cls(surface_arrays([point.wall for point in points]), arrays)
 
     @property
     def are_beside(self) -> bool:
-        """Whether no wall is around a ball or shaft."""
+        """Whether no wall surrounds its ball or shaft."""
         return not bool(self.points["is_hollow"].any())
 
     def __iter__(self) -> Iterator[RoundPoint]:

@@ -9,7 +9,7 @@ from tolcontact.declaration import Assembly, Face, Feature, Locator, Part, Stati
 from tolcontact.fasteners.fit import INTO, Fit
 from tolcontact.fasteners.placed_faces import PlacedCylinder, PlacedPlane, meshes_of, placement
 from tolcontact.geometry.faces import face_area
-from tolcontact.geometry.pin_shape import HEAD_WIDTH
+from tolcontact.geometry.shapes import HEAD_WIDTH
 
 DIGITS = 12  # of places [mm]: what is beyond is rounding
 SAME_FACE = 1 - 1e-6  # share of its area that a face has in common with that of its feature

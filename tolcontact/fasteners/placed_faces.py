@@ -11,7 +11,6 @@ from tolcontact.declaration import Cylinder as CylinderSelection, Face, Geometry
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.analytic_surfaces import Cylinder
 from tolcontact.geometry.brep_face import describe_faces
-from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.files import Shape
 from tolcontact.geometry.shapes import shape
@@ -91,9 +90,7 @@ def placed_cylinder(face: Face) -> PlacedCylinder:
     surface = patch(face, meshes_of(face))
     pieces, rest = surface.pieces, len(surface.unknown.mesh.faces)
     if len(pieces) != 1 or rest or not isinstance(pieces[0].surface, Cylinder):
-        kinds = [piece.surface.kind for piece in pieces] + (
-            ["plane" if is_flat(surface) else "other triangles"] if rest else []
-        )
+        kinds = [piece.surface.kind for piece in pieces] + (["plane" if surface.is_flat else "other triangles"] if rest else [])
         raise GeometryFault(f"face {face} is {', '.join(dict.fromkeys(kinds))}; expected one cylinder")
     cylinder = pieces[0].surface
     stations = (np.asarray(surface.mesh.vertices) - cylinder.origin) @ cylinder.axis
@@ -105,7 +102,7 @@ def placed_cylinder(face: Face) -> PlacedCylinder:
 def placed_plane(face: Face) -> PlacedPlane:
     """Return a face that is flat. Raises GeometryFault for any other face."""
     surface = patch(face, meshes_of(face))
-    if not is_flat(surface):
+    if not surface.is_flat:
         raise GeometryFault(f"face {face} is not flat; expected the plane under the head")
     R, t = placement(face.part)
     normal = surface.mesh.area_faces @ surface.mesh.face_normals
@@ -114,7 +111,7 @@ def placed_plane(face: Face) -> PlacedPlane:
 
 def outer_cylinders(part: Part) -> Iterator[PlacedCylinder]:
     """Yield the outer cylinders of a part by radius, the largest first; several of one radius are left out."""
-    descriptions = describe_faces(shape_of(part.geometry).mesh)
+    descriptions = describe_faces(shape_of(part.geometry))
     radii = {face.radius for face in descriptions if face.kind == "cylinder" and face.radius and not face.is_inner}
     for radius in sorted(radii, reverse=True):
         try:
@@ -132,7 +129,7 @@ def meshes_of(face: Face) -> Meshes:
     """Return the meshes of the parts that a face refers to. Raises GeometryFault for the first fault of the face or a part."""
     for fault in (*face.faults(), *(fault for part in face.parts for fault in (*part.faults(), *part.geometry.faults()))):
         raise GeometryFault(fault)
-    return {part: shape_of(part.geometry).mesh for part in face.parts}
+    return {part: shape_of(part.geometry) for part in face.parts}
 
 
 @lru_cache(SHAPES)

@@ -15,8 +15,8 @@ from tolcontact.errors import GeometryFault
 from tolcontact.features.axial_grid import PLACE_SPACING, AxialGrid
 from tolcontact.features.covariances import Lengths
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder
-from tolcontact.geometry.quadrature import quadrature
 from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.triangle_mesh import quadrature
 
 MIN_PLACES, MAX_PLACES = 600, 20_000  # of a face, over which areas are summed
 MAX_EXCESS = 8  # times the intended number of places

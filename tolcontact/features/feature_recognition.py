@@ -17,10 +17,9 @@ from tolcontact.features.feature_geometry import (
     SphereFeature,
 )
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, Plane, Sphere
-from tolcontact.geometry.curvature import is_flat
-from tolcontact.geometry.edges import smooth_pieces
 from tolcontact.geometry.fitting import nearest_surface
 from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.triangle_mesh import smooth_pieces
 
 AREA_TOLERANCE = 1e-3  # relative: a turned rectangle must be smaller by this to be preferred to one along the part's axes
 AXIS_TOLERANCE = 1e-6  # largest difference of a direction from the axis of the part after which it is named
@@ -55,7 +54,7 @@ def feature_geometry(faces: Sequence[Surface]) -> FeatureGeometry:
 
 def analytic_surface(face: Surface) -> AnalyticSurface | None:
     """Return the one analytic surface of a face; None for a general one."""
-    if is_flat(face):
+    if face.is_flat:
         normal_sum = face.corner_normals.reshape(-1, 3).mean(axis=0)
         n = normal_sum / np.linalg.norm(normal_sum)
         stated = [surface for surface in face.surfaces if isinstance(surface, Plane)]

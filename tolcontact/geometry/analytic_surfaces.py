@@ -63,10 +63,6 @@ class AnalyticSurface(ABC):
         Where the nearest point is not unique (on an axis) the gradient is 0.
         """
 
-    def offset(self, point: np.ndarray) -> np.ndarray:
-        """Return the vector (3,) from the origin to a point (3,), without the arbitrary components of the origin."""
-        return point - self.origin
-
     def placed(self, R: np.ndarray, t: np.ndarray) -> Self:
         """Return the surface rotated by R (3, 3), then translated by t (3,) [mm]."""
         return replace(self, origin=R @ self.origin + t, axis=R @ self.axis)
@@ -77,6 +73,15 @@ class AnalyticSurface(ABC):
             value, slope = self.distance(points)
             points = points - value[:, None] * slope
         return points
+
+    def along(self, points: np.ndarray) -> np.ndarray:
+        """Return the coordinates (point,) [mm] of points (point, 3) along the axis, from the origin."""
+        return np.asarray((points - self.origin) @ self.axis)
+
+    def extent(self, points: np.ndarray) -> tuple[float, float]:
+        """Return the least and the largest coordinate [mm] of points (point, 3) along the axis, from the origin."""
+        along = self.along(points)
+        return float(along.min()), float(along.max())
 
     def _around_axis(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return distances (point,) from the axis, unit vectors (point, 3) away from it, and coordinates (point,) along it."""
@@ -111,10 +116,6 @@ class Plane(AnalyticSurface):
         """Return heights (point,) [mm] over the plane, and its normal (point, 3)."""
         return (points - self.origin) @ self.axis, np.broadcast_to(self.axis, points.shape)
 
-    def offset(self, point: np.ndarray) -> np.ndarray:
-        """Return the component of the offset along the normal."""
-        return float((point - self.origin) @ self.axis) * self.axis
-
 
 @dataclass(frozen=True, eq=False)
 class Cylinder(RoundSurface):
@@ -131,10 +132,6 @@ class Cylinder(RoundSurface):
         """Return signed distances (point,) [mm], and their gradients (point, 3)."""
         radial, outward, along = self._around_axis(points)
         return self.height(radial, along), outward
-
-    def offset(self, point: np.ndarray) -> np.ndarray:
-        """Return the component of the offset perpendicular to the axis."""
-        return _across(point - self.origin, self.axis)
 
     def touched(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """Return the nearest point of the generator in a direction from the axis."""
@@ -162,10 +159,6 @@ class Cone(RoundSurface):
         side = np.where(along < 0, -1.0, 1.0)  # the nappes meet in one line through the apex
         slope = np.cos(self.angle) * outward - (side * np.sin(self.angle))[:, None] * self.axis
         return self.height(radial, side * along), slope
-
-    def offset(self, point: np.ndarray) -> np.ndarray:
-        """Return the component of the offset perpendicular to the axis: files place cones anywhere along it."""
-        return _across(point - self.origin, self.axis)
 
     def tangent(self, direction: np.ndarray) -> Plane:
         """Return the tangent plane in a direction (3,) from the axis; its normal points inward."""
@@ -232,6 +225,17 @@ class Torus(AnalyticSurface):
         return self.height(tube, along), slope
 
 
+def axes_across(direction: np.ndarray) -> np.ndarray:
+    """Return two unit vectors (2, 3) perpendicular to a direction (3,) and to each other."""
+    return np.asarray(np.linalg.svd(direction[None])[2][1:])
+
+
+def azimuths(offsets: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the sorted azimuths (point,) [rad] of offsets (point, 3), from x (3,) to y (3,), and the gaps after them."""
+    angles = np.sort(np.arctan2(offsets @ y, offsets @ x))
+    return angles, np.diff(angles, append=angles[0] + 2 * np.pi)
+
+
 ANALYTIC_SURFACES: dict[str, type[AnalyticSurface]] = {
     surface.kind: surface for surface in (Plane, Cylinder, Cone, Sphere, Torus)
 }
@@ -254,10 +258,6 @@ def surfaces_of(arrays: Mapping[str, np.ndarray]) -> list[AnalyticSurface | None
         None if kind < 0 else ANALYTIC_SURFACES[SURFACE_KINDS[kind]].of({name: arrays[name][number] for name in _NUMBERS})
         for number, kind in enumerate(arrays["kind"])
     ]
-
-
-def _across(vector: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    return vector - float(vector @ axis) * axis
 
 
 def _length_and_direction(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,8 +12,7 @@ import numpy as np
 import trimesh
 
 from tolcontact.arrays import Array, Float
-from tolcontact.geometry.edges import edges
-from tolcontact.geometry.triangle_tree import triangle_tree
+from tolcontact.geometry.triangle_mesh import edges, triangle_tree
 
 STARTING_CELLS = 6  # along the longest side of the box
 MAX_LEVELS = 6

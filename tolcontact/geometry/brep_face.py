@@ -1,4 +1,4 @@
-"""Descriptions of the faces of a part: B-rep faces of a STEP file, or smooth pieces of a mesh. Lengths in mm."""
+"""Faces of a part, B-rep faces of a STEP file or smooth pieces of a mesh: their surfaces and descriptions. Lengths in mm."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -9,53 +9,44 @@ import trimesh
 
 from tolcontact.declaration.values import Vector
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere, Torus
-from tolcontact.geometry.edges import smooth_pieces
-from tolcontact.geometry.face_groups import FaceGroups
+from tolcontact.geometry.face_groups import FaceOnSurface, hollow_cylinders, interruptions, patterns, slots
 from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
-from tolcontact.geometry.files import BREP, FACE_NAMES, STATED_FACES, SURFACES
-from tolcontact.geometry.files.bodies import FaceMeasure, StatedFace
+from tolcontact.geometry.files import BREP, STATED_FACES
+from tolcontact.geometry.files.step_shapes import FaceMeasure, StatedFace
 from tolcontact.geometry.fitting import fit_surface
-from tolcontact.geometry.interrupted_surfaces import FaceOnSurface, interruptions
+from tolcontact.geometry.tolerances import ROUNDING
+from tolcontact.geometry.triangle_mesh import smooth_pieces
 
 FIT_TOLERANCE = 1e-3  # [mm] largest distance of the vertices of a face from its surface
 RESIDUAL_FACTOR = 10  # times the residuals of two faces: largest distance between parts of one surface
-POSITION_TOLERANCE = 1e-9  # of a part's size: distance between faces of one surface
 PIECES = "pieces"
 DESCRIPTIONS = "descriptions"
 ON_SURFACES = "on_surfaces"
-UNKNOWN = StatedFace()  # a face of a mesh, or from an archive, which keeps no measures
 
 
-def number_faces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, Sequence[AnalyticSurface | None]]:
-    """Return the index of each triangle's face (face,), and the surface that a STEP file states for each face.
+def number_faces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, Sequence[StatedFace]]:
+    """Return the index of each triangle's face (face,), and the faces as a STEP file states them.
 
-    The faces of other meshes are their smooth pieces, without stated surfaces; the mesh caches them.
+    The faces of other meshes are their smooth pieces, which the mesh caches.
     """
     if BREP in mesh.face_attributes:
-        return np.asarray(mesh.face_attributes[BREP]).ravel(), mesh.metadata[SURFACES]
+        return np.asarray(mesh.face_attributes[BREP]).ravel(), mesh.metadata[STATED_FACES]
     if PIECES not in mesh.metadata:
         mesh.metadata[PIECES] = smooth_pieces(mesh, np.arange(len(mesh.faces)))
     pieces = mesh.metadata[PIECES]
-    return pieces, [None] * (int(pieces.max(initial=-1)) + 1)
+    return pieces, [StatedFace()] * (int(pieces.max(initial=-1)) + 1)
 
 
 def describe_faces(mesh: trimesh.Trimesh) -> tuple[FaceInFile, ...]:
     """Return the faces of a part. Its mesh caches them, since fitting surfaces takes time."""
     if DESCRIPTIONS not in mesh.metadata:
+        _, stated_faces = number_faces(mesh)
         on_surfaces = faces_on_surfaces(mesh)
-        stated_faces = mesh.metadata.get(STATED_FACES) or [UNKNOWN] * len(on_surfaces)
         faces = [
-            _description(number, surface, stated.measure or _measure(mesh, triangles, surface))
+            _description(number, surface, stated, stated.measure or _measure(mesh, triangles, surface))
             for number, (stated, (surface, triangles)) in enumerate(zip(stated_faces, on_surfaces, strict=True), start=1)
         ]
-        if BREP in mesh.face_attributes:
-            names = mesh.metadata.get(FACE_NAMES) or [""] * len(faces)
-            faces = [
-                replace(face, name=name, copies=stated.copies)
-                for face, name, stated in zip(faces, names, stated_faces, strict=True)
-            ]
-            faces = _grouped(mesh, faces, on_surfaces)
-        mesh.metadata[DESCRIPTIONS] = tuple(faces)
+        mesh.metadata[DESCRIPTIONS] = tuple(_grouped(mesh, faces, on_surfaces) if BREP in mesh.face_attributes else faces)
     return mesh.metadata[DESCRIPTIONS]  # type: ignore[no-any-return]
 
 
@@ -67,8 +58,8 @@ def faces_on_surfaces(mesh: trimesh.Trimesh) -> Sequence[FaceOnSurface]:
         groups = np.split(order, np.searchsorted(face_of[order], np.arange(1, len(stated))))
         corners = np.asarray(mesh.triangles)
         surfaces = [
-            surface or (fit_surface(corners[triangles], FIT_TOLERANCE) if len(triangles) else None)
-            for triangles, surface in zip(groups, stated, strict=True)
+            face.surface or (fit_surface(corners[triangles], FIT_TOLERANCE) if len(triangles) else None)
+            for triangles, face in zip(groups, stated, strict=True)
         ]
         mesh.metadata[ON_SURFACES] = tuple(zip(surfaces, groups, strict=True))
     return mesh.metadata[ON_SURFACES]  # type: ignore[no-any-return]
@@ -79,7 +70,7 @@ def faces_at(mesh: trimesh.Trimesh, point: Vector) -> tuple[list[int], float]:
     face_of, _ = number_faces(mesh)
     copies = np.tile(point, (len(face_of), 1))
     distances = np.linalg.norm(trimesh.triangles.closest_point(mesh.triangles, copies) - copies, axis=1)
-    nearest = np.unique(face_of[distances < distances.min() + POSITION_TOLERANCE * mesh.scale])
+    nearest = np.unique(face_of[distances < distances.min() + ROUNDING * mesh.scale])
     return [int(number) + 1 for number in nearest], float(distances.min())
 
 
@@ -90,9 +81,9 @@ def _grouped(mesh: trimesh.Trimesh, faces: Sequence[FaceInFile], surfaces: Seque
     touching = np.unique(np.sort(neighbours[neighbours[:, 0] != neighbours[:, 1]], axis=1), axis=0)
     wholes = _wholes(mesh, touching, surfaces)
     faces = [replace(face, whole=whole) for face, whole in zip(faces, wholes, strict=True)]
-    groups = FaceGroups(mesh, faces, surfaces, touching)
-    slot_of = {number: slot for slot in groups.slots() for number in slot}
-    pattern_of = {number: pattern for pattern in groups.patterns() for number in pattern}
+    cylinders = hollow_cylinders(mesh, faces, surfaces)
+    slot_of = {number: slot for slot in slots(faces, cylinders, touching) for number in slot}
+    pattern_of = {number: pattern for pattern in patterns(cylinders) for number in pattern}
     return [replace(face, slot=slot_of.get(face.number, ()), pattern=pattern_of.get(face.number, ())) for face in faces]
 
 
@@ -128,7 +119,7 @@ def are_one_surface(mesh: trimesh.Trimesh, face: FaceOnSurface, neighbour: FaceO
         return False
     vertices = np.asarray(mesh.vertices)[np.unique(np.asarray(mesh.faces)[next_triangles])]
     distance = float(np.abs(surface.distance(vertices)[0]).max())
-    return distance <= RESIDUAL_FACTOR * (surface.residual + next_surface.residual) + POSITION_TOLERANCE * float(mesh.scale)
+    return distance <= RESIDUAL_FACTOR * (surface.residual + next_surface.residual) + ROUNDING * float(mesh.scale)
 
 
 def _is_outside(mesh: trimesh.Trimesh, surface: AnalyticSurface, triangles: np.ndarray) -> bool:
@@ -150,29 +141,94 @@ def _measure(mesh: trimesh.Trimesh, triangles: np.ndarray, surface: AnalyticSurf
     return FaceMeasure(float(areas.sum()), point, np.asarray(mesh.face_normals)[largest])
 
 
-def _description(number: int, surface: AnalyticSurface | None, measure: FaceMeasure) -> FaceInFile:
+def _description(number: int, surface: AnalyticSurface | None, stated: StatedFace, measure: FaceMeasure) -> FaceInFile:
     """Return the description of a face on a `surface`, None if none is known."""
     point, area = plain_vector(measure.point), measure.area
     if surface is None:
-        return FaceInFile(number, GENERAL, point, None, None, False, area)
+        return FaceInFile(number, GENERAL, point, None, None, False, area, name=stated.name, copies=stated.copies)
     _, outward = surface.distance(measure.point[None] + 1e-6 * measure.normal)
     is_inward = float(outward[0] @ measure.normal) < 0
     is_plane = isinstance(surface, Plane)
     direction = None if isinstance(surface, Sphere) else plain_vector(-surface.axis if is_plane and is_inward else surface.axis)
-    radius = surface.radius if "radius" in surface.sizes else None
-    is_inner, residual = is_inward and not is_plane, surface.residual
-    centre = None if is_plane else plain_vector(_centre(surface, measure.point))
-    return FaceInFile(number, surface.kind, point, direction, radius, is_inner, area, centre, residual)
+    return FaceInFile(
+        number,
+        surface.kind,
+        point,
+        direction,
+        radius=surface.radius if "radius" in surface.sizes else None,
+        is_inner=is_inward and not is_plane,
+        area=area,
+        centre=None if is_plane else plain_vector(_centre(surface, measure.point)),
+        residual=surface.residual,
+        name=stated.name,
+        copies=stated.copies,
+    )
 
 
 def _centre(surface: AnalyticSurface, point: np.ndarray) -> np.ndarray:
     """Return the centre (3,) of a sphere or torus, or the projection of a point (3,) on the axis of a cylinder or cone."""
     if isinstance(surface, Sphere | Torus):
         return surface.origin
-    return surface.origin + float((point - surface.origin) @ surface.axis) * surface.axis  # type: ignore[no-any-return]
+    return np.asarray(surface.origin + float(surface.along(point)) * surface.axis)
 
 
 def plain_vector(numbers: np.ndarray) -> Vector:
     """Return three numbers in the form used in scripts."""
     x, y, z = (float(number) + 0.0 for number in numbers)
     return x, y, z
+
+
+def analytic_surfaces(mesh: trimesh.Trimesh, triangles: np.ndarray) -> tuple[list[AnalyticSurface], np.ndarray]:
+    """Return the analytic surfaces of triangles (face,) of a mesh, and the index of each triangle's surface, -1 for none.
+
+    A STEP file states the surfaces of its B-rep faces. Where it does not, and for smooth pieces of other meshes, they are
+    fitted. Planes need no fit: flat triangles are exact.
+    """
+    surfaces: list[AnalyticSurface] = []
+    numbers = np.full(len(triangles), -1)
+    brep = mesh.face_attributes.get(BREP)
+    group = smooth_pieces(mesh, triangles) if brep is None else np.asarray(brep).ravel()[triangles]
+    for label in np.unique(group):
+        rows = np.flatnonzero(group == label)
+        surface = (None if brep is None else mesh.metadata[STATED_FACES][label].surface) or _round_fit(mesh, triangles[rows])
+        if surface is None:
+            continue
+        for number, earlier in enumerate(surfaces):  # files split round faces in halves
+            members = triangles[numbers == number]
+            if are_one_surface(mesh, (earlier, members), (surface, triangles[rows])):
+                union = _round_fit(mesh, np.concatenate([members, triangles[rows]])) if earlier.is_fitted else earlier
+                if union is not None:
+                    surfaces[number], numbers[rows] = union, number
+                    break
+        else:
+            numbers[rows] = len(surfaces)
+            surfaces.append(surface)
+    return surfaces, numbers
+
+
+def _round_fit(mesh: trimesh.Trimesh, faces: np.ndarray) -> AnalyticSurface | None:
+    surface = fit_surface(np.asarray(mesh.triangles)[faces], FIT_TOLERANCE)
+    return None if isinstance(surface, Plane) else surface
+
+
+def known_surfaces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, list[AnalyticSurface | None], Sequence[str]] | None:
+    """Return the B-rep face of each triangle (face,), from 0, their surfaces and their names; None without B-rep faces.
+
+    There are no names if the file names no face.
+    """
+    if BREP not in mesh.face_attributes:
+        return None
+    face_of, faces = number_faces(mesh)
+    names = tuple(face.name for face in faces)
+    return face_of, [face.surface for face in faces], names if any(names) else ()
+
+
+def with_known_surfaces(
+    vertices: np.ndarray, faces: np.ndarray, brep: np.ndarray, surfaces: list[AnalyticSurface | None], names: Sequence[str]
+) -> trimesh.Trimesh:
+    """Return a mesh with B-rep faces, from the results of `known_surfaces`."""
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    mesh.face_attributes[BREP] = brep
+    stated = zip(surfaces, names or [""] * len(surfaces), strict=True)
+    mesh.metadata[STATED_FACES] = tuple(StatedFace(surface, name) for surface, name in stated)
+    return mesh

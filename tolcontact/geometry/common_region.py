@@ -3,8 +3,8 @@
 import numpy as np
 import trimesh
 
-from tolcontact.geometry.boxes import overlaps
 from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.triangle_mesh import overlaps
 
 MAX_PAIRS = 1_000_000  # of triangles that may overlap
 BLOCK_TRIANGLES = 64

@@ -8,6 +8,7 @@ is deepest below the line between its ends, as seen from the reference face, unt
 import numpy as np
 
 from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.tolerances import ROUNDING
 
 CHORD_SHARE = 5e-4  # of the smallest tolerance range: permitted penetration between points
 MAX_HALVINGS = 40
@@ -25,7 +26,7 @@ def curvature_points(face: Surface, target: Surface, *, chord: float, within: fl
     Only points within `within` [mm] of the target are returned, at most MAX_POINTS. If there are more, the deepest points after
     random displacements are used; the seed is fixed.
     """
-    points = distinct(_refined(face, target, chord, within).reshape(-1, 3), 1e-9 * face.mesh.scale)
+    points = distinct(_refined(face, target, chord, within).reshape(-1, 3), ROUNDING * face.mesh.scale)
     projections, normals, is_over = target.project(points)
     reached = is_over & (np.linalg.norm(points - projections, axis=1) <= within)
     points, projections, normals = points[reached], projections[reached], normals[reached]
@@ -38,7 +39,7 @@ def curvature_points(face: Surface, target: Surface, *, chord: float, within: fl
 def _refined(face: Surface, target: Surface, chord: float, within: float) -> np.ndarray:
     """Return the triangles (triangle, 3, 3) of a face, halved until the error of every edge is at most `chord` [mm]."""
     triangles = np.asarray(face.mesh.triangles)
-    max_length = np.inf if is_flat(target) else target.mesh.scale / FIRST_PIECES
+    max_length = np.inf if target.is_flat else target.mesh.scale / FIRST_PIECES
     finished = [np.zeros((0, 3, 3))]
     for _ in range(MAX_HALVINGS):
         error = _edge_errors(triangles, target, chord, within, max_length)
@@ -116,34 +117,11 @@ def facet_error(moving: Surface, reference: Surface, within: float) -> float:
         total += max((surface.residual for surface in face.surfaces), default=0.0)
         general = face.unknown
         if len(general.mesh.faces):
-            height, length = _chords(general)
+            height, length = general.chords
             _, nearest = opposite.nearest(general.mesh.triangles_center)
             distance = np.linalg.norm(general.mesh.triangles_center - nearest, axis=1) - length
             total += float(height.max(where=distance < within, initial=0.0))
     return total
-
-
-def chord_height(face: Surface) -> float:
-    """Return the largest distance [mm] of the triangles of a face from the round surface that they approximate."""
-    return float(_chords(face)[0].max(initial=0.0))
-
-
-def _chords(face: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Return the heights (face,) [mm] of the arcs over the edges of triangles, and the lengths (face,) [mm] of these edges."""
-    corners, normals = np.asarray(face.mesh.triangles), face.corner_normals
-    chord, turn = (np.roll(values, -1, axis=1) - values for values in (corners, normals))
-    return np.abs((chord * turn).sum(axis=2)).max(axis=1) / 8, np.linalg.norm(chord, axis=2).max(axis=1)
-
-
-def is_flat(surface: Surface) -> bool:
-    """Return whether the whole surface lies in one plane."""
-    normals = surface.corner_normals.reshape(-1, 3)
-    n = normals.mean(axis=0)
-    size = np.linalg.norm(n)
-    if size == 0:  # opposite normals cancel
-        return False
-    heights = np.asarray(surface.mesh.vertices) @ (n / size)
-    return bool(np.ptp(heights) < 1e-6 * surface.mesh.scale and (normals @ n).min() > 0)
 
 
 def distinct(points: np.ndarray, tolerance: float) -> np.ndarray:

@@ -1,141 +1,178 @@
-"""Faces that a drawing treats as one feature: slots, and patterns of equal holes. Part's own frame, lengths in mm.
+"""Faces that belong together: interrupted surfaces, slots, and patterns of equal holes. Part's own frame, lengths in mm.
 
+A cylinder or cone interrupted by keyways, slots or splines is one surface, although its faces do not touch, if they overlap
+along the axis and there is no material between them on the surface. So a bore with two keyways is one hole; holes in two lugs
+are two holes, and walls of curved slots around one axis remain separate.
 A slot has two parallel planes that face each other, and two hollow cylinders of one radius as its ends, tangent to both planes.
 The holes of a pattern are cylinders of one radius with parallel axes that span more than half a turn each.
 """
 
 import itertools
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import trimesh
 
-from tolcontact.declaration.selection import FACE_GROUPS
-from tolcontact.geometry.analytic_surfaces import Cylinder
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, axes_across, azimuths
+from tolcontact.geometry.body_overlap import SolidBody
 from tolcontact.geometry.face_in_file import FaceInFile
-from tolcontact.geometry.interrupted_surfaces import FaceOnSurface
+from tolcontact.geometry.tolerances import SAME_PLACE
 
 MAX_TILT = 1e-4  # [rad] between directions that count as parallel
 MARGIN = 1e-5  # of a part's size: difference of lengths that count as equal
 RESIDUAL_FACTOR = 10  # times the residual of a fitted cylinder: the same
 MAX_HOLE_GAP = 3.0  # [rad] around the axis: the end of a slot has a gap of pi
+MIN_COMMON_SHARE = 0.5  # of the shorter face of an interrupted surface along the axis
+DIRECTIONS = 360  # samples around the axis
+CHORD_FACTOR = 2.0  # times the height of the surface over its triangles
 
+FaceOnSurface = tuple[AnalyticSurface | None, np.ndarray]  # a surface, if one is known, and the triangles (face,) on it
+SameSurface = Callable[[FaceOnSurface, FaceOnSurface], bool]
 Group = tuple[int, ...]
+
+
+def interruptions(
+    mesh: trimesh.Trimesh, faces: Sequence[FaceOnSurface], label: np.ndarray, is_same: SameSurface
+) -> Iterator[tuple[int, int]]:
+    """Yield pairs of indices of faces that form one interrupted cylinder or cone.
+
+    label     (face,) equal for faces that touch and already form one surface
+    is_same   whether two faces are parts of one surface
+    """
+    firsts = [int(number) for number in np.unique(label, return_index=True)[1]]
+    candidates = [(number, faces[number][0]) for number in firsts if len(faces[number][1])]
+    round_faces = [(number, surface) for number, surface in candidates if isinstance(surface, Cylinder | Cone)]
+    body = SolidBody(mesh)
+    margin = SAME_PLACE * float(mesh.scale)
+    for (first, surface), (second, neighbour) in itertools.combinations(round_faces, 2):
+        if _may_be_one(surface, neighbour, margin) and is_same(faces[first], faces[second]) and body.is_closed:
+            parts = [
+                np.concatenate([faces[int(member)][1] for member in np.flatnonzero(label == label[number])])
+                for number in (first, second)
+            ]
+            if _is_interrupted(body, surface, parts, margin):
+                yield first, second
+
+
+def _may_be_one(surface: AnalyticSurface, neighbour: AnalyticSurface, margin: float) -> bool:
+    """Return whether two surfaces may be one: same kind, same size, same axis; a quick check."""
+    if surface.kind != neighbour.kind or abs(surface.radius - neighbour.radius) > 1e3 * margin:
+        return False
+    return bool(np.linalg.norm(np.cross(neighbour.origin - surface.origin, surface.axis)) < 1e3 * margin)
+
+
+def _is_interrupted(body: SolidBody, surface: Cylinder | Cone, parts: Sequence[np.ndarray], margin: float) -> bool:
+    """Return whether two parts of a surface, the triangles (face,) of each, overlap along its axis without material between."""
+    corners = [np.asarray(body.mesh.triangles)[triangles].reshape(-1, 3) for triangles in parts]
+    (start, end), (next_start, next_end) = map(surface.extent, corners)
+    lower, upper = max(start, next_start), min(end, next_end)
+    if upper - lower < MIN_COMMON_SHARE * min(end - start, next_end - next_start):
+        return False
+    middle = (lower + upper) / 2
+    radius = surface.radius if isinstance(surface, Cylinder) else abs(middle) * np.tan(surface.angle)
+    across = axes_across(surface.axis)
+    angles = np.linspace(0, 2 * np.pi, DIRECTIONS, endpoint=False)
+    circle = surface.origin + middle * surface.axis + radius * np.column_stack([np.cos(angles), np.sin(angles)]) @ across
+    middles = np.concatenate(
+        [(points.reshape(-1, 3, 3) + np.roll(points.reshape(-1, 3, 3), 1, axis=1)) / 2 for points in corners]
+    )
+    chord = float(np.abs(surface.distance(middles.reshape(-1, 3))[0]).max())
+    return bool((body.depth(circle) < CHORD_FACTOR * chord + margin).all())
 
 
 @dataclass(frozen=True, eq=False)
 class HollowCylinder:
-    """A hollow cylinder of a part: its face numbers from 1, its surface, and the positions (point, 3) of its vertices."""
+    """A hollow cylinder of a part.
+
+    numbers    of its faces, from 1
+    vertices   (point, 3) [mm]
+    margin     [mm] difference of lengths that count as equal
+    """
 
     numbers: Group
     surface: Cylinder
     vertices: np.ndarray
+    margin: float
 
     @cached_property
     def is_hole(self) -> bool:
         """Whether it spans more than half a turn around its axis."""
-        x, y = np.linalg.svd(self.surface.axis[None])[2][1:]
-        offsets = self.vertices - self.surface.origin
-        azimuths = np.sort(np.arctan2(offsets @ y, offsets @ x))
-        return bool(np.diff(azimuths, append=azimuths[0] + 2 * np.pi).max() < MAX_HOLE_GAP)
+        _, gaps = azimuths(self.vertices - self.surface.origin, *axes_across(self.surface.axis))
+        return bool(gaps.max() < MAX_HOLE_GAP)
 
-    def equals(self, neighbour: "HollowCylinder", margin: float) -> bool:
+    def equals(self, neighbour: "HollowCylinder") -> bool:
         """Return whether another one has the same radius, and an axis parallel to this one."""
         difference = abs(self.surface.radius - neighbour.surface.radius)
         tilt = float(np.linalg.norm(np.cross(self.surface.axis, neighbour.surface.axis)))
-        return difference < margin + RESIDUAL_FACTOR * (self.surface.residual + neighbour.surface.residual) and tilt < MAX_TILT
+        return (
+            difference < self.margin + RESIDUAL_FACTOR * (self.surface.residual + neighbour.surface.residual)
+            and tilt < MAX_TILT
+        )
 
-    def is_tangent(self, plane: FaceInFile, margin: float) -> bool:
+    def is_tangent(self, plane: FaceInFile) -> bool:
         """Return whether a plane that faces the axis is tangent to the cylinder."""
         height = float((self.surface.origin - np.array(plane.point)) @ np.array(plane.direction))
-        slack = margin + RESIDUAL_FACTOR * self.surface.residual
+        slack = self.margin + RESIDUAL_FACTOR * self.surface.residual
         is_parallel = abs(float(self.surface.axis @ np.array(plane.direction))) < MAX_TILT
         return is_parallel and abs(height - self.surface.radius) < slack
 
-
-class FaceGroups:
-    """The slots and the patterns of holes of a part.
-
-    faces      descriptions, including their whole surfaces
-    surfaces   the surface and the triangles of each face
-    touching   (pair, 2) indices of faces that share an edge
-    """
-
-    def __init__(
-        self, mesh: trimesh.Trimesh, faces: Sequence[FaceInFile], surfaces: Sequence[FaceOnSurface], touching: np.ndarray
-    ) -> None:
-        self._margin = MARGIN * float(mesh.scale)
-        self._wholes = [face.whole or (face.number,) for face in faces]
-        self._faces, self._touching = faces, touching
-        self._cylinders = {
-            whole: HollowCylinder(whole, surface, _vertices(mesh, surfaces, whole))
-            for whole, face, (surface, triangles) in zip(self._wholes, faces, surfaces, strict=True)
-            if isinstance(surface, Cylinder) and face.is_inner and len(triangles)
-        }
-
-    def slots(self) -> list[Group]:
-        """Return the face numbers, from 1, of each slot."""
-        walls: dict[tuple[Group, Group], list[Group]] = defaultdict(list)  # of the two ends of a slot
-        for plane, ends in self._tangent_ends().items():
-            for pair in itertools.combinations(sorted(ends), 2):
-                left, right = (self._cylinders[end] for end in pair)
-                if left.equals(right, self._margin) and not self._is_coaxial(left, right):
-                    walls[pair].append(plane)
-        return [
-            tuple(sorted(itertools.chain(*pair, *planes)))
-            for pair, planes in walls.items()
-            if any(self._are_opposed(left, right) for left, right in itertools.combinations(planes, 2))
-        ]
-
-    def patterns(self) -> list[Group]:
-        """Return the face numbers, from 1, of each pattern of at least two holes."""
-        patterns: list[list[HollowCylinder]] = []
-        for hole in self._cylinders.values():
-            if hole.is_hole:
-                pattern = next((members for members in patterns if members[0].equals(hole, self._margin)), None)
-                patterns.append([hole]) if pattern is None else pattern.append(hole)
-        return [tuple(sorted(itertools.chain(*(hole.numbers for hole in members)))) for members in patterns if len(members) > 1]
-
-    def _tangent_ends(self) -> dict[Group, set[Group]]:
-        """Return the hollow cylinders that touch each plane and are tangent to it."""
-        ends: dict[Group, set[Group]] = defaultdict(set)
-        for number, neighbour in (*self._touching, *self._touching[:, ::-1]):
-            plane, end = self._faces[number], self._cylinders.get(self._wholes[neighbour])
-            if plane.kind == "plane" and end is not None and end.is_tangent(plane, self._margin):
-                ends[self._wholes[number]].add(end.numbers)
-        return ends
-
-    def _is_coaxial(self, left: HollowCylinder, right: HollowCylinder) -> bool:
-        offset = right.surface.origin - left.surface.origin
-        return bool(np.linalg.norm(np.cross(offset, left.surface.axis)) < self._margin)
-
-    def _are_opposed(self, left: Group, right: Group) -> bool:
-        normals = [np.array(self._faces[plane[0] - 1].direction) for plane in (left, right)]
-        return bool(np.linalg.norm(normals[0] + normals[1]) < MAX_TILT)
+    def is_coaxial(self, neighbour: "HollowCylinder") -> bool:
+        """Return whether the axis of another one with a parallel axis is the same."""
+        offset = neighbour.surface.origin - self.surface.origin
+        return bool(np.linalg.norm(np.cross(offset, self.surface.axis)) < self.margin)
 
 
-def _vertices(mesh: trimesh.Trimesh, surfaces: Sequence[FaceOnSurface], numbers: Group) -> np.ndarray:
-    """Return the positions (point, 3) of the vertices of faces."""
-    triangles = np.concatenate([surfaces[number - 1][1] for number in numbers])
-    return np.asarray(mesh.vertices)[np.unique(np.asarray(mesh.faces)[triangles])]
+def hollow_cylinders(
+    mesh: trimesh.Trimesh, faces: Sequence[FaceInFile], surfaces: Sequence[FaceOnSurface]
+) -> dict[Group, HollowCylinder]:
+    """Return the hollow cylinders of a part by their face numbers, from descriptions that include whole surfaces."""
+    cylinders, margin = {}, MARGIN * float(mesh.scale)
+    for face, (surface, triangles) in zip(faces, surfaces, strict=True):
+        if isinstance(surface, Cylinder) and face.is_inner and len(triangles):
+            members = np.concatenate([surfaces[number - 1][1] for number in _whole(face)])
+            vertices = np.asarray(mesh.vertices)[np.unique(np.asarray(mesh.faces)[members])]
+            cylinders[_whole(face)] = HollowCylinder(_whole(face), surface, vertices, margin)
+    return cylinders
 
 
-def group_lines(faces: Sequence[FaceInFile]) -> Iterator[str]:
-    """Yield a line for each slot and each hole pattern among the faces of a part, with the code that selects it."""
-    for word in FACE_GROUPS:
-        for group in dict.fromkeys(getattr(face, word) for face in faces):
-            if group:
-                yield f'{_title(word, group, faces)}: tc.Brep({group[0]}, whole="{word}")'
+def slots(faces: Sequence[FaceInFile], cylinders: Mapping[Group, HollowCylinder], touching: np.ndarray) -> list[Group]:
+    """Return the face numbers, from 1, of each slot; `touching` (pair, 2) are the indices of faces that share an edge."""
+    ends_of: dict[Group, set[Group]] = defaultdict(set)  # the cylinders that touch a plane and are tangent to it
+    for number, neighbour in (*touching, *touching[:, ::-1]):
+        plane, end = faces[number], cylinders.get(_whole(faces[neighbour]))
+        if plane.kind == "plane" and end is not None and end.is_tangent(plane):
+            ends_of[_whole(plane)].add(end.numbers)
+    walls: dict[tuple[Group, Group], list[Group]] = defaultdict(list)  # of the two ends of a slot
+    for plane_numbers, ends in ends_of.items():
+        for pair in itertools.combinations(sorted(ends), 2):
+            left, right = (cylinders[end] for end in pair)
+            if left.equals(right) and not left.is_coaxial(right):
+                walls[pair].append(plane_numbers)
+    return [
+        tuple(sorted(itertools.chain(*pair, *planes)))
+        for pair, planes in walls.items()
+        if any(_are_opposed(faces, *sides) for sides in itertools.combinations(planes, 2))
+    ]
 
 
-def _title(word: str, group: Group, faces: Sequence[FaceInFile]) -> str:
-    members = [faces[number - 1] for number in group]
-    radius = next(face.radius for face in members if face.radius is not None)
-    if word == "slot":
-        return f"slot, radius {radius:.6g} mm, faces {', '.join(map(str, group))}"
-    holes = list(dict.fromkeys(face.whole or (face.number,) for face in members))
-    listed = "; ".join(" and ".join(map(str, hole)) for hole in holes)
-    return f"pattern of {len(holes)} holes, radius {radius:.6g} mm, faces {listed}"
+def patterns(cylinders: Mapping[Group, HollowCylinder]) -> list[Group]:
+    """Return the face numbers, from 1, of each pattern of at least two holes."""
+    holes: list[list[HollowCylinder]] = []
+    for hole in cylinders.values():
+        if hole.is_hole:
+            pattern = next((members for members in holes if members[0].equals(hole)), None)
+            holes.append([hole]) if pattern is None else pattern.append(hole)
+    return [tuple(sorted(itertools.chain(*(hole.numbers for hole in members)))) for members in holes if len(members) > 1]
+
+
+def _whole(face: FaceInFile) -> Group:
+    """Return the numbers of the faces that form the surface of a face."""
+    return face.whole or (face.number,)
+
+
+def _are_opposed(faces: Sequence[FaceInFile], left: Group, right: Group) -> bool:
+    normals = [np.array(faces[plane[0] - 1].direction) for plane in (left, right)]
+    return bool(np.linalg.norm(normals[0] + normals[1]) < MAX_TILT)

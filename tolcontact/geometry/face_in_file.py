@@ -1,7 +1,9 @@
 """The description of a face of a body. Lengths in mm."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from tolcontact.declaration.selection import FACE_GROUPS
 from tolcontact.declaration.values import Vector
 from tolcontact.errors import shown_name
 from tolcontact.readable import Readable
@@ -65,3 +67,21 @@ class FaceInFile(Readable):
 
 def _numbers(vector: Vector) -> str:
     return "({:.7g}, {:.7g}, {:.7g})".format(*(round(c, 6) + 0.0 for c in vector))
+
+
+def group_lines(faces: Sequence[FaceInFile]) -> Iterator[str]:
+    """Yield a line for each slot and each hole pattern among the faces of a part, with the code that selects it."""
+    for word in FACE_GROUPS:
+        for group in dict.fromkeys(getattr(face, word) for face in faces):
+            if group:
+                yield f'{_title(word, group, faces)}: tc.Brep({group[0]}, whole="{word}")'
+
+
+def _title(word: str, group: tuple[int, ...], faces: Sequence[FaceInFile]) -> str:
+    members = [faces[number - 1] for number in group]
+    radius = next(face.radius for face in members if face.radius is not None)
+    if word == "slot":
+        return f"slot, radius {radius:.6g} mm, faces {', '.join(map(str, group))}"
+    holes = list(dict.fromkeys(face.whole or (face.number,) for face in members))
+    listed = "; ".join(" and ".join(map(str, hole)) for hole in holes)
+    return f"pattern of {len(holes)} holes, radius {radius:.6g} mm, faces {listed}"

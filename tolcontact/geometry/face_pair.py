@@ -15,11 +15,9 @@ import numpy as np
 import trimesh
 
 from tolcontact import poses as pose
-from tolcontact.geometry.curvature import chord_height
-from tolcontact.geometry.edges import rim
-from tolcontact.geometry.spreading import distinct
-from tolcontact.geometry.subdivision import subdivided
+from tolcontact.geometry.spreading import unique_points
 from tolcontact.geometry.surface import Piece, Surface
+from tolcontact.geometry.triangle_mesh import rim, subdivided
 from tolcontact.vocabulary import ROUNDED
 
 MIN_POINTS = 2000  # of a face, in addition to the corners of its triangles
@@ -132,7 +130,7 @@ class BodyFace:
     @cached_property
     def _bulge(self) -> float:
         """The largest distance [mm] of analytic surfaces from the body's flat triangles."""
-        return max((chord_height(piece.face) for piece in self._pieces), default=0.0)
+        return max((piece.face.chord_height for piece in self._pieces), default=0.0)
 
     @cached_property
     def _pieces(self) -> list[Piece]:
@@ -231,7 +229,7 @@ def body_face(face: Surface, body: trimesh.Trimesh, contacts: int) -> BodyFace:
     """Return a face and its body, for a pair with `contacts` contact points."""
     count = min(max(MIN_POINTS, contacts * DENSITY**2), MAX_POINTS)
     step = float(np.sqrt(face.mesh.area / count))
-    points = distinct(_spread(face.mesh, step, count))
+    points = unique_points(_spread(face.mesh, step, count))
     if len(points) > MAX_POINTS:
         points = points[np.random.default_rng(0).choice(len(points), MAX_POINTS, replace=False)]
     flat = _plane_of(face)

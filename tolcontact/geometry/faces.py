@@ -7,20 +7,18 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 import trimesh
-from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Brep, Cylinder, Face, Facing, Inside, Largest, Near, Part, Picked, Triangles
 from tolcontact.declaration.selection import FACE_ANGLE
 from tolcontact.declaration.values import Vector
 from tolcontact.errors import GeometryFault, shown_name
-from tolcontact.geometry.boxes import overlaps
-from tolcontact.geometry.brep_face import describe_faces, faces_at, number_faces
-from tolcontact.geometry.face_groups import group_lines
-from tolcontact.geometry.face_in_file import FaceInFile
-from tolcontact.geometry.files import BREP, FACE_NAMES, SURFACES
-from tolcontact.geometry.subdivision import subdivided
+from tolcontact.geometry.brep_face import analytic_surfaces, describe_faces, faces_at, number_faces
+from tolcontact.geometry.face_in_file import FaceInFile, group_lines
+from tolcontact.geometry.files import BREP, STATED_FACES
+from tolcontact.geometry.shapes import placement_of
 from tolcontact.geometry.surface import Surface
-from tolcontact.geometry.surface_recognition import analytic_surfaces
+from tolcontact.geometry.tolerances import OPPOSING_COSINE, ROUNDING
+from tolcontact.geometry.triangle_mesh import overlaps, subdivided
 
 NEAR_DIVISIONS = 100
 CUT = 4  # refinement factor of the pieces of triangles in one step
@@ -28,9 +26,7 @@ BREP_REACH = 1e-3  # of the part's size: largest distance of a point from the B-
 FLAT_ANGLE = 2e-4  # rad: between neighbouring triangles of one flat face, after single precision
 RADIUS_TOLERANCE = 1e-6  # of a radius: radii that differ by less are equal
 MAX_LISTED = 12  # faces in a message
-OPPOSING_COSINE = -0.5  # between the outward normals of two surfaces that face each other
 MAX_COMPARISONS = 4_000_000  # of pieces with triangles: above this, a search for the nearest ones takes less time
-CUT_MARGIN = 1e-9  # of the part's size: geometry on a side of a box counts as inside
 
 Meshes = Mapping[Part, trimesh.Trimesh]
 # By the meshes of a part and of its neighbour: which triangles of the part are near, for each pair of poses and distance.
@@ -67,7 +63,7 @@ def _area(mesh: trimesh.Trimesh, indices: np.ndarray, boxes: Sequence[Inside]) -
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)[indices]
     for box in boxes:
         if len(faces):
-            vertices, faces = _sliced(vertices, faces, box, CUT_MARGIN * mesh.scale)
+            vertices, faces = _sliced(vertices, faces, box, ROUNDING * mesh.scale)
     return float(trimesh.triangles.area(vertices[faces]).sum()) if len(faces) else 0.0
 
 
@@ -84,7 +80,7 @@ def patch(face: Face, meshes: Meshes) -> Surface:
     surface = Surface(face_mesh, None, surfaces, surface_numbers)
     for selection in face.selections:
         if isinstance(selection, Inside):
-            surface = _cut(surface, selection, CUT_MARGIN * mesh.scale)
+            surface = _cut(surface, selection, ROUNDING * mesh.scale)
             if len(surface.mesh.faces) == 0:
                 raise GeometryFault(f"face {face}: nothing of it lies in that box; the part spans {_span(mesh)}")
     if sheets := _opposite_pairs(surface.mesh):
@@ -195,10 +191,10 @@ def _group(face: Face, faces: Sequence[FaceInFile], description: FaceInFile, who
 def _brep_numbers(face: Face, mesh: trimesh.Trimesh, which: int | str | Vector) -> np.ndarray:
     """Return the indices of the B-rep faces that a number from 1, a name or a point selects."""
     if isinstance(which, str):
-        return _by_name(face, mesh.metadata[FACE_NAMES], which)
+        return _by_name(face, [stated.name for stated in mesh.metadata[STATED_FACES]], which)
     if isinstance(which, tuple):
         return _by_point(face, mesh, which)
-    count = len(mesh.metadata[SURFACES])
+    count = len(mesh.metadata[STATED_FACES])
     if not 1 <= which <= count:
         raise GeometryFault(f"face {face}: the part has faces 1 to {count}; tolcontact faces lists them")
     return np.array([which - 1])
@@ -272,7 +268,7 @@ def _near_pieces(
     corners = np.asarray(sampled.triangles)
     origin = np.flatnonzero(((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1))
     step, pieces = finest * CUT ** max(math.ceil(math.log(sampled.scale / finest, CUT)), 0), corners[origin]
-    facing, reach = np.flatnonzero(is_open), within + CUT_MARGIN * sampled.scale
+    facing, reach = np.flatnonzero(is_open), within + ROUNDING * sampled.scale
     while True:
         promising = _facing_pieces(
             pieces, sampled.face_normals[origin], target.triangles[facing], target.face_normals[facing], reach
@@ -287,7 +283,7 @@ def _near_pieces(
             is_near = distance <= within
             return origin[is_near], hit[is_near]
         radius = np.linalg.norm(pieces - centres[:, None], axis=2).max(axis=1)
-        is_near = distance <= within + radius * (1 + CUT_MARGIN)
+        is_near = distance <= within + radius * (1 + ROUNDING)
         pieces, origin, step = pieces[is_near], origin[is_near], step / CUT
 
 
@@ -305,17 +301,17 @@ def _facing_pieces(
     )
     if len(pieces) * len(nearby) > MAX_COMPARISONS:
         return np.arange(len(pieces))
-    are_opposing = normals @ target_normals[nearby].T < OPPOSING_COSINE + CUT_MARGIN
+    are_opposing = normals @ target_normals[nearby].T < OPPOSING_COSINE + ROUNDING
     return np.flatnonzero((are_opposing & overlaps(lower, upper, low[nearby], high[nearby])).any(axis=1))
 
 
 def _in_place(part: Part, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    R = Rotation.from_rotvec(part.rotation).as_matrix()
-    return trimesh.Trimesh(np.asarray(mesh.vertices) @ R.T + np.array(part.at), mesh.faces, process=False)
+    R, t = placement_of(part)
+    return trimesh.Trimesh(np.asarray(mesh.vertices) @ R.T + t, mesh.faces, process=False)
 
 
 def _cut(surface: Surface, box: Inside, margin: float) -> Surface:
-    vertices, faces = _sliced(np.asarray(surface.mesh.vertices), np.asarray(surface.mesh.faces), box, margin)
+    vertices, faces = _sliced(surface.vertices, surface.faces, box, margin)
     cut = trimesh.Trimesh(vertices, faces, process=False)
     cut.merge_vertices()
     cut.update_faces(cut.area_faces > 0)

@@ -21,11 +21,11 @@ import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.geometry import kernel, places_kernel
-from tolcontact.geometry.boxes import blocks, overlaps
 from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER
 from tolcontact.geometry.polyhedron import Polyhedron, polyhedron
 from tolcontact.geometry.sorted_candidates import sorted_candidates
 from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.triangle_mesh import blocks, overlaps
 
 FACING = -0.99  # cosine of the angle between the normals of planes that face each other
 TILT_MARGIN = 0.1  # rad: tilt of candidates in addition to the largest tilt of the body

@@ -10,15 +10,13 @@ import trimesh
 
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.body_overlap import SolidBody
-from tolcontact.geometry.edges import edges
+from tolcontact.geometry.tolerances import ROUNDING, SAME_DIRECTION
+from tolcontact.geometry.triangle_mesh import blocks, edges
 
 SPARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the smaller mesh's size: distance of the horizon beyond the least distance
 MIN_SPARE = 1e-3  # of this size: smallest permitted spare if there are too many elements
 MAX_ELEMENTS = (500, 500, 200)  # pairs of a corner and a triangle (both ways), and pairs of edges
 MAX_COMPARISONS = 30_000_000  # of triangles with triangles
-CHUNK = 1_000_000
-FLAT = 1e-6  # [rad] between triangles of one plane
-MARGIN = 1e-9  # of the size of a mesh
 TINY = 1e-300
 
 
@@ -88,7 +86,7 @@ class Edged:
             (np.cross(normals[left], normals[right]) * along).sum(axis=1), (normals[left] * normals[right]).sum(axis=1)
         )
         self.slopes = np.tan(np.maximum(-turn, 0) / 2)[edge].reshape(-1, 3)
-        is_convex = (turn > FLAT) | (left == right)
+        is_convex = (turn > SAME_DIRECTION) | (left == right)
         self.edge_of = np.where(is_convex, np.arange(len(is_convex)), -1)[edge].reshape(-1, 3)
 
 
@@ -146,12 +144,11 @@ def _near_triangles(A: np.ndarray, B: np.ndarray, horizon: float) -> np.ndarray:
             "parts with a larger chord"
         )
     (lower, upper), (other_lower, other_upper) = ((low[row], up[row]) for (low, up), row in zip(boxes, rows, strict=True))
-    step = max(1, CHUNK // max(1, len(rows[1])))
     pairs = [np.zeros((0, 2), dtype=np.int64)]
-    for start in range(0, len(rows[0]), step):
-        gaps = np.maximum(other_lower - upper[start : start + step, None], lower[start : start + step, None] - other_upper)
+    for block in blocks(len(rows[0]), len(rows[1])):
+        gaps = np.maximum(other_lower - upper[block, None], lower[block, None] - other_upper)
         nearby = np.argwhere((np.maximum(gaps, 0) ** 2).sum(axis=2) <= horizon**2)
-        pairs.append(np.column_stack([rows[0][nearby[:, 0] + start], rows[1][nearby[:, 1]]]))
+        pairs.append(np.column_stack([rows[0][block][nearby[:, 0]], rows[1][nearby[:, 1]]]))
     return np.concatenate(pairs)
 
 
@@ -165,8 +162,8 @@ def _corner_pairs(body: Edged, target: Edged, pairs: np.ndarray) -> np.ndarray:
     if not len(corners):
         return rows
     offsets = body.vertices[rows[:, 0]] - target.triangles[rows[:, 1], 0]
-    is_behind = (offsets * target.face_normals[rows[:, 1]]).sum(axis=1) < -MARGIN * target.size
-    is_inside = target.solid.depth(body.vertices[corners]) > MARGIN * target.size
+    is_behind = (offsets * target.face_normals[rows[:, 1]]).sum(axis=1) < -ROUNDING * target.size
+    is_inside = target.solid.depth(body.vertices[corners]) > ROUNDING * target.size
     return rows[~is_behind | is_inside[corner_rows]]
 
 
@@ -215,5 +212,5 @@ def _is_between(n: np.ndarray, normals: np.ndarray) -> np.ndarray:
     middle = normals.sum(axis=1)
     middle /= np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), TINY)
     cosine = (normals[:, 0] * middle).sum(axis=1)
-    widest = np.where(cosine > 1 - FLAT**2, 0.0, cosine)
+    widest = np.where(cosine > 1 - SAME_DIRECTION**2, 0.0, cosine)
     return np.asarray((n * middle).sum(axis=1) >= np.linalg.norm(n, axis=1) * widest)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tolcontact.geometry.edges import edges, rim
 from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.triangle_mesh import edges, rim
 
 MAX_EDGES = 2000  # of a rim; above this its corners are so dense that evenly spread points suffice
 MIN_ANGLE = np.radians(1.0)  # between edges that cross

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 import trimesh
-from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Part
 from tolcontact.declaration.selection import FACE_ANGLE, FACE_GROUPS
@@ -13,7 +12,7 @@ from tolcontact.errors import GeometryFault
 from tolcontact.geometry.brep_face import describe_faces, number_faces
 from tolcontact.geometry.face_in_file import FaceInFile
 from tolcontact.geometry.files import BREP
-from tolcontact.geometry.shapes import shape
+from tolcontact.geometry.shapes import placement_of, shape
 
 MARGIN = 1e-6  # of a direction, and of a part's size
 
@@ -44,11 +43,11 @@ def preview(part: Part) -> PartPreview | None:
     if any(part.faults()):
         return None
     try:
-        mesh = shape(part.geometry).mesh
+        mesh = shape(part.geometry)
     except GeometryFault:
         return None
-    R = Rotation.from_rotvec(part.rotation).as_matrix()
-    vertices = np.asarray(mesh.vertices) @ R.T + np.array(part.at)
+    R, t = placement_of(part)
+    vertices = np.asarray(mesh.vertices) @ R.T + t
     face_of, _ = number_faces(mesh)
     faces = describe_faces(mesh)
     snippets = tuple(_snippet(mesh, face_of, face) for face in faces)

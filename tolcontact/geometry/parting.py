@@ -13,8 +13,8 @@ import trimesh
 
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.geometry import parting_kernel
-from tolcontact.geometry.coordinate_error import coordinate_error
 from tolcontact.geometry.inset import smaller
+from tolcontact.geometry.triangle_mesh import coordinate_error
 
 SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
 CONVEX_SHARE = 1e-6  # of the hull's size: largest depth of a convex body's surface inside its hull, since files are rounded

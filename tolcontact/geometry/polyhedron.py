@@ -6,11 +6,10 @@ import numpy as np
 import trimesh
 
 from tolcontact.arrays import Array, Float, Int
-from tolcontact.geometry.coordinate_error import coordinate_error
-from tolcontact.geometry.edges import edges
 from tolcontact.geometry.inset import smaller
 from tolcontact.geometry.merged_surface import merged_surface
 from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.triangle_mesh import coordinate_error, edges
 
 SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
 

@@ -5,16 +5,17 @@ import logging
 import igl
 import numpy as np
 import trimesh
+from scipy.spatial.transform import Rotation
 
-from tolcontact.declaration import Box, Geometry, Mesh, Pin
+from tolcontact.declaration import Box, Geometry, Mesh, Part, Pin
 from tolcontact.errors import GeometryFault
-from tolcontact.geometry.edges import distinct_triangles, edges
 from tolcontact.geometry.files.reading import Contents, Shape, read, read_files
-from tolcontact.geometry.pin_shape import pin_shape
-from tolcontact.geometry.subdivision import subdivided
+from tolcontact.geometry.triangle_mesh import distinct_triangles, edges, subdivided
 
 log = logging.getLogger(__name__)
 
+SECTIONS = 72  # triangles around a pin
+HEAD_WIDTH, HEAD_HEIGHT = 1.6, 0.65  # of a pin, times its diameter, as for hexagon head bolts to ISO 4014
 FIELD_DIVISIONS = 12  # number of edges across a part for showing its displacement field
 
 
@@ -24,18 +25,28 @@ def shape(geometry: Geometry, contents: Contents | None = None) -> Shape:
     Raises GeometryFault if a mesh cannot be read, is empty, or its outside is undefined.
     """
     if isinstance(geometry, Box):
-        return Shape(trimesh.creation.box(bounds=[[0, 0, 0], [geometry.x, geometry.y, geometry.z]]))
+        return trimesh.creation.box(bounds=[[0, 0, 0], [geometry.x, geometry.y, geometry.z]])
     if isinstance(geometry, Pin):
-        return Shape(pin_shape(geometry))
-    surface = read(geometry, read_files([geometry]) if contents is None else contents)
-    mesh = surface.mesh
+        return _pin(geometry)
+    mesh = read(geometry, read_files([geometry]) if contents is None else contents)
     if len(mesh.faces) == 0:
         raise GeometryFault(f"{geometry} has no triangles; expected a triangle surface")
     if not mesh.area > 0:
         raise GeometryFault(f"{geometry} has no area: all its triangles are degenerate")
     _leave_out_repetitions(mesh, geometry)
     _check_outward(mesh, geometry)
-    return surface
+    return mesh
+
+
+def _pin(pin: Pin) -> trimesh.Trimesh:
+    """Return the closed surface of a pin; a head is round."""
+    radius, profile = pin.diameter / 2, [(0.0, -pin.length), (pin.diameter / 2, -pin.length), (pin.diameter / 2, 0.0)]
+    if pin.head:
+        top = HEAD_HEIGHT * pin.diameter
+        profile += [(HEAD_WIDTH * radius, 0.0), (HEAD_WIDTH * radius, top), (0.0, top)]
+    else:
+        profile += [(0.0, 0.0)]
+    return trimesh.creation.revolve(profile, sections=SECTIONS)
 
 
 def _leave_out_repetitions(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
@@ -96,6 +107,11 @@ def _per_body(limit: np.ufunc, corners: np.ndarray, body: np.ndarray, count: int
     extremes = np.full((count, 3), -limit.reduce(np.array([-np.inf, np.inf])))
     limit.at(extremes, body, limit.reduce(corners, axis=1))
     return extremes
+
+
+def placement_of(part: Part) -> tuple[np.ndarray, np.ndarray]:
+    """Return R (3, 3) and t (3,) [mm] of a part in the nominal assembly."""
+    return Rotation.from_rotvec(part.rotation).as_matrix(), np.array(part.at)
 
 
 def field_surface(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:

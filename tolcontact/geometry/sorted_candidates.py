@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.arrays import Array, Float, Int
-from tolcontact.geometry.edges import edges
 from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER
 from tolcontact.geometry.places_kernel import Candidates
 from tolcontact.geometry.polyhedron import Polyhedron
+from tolcontact.geometry.triangle_mesh import edges
 
 WIDE_SHARE = 1 / 8  # of the whole range: wider intervals come first
 

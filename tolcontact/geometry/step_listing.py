@@ -16,9 +16,8 @@ from tolcontact.declaration.values import Vector
 from tolcontact.errors import CONTROL_CHARACTERS, GeometryFault, ModelError, OptionError, nearest_name, shown, shown_name
 from tolcontact.geometry.brep_face import describe_faces, plain_vector
 from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
-from tolcontact.geometry.files import SURFACES, key_of, read_files
-from tolcontact.geometry.files.bodies import MAX_LISTED
-from tolcontact.geometry.files.product import Product
+from tolcontact.geometry.files import STATED_FACES, key_of, read_files
+from tolcontact.geometry.files.product import MAX_LISTED, Product
 from tolcontact.readable import Readable
 from tolcontact.shape_worker import UnfinishedRead
 
@@ -74,7 +73,7 @@ def faces_in(path: str | Path, body: str | int | None = None) -> tuple[FaceInFil
     mesh = _part(_listed_product(path), body)
     faces = describe_faces(mesh)
     is_fitted = any(
-        surface is None and face.kind != GENERAL for surface, face in zip(mesh.metadata[SURFACES], faces, strict=True)
+        stated.surface is None and face.kind != GENERAL for stated, face in zip(mesh.metadata[STATED_FACES], faces, strict=True)
     )
     # A surface that does not fit a few vertices does not fit many; a surface that does may still fail for many.
     return describe_faces(_part(_product(path), body)) if is_fitted else faces

@@ -1,6 +1,6 @@
 """Faces as surfaces: nearest points and normals (paper, 2.2)."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -9,28 +9,20 @@ import numpy as np
 import trimesh
 from scipy.sparse import csr_array
 
-from tolcontact.geometry.analytic_surfaces import AnalyticSurface
-from tolcontact.geometry.edges import CREASE, on_rim, rim
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface, axes_across
 from tolcontact.geometry.region_kernel import Region
-from tolcontact.geometry.triangle_tree import triangle_tree
+from tolcontact.geometry.tolerances import SAME_DIRECTION, SAME_PLACE
+from tolcontact.geometry.triangle_mesh import CREASE, on_rim, rim, triangle_tree
 
-RIM_TOLERANCE = 1e-6  # of a face's size: largest overhang of a point that counts as over the face
+EVERY = slice(None)
 MAX_TURN = 0.3  # rad: between the normals of a triangle and of the analytic surface that it approximates
 MAX_BULGE = 0.05  # of a face's size: between a triangle and the analytic surface that it approximates
-FLAT_ANGLE = 1e-6  # rad: faces whose normals rotate by less from end to end are planes
-
-
-class Approximation(NamedTuple):
-    """The rows (triangles or points) that approximate an analytic surface; `side` is 1, or -1 if the triangles are hollow."""
-
-    surface: AnalyticSurface
-    rows: np.ndarray
-    side: float
 
 
 class Surface:
     """The triangles of a face, with a search tree for nearest points.
 
+    vertices, faces  (vertex, 3) [mm] and (face, 3), both contiguous
     corner_normals   (face, 3, 3): outward unit normals at the corners of each triangle, interpolated inside the triangle; by
                      default they follow from the neighbouring facets
     surfaces         analytic surfaces; where a triangle approximates one, projections and normals refer to that surface
@@ -48,8 +40,8 @@ class Surface:
         self.surfaces = tuple(surfaces)
         self.surface_numbers = np.full(len(mesh.faces), -1) if surface_numbers is None else surface_numbers
         self._stated_normals = corner_normals
-        self._vertices = np.ascontiguousarray(mesh.vertices, dtype=np.float64)
-        self._faces = np.ascontiguousarray(mesh.faces, dtype=np.int64)
+        self.vertices = np.ascontiguousarray(mesh.vertices, dtype=np.float64)
+        self.faces = np.ascontiguousarray(mesh.faces, dtype=np.int64)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state for other processes, which build their own search tree."""
@@ -59,27 +51,38 @@ class Surface:
     def corner_normals(self) -> np.ndarray:
         """Outward unit normals at the corners of each triangle (face, 3, 3)."""
         normals = np.array(_corner_normals(self.mesh) if self._stated_normals is None else self._stated_normals)
-        for surface, rows, side in self._approximations:
+        for surface, rows, side in self._rows_on_surfaces():
             corners = np.asarray(self.mesh.triangles)[rows].reshape(-1, 3)
             normals[rows] = _normals_of(surface, side, corners, normals[rows].reshape(-1, 3)).reshape(-1, 3, 3)
         return normals
 
     @cached_property
-    def _approximations(self) -> list[Approximation]:
-        """The triangles that approximate each analytic surface."""
+    def _sides(self) -> np.ndarray:
+        """A sign (surface,) for each analytic surface: 1, or -1 if its triangles are hollow."""
         centres, facets = np.asarray(self.mesh.triangles_center), np.asarray(self.mesh.face_normals)
-        approximations = []
+        rows = [np.flatnonzero(self.surface_numbers == number) for number in range(len(self.surfaces))]
+        slopes = [surface.distance(centres[of_surface])[1] for surface, of_surface in zip(self.surfaces, rows, strict=True)]
+        outward = [(slope * facets[of_surface]).sum() > 0 for slope, of_surface in zip(slopes, rows, strict=True)]
+        return np.where(outward, 1.0, -1.0)
+
+    def _rows_on_surfaces(self, triangle: np.ndarray | slice = EVERY) -> Iterator[tuple[AnalyticSurface, np.ndarray, float]]:
+        """Yield each analytic surface, the rows of `triangle` (point,) that approximate it, and its side."""
+        numbers = self.surface_numbers[triangle] if self.surfaces else np.zeros(0, dtype=int)
         for number, surface in enumerate(self.surfaces):
-            rows = np.flatnonzero(self.surface_numbers == number)
+            rows = np.flatnonzero(numbers == number)
             if rows.size:
-                _, slope = surface.distance(centres[rows])
-                approximations.append(Approximation(surface, rows, 1.0 if (slope * facets[rows]).sum() > 0 else -1.0))
-        return approximations
+                yield surface, rows, float(self._sides[number])
 
     @property
     def pieces(self) -> "list[Piece]":
         """The parts of the face that lie on its analytic surfaces."""
-        return [Piece(surface, side < 0, self.part(rows)) for surface, rows, side in self._approximations]
+        return [Piece(surface, side < 0, self.part(rows)) for surface, rows, side in self._rows_on_surfaces()]
+
+    @property
+    def only_piece(self) -> "Piece | None":
+        """The face as a piece; None if it spans several surfaces, or has triangles that approximate none."""
+        numbers = np.unique(self.surface_numbers)
+        return self.pieces[0] if len(numbers) == 1 and numbers[0] >= 0 else None
 
     @cached_property
     def bulge(self) -> float:
@@ -89,7 +92,7 @@ class Surface:
         return max(
             (
                 float(np.abs(surface.distance(midpoints[rows].reshape(-1, 3))[0]).max())
-                for surface, rows, _ in self._approximations
+                for surface, rows, _ in self._rows_on_surfaces()
             ),
             default=0.0,
         )
@@ -101,8 +104,8 @@ class Surface:
 
     def part(self, faces: np.ndarray) -> "Surface":
         """Return the surface of a subset of the triangles (face,)."""
-        used, renumbered = np.unique(self._faces[faces], return_inverse=True)
-        mesh = trimesh.Trimesh(self._vertices[used], renumbered.reshape(-1, 3), process=False)
+        used, renumbered = np.unique(self.faces[faces], return_inverse=True)
+        mesh = trimesh.Trimesh(self.vertices[used], renumbered.reshape(-1, 3), process=False)
         return Surface(mesh, self.corner_normals[faces], self.surfaces, self.surface_numbers[faces])
 
     @cached_property
@@ -114,33 +117,71 @@ class Surface:
         order = np.argsort(rate)
         middle = np.searchsorted(np.cumsum(self.mesh.area_faces[order]), self.mesh.area / 2)
         median = float(rate[order[min(middle, len(order) - 1)]])
-        return median if median * self.mesh.scale > FLAT_ANGLE else 0.0
+        return median if median * self.mesh.scale > SAME_DIRECTION else 0.0
 
     @cached_property
     def _tree(self) -> igl.AABB:
-        return triangle_tree(self._vertices, self._faces)
+        return triangle_tree(self.vertices, self.faces)
 
     @cached_property
     def _rim_edges(self) -> np.ndarray:
         """Mask (face, edge) of the edges on the rim."""
-        return on_rim(self._faces)
+        return on_rim(self.faces)
+
+    @cached_property
+    def rim(self) -> np.ndarray:
+        """The vertex indices (edge, 2) of the edges on the rim."""
+        return rim(self.faces)
+
+    @property
+    def rim_ends(self) -> np.ndarray:
+        """The ends (edge, 2, 3) [mm] of the edges on the rim."""
+        return self.vertices[self.rim]
+
+    @property
+    def rim_corners(self) -> np.ndarray:
+        """The vertices (corner, 3) [mm] on the rim."""
+        return self.vertices[np.unique(self.rim)]
 
     @cached_property
     def _rim_corners(self) -> np.ndarray:
         """Mask (face, corner) of the corners on the rim."""
-        return np.isin(self._faces, rim(self._faces))
+        return np.isin(self.faces, self.rim)
+
+    @cached_property
+    def is_flat(self) -> bool:
+        """Whether the whole surface lies in one plane."""
+        normals = self.corner_normals.reshape(-1, 3)
+        n = normals.mean(axis=0)
+        size = np.linalg.norm(n)
+        if size == 0:  # opposite normals cancel
+            return False
+        heights = self.vertices @ (n / size)
+        return bool(np.ptp(heights) < SAME_PLACE * self.mesh.scale and (normals @ n).min() > 0)
+
+    @cached_property
+    def chords(self) -> tuple[np.ndarray, np.ndarray]:
+        """The heights (face,) [mm] of the arcs over the edges of triangles, and the lengths (face,) [mm] of these edges."""
+        corners, normals = np.asarray(self.mesh.triangles), self.corner_normals
+        chord, turn = (np.roll(values, -1, axis=1) - values for values in (corners, normals))
+        return np.abs((chord * turn).sum(axis=2)).max(axis=1) / 8, np.linalg.norm(chord, axis=2).max(axis=1)
+
+    @property
+    def chord_height(self) -> float:
+        """The largest distance [mm] of the triangles from the round surface that they approximate."""
+        return float(self.chords[0].max(initial=0.0))
 
     @cached_property
     def region(self) -> Region:
         """A flat face, seen along its normal."""
-        axes = np.linalg.svd(self.corner_normals[0, 0][None])[2][1:]
-        edges = np.asarray(self.mesh.vertices)[rim(self._faces)] @ axes.T
-        return Region(np.ascontiguousarray(axes), np.ascontiguousarray(edges), RIM_TOLERANCE * float(self.mesh.scale))
+        axes = axes_across(self.corner_normals[0, 0])
+        edges = self.rim_ends @ axes.T
+        return Region(np.ascontiguousarray(axes), np.ascontiguousarray(edges), SAME_PLACE * float(self.mesh.scale))
 
     def nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the triangle (point,), and the point on it (point, 3) [mm], nearest to each of `points` (point, 3) [mm]."""
         points = np.ascontiguousarray(points, dtype=np.float64)
-        _, triangle, nearest = self._tree.squared_distance(self._vertices, self._faces, points)
+        _, triangle, nearest = self._tree.squared_distance(self.vertices, self.faces, points)
         return triangle, nearest
 
     def normals(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -148,23 +189,13 @@ class Surface:
         barycentric = self._barycentric(triangle, points)
         normals = (barycentric[..., None] * self.corner_normals[triangle]).sum(axis=1)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        for surface, rows, side in self._approximating_points(triangle):
+        for surface, rows, side in self._rows_on_surfaces(triangle):
             normals[rows] = _normals_of(surface, side, points[rows], normals[rows])
         return normals
 
-    def _approximating_points(self, triangle: np.ndarray) -> list[Approximation]:
-        """Return, for each analytic surface, the points on `triangle` (point,) that belong to it."""
-        if not self.surfaces:
-            return []
-        numbers = self.surface_numbers[triangle]
-        return [
-            approximation._replace(rows=np.flatnonzero(numbers == self.surface_numbers[approximation.rows[0]]))
-            for approximation in self._approximations
-        ]
-
     def placed(self, R: np.ndarray, t: np.ndarray) -> "Surface":
         """Return the surface rotated by R (3, 3), then translated by t (3,) [mm]."""
-        mesh = trimesh.Trimesh(np.asarray(self.mesh.vertices) @ R.T + t, self.mesh.faces, process=False)
+        mesh = trimesh.Trimesh(self.vertices @ R.T + t, self.mesh.faces, process=False)
         surfaces = [surface.placed(R, t) for surface in self.surfaces]
         return Surface(mesh, self.corner_normals @ R.T, surfaces, self.surface_numbers)
 
@@ -191,9 +222,9 @@ class Surface:
         """Return the nearest triangles (point,), and the nearest points and the mask that `project` returns."""
         triangle, nearest = self.nearest(points)
         lateral, at_rim = self._lateral_distances(points, triangle, nearest)
-        is_over = ~at_rim | (lateral <= max(margin, RIM_TOLERANCE * self.mesh.scale))
+        is_over = ~at_rim | (lateral <= max(margin, SAME_PLACE * self.mesh.scale))
         projections = np.array(nearest)
-        for surface, rows, _ in self._approximating_points(triangle):
+        for surface, rows, _ in self._rows_on_surfaces(triangle):
             nearby, direct = surface.project(nearest[rows]), surface.project(points[rows])
             shift = np.linalg.norm(direct - nearest[rows], axis=1)
             height = np.linalg.norm(points[rows] - nearest[rows], axis=1)
@@ -208,12 +239,12 @@ class Surface:
         offset = nearest - points
         height = -(offset * np.asarray(self.mesh.face_normals)[triangle]).sum(axis=1)
         distance = np.linalg.norm(offset, axis=1)
-        for surface, rows, side in self._approximating_points(triangle):
+        for surface, rows, side in self._rows_on_surfaces(triangle):
             height[rows] = side * surface.distance(points[rows])[0]
             distance[rows] = np.abs(height[rows])
         behind = np.flatnonzero(height < 0)
         lateral, at_rim = self._lateral_distances(points[behind], triangle[behind], nearest[behind])
-        is_over = ~at_rim | (lateral <= RIM_TOLERANCE * self.mesh.scale)
+        is_over = ~at_rim | (lateral <= SAME_PLACE * self.mesh.scale)
         depth = np.zeros(len(points))
         depth[behind[is_over]] = distance[behind[is_over]]
         return depth
@@ -228,7 +259,7 @@ class Surface:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return lateral distances (point,) [mm] from the nearest points, and a mask of the nearest points on the rim."""
         normal = np.array(np.asarray(self.mesh.face_normals)[triangle])
-        for surface, rows, _ in self._approximating_points(triangle):
+        for surface, rows, _ in self._rows_on_surfaces(triangle):
             normal[rows] = surface.distance(nearest[rows])[1]
         offset = points - nearest
         lateral = np.linalg.norm(offset - (offset * normal).sum(axis=1, keepdims=True) * normal, axis=1)

@@ -7,8 +7,8 @@ import trimesh
 
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cylinder, Plane
+from tolcontact.geometry.brep_face import known_surfaces
 from tolcontact.geometry.surface import Surface
-from tolcontact.geometry.surface_recognition import known_surfaces
 from tolcontact.interference.deviating_solid import DeviatingSolid, deviating_solid
 from tolcontact.interference.solid import Solid, solid
 from tolcontact.vocabulary import ROUNDED

@@ -7,10 +7,9 @@ import numpy as np
 import trimesh
 
 from tolcontact.arrays import Array, Float, Int
-from tolcontact.geometry.coordinate_error import coordinate_error
-from tolcontact.geometry.edges import edges
 from tolcontact.geometry.inset import smaller
 from tolcontact.geometry.merged_surface import merged_surface
+from tolcontact.geometry.triangle_mesh import coordinate_error, edges
 from tolcontact.geometry.vertex_displacements import capped, displacements
 
 SAME_PLANE = 1e-5  # rad: facets whose normals differ by less are one plane

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.declaration.locator import FIRST_ORDER
-from tolcontact.discretization import ContactPoints, Nominal, counted_points
+from tolcontact.discretization import ContactPoints, Nominal
 from tolcontact.mechanics.correction import Mobility
 from tolcontact.mechanics.displacement import moment_table
 from tolcontact.mechanics.pose import Number, Vector
@@ -18,7 +18,7 @@ BALL_SHARE = 0.01  # of the group's length: radius of the ball that a point repr
 class Side:
     """One side of a pair whose points can be displaced: its points, and the position of their part in the group.
 
-    radii         (point,) [mm]: of the spheres that the points represent (see counted_points)
+    radii         (point,) [mm]: of the spheres that the points represent (see ContactPoints.counted)
     centre        (3,) [mm]: nominal reference point of the moments
     all_moments   (10,): the moments of all points as small balls, so that points on a line constrain all rotations, too
     """
@@ -222,7 +222,7 @@ def _side(
     position: int, pair: ContactPoints, part: int, of_moving: bool, weighs_areas: bool, centre: np.ndarray, radius: float
 ) -> Side:
     """Return one side of a pair; in the regularization its contact points are balls of a radius [mm]."""
-    counted, points = counted_points(pair)[0 if of_moving else 1], pair.P_m if of_moving else pair.P_r
+    counted, points = pair.counted(of_moving=of_moving), pair.P_m if of_moving else pair.P_r
     weights = pair.weights if weighs_areas else np.ones(len(points))
     all_moments = (moment_table(points, centre) * weights).sum(axis=1)
     all_moments[[4, 7, 9]] += weights.sum() * radius**2

@@ -9,7 +9,7 @@ import numpy as np
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.geometry.analytic_surfaces import Plane
 from tolcontact.geometry.brep_face import number_faces
-from tolcontact.geometry.files import BREP, FACE_NAMES
+from tolcontact.geometry.files import BREP
 from tolcontact.interference import Interference, Watch
 
 AXES = {"+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1)}
@@ -67,11 +67,11 @@ def face_line(part: NominalPart, triangle: int) -> str:
     mesh, variable = part.mesh, variable_of(part.name)
     normal = np.asarray(mesh.face_normals)[triangle]
     if BREP in mesh.face_attributes:
-        numbers, surfaces = number_faces(mesh)
-        number = int(numbers[triangle])
-        names = mesh.metadata.get(FACE_NAMES) or [""] * len(surfaces)
-        face = f'"{names[number]}"' if names[number] and names.count(names[number]) == 1 else str(number + 1)
-        whole = "" if surfaces[number] is None or isinstance(surfaces[number], Plane) else ", whole=True"
+        face_of, faces = number_faces(mesh)
+        number = int(face_of[triangle])
+        stated, names = faces[number], [face.name for face in faces]
+        face = f'"{stated.name}"' if stated.name and names.count(stated.name) == 1 else str(number + 1)
+        whole = "" if stated.surface is None or isinstance(stated.surface, Plane) else ", whole=True"
         return f"{variable}.face(tc.Brep({face}{whole}))"
     for direction, axis in AXES.items():
         if normal @ np.array(axis) > 1 - SAME_DIRECTION:

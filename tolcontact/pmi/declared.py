@@ -103,7 +103,7 @@ def declared_file(path: Path, pmi: Pmi) -> DeclaredFile:
         part = model.part(part_name(body), geometry, at=body.at, rotation=body.rotation)
         reports.append(declare_features(part, pmi, read)[1:])
         parts.append(part)
-        kinds = {face.number: face.kind for face in describe_faces(read.mesh)}
+        kinds = {face.number: face.kind for face in describe_faces(read)}
         faces |= {record: replace(faces[record], kind=kinds[faces[record].number]) for record in records}
     if faults and not parts:
         raise OptionError("; ".join(faults))

@@ -61,7 +61,7 @@ def declare_features(part: Part, pmi: Pmi, read: Shape) -> tuple[tuple[Declared,
     surfaces = TolerancedSurfaces(read)
     claims = claims_of(pmi, surfaces)
     report = Report(claims)
-    meshes = {part: read.mesh}
+    meshes = {part: read}
     drafts = _drafts(part, meshes, claims, surfaces, report)
     declared = _Trial(part, meshes, report).features(drafts)
     return tuple(declared[draft] for draft in drafts if draft in declared), claims, report

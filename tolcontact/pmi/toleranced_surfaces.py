@@ -11,9 +11,9 @@ from tolcontact.geometry.brep_face import (
     faces_at,
     faces_on_surfaces,
 )
+from tolcontact.geometry.face_groups import FaceOnSurface
 from tolcontact.geometry.face_in_file import FaceInFile
 from tolcontact.geometry.files import STATED_FACES, Shape
-from tolcontact.geometry.interrupted_surfaces import FaceOnSurface
 
 MAX_OPPOSED_ERROR = 1e-3  # [rad] between two planes that count as parallel
 MAX_ANGLE = 0.01  # [rad] between directions of faces that may be parts of one surface: fitted ones differ by much less
@@ -27,8 +27,8 @@ class TolerancedSurfaces:
     faces   the faces of the part, by their numbers less 1
     """
 
-    def __init__(self, shape: Shape) -> None:
-        self._mesh = mesh = shape.mesh
+    def __init__(self, mesh: Shape) -> None:
+        self._mesh = mesh
         self._numbers = {
             record: number for number, face in enumerate(mesh.metadata[STATED_FACES], start=1) for record in face.records
         }

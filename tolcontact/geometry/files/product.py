@@ -1,38 +1,73 @@
-"""The product in a STEP file: shapes of bodies, moved onto the surfaces that it states, and bodies in their places.
-
-Lengths in mm.
-"""
+"""The product in a STEP file: its bodies in their poses. A part is one body. Lengths in mm."""
 
 import logging
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.spatial
 import trimesh
 
-from tolcontact.errors import GeometryFault, nearest_name
-from tolcontact.geometry.edges import distinct_triangles, rim
-from tolcontact.geometry.files.bodies import Body, FaceMeasure, StatedFace, StepShape, listed, uniquely_named
-from tolcontact.geometry.files.step_surfaces import credible, onto, stated_surface
+from tolcontact.errors import GeometryFault, clipped, nearest_name
+from tolcontact.geometry.files.step_shapes import StepShape, rounded, step_shape
 from tolcontact.geometry.files.step_text import StepText
 
 STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # largest distance [mm] and angle [rad] between triangles and true faces of a STEP file
 STEP_SHARE = 5e-6  # the chord of files larger than 0.4 m, as a share of their extent
+MAX_LISTED = 12  # bodies that a message lists
 MAX_COORDINATE = 1e7  # [mm]
-COORDINATE_DIGITS = 9  # of vertices after the point [mm]
 MERGE_DISTANCE = 1e-7  # [mm], beyond 1 mm from the origin a share: vertices of a shape that are closer are one
 STRETCH_TOLERANCE = 1e-6  # relative, for a rigid motion
 MAX_OFFSET = 3.0  # in chords: vertices at a larger distance from the surface of their B-rep face are not moved onto it
 BREP = "brep_index"  # face attribute of a mesh: the B-rep face of each triangle
-SURFACES = "surfaces"  # in its metadata: the surface of each B-rep face, None if the file states none
-FACE_NAMES = "face_names"  # in its metadata: the name of each B-rep face; empty if the file names none
 STATED_FACES = "stated_faces"  # in its metadata: each B-rep face as the file states it
 
 log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A body in its place.
+
+    name          a name that no other body of the file has; "" if the file states none
+    path          names of the products that contain the body, from the root on
+    place         (4, 4): from its own frame to the frame of the file [mm]
+    box           (2, 3) lower and upper corner of the box around the body in its place
+    is_open       whether its triangles do not close
+    """
+
+    name: str
+    path: tuple[str, ...]
+    place: np.ndarray
+    box: np.ndarray
+    is_open: bool
+    shape: StepShape
+
+    def __str__(self) -> str:
+        title = ("open, " if self.is_open else "") + (f'"{clipped(self.name, 60)}"' if self.name else "without a name")
+        size = " x ".join(f"{length:.4g}" for length in self.box[1] - self.box[0])
+        return f"{title}, {size} mm at ({', '.join(f'{x:.4g}' for x in self.box.sum(axis=0) / 2)})"
+
+
+def uniquely_named(bodies: Sequence[Body]) -> Iterator[Body]:
+    """Yield the bodies with different names: repeated names are numbered in the file's order."""
+    names = {body.name for body in bodies}
+    used: set[str] = set()
+    for body in bodies:
+        name, number = body.name, 1
+        while name and (name in used or (number > 1 and name in names)):
+            number += 1
+            name = f"{body.name} ({number})"
+        used.add(name)
+        yield replace(body, name=name)
+
+
+def listed(bodies: Sequence[Body]) -> str:
+    """Return a list of bodies for a message: numbers, names, sizes and places."""
+    entries = "; ".join(f"{number}. {body}" for number, body in enumerate(bodies[:MAX_LISTED], start=1))
+    return entries + (f"; and {len(bodies) - MAX_LISTED} more (see tolcontact bodies)" if len(bodies) > MAX_LISTED else "")
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,21 +116,19 @@ class Product:
     def part(self, selector: str | int | None) -> trimesh.Trimesh:
         """Return the mesh of a body: in its own frame if it is selected, in its place if `selector` is None.
 
-        The mesh carries BREP, whose numbers start from 0 in the file's order, SURFACES, FACE_NAMES and STATED_FACES.
+        The mesh has BREP, whose indices follow the file's order, and STATED_FACES.
         """
         body = self.body(selector)
         shape = body.shape
-        vertices, surfaces, faces = np.array(shape.vertices), list(shape.surfaces), shape.faces
+        vertices, faces = np.array(shape.vertices), shape.faces
         if selector is None and not np.array_equal(body.place, np.eye(4)):
             R, t = body.place[:3, :3], body.place[:3, 3]
             vertices = vertices @ R.T + t
-            surfaces = [None if surface is None else surface.placed(R, t) for surface in surfaces]
             faces = tuple(face.placed(R, t) for face in faces)
         mesh = trimesh.Trimesh(vertices, np.array(shape.triangles), process=False)
         mesh.units = "mm"
         mesh.face_attributes[BREP] = np.array(shape.brep)
-        names = tuple(face.name for face in faces)
-        mesh.metadata |= {SURFACES: surfaces, FACE_NAMES: names if any(names) else (), STATED_FACES: faces}
+        mesh.metadata[STATED_FACES] = faces
         if shape.face_count and len(self.bodies) == 1 and shape.gap_count:
             raise GeometryFault(
                 f'"{self.path}" holds a solid whose faces do not close ({shape.gap_count} edges have a triangle on one side '
@@ -112,13 +145,13 @@ def product(path: Path, content: Mapping[str, Any], text: StepText, chord: float
     """
     vertices = np.concatenate([np.zeros((0, 3)), *(entry["vertices"] for entry in content["shapes"])])
     check_numbers(vertices, f'"{path}"')
-    merge_distance = MERGE_DISTANCE * max(1.0, float(np.abs(_rounded(vertices)).max(initial=0)))
+    merge_distance = MERGE_DISTANCE * max(1.0, float(np.abs(rounded(vertices)).max(initial=0)))
     max_offset = MAX_OFFSET * min(chord, usual_chord(text))  # vertices are on the true faces at any chord
     # The kernel counts records; if it counts others than the text has, their numbers are unknown.
     is_counted = content["record_count"] == len(text.order)
     numbers = np.array([0, *text.order]) if is_counted else np.zeros(content["record_count"] + 1, dtype=np.int64)
     omissions: Counter[str] = Counter()
-    shapes = [_shape(entry, numbers, merge_distance, max_offset, omissions) for entry in content["shapes"]]
+    shapes = [step_shape(entry, numbers, merge_distance, max_offset, omissions) for entry in content["shapes"]]
     for kind, count in omissions.items():
         log.info('"%s": %d triangles %s are left out', path, count, kind)
     if not any(len(shape.triangles) for shape in shapes):
@@ -146,57 +179,6 @@ def usual_chord(text: StepText) -> float:
     return max(STEP_CHORD, STEP_SHARE * text.extent * text.unit)
 
 
-def _shape(
-    entry: Mapping[str, Any], numbers: np.ndarray, merge_distance: float, max_offset: float, omissions: Counter[str]
-) -> StepShape:
-    """Return a shape, without triangles that are degenerate or repeat others.
-
-    entry            what the kernel reads
-    numbers          (record + 1,) numbers of all records in the file's text, after a 0
-    merge_distance   [mm] between vertices that are one
-    max_offset       [mm] by which a vertex may be moved onto the surfaces of its faces
-    omissions        counts of triangles by the reason for which they are left out
-    """
-    vertices, triangles = _merge_vertices(entry["vertices"], entry["triangles"], merge_distance)
-    proper, repeated = _proper_triangles(triangles, omissions)
-    brep = entry["brep"][proper]
-    corners, triangles = np.unique(triangles[proper], return_inverse=True)
-    vertices, triangles = vertices[corners], triangles.reshape(-1, 3)
-    surfaces = credible(vertices, triangles, brep, list(map(stated_surface, entry["surfaces"])), max_offset)
-    vertices = onto(vertices, triangles, brep, surfaces, max_offset)
-    # Of each face, the face of which it is a copy, or itself.
-    first = np.arange(len(surfaces))
-    first[entry["brep"][repeated[::-1, 0]]] = entry["brep"][repeated[::-1, 1]]
-    first[brep] = brep
-    places, faces = np.unique(first), []
-    for place in places:
-        members = [place, *(member for member in np.flatnonzero(first == place) if member != place)]
-        records = [int(numbers[entry["records"][member]]) for member in members] if entry["records"] else []
-        measure = entry["measures"][place]
-        measured = None if measure is None else FaceMeasure(measure[0], np.array(measure[1]), np.array(measure[2]))
-        faces.append(StatedFace(entry["names"][place], tuple(filter(None, records)), len(members) - 1, measured))
-    stated = tuple(surfaces[place] for place in places)
-    gap_count = len(rim(triangles))
-    return StepShape(
-        vertices, triangles, np.searchsorted(places, brep), tuple(faces), stated, entry["face_count"], gap_count
-    )  # fmt: skip
-
-
-def _proper_triangles(triangles: np.ndarray, omissions: Counter[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Return indices of triangles (triangle, 3), without repeated ones and without those that have two corners in one place.
-
-    The second array (repeated, 2) has the indices of each repeated triangle and of the triangle that it repeats: they come
-    from a face that stands twice in its shell. Corners fall together at the ends of an edge that is shorter than coordinates
-    resolve.
-    """
-    proper = np.flatnonzero((triangles != np.roll(triangles, 1, axis=1)).all(axis=1))
-    unique, group = distinct_triangles(triangles[proper])
-    counts = {"on edges of no length": len(triangles) - len(proper), "that stand twice": len(proper) - len(unique)}
-    omissions += Counter(counts)
-    pairs = np.column_stack([proper, proper[unique][group]])
-    return proper[np.sort(unique)], pairs[pairs[:, 0] != pairs[:, 1]]
-
-
 def check_numbers(vertices: np.ndarray, subject: str) -> None:
     """Raise GeometryFault if coordinates [mm] are not finite, or too large."""
     if not np.isfinite(vertices).all():
@@ -207,24 +189,6 @@ def check_numbers(vertices: np.ndarray, subject: str) -> None:
             f"{subject} reaches as far as {largest:.3g} mm, beyond the limit of {MAX_COORDINATE:g} mm; it is damaged, "
             "or in other units: export it again, or state its units"
         )
-
-
-def _rounded(vertices: np.ndarray) -> np.ndarray:
-    return np.round(vertices, COORDINATE_DIGITS) + 0.0  # no negative zeros
-
-
-def _merge_vertices(vertices: np.ndarray, triangles: np.ndarray, distance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return vertices (vertex, 3) [mm] without those that are within a `distance` of others, and `triangles` (triangle, 3).
-
-    The ends of an edge that is shorter than the kernel's triangulation resolves fall together.
-    """
-    rows, number = np.unique(_rounded(vertices), axis=0, return_inverse=True)
-    pairs = scipy.spatial.cKDTree(rows).query_pairs(distance, output_type="ndarray")
-    if not len(pairs):
-        return rows, number.ravel()[triangles]
-    label = trimesh.graph.connected_component_labels(pairs, node_count=len(rows))
-    _, first, cluster = np.unique(label, return_index=True, return_inverse=True)
-    return rows[first], cluster.ravel()[number.ravel()][triangles]
 
 
 def rigid_motion(path: Path, transform: np.ndarray) -> np.ndarray:

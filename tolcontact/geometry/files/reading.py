@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import trimesh
@@ -13,21 +13,19 @@ import trimesh
 from tolcontact.declaration import Geometry, Mesh
 from tolcontact.declaration.geometry import UNITS
 from tolcontact.errors import GeometryFault, clipped
-from tolcontact.geometry.coordinate_error import COORDINATE_SPACING
-from tolcontact.geometry.edges import rim
 from tolcontact.geometry.files import screening
 from tolcontact.geometry.files.product import (
     BREP,
-    FACE_NAMES,
+    STATED_FACES,
     STEP_ANGLE,
     STEP_CHORD,
-    SURFACES,
     Product,
     check_numbers,
     product,
     usual_chord,
 )
 from tolcontact.geometry.files.step_text import SOLIDS, USAGES, StepText
+from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING, rim
 from tolcontact.shape_worker import Job, UnfinishedRead, Worker, taken
 
 MAX_ANGLE = 0.5  # [rad] between triangles of round faces
@@ -35,13 +33,6 @@ COARSENINGS = (1, 30)  # times the usual chord, tried one after the other
 CACHE_SIZE = 4  # STEP files
 
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Shape:
-    """The surface of a part in mm."""
-
-    mesh: trimesh.Trimesh
 
 
 @dataclass(frozen=True)
@@ -59,6 +50,7 @@ class ReadingLimits:
 
 
 DEFAULT_LIMITS = ReadingLimits()
+Shape: TypeAlias = trimesh.Trimesh  # the surface of a part in mm
 Key = tuple[Path, float | None]  # a file and its required chord
 Content = Product | Mapping[str, np.ndarray]  # of a STEP file, and of a mesh file as `worker` reads it
 Contents = Mapping[Key, Content | GeometryFault]
@@ -163,44 +155,32 @@ def read(geometry: Mesh, contents: Contents) -> Shape:
     too large, or if its units are unknown.
     """
     source = geometry.source
-    if not isinstance(source, str | Path):
-        return Shape(_in_memory(geometry))
-    content = contents[key_of(geometry)]
-    if isinstance(content, GeometryFault):
-        raise content
-    if isinstance(content, Product):
-        return Shape(content.part(geometry.body))
-    mesh = trimesh.Trimesh(content["vertices"], content["faces"], process=False)
-    scale = _scale(geometry, str(content["units"]) or None)
+    if isinstance(source, str | Path):
+        content = contents[key_of(geometry)]
+        if isinstance(content, GeometryFault):
+            raise content
+        if isinstance(content, Product):
+            return content.part(geometry.body)
+        mesh = trimesh.Trimesh(content["vertices"], content["faces"], process=False)
+        piece, unit, spacing = content["piece"], str(content["units"]) or None, content["spacing"]
+    else:
+        mesh = trimesh.Trimesh(source.vertices, source.faces, process=False)
+        if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
+            raise GeometryFault(f"{geometry}: its triangles refer to vertices beyond the {len(mesh.vertices)} that it has")
+        if len(mesh.faces) > DEFAULT_LIMITS.triangles:
+            raise GeometryFault(screening.too_many(geometry, len(mesh.faces), DEFAULT_LIMITS.triangles))
+        piece, unit = np.zeros(len(mesh.faces), dtype=np.int64), getattr(source, "units", None)
+        spacing = getattr(source, COORDINATE_SPACING, np.zeros(3))  # from an archive
+    scale = _scale(geometry, unit)
     mesh.apply_scale(scale)
     check_numbers(mesh.vertices, str(geometry))
-    merged = _merge_vertices(mesh, content["piece"])
-    _state_spacing(merged, scale * content["spacing"])
-    return Shape(merged)
-
-
-def _in_memory(geometry: Mesh) -> trimesh.Trimesh:
-    source = geometry.source
-    mesh = trimesh.Trimesh(source.vertices, source.faces, process=False)
-    if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
-        raise GeometryFault(f"{geometry}: its triangles refer to vertices beyond the {len(mesh.vertices)} that it has")
-    if len(mesh.faces) > DEFAULT_LIMITS.triangles:
-        raise GeometryFault(screening.too_many(geometry, len(mesh.faces), DEFAULT_LIMITS.triangles))
-    scale = _scale(geometry, getattr(source, "units", None))
-    mesh.apply_scale(scale)
-    check_numbers(mesh.vertices, str(geometry))
-    mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    _state_spacing(mesh, scale * getattr(source, COORDINATE_SPACING, np.zeros(3)))  # from an archive
+    mesh = _merge_vertices(mesh, piece)
+    if spacing.any():  # otherwise coordinates are exact
+        mesh.metadata[COORDINATE_SPACING] = scale * spacing
     if BREP in getattr(source, "face_attributes", {}):  # from an archive
         mesh.face_attributes[BREP] = source.face_attributes[BREP]
-        mesh.metadata |= {name: source.metadata[name] for name in (SURFACES, FACE_NAMES)}
+        mesh.metadata[STATED_FACES] = source.metadata[STATED_FACES]
     return mesh
-
-
-def _state_spacing(mesh: trimesh.Trimesh, spacing: np.ndarray) -> None:
-    """Add the spacing (3,) [mm] of stored coordinates to a mesh, unless they are exact."""
-    if spacing.any():
-        mesh.metadata[COORDINATE_SPACING] = spacing
 
 
 def _scale(geometry: Mesh, source_unit: str | None) -> float:
@@ -217,7 +197,7 @@ def _scale(geometry: Mesh, source_unit: str | None) -> float:
 
 
 def _merge_vertices(mesh: trimesh.Trimesh, piece: np.ndarray) -> trimesh.Trimesh:
-    """Return a mesh whose neighbouring triangles share vertices, from which rims, smooth normals and bodies follow.
+    """Return a mesh whose neighbouring triangles share vertices: rims, smooth normals and bodies depend on this.
 
     Each closed piece (face,) is a body and shares no vertices with the pieces that it touches. Open pieces may be parts of one
     body.

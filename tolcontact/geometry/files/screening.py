@@ -8,7 +8,7 @@ from tolcontact.errors import GeometryFault, clipped
 from tolcontact.geometry.files.step_text import StepText
 
 MESH_SUFFIXES = (".stl", ".obj", ".ply", ".glb", ".gltf")
-HEAD_SIZE = 10_000  # [byte] at the beginning of a file, by which its kind is recognized
+HEAD_SIZE = 10_000  # [byte] at the beginning of a file, which show its kind
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # of UTF-8
 _PLY_ELEMENT = re.compile(rb"^element (\w+) (\d+)", re.MULTILINE)
 # The beginnings of files with a wrong suffix, and the advice for each.
