@@ -7,6 +7,6 @@ from tolcontact.vocabulary.labels import *  # noqa: F403
 from tolcontact.vocabulary.labels import ArchiveVariable as ArchiveVariable
 from tolcontact.vocabulary.stations import *  # noqa: F403
 from tolcontact.vocabulary.summary import *  # noqa: F403
-from tolcontact.vocabulary.surface import *  # noqa: F403  # noqa: F403  # noqa: F403
-from tolcontact.vocabulary.variation import *  # noqa: F403  # noqa: F403
+from tolcontact.vocabulary.surface import *  # noqa: F403
+from tolcontact.vocabulary.variation import *  # noqa: F403
 from tolcontact.vocabulary.words import *  # noqa: F403
