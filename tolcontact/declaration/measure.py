@@ -11,17 +11,16 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from tolcontact.declaration.checks import TRUTH, direction_faults, field_faults
+from tolcontact.declaration.checks import TRUTH, Declaration, direction_faults
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Part, Point
 from tolcontact.declaration.place import MAX_NUMBER, Place
 from tolcontact.declaration.values import Vector, is_length, is_line
 from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
-from tolcontact.readable import Readable
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Measure(Readable):
+class Measure(Declaration):
     """A number that follows from the poses of the parts.
 
         of one Point                its displacement from its nominal place, along `along` [mm]; its coordinate, if `absolute`
@@ -45,6 +44,7 @@ class Measure(Readable):
     absolute: bool | None = None
     station: str = ""
     noun: ClassVar[str] = "measurement"
+    checks: ClassVar = {"absolute": TRUTH}
 
     def __post_init__(self) -> None:
         with contextlib.suppress(TextFault):  # faults() reports it
@@ -108,7 +108,7 @@ class Measure(Readable):
         if self.to is not None and not isinstance(self.to, Point):
             yield f"to is a {type(self.to).__name__}; expected part.point(x, y, z)"
         yield from self._limits_faults()
-        yield from field_faults(self, {"absolute": TRUTH})
+        yield from super().faults()
         if self.absolute is not None and not isinstance(self.of, Point):
             yield f"absolute is for measurements of points; a {self._noun} has its own value, so leave it out"
 

@@ -21,7 +21,7 @@ class Measurement(Readable):
     """A quantity that follows from the poses of parts and the deviations of their features.
 
     kind     its name, in documents and tables
-    units    of its value; a combination has those of its measurements
+    units    of its value; a combination has the units of its measurements
     depth    number of combinations inside each other
     """
 
@@ -61,7 +61,7 @@ class Measurement(Readable):
         return tuple(operand for operand in self.operands if isinstance(operand, Measurement))
 
     def units_among(self, units: Mapping[str, str]) -> set[str]:
-        """Return the units of the value, from those of named measures: several if measurements of unlike units are combined."""
+        """Return the units of the value from the units of named measures: several if it combines unlike measurements."""
         return {self.units}
 
     def faults(self) -> Iterator[str]:
@@ -70,7 +70,7 @@ class Measurement(Readable):
             yield from thing.faults()
 
     def _take_faces(self, **faces: Any) -> None:
-        """Store faces, or those of features. Raises TypeError for what is neither."""
+        """Store faces, or the faces of features. Raises TypeError for anything else."""
         for name, face in faces.items():
             if not isinstance(face, Face | Feature):
                 raise TypeError(f'{self.kind}: {name} is a {type(face).__name__}; expected part.face("+z"), or a feature')
@@ -112,7 +112,7 @@ class Gap(_OfStation):
 class Flush(_OfStation):
     """The height of a station, a point of one part, over a neighbouring outer face of another, perpendicular to this face.
 
-    The face counts beyond its ends, as that of a Gap.
+    The face counts beyond its ends, as for a Gap.
     """
 
     kind = "flush"
@@ -138,9 +138,9 @@ class _OfTwoFaces(Measurement):
 class Clearance(_OfTwoFaces):
     """The least distance of two faces of different parts, negative where they overlap.
 
-    Of planes it is the least height, perpendicular to the second face, in the region in which they overlap at the present pose;
-    in the region in which they overlap nominally if there is none, or if their rims have more than 2500 pairs of edges. Of a
-    ball or a shaft beside walls it is the least gap of contact (see tolcontact.discretization), of two outer cylinders the
+    Of planes it is the least height, perpendicular to the second face, in their overlap region at the present pose; in their
+    nominal overlap region if they do not overlap there, or if their rims have more than 2500 pairs of edges. Of a ball or a
+    shaft and walls it is the least gap of contact (see tolcontact.discretization), of two outer cylinders the
     distance of their axes, each as long as its face, less both radii. Of all other faces, and of whole parts
     (`part.face()`), it is the least distance of their triangles, negative by the depth of a corner or an edge inside the other
     one. It looks at the corners and edges that are nearest nominally, and where parts move beyond these it is too small, never
@@ -156,7 +156,7 @@ class LargestGap(_OfTwoFaces):
     The gap is measured at places of the first face, perpendicular to the second one, with the form of both, and is negative
     inside the material. The places cover the region of the first face over which the second one lies in the nominal assembly,
     its rim and its corners included. They are a seventh of the least correlation length of form apart; without form there are
-    some 200. The second face counts beyond its ends, as that of a Gap, and its form is that opposite the nominal place.
+    some 200. The second face counts beyond its ends, as for a Gap, and its form is taken opposite the nominal place.
     """
 
     kind = "largest gap"
@@ -166,9 +166,9 @@ class MeanGap(_OfTwoFaces):
     """The mean by area of the gap left between two faces of different parts, at the places of a LargestGap.
 
     Each place counts by the area of the first face that is nearest to it, so that flat faces have the mean of the region where
-    they lie over each other. On curved faces the area is that of triangles, each over the second face or not: where the second
-    face ends over the first one, the mean is off by up to some 0.4 % of the range of gaps. The mean times the area of the
-    region is the volume between both faces.
+    they lie over each other. On curved faces the area is summed over triangles, each over the second face or not: where the
+    second face ends over the first one, the mean is off by up to some 0.4 % of the range of gaps. The mean times the area of
+    the region is the volume between both faces.
     """
 
     kind = "mean gap"
@@ -180,7 +180,7 @@ class AxisDistance(_OfTwoFaces):
 
     By default it is the shortest distance of the two axes, each as long as its face.
 
-    across   a direction: the distance of the points in which both axes, however long, pierce the plane across it through the
+    across   a direction: the distance of the points where both axes, however long, pierce the plane across it through the
              middle of the first axis
     along    a direction: the component of the perpendicular from the middle of the first axis to the second axis, however long
 
@@ -214,10 +214,10 @@ class Angle(_OfTwoFaces):
     """The angle [rad] between two planes or axes, by the normals of planes and the axes of cylinders and cones.
 
     Planes and lines have no sense: the second direction is reversed if it is more than a right angle from the first one
-    nominally. Without `about` the angle is that of the two directions in space, from 0 on.
+    nominally. Without `about` it is the angle between the two directions in space, from 0 on.
 
-    about   a direction, fixed in the assembly frame: the angle by which the first direction must turn about it to coincide with
-            the second one, both seen along it, from -pi to pi
+    about   a direction, fixed in the assembly frame: the rotation about it that makes the first direction coincide with the
+            second one, both seen along it, from -pi to pi
     """
 
     kind = "angle"

@@ -1,6 +1,6 @@
 """The sequence of stations: which parts are present in each, as which bodies, and what is wrong with that.
 
-A station is a model by itself: its parts, with the locations, contact pairs, forces and measures that it declares, and the
+A station is a model of its own: its parts, with the locations, contact pairs, forces and measures that it declares, and the
 joints that it locates.
 """
 

@@ -3,18 +3,18 @@
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
+from tolcontact.declaration.checks import Declaration
 from tolcontact.declaration.declarations import Declarations, expect
 from tolcontact.declaration.joint import Joint, parts_of
 from tolcontact.declaration.part import Part
 from tolcontact.declaration.values import script_line
-from tolcontact.readable import Readable
 
 
-class Station(Declarations, Readable):
-    """A step in which an assembly is built or measured: `assembly.station(name)` declares it, in the order of the steps.
+class Station(Declarations, Declaration):
+    """A step of building or measuring an assembly: `assembly.station(name)` declares it, in the order of the steps.
 
     Parts and joints are located again in each station; a station that only measures is an inspection. Features belong to parts:
-    they deviate alike in all stations. A locator is a contributor of its own in each station, "weld.panel.A1".
+    their deviations are equal in all stations. A locator is a contributor of its own in each station, "weld.panel.A1".
     """
 
     name: str
