@@ -9,10 +9,10 @@ from tolcontact.declaration import Face, Part
 from tolcontact.errors import GeometryFault
 from tolcontact.fasteners.placed_faces import Axis, PlacedCylinder, PlacedPlane, outer_cylinders, placed_cylinder
 
-INTO, SEAT = "into", "seat"  # labels of faces beside "through[0]" and so on
+INTO, SEAT = "into", "seat"  # labels of faces, in addition to "through[0]" and so on
 FREE_END = 0.25  # of the diameter: how far a made shank reaches out of the parts
 ROUNDING = 1e-6  # of a diameter: what counts as nothing
-PRESSED = 1e-3  # of a diameter: how far the axis of a part may be off that of the hole that it goes into
+PRESSED = 1e-3  # of a diameter: distance allowed between the axes of a part and of the hole that it goes into
 MAX_LEAN = 1e-4  # [rad] between the axis of a fastener and the normal of its seat
 
 Holes = Mapping[str, PlacedCylinder]  # by their labels, from the head on

@@ -39,7 +39,7 @@ class Axis:
         return self.origin + station * self.head
 
     def station(self, point: np.ndarray) -> float:
-        """Return the station [mm] beside a point (3,)."""
+        """Return the station [mm] of the projection of a point (3,)."""
         return float((point - self.origin) @ self.head)
 
     def distance(self, point: np.ndarray) -> float:
@@ -73,7 +73,7 @@ class PlacedCylinder:
         return low, high
 
     def offset(self, axis: Axis) -> float:
-        """Return the largest distance [mm] of its own axis from that of a fastener."""
+        """Return the largest distance [mm] from its own axis to the axis of a fastener."""
         return max(axis.distance(end) for end in self.ends)
 
 

@@ -21,7 +21,7 @@ MIN_THICKNESS_SHARE = 0.02  # of the thinner body: thinner overlaps are not look
 FACET_FACTOR = 2.0  # times the height of round faces over their triangles
 MAX_COMPARED = 1000  # pairs of bodies whose boxes overlap
 MIN_SHARE = 0.005  # of the draws
-MIN_MEASURED = 8  # draws in which the depth of a clash is measured
+MIN_MEASURED = 8  # draws whose depth of a clash is measured
 MAX_TRIANGLES = 20_000  # of both bodies, in all of these draws, if there are more of them
 MAX_CLASHES = 20  # pairs of parts that are named
 
@@ -112,7 +112,7 @@ def _is_carried(nominal: Nominal, pair: tuple[int, int]) -> bool:
 
 
 def _rows_with_contact(draws: TrialDraws, pair: tuple[int, int]) -> Int[Array, " k"]:
-    """Return the draws (k,) in which two bodies lie in each other after contact has moved them."""
+    """Return the draws (k,) with two bodies in each other after contact has moved them."""
     clashes = draws.program.watch.clashes(draws.resolved.poses[:, CORRECTED], draws.deviations, among=[pair])
     return next((clash.rows for clash in clashes), np.zeros(0, dtype=int))
 
@@ -182,7 +182,7 @@ def body_overlaps(draws: TrialDraws) -> Iterator[str]:
 
 
 def _is_press_fit(nominal: Nominal, left: NominalPart, right: NominalPart, diameter: float, place: np.ndarray) -> bool:
-    """Return whether the ball in which two parts overlap lies at the wall of a hole of one that the other is located in.
+    """Return whether two parts overlap at the wall of a hole of one that the other is located in.
 
     A screw is thicker than its thread, and a dowel than its hole.
     """

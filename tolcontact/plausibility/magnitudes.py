@@ -1,4 +1,4 @@
-"""Rotations beyond a full turn, and tolerances that are large beside their part."""
+"""Rotations beyond a full turn, and tolerances that are wide compared with their part."""
 
 import math
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ def rotations(draws: TrialDraws) -> Iterator[str]:
 
 
 def wide_tolerances(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence for each part with a zone that is wide beside it, or with locators too close together for theirs."""
+    """Yield a sentence for each part with a zone that is wide compared with it, or with locators too close together."""
     in_other_units = parts_in_other_units(draws)
     for nominal in draws.program.nominal.parts:
         if nominal.part in in_other_units:

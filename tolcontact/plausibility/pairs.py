@@ -50,7 +50,7 @@ def pair_clearances(draws: TrialDraws) -> Iterator[str]:
 
 
 def coarse_pairs(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence if the contact points of a pair of curved faces, or its triangles, are coarse beside the tolerances.
+    """Yield a sentence if contact points or triangles of a pair of curved faces are coarse compared with the tolerances.
 
     Errors below the rounding of coordinates in files, which bends flat faces, do not count.
     """
@@ -93,7 +93,7 @@ def _name(draws: TrialDraws, part: int | None) -> str:
 
 
 def unsure_seats(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence for each seat short of which the stated friction can hold its part."""
+    """Yield a sentence for each seat if the stated friction can keep its part off it."""
     assembly = draws.program.nominal.assembly
     if not assembly.forces or all(mu is None for mu in (assembly.mu, *(pair.mu for pair in assembly.pairs))):
         return

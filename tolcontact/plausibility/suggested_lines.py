@@ -19,7 +19,7 @@ SAME_DIRECTION = 1e-4  # of the cosine of an angle
 class ClashPlace(NamedTuple):
     """Where two bodies lie in each other.
 
-    triangles   of the mesh of each body: those on which the place may lie, several at an edge and its ends
+    triangles   candidates of the mesh of each body: several at an edge and its ends
     position    (3,) [mm] in the nominal assembly
     """
 
