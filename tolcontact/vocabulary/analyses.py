@@ -1,8 +1,8 @@
-"""Every analysis of a model beside its run: its group in an archive, its title, its variables and their labels."""
+"""Every analysis of a model: its group in an archive, its title, its variables and their labels."""
 
 from dataclasses import dataclass, replace
 
-from tolcontact.vocabulary.archive import GAP_MIN, KKT_RESIDUAL, MEASURED, ROTATION, STATUS, TRANSLATION
+from tolcontact.vocabulary.archive import GAP_MIN, KKT_RESIDUAL, MEASURED, ROTATION, STATION_POSES, STATUS, TRANSLATION
 from tolcontact.vocabulary.labels import (
     AXES,
     AXIS,
@@ -15,7 +15,6 @@ from tolcontact.vocabulary.labels import (
     ArchiveVariable,
     variable,
 )
-from tolcontact.vocabulary.stations import STATION_POSES
 from tolcontact.vocabulary.summary import ESTIMATE, INTERVAL, OUTSIDE
 
 ANALYSES_GROUP = "statistics"  # the group of an archive that holds a group for each analysis
@@ -35,9 +34,9 @@ FIXED_LABELS = {
 
 @dataclass(frozen=True, eq=False)
 class AnalysisRecord:
-    """The form in which an analysis is returned and archived; `title` is a format of the assembly's name and of attributes.
+    """The form of an analysis, as it is returned and archived; `title` is a format of the assembly's name and of attributes.
 
-    Variables `of_stations` are only those of an assembly that is built in stations.
+    Only assemblies that are built in stations have variables `of_stations`.
     """
 
     name: str
@@ -77,7 +76,7 @@ CONTRIBUTIONS = AnalysisRecord(
             "total Sobol' index: share of variance by a group and its interactions",
             "1",
         ),
-        variable("i1 minor(group)", "1: estimated together with all other minor groups; 0: by itself", "1"),
+        variable("i1 minor(group)", "1: estimated together with all other minor groups; 0: alone", "1"),
         variable("f8 minor_total(measure, state, interval)", "total Sobol' index of all minor groups together", "1"),
         variable(
             "f8 shapley(measure, state, unit, interval)", "Shapley effect: share of variance, also of what is correlated", "1"
@@ -154,11 +153,11 @@ RELOCATION = AnalysisRecord(
     "place of {locator} in {assembly}",
     (
         variable("f8 point(stage, axis)", "place of the locator, in its part's own frame", "mm"),
-        variable("f8 reached(stage, interval)", "what is to be least, in a fresh run"),
+        variable("f8 reached(stage, interval)", "value of the objective in a fresh run"),
         variable("f8 change(interval)", "6 sigma after / before; or share outside, after minus before", "1"),
         variable("i8 unresolved(stage)", "number of realizations of the fresh run that were not resolved", "1"),
-        variable("f8 tried(trial, axis)", "places tried, in the part's own frame", "mm"),
-        variable("f8 tried_value(trial)", "what is to be least, at the places tried"),
+        variable("f8 tried(trial, axis)", "trial positions, in the part's own frame", "mm"),
+        variable("f8 tried_value(trial)", "value of the objective at each trial position"),
     ),
 )
 SEATING = AnalysisRecord(

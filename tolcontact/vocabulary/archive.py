@@ -1,4 +1,4 @@
-"""Every variable of an archive."""
+"""Variables of an archive: its coordinates and root, contact, fields, and the groups station/NAME of stations."""
 
 import unicodedata
 
@@ -14,35 +14,14 @@ from tolcontact.vocabulary.labels import (
     STATE,
     STATUS_MEANINGS,
     UNFINISHED,
-    ArchiveVariable,
     label,
     variable,
 )
-from tolcontact.vocabulary.surface import CLASH_DEPTH, CLASH_OTHER, CLASH_PART, CLASHES
+from tolcontact.vocabulary.surface import CLASH_DEPTH, CLASH_OTHER, CLASH_PART, CLASHES, surface_variables
 from tolcontact.vocabulary.variation import DEVIATION
 
 BREP_FACE, ROUND_POINT = "brep_face", "round_point"
-SURFACE_KINDS = ("plane", "cylinder", "cone", "sphere", "torus")  # in the order of their numbers
 TOUCHING_GAP = 1e-4  # mm: a contact point with a smaller gap touches
-KINDS_MEAN = {"flag_values": list(range(len(SURFACE_KINDS))), "flag_meanings": " ".join(SURFACE_KINDS)}
-
-
-def surface_variables(prefix: str, dim: str, surface: str) -> dict[str, ArchiveVariable]:
-    """Return the variables of a surface, by the names of the attributes that they hold."""
-    return {
-        "kind": variable(f"i1 {prefix}_kind({dim})", f"kind of {surface}; -1: not known", "1", KINDS_MEAN),
-        "origin": variable(
-            f"f8 {prefix}_point({dim}, axis)",
-            f"a point of {surface}, if it is a plane, or its centre; of a cone the apex",
-            "mm",
-        ),
-        "axis": variable(
-            f"f8 {prefix}_axis({dim}, axis)", f"unit normal or axis of {surface}; of a cone from the apex inward", "1"
-        ),
-        "radius": variable(f"f8 {prefix}_radius({dim})", f"radius of {surface}; of a torus that of the tube's middle", "mm"),
-        "minor": variable(f"f8 {prefix}_tube_radius({dim})", f"radius of the tube, if {surface} is a torus", "mm"),
-        "angle": variable(f"f8 {prefix}_angle({dim})", f"angle between axis and {surface}, if it is a cone", "rad"),
-    }
 
 
 BREP_OF_FACE = variable("i4 brep_of_face(face)", "number of the B-rep face of each triangle, counted from 0")
@@ -58,7 +37,7 @@ OF_ROUND = {
     "towards": variable("f8 wall_middle(round_point, axis)", "unit vector from a hollow wall's axis to its middle", "1"),
     "opening": variable("f8 wall_opening(round_point)", "angle that a hollow wall reaches to either side; pi: whole", "rad"),
     "cut": variable(
-        "f8 wall_end(round_point, axis)", "unit normal of the plane in which the wall ends; 0: the shaft itself ends", "1"
+        "f8 wall_end(round_point, axis)", "unit normal of the plane at the end of the wall; 0: the shaft itself ends", "1"
     ),
     "centre": variable("f8 round_centre(round_point, axis)", "centre of the ball, or of the shaft's end, nominal", "mm"),
     "axis": variable("f8 round_axis(round_point, axis)", "unit vector of the shaft's axis, nominal; 0 of a ball", "1"),
@@ -189,9 +168,7 @@ REFERENCE_NORMAL = variable(
     "f8 reference_normal(point, axis)", "n^r: outward unit normal of the reference part there, nominal", "1"
 )
 
-POINT_STIFFNESS = variable(
-    "f8 point_stiffness(point)", "stiffness of a contact point that gives way; infinite: it is rigid", "N mm-1"
-)
+POINT_STIFFNESS = variable("f8 point_stiffness(point)", "stiffness of a contact point; infinite: it is rigid", "N mm-1")
 LOCATOR_OF_POINT = variable(
     "i4 locator_of_point(point)",
     "number of the one-sided locator that a contact point represents, whose deviation is subtracted from its gap; -1: none",
@@ -228,7 +205,7 @@ MAGNITUDE_REALIZATIONS = variable(
 FIELDS = (FIELD_MEAN, FIELD_SIX_SIGMA, FIELD_INTERVAL, FIELD_REALIZATIONS, MAGNITUDE_REALIZATIONS)
 TOUCHING_SHARE = variable(
     "f8 touching(point)",
-    f"share of realizations in which a contact point touches, corrected: gap below {TOUCHING_GAP} mm; NaN: not known",
+    f"share of realizations with a touching contact point, corrected: gap below {TOUCHING_GAP} mm; NaN: not known",
     "1",
 )
 TOUCHING_INTERVAL = variable("f8 touching_interval(point, bound)", "its 95 % confidence interval", "1")
@@ -241,7 +218,7 @@ GROUP_CHECKSUM = variable(
 )
 SUMMED_ROWS = variable("i8 summed_rows(checkpoint)", "number of realizations in the sums of a checkpoint; -1: none", "1")
 FIELD_SUMS = variable(
-    "f8 sums(checkpoint, state, number)", "running sums of the displacement field, from which an unfinished run continues", "1"
+    "f8 sums(checkpoint, state, number)", "running sums of the displacement field; an unfinished run continues from them", "1"
 )
 SUMS_CHECKSUM = variable("i8 sums_checksum(checkpoint)", "CRC-32 of the sums of a checkpoint", "1")
 
@@ -258,3 +235,29 @@ def group_of(part: str) -> str:
 def field_of(part: str) -> str:
     """Return the path of a part's displacement field."""
     return f"field/{group_of(part)}"
+
+
+STATIONS_GROUP, STATION_PART = "station", "station_part"
+
+MEASURE_STATION = variable("str measure_station(measure)", "station of a measure")
+PAIR_STATION = variable("str pair_station(pair)", "station of a contact pair")
+PART_STATION = variable("str part_station(part)", "last station with a part, and of its pose")
+OF_STATIONS = (MEASURE_STATION, PAIR_STATION, PART_STATION)
+
+STATION_PART_LABEL = label(STATION_PART, "part in the station")
+STATION_TRANSLATION = variable(
+    "f8 station_translation(realization, state, station_part, axis)", f"{TRANSLATION.long_name}; in the station", "mm"
+)
+STATION_ROTATION = variable(
+    "f8 station_rotation(realization, state, station_part, axis, body_axis)", f"{ROTATION.long_name}; in the station", "1"
+)
+STATION_STATUS = variable(
+    "i1 station_status(realization)", "outcome of the realization in the station", None, STATUS.attributes
+)
+STATION_POSES = (STATION_TRANSLATION, STATION_ROTATION)
+STATION_ROWS = (*STATION_POSES, STATION_STATUS)
+
+
+def station_group(station: str) -> str:
+    """Return the path of a station's group."""
+    return f"{STATIONS_GROUP}/{group_of(station)}"

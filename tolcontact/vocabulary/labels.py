@@ -25,7 +25,7 @@ SOLVER, RUN, DESIGN, STATUS_MEANING, EXTENT = "solver", "run", "design", "status
 BOUNDS = ("lower", "upper")
 MONTE_CARLO, LATIN_HYPERCUBE, SOBOL = PLANS = ("monte-carlo", "latin hypercube", "sobol")  # sampling plans
 REPLICATE = 256  # realizations that the last two draw together, independent of all others
-# Attributes of archives and summaries: the depth [mm] up to which bodies are tested for interference, and what is not tested.
+# Attributes of archives and summaries: the largest depth [mm] in the test for interference, and what is not tested.
 INTERFERENCE_DEPTH, NOT_WATCHED = "interference_depth", "not_watched"
 METHOD_ATTRIBUTES = ("resolution", "objective", "active_set")  # of archives, summaries and analyses
 KEPT = ("measures", "poses", "all")

@@ -2,17 +2,7 @@
 
 from dataclasses import replace
 
-from tolcontact.vocabulary.labels import (
-    BOUNDS,
-    EXTENT,
-    MEASURE,
-    RUN,
-    SOLVER,
-    STATE,
-    STATUS_MEANING,
-    label,
-    variable,
-)
+from tolcontact.vocabulary.labels import BOUNDS, EXTENT, MEASURE, RUN, SOLVER, STATE, STATUS_MEANING, label, variable
 
 INTERVAL, STATISTIC, CHANGE_OF, EXTREME, OF_ITERATIONS = "interval", "statistic", "change_of", "extreme", "of_iterations"
 ESTIMATE = ("estimate", "lower", "upper")  # labels of `interval`: 95 %
@@ -51,23 +41,21 @@ BY_STATUS = variable("i8 by_status(status_meaning)", "number of realizations", "
 NOT_ASSEMBLABLE_SHARE = variable(
     "f8 not_assemblable(interval)", "share of realizations without a pose free of penetration", "1"
 )
-CONFLICTS = variable("i8 conflicts(pair)", "number of these realizations in which a pair is among those in conflict", "1")
-CARRIED = variable("f8 carried(pair, interval)", "share of realizations in which a pair carries", "1")
+CONFLICTS = variable("i8 conflicts(pair)", "number of these realizations with a pair in conflict", "1")
+CARRIED = variable("f8 carried(pair, interval)", "share of realizations with a pair in contact", "1")
 PAIR_REACTION = variable("f8 reaction(pair, of_reaction, interval)", "mean and percentiles of a pair's reaction")
 CARRIED_TOGETHER = variable(
-    "f8 together(combination, interval)", "share of realizations in which exactly these pairs carry", "1"
+    "f8 together(combination, interval)", "share of realizations with exactly these pairs in contact", "1"
 )
 STEPS = variable("f8 iterations(of_iterations)", "linear steps of the realizations that contact touched", "1")
-WATCHED = variable("i8 watched()", "number of realizations in which all bodies were tested for interference", "1")
+WATCHED = variable("i8 watched()", "number of realizations whose bodies were all tested for interference", "1")
 CLASH_SHARE = variable(
     "f8 clash_share(interval)",
-    "share of these realizations in which parts without declared contact lie in each other; NaN: none was tested",
+    "share of these realizations with interference of parts without declared contact; NaN: none was tested",
     "1",
 )
-CLASH_COUNT = variable(
-    "i8 clash_count(clash)", "number of realizations in which two parts are those that lie deepest in each other", "1"
-)
-CLASH_LARGEST_DEPTH = variable("f8 clash_largest_depth(clash)", "how deep they do at most; NaN: not measured", "mm")
+CLASH_COUNT = variable("i8 clash_count(clash)", "number of realizations whose deepest interference is between two parts", "1")
+CLASH_LARGEST_DEPTH = variable("f8 clash_largest_depth(clash)", "their largest depth of interference; NaN: not measured", "mm")
 CLASH_DECLARED = variable("i1 clash_declared(clash)", "1: their contact is declared, and these realizations are doubtful", "1")
 PENETRATION = variable("f8 penetration(state)", "largest true penetration of any contact point", "mm")
 DEEPEST_SURFACE = variable(
@@ -83,12 +71,12 @@ DEEPEST_FALSE_CONTACT = variable(
 )
 PENETRATING_SHARE = variable(
     "f8 penetrating_share(interval)",
-    "share of realizations in which surfaces penetrate each other by more than 1 % of the smallest tolerance range",
+    "share of realizations with penetration of surfaces by more than 1 % of the smallest tolerance range",
     "1",
 )
 FALSE_CONTACT_SHARE = variable(
     "f8 false_contact_share(interval)",
-    "share of realizations in which contact of more than that depth was resolved where the surfaces are apart",
+    "share of realizations with resolved contact of more than that depth where the surfaces are apart",
     "1",
 )
 CONTACTS_CHECKED = variable("f8 contacts()", "number of touching contact points, of the realizations that were checked", "1")

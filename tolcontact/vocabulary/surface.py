@@ -1,6 +1,30 @@
-"""Variables of bodies: realizations checked against the surfaces, clashes without contact, coordinates in files."""
+"""Variables of bodies: their surfaces, checks against these, clashes without contact, and coordinates in files."""
 
-from tolcontact.vocabulary.labels import variable
+from tolcontact.vocabulary.labels import ArchiveVariable, variable
+
+SURFACE_KINDS = ("plane", "cylinder", "cone", "sphere", "torus")  # in the order of their numbers
+KINDS_MEAN = {"flag_values": list(range(len(SURFACE_KINDS))), "flag_meanings": " ".join(SURFACE_KINDS)}
+
+
+def surface_variables(prefix: str, dim: str, surface: str) -> dict[str, ArchiveVariable]:
+    """Return the variables of a surface, by the names of the attributes that they hold."""
+    return {
+        "kind": variable(f"i1 {prefix}_kind({dim})", f"kind of {surface}; -1: not known", "1", KINDS_MEAN),
+        "origin": variable(
+            f"f8 {prefix}_point({dim}, axis)",
+            f"a point of {surface}, if it is a plane, or its centre; of a cone the apex",
+            "mm",
+        ),
+        "axis": variable(
+            f"f8 {prefix}_axis({dim}, axis)", f"unit normal or axis of {surface}; of a cone from the apex inward", "1"
+        ),
+        "radius": variable(
+            f"f8 {prefix}_radius({dim})", f"radius of {surface}; of a torus to the centre line of its tube", "mm"
+        ),
+        "minor": variable(f"f8 {prefix}_tube_radius({dim})", f"radius of the tube, if {surface} is a torus", "mm"),
+        "angle": variable(f"f8 {prefix}_angle({dim})", f"angle between axis and {surface}, if it is a cone", "rad"),
+    }
+
 
 CLASHES = variable(
     "i2 clashes(realization)",
@@ -36,7 +60,7 @@ FALSE_CONTACT = variable(
     "how deep contact points lay inside in the raw state, where the surfaces themselves were apart; NaN if that is not known",
     "mm",
 )
-NOTICED_SHARE = 0.01  # of the smallest tolerance range: deeper penetration or false contact of surfaces is told
+NOTICED_SHARE = 0.01  # of the smallest tolerance range: deeper penetration or false contact of surfaces is reported
 CONTACTS = variable(
     "f8 contacts(checked, pair)", "number of contact points that touch in the corrected state; NaN if that is not known", "1"
 )
@@ -45,7 +69,7 @@ CONTACTS_ENDED = variable(
 )
 AT_RANDOM = variable(
     "i1 at_random(checked)",
-    "1: the realization was chosen at random; 0: because it penetrates most, or because most of its points carry",
+    "1: the realization was chosen at random; 0: for the deepest penetration, or the most active points",
     "1",
 )
 SURFACE = (
@@ -54,13 +78,13 @@ SURFACE = (
 
 
 STORED_COORDINATES = "stored_coordinates"  # attribute of archives and summaries: how exactly files store which parts
-STATED_ERROR_SHARE = 1e-4  # of the smallest tolerance range: a larger error of coordinates in files is told
+STATED_ERROR_SHARE = 1e-4  # of the smallest tolerance range: a larger error of coordinates in files is reported
 
 COORDINATE_SPACING = variable(
     "f8 coordinate_spacing(axis)", "spacing of the coordinates that the file of the mesh can store", "mm"
 )
 COORDINATE_ERROR = variable(
     "f8 coordinate_error(pair)",
-    "error of coordinates in the files of a pair, by which its gaps count larger, also in gap_min and in reference_point",
+    "error of coordinates in the files of a pair; its gaps count larger by it, also in gap_min and in reference_point",
     "mm",
 )

@@ -1,12 +1,7 @@
-"""Variables of an archive that describe what varies: contributors, locators, faces of features, and planes of their datums."""
+"""Variables of an archive for what varies: contributors, locators, faces of features, planes of their datums, and form."""
 
-from tolcontact.vocabulary.labels import (
-    CONTRIBUTOR,
-    FREEDOM,
-    LOCATOR,
-    label,
-    variable,
-)
+from tolcontact.vocabulary.labels import CONTRIBUTOR, FEATURE_FACE, FREEDOM, LOCATOR, label, variable
+from tolcontact.vocabulary.surface import surface_variables
 
 FREEDOMS = ("tau x", "tau y", "tau z", "rho x", "rho y", "rho z")
 
@@ -34,12 +29,10 @@ MEAN_SHIFT = variable(
 
 LOCATOR_LABEL = label(LOCATOR, "locator, as part.locator: contributors of the same number")
 STIFFNESS = variable("f8 stiffness(locator)", "stiffness of the locator", "N mm-1")
-ONE_SIDED = variable("i1 one_sided(locator)", "1: a support that the part may lift off, 0: held both ways")
+ONE_SIDED = variable("i1 one_sided(locator)", "1: a support that the part may lift off, 0: two-sided")
 LOCATOR_POINT = variable("f8 locator_point(locator, axis)", "where the locator holds its part, nominal", "mm")
 LOCATOR_DIRECTION = variable("f8 locator_direction(locator, axis)", "direction of the deviation, into the part", "1")
-FACE_OF_LOCATOR = variable(
-    "i4 face_of_locator(locator)", "number of the feature's face that a locator stands against, counted from 0; -1: none"
-)
+FACE_OF_LOCATOR = variable("i4 face_of_locator(locator)", "index of the feature's face at a locator; -1: none")
 
 GROUND_OF_LOCATOR = variable(
     "i4 ground_of_locator(locator)",
@@ -48,15 +41,15 @@ GROUND_OF_LOCATOR = variable(
 
 FREEDOM_LABEL = label(FREEDOM, "component of a small displacement p -> p + tau + rho x (p - centre)")
 FEATURE_OF_FACE = variable("str feature_of_face(feature_face)", "feature that a face belongs to, as part.feature")
-FACE_CENTRE = variable("f8 face_centre(feature_face, axis)", "centre about which a feature's face turns, nominal", "mm")
+FACE_CENTRE = variable("f8 face_centre(feature_face, axis)", "centre of rotation of a feature's face, nominal", "mm")
 FACE_TWIST = variable(
     "f8 face_twist(feature_face, freedom, contributor)",
-    "displacement tau [mm], rho [rad] of a feature's face, nominal frame, for deviations of 1",
+    "displacement tau [mm], rho [rad] of a feature's face per unit deviation, nominal frame",
     "1",
 )
 FACE_HEIGHT = variable(
     "f8 face_height(feature_face, contributor)",
-    "how much farther out of the material a feature's face lies everywhere, for deviations of 1",
+    "outward offset of a feature's face per unit deviation",
     "1",
 )
 FACE_OF_MOVING = variable(
@@ -66,7 +59,7 @@ FACE_OF_REFERENCE = variable(
     "i4 face_of_reference(pair)", "number of the feature's face that the reference side is, counted from 0; -1: none"
 )
 FACING = variable(
-    "f8 facing(point)", "-n^m . n^r: share of the moving face's height by which it comes nearer at a contact point", "1"
+    "f8 facing(point)", "-n^m . n^r: share of the moving face's outward offset that closes the gap at a contact point", "1"
 )
 FEATURE_FACES = (
     FEATURE_OF_FACE, FACE_CENTRE, FREEDOM_LABEL, FACE_TWIST, FACE_HEIGHT, FACE_OF_MOVING, FACE_OF_REFERENCE, FACING,
@@ -83,11 +76,11 @@ TANGENT_CONTRIBUTOR = variable(
 )
 TANGENT_LEANING = variable(
     "f8 tangent_leaning(tangent, plane_coordinate, contributor)",
-    "offset and tilts of the face from the datum by least squares, for deviations of 1",
+    "offset and tilts of the face from the least-squares datum per unit deviation",
 )
 TANGENT_FREE = variable(
     "f8 tangent_free(tangent, plane_coordinate, tangent_freedom)",
-    "offset and tilts in which the plane may lie; 0: no more",
+    "possible offsets and tilts of the plane; 0: no more",
     "1",
 )
 FACE_OF_TANGENT_PLACE = variable(
@@ -99,4 +92,63 @@ TANGENT_HEIGHT = variable(
 )
 TANGENTS = (
     TANGENT_FACE, TANGENT_CONTRIBUTOR, TANGENT_LEANING, TANGENT_FREE, FACE_OF_TANGENT_PLACE, TANGENT_PLACE_AT, TANGENT_HEIGHT,
+)  # fmt: skip
+
+
+FORM_STATION, FORM_MODE, FORM_TERM = "form_station", "form_mode", "form_term"
+
+FORM_COVARIANCE = variable(
+    "str form_covariance(feature_face)", "covariance of the form of a feature's face, by distance; empty: it keeps its shape"
+)
+FORM_LENGTH = variable(
+    "f8 form_length(feature_face)", "correlation length of the form, across the axis of a surface with one; NaN: none", "mm"
+)
+FORM_LENGTH_ALONG = variable(
+    "f8 form_length_along(feature_face)", "correlation length of the form along the axis of its surface; NaN: none", "mm"
+)
+FORM_LOBES = variable(
+    "i4 form_lobes(feature_face)", "number of lobes around the axis that all of the form has; 0: any number", "1"
+)
+FORM_ASSOCIATED = variable(
+    "str form_associated(feature_face)",
+    'what the form is measured from: the "surface", the "circles" of sections across its axis, or its "lines"; empty: none',
+)
+FORM_START, FORM_END = (
+    variable(f"f8 form_{end}(feature_face)", f"place along the axis at the {end} of the face; NaN: no form", "mm")
+    for end in ("start", "end")
+)
+FORM_SURFACE = surface_variables("form_surface", FEATURE_FACE, "the surface of a face with form, nominal")
+FORM_SPREAD = variable(
+    "f8 form_spread(feature_face)",
+    "standard deviation of the coefficients of the form's modes; NaN: none, or one for each, as measured",
+    "mm",
+)
+FORM_LEFT_OUT = variable(
+    "f8 form_left_out(feature_face)",
+    "share of the variance of the form that the modes leave out, or of the mean square of measured forms; NaN: none",
+    "1",
+)
+FORM_MEAN_ZONE = variable(
+    "f8 form_mean_zone(feature_face)", "mean width of the minimum zones of faces with this form; NaN: none", "mm"
+)
+FORM_CONTRIBUTOR = variable(
+    "i4 form_contributor(feature_face, form_mode)",
+    "number of the contributor that is the coefficient of a mode, counted from 0; -1: none",
+)
+FACE_OF_FORM_STATION = variable(
+    "i4 face_of_station(form_station)", "number of the feature's face whose form a station is of, counted from 0"
+)
+FORM_STATION_PLACE = variable("f8 station(form_station, axis)", "point of the covariance, nominal", "mm")
+FORM_STATION_WEIGHT = variable(
+    "f8 station_weight(form_station, form_mode)", "factor of the covariance with a station in the height of a mode", "1"
+)
+FORM_REMOVED = variable(
+    "f8 form_removed(feature_face, form_mode, form_term)",
+    "growth, translation, and rotation [mm-1] about the origin, of the face as a whole, which is subtracted from a mode",
+    "1",
+)
+FORMS = (
+    FORM_COVARIANCE, FORM_LENGTH, FORM_LENGTH_ALONG, FORM_LOBES, FORM_ASSOCIATED, FORM_START, FORM_END,
+    *FORM_SURFACE.values(), FORM_SPREAD, FORM_LEFT_OUT, FORM_MEAN_ZONE, FORM_CONTRIBUTOR, FACE_OF_FORM_STATION,
+    FORM_STATION_PLACE, FORM_STATION_WEIGHT, FORM_REMOVED,
 )  # fmt: skip
