@@ -13,8 +13,9 @@ import tolcontact as tc
 from tests import cases
 from tests.cases import floating, toleranced
 from tests.helpers import nightly, run
-from tolcontact.declaration.codec import Record, named_codecs
+from tolcontact.declaration.codec import named_codecs
 from tolcontact.declaration.document import CODECS_OF_LISTS, json_schema
+from tolcontact.declaration.record import Record
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import ScriptError
 from tolcontact.testing import assert_same_run

@@ -19,9 +19,8 @@ from tolcontact.declaration.joint import Joint, Overlap
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.part import Feature, Part
-from tolcontact.declaration.sequence import in_order, joined_before, present_parts, sequence_faults, settings_of
+from tolcontact.declaration.sequence import Station, in_order, joined_before, present_parts, sequence_faults, settings_of
 from tolcontact.declaration.size import Size
-from tolcontact.declaration.station import Station
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import (
@@ -32,7 +31,6 @@ from tolcontact.declaration.values import (
     text_faults,
     vector as _vector,
 )
-from tolcontact.errors import designation
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
 
@@ -118,7 +116,10 @@ class Assembly(Declarations, Pictured, Checked):
 
     def variable(self, name: str, tolerance: Any, *, drives: Mapping[str, float], units: str = "mm") -> Variable:
         """Declare a cause that drives several contributors, each by a factor (see Variable)."""
-        return self._add("variables", Variable(name, _tolerance(tolerance), dict(drives), units, script_line()))
+        variable = Variable(
+            name=name, tolerance=_tolerance(tolerance), drives=dict(drives), units=units, declared_at=script_line()
+        )
+        return self._add("variables", variable)
 
     def correlate(self, labels: Sequence[str], matrix: Any) -> Correlation:
         """Declare that contributors are correlated: a matrix, or one coefficient for two of them (see Correlation)."""
@@ -220,7 +221,10 @@ class Assembly(Declarations, Pictured, Checked):
                 yield from part.located_faults(self._repetition_faults(part))
                 yield from part.located_faults(self._location_faults(part))
             yield from self._feature_faults(part)
-        for thing in (*self.locations, *self.pairs, *self.forces, *self.measures, *self.overlaps):
+        things: tuple[Location | ContactPair | Force | Measure | Overlap, ...] = (
+            *self.locations, *self.pairs, *self.forces, *self.measures, *self.overlaps,
+        )  # fmt: skip
+        for thing in things:
             yield from thing.located_faults()
             label = f'locators of "{thing.name}"' if isinstance(thing, Location) else f'{thing.noun} "{thing.name}"'
             yield from self._unknown_parts(f"{label} ({thing.declared_at})", *thing.parts)
@@ -251,11 +255,11 @@ class Assembly(Declarations, Pictured, Checked):
         for declared in part.toleranced:
             yield from declared.located_faults(owner=f'part "{part.name}": ')
             for tolerance in declared.geometric:
-                for letter in [letter for compartment in tolerance.system for letter in compartment]:
+                for letter in tolerance.letters:
                     if letter not in letters:
                         datums = ", ".join(sorted(set(letters))) or "none"
                         yield (
-                            f'part "{part.name}": {designation(declared.noun, declared)}: {tolerance.kind} refers to '
+                            f'part "{part.name}": {declared.designation}: {tolerance.kind} refers to '
                             f"datum {letter}, which no feature of the part is; its datums are: {datums}; "
                             f'declare it with part.feature(..., datum="{letter}")'
                         )

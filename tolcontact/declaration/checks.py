@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 from msgspec import Meta
 
 from tolcontact.declaration.values import Vector, is_finite, is_length
+from tolcontact.errors import designation
 from tolcontact.readable import Readable
 
 MAX_FRICTION = 10  # above any physical value
@@ -75,6 +76,11 @@ class Declaration(Checked):
     name: Any
     declared_at: str
     station: str
+
+    @property
+    def designation(self) -> str:
+        """Its kind, its name and the line of the script, as messages name it."""
+        return designation(self.noun, self)
 
     def located_faults(self, faults: Iterator[str] | None = None, owner: str = "") -> Iterator[str]:
         """Yield its faults, or some `faults` of it, after its kind, name and line; `owner` stands before these."""

@@ -35,9 +35,9 @@ class ContactPair(Declaration):
               and ends of shafts. By default the pair is rigid
     """
 
-    name: str
     moving: Face
     reference: Face
+    name: str
     points: int | str | None = None
     spacing: float | None = None
     within: float | None = None
@@ -76,8 +76,8 @@ class ContactPair(Declaration):
 class Force(Declaration):
     """A force `vector` [N] at a point of a part, constant in the assembly frame. The objective "seating" uses it."""
 
-    name: str
     at: Point
+    name: str
     vector: Vector
     declared_at: str = ""
     station: str = ""

@@ -20,16 +20,16 @@ SEPARATORS = {";": "semicolons", "\t": "tabs"}
 MIN_EIGENVALUE = 1e-12  # of a correlation matrix; of a smaller absolute value it is zero
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Variable(Declaration):
     """A cause that drives several contributors: `drives[label]` times its deviation is added to the draw of each.
 
     The variable is in `units`; a factor converts them to the units of its contributor.
     """
 
-    name: str
     tolerance: Tolerance
     drives: Mapping[str, float]
+    name: str
     units: str = "mm"
     declared_at: str = ""
     noun: ClassVar[str] = "variable"
@@ -76,8 +76,8 @@ class Correlation(Declaration):
             yield "its matrix is not symmetric with ones on the diagonal; expected correlation coefficients, not covariances"
         elif (smallest := float(np.linalg.eigvalsh(matrix).min())) < -MIN_EIGENVALUE:
             yield (
-                f"its matrix is not positive definite (smallest eigenvalue {smallest:.3g}): nothing is correlated like "
-                "that; check the signs, or make the coefficients smaller"
+                f"its matrix is not positive definite (smallest eigenvalue {smallest:.3g}): no variables have "
+                "these correlations; check the signs, or make the coefficients smaller"
             )
         elif smallest < MIN_EIGENVALUE:
             yield (

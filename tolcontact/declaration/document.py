@@ -11,7 +11,8 @@ from msgspec import UNSET, UnsetType
 from tolcontact.declaration.assembly import MAX_COUNTS, Assembly
 from tolcontact.declaration.checks import NOT_NEGATIVE
 from tolcontact.declaration.codec import Document, Items, definitions
-from tolcontact.declaration.entries import CONTROL, METHOD, RECORDS, TARGETS, TITLE_BLOCK, TOLERANCED, Writing
+from tolcontact.declaration.entries import CONTROL, METHOD, RECORDS, TARGETS, TITLE_BLOCK, TOLERANCED
+from tolcontact.declaration.face_entries import Writing
 from tolcontact.declaration.feature_tolerance import GeometricTolerance
 from tolcontact.declaration.measure import Tape
 from tolcontact.declaration.part import Face

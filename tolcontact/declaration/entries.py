@@ -25,8 +25,8 @@ from tolcontact.declaration.measure import Measure, tape_of
 from tolcontact.declaration.part import DatumTargets, Face, Feature, Part, Pattern
 from tolcontact.declaration.place import Place
 from tolcontact.declaration.record import Field, Record
+from tolcontact.declaration.sequence import Station
 from tolcontact.declaration.size import Size
-from tolcontact.declaration.station import Station
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
 from tolcontact.method import ACTIVE_SETS, OBJECTIVES, REGULARIZATIONS, RESOLUTIONS, SEARCHES, Method
@@ -46,7 +46,7 @@ def _distribution(values: Document, place: Place) -> Document:
             raise place[key].error('it goes with "scipy"; leave it out')
         return values
     if "distribution" in values:
-        raise place["distribution"].error('it is given beside "scipy"; leave one of them out')
+        raise place["distribution"].error('it is given together with "scipy"; leave one of them out')
     name, family = values["scipy"], scipy_distribution(values["scipy"])
     if family is None:
         raise place["scipy"].mismatch("a continuous distribution of scipy.stats", name)
@@ -76,7 +76,7 @@ CONTROL = CODECS[Size | GeometricTolerance] = Choice(
     "FeatureTolerance",
     f"kind: one of {', '.join(['size', *KINDS])}",
     Record(
-        Size, kind="size", fields="nominal upper lower cp cpk moves distribution tolerance_class", omitted="tolerance_class",
+        Size, kind="size", omitted="tolerance_class",
         nominal=Plain(POSITIVE), upper=Plain(float | str), distribution=DISTRIBUTION,
     ),
     *(
@@ -217,22 +217,17 @@ RECORDS = {
         Part, fields="geometry name at rotation fixed declared_at features", geometry=SHAPE, features=FEATURES
     ),
     "locations": Record(
-        Location, fields="part on tolerance scheme declared_at floating station joint placing",
-        omitted="floating station joint placing", scheme=SCHEME,
+        Location, omitted="floating station joint placing", scheme=SCHEME,
         on=Field({"on": CODECS[Part], "on_feature": Plain(str)}, _ground_values, _ground, is_nullable=True),
     ),
-    "pairs": Record(
-        ContactPair, fields="moving reference name points spacing within declared_at mu station stiffness",
-        omitted="mu station stiffness", floats="mu stiffness",
-    ),
+    "pairs": Record(ContactPair, omitted="mu station stiffness", floats="mu stiffness"),
     "measures": Record(
-        Measure, fields="name of to along tolerance units declared_at absolute limits station",
-        omitted="to absolute limits station", floats="limits", along=UNIT_VECTOR,
+        Measure, omitted="to absolute limits station", floats="limits", along=UNIT_VECTOR,
         of=Field({"of": MEASURED, "tape": Plain(STEPS, read=tape_of, are_finite=False)}, _measured_values, _measured),
         tolerance=Plain(POSITIVE | tuple[float, float] | str),
     ),
-    "forces": Record(Force, fields="at name vector declared_at station", omitted="station"),
-    "variables": Record(Variable, fields="tolerance drives name units declared_at", floats="drives"),
+    "forces": Record(Force, omitted="station"),
+    "variables": Record(Variable, floats="drives"),
     "correlations": Record(Correlation),
     "populations": Record(Population, fields="values columns source declared_at"),
     "stations": Record(Station),

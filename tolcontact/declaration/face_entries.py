@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -169,17 +168,14 @@ CODECS[Face] = Record(Face, part=CODECS[Part], selections=Field({
 CODECS[Point] = Record(Point, mark="part", fields="part on end position", omitted="on end position")
 
 
-def _combined(cls: type[Combination], measurements: tuple[str | Measurement, ...]) -> Combination:
-    return cls(*measurements)
+def _record(cls: Any) -> Record:
+    """Return the record of a kind of measurement: its faces and points, and its directions if it has any."""
+    if issubclass(cls, Combination):
+        return Record(cls, kind=cls.kind, fields="measurements", build=lambda measurements: cls(*measurements))
+    return Record(cls, kind=cls.kind, omitted="across along about", across=UNIT_VECTOR, along=UNIT_VECTOR, about=UNIT_VECTOR)
 
 
 KIND = f"a measurement whose kind is one of {', '.join(MEASUREMENTS)}"
-KINDS_MEASURED = [
-    Record(
-        cls, kind=kind, omitted="across along about", across=UNIT_VECTOR, along=UNIT_VECTOR, about=UNIT_VECTOR,
-        **({"fields": "measurements", "build": partial(_combined, cls)} if issubclass(cls, Combination) else {}),
-    )
-    for kind, cls in MEASUREMENTS.items()
-]  # fmt: skip
-CODECS[str | Measurement] = Choice("Operand", f"the name of a measurement, or {KIND}", *KINDS_MEASURED, Plain(str))
-MEASURED = Choice("Measured", f"a point, or {KIND}", *KINDS_MEASURED, CODECS[Point])
+KINDS = tuple(map(_record, MEASUREMENTS.values()))
+CODECS[str | Measurement] = Choice("Operand", f"the name of a measurement, or {KIND}", *KINDS, Plain(str))
+MEASURED = Choice("Measured", f"a point, or {KIND}", *KINDS, CODECS[Point])

@@ -127,6 +127,11 @@ class GeometricTolerance(Checked):
         return tuple(tuple(match.group(1).split("-")) for match in matches if match)
 
     @property
+    def letters(self) -> tuple[str, ...]:
+        """The letters of all its datums."""
+        return tuple(letter for compartment in self.system for letter in compartment)
+
+    @property
     def orientation_only(self) -> tuple[bool, ...]:
         """Whether a compartment locks directions alone: one for each."""
         return tuple(compartment.endswith("><") for compartment in self._compartments)
@@ -174,8 +179,7 @@ class GeometricTolerance(Checked):
         ):
             yield f'datums is {self.datums!r}; expected up to three datums, such as "A|B|C", "A|B(M)", "A-B" or "A><"'
             return
-        letters = [letter for compartment in self.system for letter in compartment]
-        if len(set(letters)) < len(letters):
+        if len(set(self.letters)) < len(self.letters):
             yield f"datums {self.datums!r} names a datum twice"
 
     def _zone_faults(self) -> Iterator[str]:

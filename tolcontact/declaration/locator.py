@@ -137,9 +137,9 @@ class Location(Declaration):
     """
 
     part: Part
-    scheme: ThreeTwoOne | tuple[Locator, ...]
-    tolerance: Tolerance | None = None
     on: Part | Feature | None = None
+    tolerance: Tolerance | None = None
+    scheme: ThreeTwoOne | tuple[Locator, ...]
     declared_at: str = ""
     floating: bool = False
     station: str = ""

@@ -40,8 +40,8 @@ class Measure(Declaration):
     tolerance: float | Deviations | None = None  # a text or another pair only if it is no tolerance
     units: str = "mm"
     declared_at: str = ""
-    limits: tuple[float | None, float | None] | None = None
     absolute: bool | None = None
+    limits: tuple[float | None, float | None] | None = None
     station: str = ""
     noun: ClassVar[str] = "measurement"
     checks: ClassVar = {"absolute": TRUTH}
@@ -123,7 +123,7 @@ class Measure(Declaration):
                 "or a function of the poses"
             )
         elif self.along is not None or self.to is not None:
-            yield f"a {self._noun} defines its value by itself; leave out to and along"
+            yield f"a {self._noun} needs no direction; leave out to and along"
         if isinstance(self.of, Measurement):
             yield from self.of.faults()
 

@@ -123,15 +123,27 @@ class _OfTwoFaces(Measurement):
     first: Face
     second: Face
 
+    directions: ClassVar[tuple[str, ...]] = ()  # names of fields that may be left out
+
     def __post_init__(self) -> None:
         self._take_faces(first=self.first, second=self.second)
+        for name in self.directions:
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, direction(getattr(self, name)))
 
     @property
     def faces(self) -> tuple[Face, ...]:
         return (self.first, self.second)
 
+    def faults(self) -> Iterator[str]:
+        yield from super().faults()
+        for name in self.directions:
+            yield from direction_faults(name, getattr(self, name))
+
     def __str__(self) -> str:
-        return f"{self.kind} of {self.first} and {self.second}"
+        given = [(name, value) for name in self.directions if (value := getattr(self, name)) is not None]
+        texts = [" {} ({:g}, {:g}, {:g})".format(name, *value) for name, value in given]
+        return "".join([f"{self.kind} of {self.first} and {self.second}", *texts])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -187,26 +199,15 @@ class AxisDistance(_OfTwoFaces):
     Directions are fixed in the assembly frame.
     """
 
-    kind = "distance of axes"
+    kind, directions = "distance of axes", ("across", "along")
 
     across: Vector | None = None
     along: Vector | None = None
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for name in ("across", "along"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, direction(getattr(self, name)))
-
     def faults(self) -> Iterator[str]:
         yield from super().faults()
-        for name in ("across", "along"):
-            yield from direction_faults(name, getattr(self, name))
         if self.across is not None and self.along is not None:
             yield "across and along are both given; give one of them"
-
-    def __str__(self) -> str:
-        return super().__str__() + _direction_text("across", self.across) + _direction_text("along", self.along)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -220,22 +221,9 @@ class Angle(_OfTwoFaces):
             second one, both seen along it, from -pi to pi
     """
 
-    kind = "angle"
-    units = "rad"
+    kind, units, directions = "angle", "rad", ("about",)
 
     about: Vector | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.about is not None:
-            object.__setattr__(self, "about", direction(self.about))
-
-    def faults(self) -> Iterator[str]:
-        yield from super().faults()
-        yield from direction_faults("about", self.about)
-
-    def __str__(self) -> str:
-        return super().__str__() + _direction_text("about", self.about)
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
@@ -267,7 +255,7 @@ class Combination(Measurement):
     def faults(self) -> Iterator[str]:
         yield from super().faults()
         if len(self.operands) < 2:
-            yield f"the {self.kind} is that of {len(self.operands)} measurement(s); expected two or more"
+            yield f"the {self.kind} has {len(self.operands)} measurement(s); expected two or more"
 
     def __str__(self) -> str:
         if len(self.operands) > MAX_LISTED:
@@ -307,7 +295,7 @@ class Difference(Combination):
     def faults(self) -> Iterator[str]:
         yield from super().faults()
         if len(self.operands) > 2:
-            yield f"the difference is that of {len(self.operands)} measurements; expected two"
+            yield f"the difference has {len(self.operands)} measurements; expected two"
 
 
 _KINDS: tuple[type[Measurement], ...] = (
@@ -332,7 +320,3 @@ def stations(start: Point, end: Point, count: int) -> tuple[Point, ...]:
     return tuple(
         point(*((1 - share) * a + share * b for a, b in zip(start.position, end.position, strict=True))) for share in shares
     )
-
-
-def _direction_text(name: str, value: Vector | None) -> str:
-    return "" if value is None else " {} ({:g}, {:g}, {:g})".format(name, *value)

@@ -126,7 +126,7 @@ class Record(Codec):
         return msgspec.defstruct(self.name, members, forbid_unknown_fields=True, kw_only=True)
 
     def encode(self, value: Any, writing: Any) -> Document:
-        entry = {"kind": self.kind} if self.kind else {}
+        entry: Document = {"kind": self.kind} if self.kind else {}
         for field in self.fields:
             values = field.split(value, writing)
             entry |= {key: None if v is None else field.codecs[key].encode(v, writing) for key, v in values.items()}

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -17,12 +17,6 @@ Picker = Callable[[np.ndarray, np.ndarray], np.ndarray]
 FACE_ANGLE = math.radians(1.0)
 KINDS = (*SURFACE_KINDS, "general")  # of surfaces
 FACE_GROUPS = ("slot", "pattern")  # one of their faces selects all of them
-
-
-class Selection(Protocol):
-    """A criterion of triangles. A face consists of the triangles that meet all of its criteria."""
-
-    def faults(self) -> Iterator[str]: ...
 
 
 @dataclass(frozen=True, repr=False)
@@ -209,11 +203,14 @@ class Largest(Checked):
         return f"largest {self.kind}" + ("" if self.direction is None else f" facing {self.direction}")
 
 
+Selection = Facing | Triangles | Picked | Inside | Near | Brep | Cylinder | Largest  # a criterion of triangles
+
+
 def criterion(choice: Any) -> Selection:
     """Return the criterion for a direction, indices of triangles, a function, or a criterion. Raises TypeError for others."""
     if isinstance(choice, str):
         return Facing(choice)
-    if isinstance(choice, Facing | Triangles | Picked | Inside | Near | Brep | Cylinder | Largest):
+    if isinstance(choice, Selection):
         return choice
     if callable(choice):
         return Picked(choice)

@@ -25,16 +25,17 @@ class Size(Checked):
     """
 
     kind: ClassVar[str] = "size"
+    letters: ClassVar[tuple[str, ...]] = ()  # of datums
     checks: ClassVar = {"moves": one_of(MOVES)}
 
     nominal: float
     upper: float  # a text or a pair only if it is no tolerance
     lower: float = None  # type: ignore[assignment]  # -upper by default
     _: KW_ONLY
-    distribution: Any = "normal"
     cp: float | None = None
     cpk: float | None = None
     moves: str = "both"
+    distribution: Any = "normal"
     tolerance_class: str = ""
 
     def __post_init__(self) -> None:

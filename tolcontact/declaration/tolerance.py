@@ -68,7 +68,7 @@ class Tolerance(Readable):
             elif value is not None and self.distribution != "normal":
                 yield f"{option} is given, which goes with a normal distribution; leave it out"
         if self.cpk is not None and (self.cp is None or (is_length(self.cpk) and is_length(self.cp) and self.cpk > self.cp)):
-            yield f"cpk is {self.cpk!r} with cp {self.cp!r}; expected cp, and cpk at most as large"
+            yield f"cpk is {self.cpk!r} with cp {self.cp!r}; expected cp, and cpk not above it"
 
     def _scipy_faults(self) -> Iterator[str]:
         frozen = self.distribution
