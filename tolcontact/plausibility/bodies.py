@@ -9,7 +9,6 @@ import numpy as np
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.declaration import Part
 from tolcontact.discretization import Nominal, NominalPart
-from tolcontact.errors import designation
 from tolcontact.features.feature_geometry import CylinderFeature
 from tolcontact.geometry.body_overlap import SolidBody, common_ball
 from tolcontact.interference import Clash
@@ -49,10 +48,10 @@ def clashes(draws: TrialDraws) -> Iterator[str]:
     """
     nominal, watch = draws.program.nominal, draws.program.watch
     declared = {_parts(nominal, pair) for pair in watch.declared}
-    told = set[frozenset[Part]]()
+    reported = set[frozenset[Part]]()
     for clash in draws.clashes:
         parts = _parts(nominal, clash.pair)
-        if parts in told or parts in declared or clash.pair in watch.overlapping or _is_carried(nominal, clash.pair):
+        if parts in reported or parts in declared or clash.pair in watch.overlapping or _is_carried(nominal, clash.pair):
             continue
         if any(nominal.may_differ(body) for body in clash.pair):
             measured = _measured(draws, clash.pair, _rows_with_contact(draws, clash.pair), draws.resolved.poses[:, CORRECTED])
@@ -60,15 +59,15 @@ def clashes(draws: TrialDraws) -> Iterator[str]:
             measured = _measured(draws, clash.pair, clash.rows, draws.poses)
         if measured.share <= MIN_SHARE:
             continue
-        told.add(parts)
-        if len(told) > MAX_CLASHES:
-            yield f"more than {MAX_CLASHES} pairs of parts lie in each other without contact; declare that of these first"
+        reported.add(parts)
+        if len(reported) > MAX_CLASHES:
+            yield f"more than {MAX_CLASHES} pairs of parts lie in each other without contact; declare their contact first"
             return
         moving, reference = moving_first(nominal, clash.pair)
         location = nominal.assembly.location_of(moving.part)
-        basis = ", on which it is located," if location is not None and location.parent is reference.part else ""
+        basis = ", its support," if location is not None and location.parent is reference.part else ""
         yield (
-            f'{designation("part", moving.part)}: it lies in part "{reference.name}"{basis} in {_extent(draws, measured, 0)}, '
+            f'{moving.part.designation}: it lies in part "{reference.name}"{basis} in {_extent(draws, measured, 0)}, '
             f"and no contact holds them apart; declare it: {contact_line(nominal, clash.pair, measured.places[0])}, "
             f"or say that it is meant: {overlap_line(nominal, clash.pair)}"
         )
@@ -94,7 +93,7 @@ def clashes_beyond_faces(draws: TrialDraws) -> Iterator[str]:
             pair = next(pair for pair in nominal.assembly.pairs if {pair.moving.part, pair.reference.part} == parts)
             moving, reference = moving_first(nominal, clash.pair)
             yield (
-                f'{designation("contact pair", pair)}: part "{moving.name}" still lies in part "{reference.name}" beyond the '
+                f'{pair.designation}: part "{moving.name}" still lies in part "{reference.name}" beyond the '
                 f"chosen faces in {_extent(draws, measured, beyond[0])}; declare their contact there, too: "
                 f"{contact_line(nominal, clash.pair, measured.places[beyond[0]])}, or say that it is meant: "
                 f"{overlap_line(nominal, clash.pair)}"
@@ -107,8 +106,9 @@ def _parts(nominal: Nominal, pair: tuple[int, int]) -> frozenset[Part]:
 
 def _is_carried(nominal: Nominal, pair: tuple[int, int]) -> bool:
     """Return whether two bodies are of one joint, so that an earlier station decides how they lie to each other."""
-    carriers = [part.parent if part.carried is not None else number for number, part in ((k, nominal.parts[k]) for k in pair)]
-    return carriers[0] == carriers[1]
+    first, second = ((k, nominal.parts[k]) for k in pair)
+    roots = [part.parent if part.carried is not None else number for number, part in (first, second)]
+    return roots[0] == roots[1]
 
 
 def _rows_with_contact(draws: TrialDraws, pair: tuple[int, int]) -> Int[Array, " k"]:
@@ -175,7 +175,7 @@ def body_overlaps(draws: TrialDraws) -> Iterator[str]:
         if ball is not None and not _is_press_fit(nominal, nominal.parts[i], nominal.parts[j], *ball):
             diameter, place = ball
             yield (
-                f'{designation("part", nominal.parts[i].part)}: it overlaps part "{nominal.parts[j].name}" by about '
+                f'{nominal.parts[i].part.designation}: it overlaps part "{nominal.parts[j].name}" by about '
                 f"{diameter:.2g} mm near ({', '.join(f'{c:.4g}' for c in place)}) in the nominal assembly, and they are no "
                 "contact pair; check their places, declare their contact, or say that it is meant: assembly.may_overlap(...)"
             )

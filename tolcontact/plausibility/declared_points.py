@@ -11,7 +11,6 @@ import numpy as np
 from tolcontact.declaration import Assembly, Mesh, Part
 from tolcontact.declaration.geometry import STEP, UNITS
 from tolcontact.discretization import Nominal, NominalPart
-from tolcontact.errors import designation
 from tolcontact.plausibility.trial_draws import TrialDraws
 
 FAR_SHARE = 0.25  # of a part's size: how far off its box a point may lie
@@ -49,7 +48,7 @@ def doubtful_units(draws: TrialDraws) -> Iterator[str]:
         if isinstance(geometry, Mesh):
             doubts = chain(_far_point(part, geometry, points[part.part]), _implausible_size(nominal, part, geometry))
             for doubt in islice(doubts, 1):
-                yield f"{designation('part', part.part)}: {geometry} is {float(part.mesh.scale):.4g} mm across, {doubt}"
+                yield f"{part.part.designation}: {geometry} is {float(part.mesh.scale):.4g} mm across, {doubt}"
 
 
 def _far_point(nominal: NominalPart, geometry: Mesh, declared: list[DeclaredPoint]) -> Iterator[str]:
@@ -185,11 +184,11 @@ def _declared_points(draws: TrialDraws) -> "defaultdict[Part, list[DeclaredPoint
     for measure in assembly.measures:
         for point in measure.points:
             if point.position is not None:
-                owner, phrase = designation(measure.noun, measure), f'the point of measurement "{measure.name}"'
+                owner, phrase = measure.designation, f'the point of measurement "{measure.name}"'
                 points[point.part].append(DeclaredPoint(owner, phrase, np.array(point.position)))
     for force in assembly.forces:
         if force.at.position is not None:
-            owner, phrase = designation("force", force), f'the point of force "{force.name}"'
+            owner, phrase = force.designation, f'the point of force "{force.name}"'
             points[force.at.part].append(DeclaredPoint(owner, phrase, np.array(force.at.position)))
     return points
 

@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tolcontact.declaration.values import DIRECTIONS, direction
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.geometry.analytic_surfaces import Plane
 from tolcontact.geometry.brep_face import number_faces
 from tolcontact.geometry.files import BREP, FACE_NAMES
 from tolcontact.interference import Interference, Watch
 
-AXES = {"+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1)}
 SAME_DIRECTION = 1e-4  # of the cosine of an angle
 
 
@@ -73,9 +73,9 @@ def face_line(part: NominalPart, triangle: int) -> str:
         face = f'"{names[number]}"' if names[number] and names.count(names[number]) == 1 else str(number + 1)
         whole = "" if surfaces[number] is None or isinstance(surfaces[number], Plane) else ", whole=True"
         return f"{variable}.face(tc.Brep({face}{whole}))"
-    for direction, axis in AXES.items():
-        if normal @ np.array(axis) > 1 - SAME_DIRECTION:
-            return f'{variable}.face("{direction}")'
+    for side in DIRECTIONS:
+        if normal @ np.array(direction(side)) > 1 - SAME_DIRECTION:
+            return f'{variable}.face("{side}")'
     return f"{variable}.face()"
 
 
