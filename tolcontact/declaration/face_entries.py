@@ -129,9 +129,8 @@ CRITERION = Choice(
         Brep, mark="brep", omitted="whole", which=BREP_FACES, whole=Plain(bool | text_type(FACE_GROUPS)),
         build=lambda which, whole=False: Brep(*which, whole=whole),
     ),
-    Record(Cylinder, mark="cylinder", fields="radius", name="CylinderCriterion", radius=Field(
-        {"cylinder": CYLINDER}, lambda cylinder, writing: {"cylinder": cylinder},
-        lambda values, place: {"cylinder": values["cylinder"]}, is_required=True,
+    Record(Cylinder, mark="cylinder", fields="cylinder", name="CylinderCriterion", cylinder=Field(
+        {"cylinder": CYLINDER}, lambda cylinder, writing: {"cylinder": cylinder}, lambda values, place: values, is_required=True
     ), build=lambda cylinder: cylinder),
     Record(Largest, mark="largest", omitted="direction", direction=FREE_DIRECTION),
     Record(Triangles, mark="triangles", indices=TRIANGLES),

@@ -220,7 +220,7 @@ class Feature(Toleranced):
     def faults(self) -> Iterator[str]:
         yield from self.face_faults()
         yield from letter_faults(self.datum)
-        yield from Declaration.faults(self)
+        yield from super().faults()
         yield from self.tolerance_faults(len(self.faces))
 
     def face_faults(self) -> Iterator[str]:

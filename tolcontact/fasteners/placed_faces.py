@@ -67,6 +67,10 @@ class PlacedCylinder:
         along = self.ends[1] - self.ends[0]
         return along / np.linalg.norm(along)
 
+    def axis(self, towards: np.ndarray) -> Axis:
+        """Return its axis from its middle, in the sense of a vector (3,)."""
+        return Axis(self.middle, self.direction * (1.0 if self.direction @ towards >= 0 else -1.0))
+
     def extent(self, axis: Axis) -> tuple[float, float]:
         """Return the stations [mm] on the axis of a fastener between which it lies."""
         low, high = sorted(axis.station(end) for end in self.ends)
