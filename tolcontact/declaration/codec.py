@@ -120,7 +120,7 @@ class Items(Codec):
     """Lists of things of one kind; `count` is their length, or 0 for any length."""
 
     def __init__(self, codec: Codec, count: int = 0) -> None:
-        self.codec, self.count, self.inner = codec, count, (codec,)
+        self.codec, self.inner = codec, (codec,)
         self.wire = tuple[(codec.wire,) * count] if count else list[codec.wire]  # type: ignore[misc, name-defined]
 
     def encode(self, value: Any, writing: Any) -> Any:
@@ -128,8 +128,6 @@ class Items(Codec):
 
     def decode(self, entry: Any, place: Place, **arguments: Any) -> Any:
         entries = place.converted(entry, list[Any])
-        if self.count and len(entries) != self.count:
-            raise place.mismatch(f"a list of {self.count}", entries)
         return tuple(self.codec.decode(item, place[k], **arguments) for k, item in enumerate(entries))
 
     def fits(self, entry: Any) -> bool:
