@@ -60,9 +60,9 @@ def reference(name: str) -> Any:
 class Plain(Codec):
     """Numbers, texts and truth values, and tuples and mappings of them. Whole numbers stay whole.
 
-    write   returns the entry of a value; by default the value itself
-    read    returns the value of a valid entry; by default the entry itself
-    when    condition of a value that is written so
+    write        returns the entry of a value; by default the value itself
+    read         returns the value of a valid entry; by default the entry itself
+    when         condition of a value that is written so
     are_finite   whether the numbers have to be finite
     """
 

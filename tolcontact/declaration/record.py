@@ -18,12 +18,14 @@ from tolcontact.errors import TolcontactError
 
 @dataclass(frozen=True)
 class Field:
-    """A field of a class and its keys in an entry: one with its name, or several over which its value is spread.
+    """A field of a class and its keys in an entry: one with its name, or several with parts of its value.
 
-    codecs     by the keys
-    split      returns the values of a thing by these keys; keys without a value are left out
-    join       returns arguments for the class from the values of an entry, and its place
-    default    in the JSON schema, if it is a plain value
+    codecs        by the keys
+    split         returns the values of a thing by these keys; keys without a value are left out
+    join          returns arguments for the class from the values of an entry, and its place
+    is_nullable   whether entries may be null
+    is_required   whether an entry has to have the keys
+    default       in the JSON schema, if it is a plain value
     """
 
     codecs: Mapping[str, Codec]
