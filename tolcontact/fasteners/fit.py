@@ -63,7 +63,7 @@ class Fit:
             )
         elif offset > limit + ROUNDING * self.radius:
             yield (
-                f"{label}: its axis is {offset:.4g} mm off the axis of the fastener in the nominal assembly, where at most "
+                f"{label}: its axis is {offset:.4g} mm off that of the fastener in the nominal assembly, where at most "
                 f"{limit:.4g} mm are possible; move the part, or choose another hole"
             )
         elif min(high, self.reach[1]) - max(low, self.reach[0]) < ROUNDING * self.radius:
