@@ -43,7 +43,7 @@ class Form(Checked):
         if self.measured is not None and not (isinstance(self.measured, str) and self.measured):
             yield f'measured is {self.measured!r}; expected the path of CSV or PLY files, as in "scans/*.csv"'
         elif self.measured is not None and (self.covariance, self.length, self.lobes) != (COVARIANCES[0], None, None):
-            yield "it is measured, and has a covariance, a length or lobes in addition; leave these out"
+            yield "it is measured, and has a covariance, a length or lobes beside that; leave these out"
 
     def __str__(self) -> str:
         if self.measured is not None:
