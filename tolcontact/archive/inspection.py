@@ -20,7 +20,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
 from tolcontact.child import ChildDiedError, limit_resources, run_child
 from tolcontact.errors import ArchiveError, shown
-from tolcontact.vocabulary import ArchiveVariable, archive, form, stations, variation
+from tolcontact.vocabulary import ArchiveVariable, archive, variation
 
 MAX_SECONDS, SECONDS_PER_GB = 20.0, 20.0  # of processor time
 MEMORY = 1 << 30  # beside four times the file's own size
@@ -58,7 +58,7 @@ OF_MESH = (terms.MESH_VERTICES, terms.MESH_FACES)
 CHECKED_GROUPS = ("", "model", "contact", "sample", "surface", "field", terms.STATIONS_GROUP)
 VARIABLES = {  # by name; no two variables of an archive differ that have one name
     variable.name: variable
-    for module in (archive, variation, form, stations)
+    for module in (archive, variation)
     for item in vars(module).values()
     for variable in (item if isinstance(item, tuple) else (item,))
     if isinstance(variable, ArchiveVariable)

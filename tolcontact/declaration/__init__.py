@@ -47,8 +47,8 @@ from tolcontact.declaration.measurement import (
 )
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
+from tolcontact.declaration.sequence import Station
 from tolcontact.declaration.size import Size
-from tolcontact.declaration.station import Station
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import degrees

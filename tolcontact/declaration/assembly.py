@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
-from tolcontact.declaration.checks import FRICTION, field_faults
+from tolcontact.declaration.checks import FRICTION, Checked
 from tolcontact.declaration.contact_pair import ContactPair, Force
 from tolcontact.declaration.declarations import Declarations, expect
 from tolcontact.declaration.dependence import (
@@ -19,9 +19,8 @@ from tolcontact.declaration.joint import Joint, Overlap
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.part import Feature, Part
-from tolcontact.declaration.sequence import in_order, joined_before, present_parts, sequence_faults, settings_of
+from tolcontact.declaration.sequence import Station, in_order, joined_before, present_parts, sequence_faults, settings_of
 from tolcontact.declaration.size import Size
-from tolcontact.declaration.station import Station
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import (
@@ -54,14 +53,15 @@ class Declared(Generic[T]):
         return self if assembly is None else tuple(assembly._declared[self._name])  # type: ignore[return-value]
 
 
-class Assembly(Declarations, Pictured):
+class Assembly(Declarations, Pictured, Checked):
     """Parts, how they are located, which faces may touch, and what is measured. Lengths in mm, angles in rad.
 
     The methods only record declarations; `faults()` lists everything that is wrong with them. `method` states how contact in
     this model is resolved; a run may state another one. `title_block` heads its reports. `mu` is the coefficient of friction of
-    all contacts, of which `tc.seating` makes use. Raises TypeError for an argument of a wrong type.
+    all contacts; `tc.seating` uses it. Raises TypeError for an argument of a wrong type.
     """
 
+    checks: ClassVar = {"mu": FRICTION}
     parts = Declared[Part]()
     locations = Declared[Location]()
     pairs = Declared[ContactPair]()
@@ -90,7 +90,7 @@ class Assembly(Declarations, Pictured):
         return self
 
     def replaced(self, **lists: Iterable[Any]) -> "Assembly":
-        """Return a copy in which `lists` (parts=..., pairs=...) replace its lists. Raises TypeError for other names."""
+        """Return a copy with other lists, as in replaced(parts=..., pairs=...). Raises TypeError for other names."""
         copy = Assembly(self.name, method=self.method, title_block=self.title_block, mu=self.mu)
         copy._declared |= {name: list(lists.pop(name, things)) for name, things in self._declared.items()}
         if lists:
@@ -116,7 +116,10 @@ class Assembly(Declarations, Pictured):
 
     def variable(self, name: str, tolerance: Any, *, drives: Mapping[str, float], units: str = "mm") -> Variable:
         """Declare a cause that drives several contributors, each by a factor (see Variable)."""
-        return self._add("variables", Variable(name, _tolerance(tolerance), dict(drives), units, script_line()))
+        variable = Variable(
+            name=name, tolerance=_tolerance(tolerance), drives=dict(drives), units=units, declared_at=script_line()
+        )
+        return self._add("variables", variable)
 
     def correlate(self, labels: Sequence[str], matrix: Any) -> Correlation:
         """Declare that contributors are correlated: a matrix, or one coefficient for two of them (see Correlation)."""
@@ -154,7 +157,7 @@ class Assembly(Declarations, Pictured):
         return self.replaced(parts=parts, joints=joints, **settings_of(self, station), **none)
 
     def body_of(self, part: Part) -> tuple[Part, ...]:
-        """Return the parts of the rigid body to which a part of a scene belongs; the first one carries the others."""
+        """Return the parts of the rigid body of a part in a scene; its pose is the pose of the first one."""
         return next((joint.members for joint in self.joints if part in joint.members), (part,))
 
     def support_chain(self, part: Part) -> tuple[Part, ...]:
@@ -193,17 +196,17 @@ class Assembly(Declarations, Pictured):
         """Yield the faults of a model that is not complete yet: declarations that only a run needs."""
         if not self.measures:
             yield "it measures nothing; declare at least one measurement with assembly.measure(...)"
+        advice = "it is not located; call locate(...), or declare it fixed=True to hold it at its nominal place"
         for part in self.parts:
             if self.location_of(part) is None and part.fixed is not True:
-                advice = "it is not located; call locate(...), or declare it fixed=True to hold it at its nominal place"
-                yield from _located("part", part, iter([advice]))
+                yield from part.located_faults(iter([advice]))
 
     def faults(self) -> Iterator[str]:
         """Yield the faults of the declarations, among them omissions: sentences that name a declaration and its script line."""
         if not self.parts:
             yield "it has no parts; declare at least one with assembly.part(name, geometry)"
         yield from self.omissions()
-        yield from (*text_faults("assembly", [self.name]), *field_faults(self, {"mu": FRICTION}))
+        yield from (*text_faults("assembly", [self.name]), *Checked.faults(self))
         yield from (f"title block: {fault}" for fault in (self.title_block.faults() if self.title_block else ()))
         for name, most in MAX_COUNTS.items():
             if (count := len(self._declared[name])) > most:
@@ -213,34 +216,28 @@ class Assembly(Declarations, Pictured):
             yield from key_faults(kind, [thing.name for thing in self._declared[name]])
         yield from group_faults("part", [part.name for part in self.parts])
         for part in self.parts:
-            yield from _located("part", part, part.faults())
+            yield from part.located_faults()
             if not self.stations:
-                yield from _located("part", part, self._repetition_faults(part))
-                yield from _located("part", part, self._location_faults(part))
+                yield from part.located_faults(self._repetition_faults(part))
+                yield from part.located_faults(self._location_faults(part))
             yield from self._feature_faults(part)
-        for location in self.locations:
-            yield from _located(location.noun, location, location.faults())
-            yield from self._unknown_parts(f'locators of "{location.name}"', location.declared_at, *location.parts)
-        references: list[tuple[str, Any, Iterable[Part]]] = [
-            *(("contact pair", pair, pair.parts) for pair in self.pairs),
-            *(("force", force, force.parts) for force in self.forces),
-            *(("measurement", measure, measure.parts) for measure in self.measures),
-            *(("overlap", overlap, overlap.parts) for overlap in self.overlaps),
-            *(("variable", variable, ()) for variable in self.variables),
-            *(("correlation", correlation, ()) for correlation in self.correlations),
-            *(("population", population, ()) for population in self.populations),
-        ]
-        for kind, thing, parts in references:
-            yield from _located(kind, thing, thing.faults())
-            yield from self._unknown_parts(f'{kind} "{thing.name}"', thing.declared_at, *parts)
+        things: tuple[Location | ContactPair | Force | Measure | Overlap, ...] = (
+            *self.locations, *self.pairs, *self.forces, *self.measures, *self.overlaps,
+        )  # fmt: skip
+        for thing in things:
+            yield from thing.located_faults()
+            label = f'locators of "{thing.name}"' if isinstance(thing, Location) else f'{thing.noun} "{thing.name}"'
+            yield from self._unknown_parts(f"{label} ({thing.declared_at})", *thing.parts)
+        for cause in (*self.variables, *self.correlations, *self.populations):
+            yield from cause.located_faults()
         yield from key_faults("variable", [variable.name for variable in self.variables])
         for number, measure in enumerate(self.measures):
             earlier = [other for other in self.measures[:number] if other.station == measure.station]
-            yield from _located("measurement", measure, measure.reference_faults(earlier))
+            yield from measure.located_faults(measure.reference_faults(earlier))
         if self.stations:
             yield from sequence_faults(self)
             for scene in self.scenes:
-                yield from (fault for part in scene.parts for fault in _located("part", part, scene._location_faults(part)))
+                yield from (fault for part in scene.parts for fault in part.located_faults(scene._location_faults(part)))
 
     def _feature_faults(self, part: Part) -> Iterator[str]:
         letters = [declared.datum for declared in part.toleranced if declared.datum] + [datum.letter for datum in part.targets]
@@ -248,7 +245,7 @@ class Assembly(Declarations, Pictured):
         yield from key_faults(f'part "{part.name}": feature', names)
         yield from repetitions(f'part "{part.name}": datum', letters)
         for datum in part.targets:
-            yield from _located(f'part "{part.name}": datum', datum, datum.faults())
+            yield from datum.located_faults(owner=f'part "{part.name}": ')
             for feature in datum.features:
                 if feature not in part.features:
                     yield (
@@ -256,14 +253,13 @@ class Assembly(Declarations, Pictured):
                         f'"{feature.name}", which is no feature of the part; take one of the part'
                     )
         for declared in part.toleranced:
-            kind = f'part "{part.name}": {declared.noun}'
-            yield from _located(kind, declared, declared.faults())
+            yield from declared.located_faults(owner=f'part "{part.name}": ')
             for tolerance in declared.geometric:
-                for letter in [letter for compartment in tolerance.system for letter in compartment]:
+                for letter in tolerance.letters:
                     if letter not in letters:
                         datums = ", ".join(sorted(set(letters))) or "none"
                         yield (
-                            f'{kind} "{declared.name}" ({declared.declared_at}): {tolerance.kind} refers to '
+                            f'part "{part.name}": {declared.designation}: {tolerance.kind} refers to '
                             f"datum {letter}, which no feature of the part is; its datums are: {datums}; "
                             f'declare it with part.feature(..., datum="{letter}")'
                         )
@@ -290,11 +286,11 @@ class Assembly(Declarations, Pictured):
             circle = " on ".join(f'"{link.name}"' for link in (first, *rest))
             yield f"it is located on itself: {circle}; locate one of them on another part, or on the ground"
 
-    def _unknown_parts(self, label: str, line: str, *parts: Part | None) -> Iterator[str]:
+    def _unknown_parts(self, label: str, *parts: Part | None) -> Iterator[str]:
         for part in parts:
             if part is not None and not any(part is member for member in self.parts):
                 names = ", ".join(member.name for member in self.parts) or "none"
-                yield f'{label} ({line}): unknown part "{getattr(part, "name", part)}"; the parts of "{self.name}" are: {names}'
+                yield f'{label}: unknown part "{getattr(part, "name", part)}"; the parts of "{self.name}" are: {names}'
 
     def __str__(self) -> str:
         causes = *self.variables, *self.correlations, *self.populations
@@ -305,9 +301,3 @@ class Assembly(Declarations, Pictured):
             joined = [joint for joint in self.joints if joint.station == station.name]
             rows = *(row for row in rows if row not in settings), station, *settings, *joined
         return "\n".join([f"assembly {self.name}", *(f"  {row}" for row in rows)])
-
-
-def _located(kind: str, thing: Any, faults: Iterator[str]) -> Iterator[str]:
-    """Return faults that begin with the name and the script line of a declaration."""
-    line = thing.declared_at
-    return (f'{kind} "{thing.name}"{f" ({line})" if line else ""}: {fault}' for fault in faults)

@@ -4,40 +4,40 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
-from tolcontact.declaration.checks import FRICTION, LENGTH, STIFFNESS, Check, field_faults, whole_number
+from tolcontact.declaration.checks import FRICTION, LENGTH, STIFFNESS, Check, Declaration, text_type, whole_number
 from tolcontact.declaration.part import Face, Part, Point
 from tolcontact.declaration.values import Vector, is_finite
-from tolcontact.readable import Readable
 
 VERTICES = "vertices"
 MAX_POINTS = 100_000  # of a pair; more take minutes, and gigabytes
 COUNT = whole_number(1, MAX_POINTS)
-PAIR_CHECKS = {
-    "points": Check(lambda points: points == VERTICES or COUNT.holds(points), f'{COUNT.expected}, or "{VERTICES}"'),
-    "spacing": LENGTH, "within": LENGTH, "mu": FRICTION, "stiffness": STIFFNESS,
-}  # fmt: skip
+POINTS = Check(
+    lambda points: points == VERTICES or COUNT.holds(points),
+    f'{COUNT.expected}, or "{VERTICES}"',
+    COUNT.wire | text_type([VERTICES]),
+)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class ContactPair(Readable):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class ContactPair(Declaration):
     """Two faces that may touch: points of the `moving` face stay outside the `reference` face.
 
     points    the number of points, spread evenly, or "vertices" for the vertices of the mesh. By default 200 points, the
               corners of the region where flat faces overlap, and more points on curved faces as their curvature requires; a
               ball or a shaft against walls needs no points
-    spacing   [mm] largest distance of a spot of the face from a point, in place of a number of points
+    spacing   [mm] largest distance from the face to the nearest contact point, in place of a number of points
     within    [mm] a point takes part if the reference face is this near in the nominal assembly; by default a tenth of the
               diagonal of the moving part
-    mu        coefficient of friction, of which tc.seating and tc.check make use; contact is resolved without friction. By
-              default that of the assembly
+    mu        coefficient of friction for tc.seating and tc.check; contact is resolved without friction. By default the
+              coefficient of the assembly
     stiffness [N/mm] the force that presses the faces into each other evenly by 1 mm, under the objective "seating". Each point
-              is a spring with the share of the area that it stands for, and pushes only; round faces share it by their balls
+              is a spring with its share of the area, and pushes only; round faces share it by their balls
               and ends of shafts. By default the pair is rigid
     """
 
-    name: str
     moving: Face
     reference: Face
+    name: str
     points: int | str | None = None
     spacing: float | None = None
     within: float | None = None
@@ -46,10 +46,11 @@ class ContactPair(Readable):
     station: str = ""
     stiffness: float | None = None
     noun: ClassVar[str] = "contact pair"
+    checks: ClassVar = {"points": POINTS, "spacing": LENGTH, "within": LENGTH, "mu": FRICTION, "stiffness": STIFFNESS}
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """The parts to which its faces refer."""
+        """The parts of its faces, and of their criteria."""
         return (*self.moving.parts, *self.reference.parts)
 
     def faults(self) -> Iterator[str]:
@@ -57,7 +58,7 @@ class ContactPair(Readable):
         yield from self.reference.faults()
         if self.moving.part is self.reference.part:
             yield f'both faces belong to part "{self.moving.part.name}"; a pair needs two parts'
-        yield from field_faults(self, PAIR_CHECKS)
+        yield from super().faults()
         if self.points is not None and self.spacing is not None:
             yield "both points and spacing are given; give one of them"
 
@@ -71,12 +72,12 @@ class ContactPair(Readable):
         return f"contact {self.name}: {self.moving} (moving) against {self.reference} (reference), {points}{stiffness}"
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Force(Readable):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Force(Declaration):
     """A force `vector` [N] at a point of a part, constant in the assembly frame. The objective "seating" uses it."""
 
-    name: str
     at: Point
+    name: str
     vector: Vector
     declared_at: str = ""
     station: str = ""

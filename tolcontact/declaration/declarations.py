@@ -18,7 +18,7 @@ T = TypeVar("T")
 class Declarations:
     """The methods that declare how parts are located and fastened, where they touch, what presses them, what is measured."""
 
-    _station = ""  # the name of the station; empty for an assembly by itself
+    _station = ""  # the name of the station; empty for an assembly without stations
 
     @property
     def assembly(self) -> Any:
@@ -59,8 +59,8 @@ class Declarations:
         joint, part = (part.name, part.first) if isinstance(part, Joint) else ("", part)
         ground = on.first if isinstance(on, Joint) else on
         location = Location(
-            part, scheme, tolerance=zone, on=ground, declared_at=script_line(), floating=floating, station=self._station,
-            joint=joint, placing=placing,
+            part=part, scheme=scheme, tolerance=zone, on=ground, declared_at=script_line(), floating=floating,
+            station=self._station, joint=joint, placing=placing,
         )  # fmt: skip
         return self._add("locations", location)
 
@@ -80,15 +80,16 @@ class Declarations:
         for side, face in (("moving", moving), ("reference", reference)):
             expect(f'contact "{name}": {side}', face, Face | Feature, 'part.face("+z"), or a feature')
         pair = ContactPair(
-            name, face_of(moving), face_of(reference), points=points, spacing=spacing, within=within, mu=mu,
-            stiffness=stiffness, declared_at=script_line(), station=self._station,
+            name=name, moving=face_of(moving), reference=face_of(reference), points=points, spacing=spacing, within=within,
+            mu=mu, stiffness=stiffness, declared_at=script_line(), station=self._station,
         )  # fmt: skip
         return self._add("pairs", pair)
 
     def force(self, name: str, *, at: Point, vector: Any) -> Force:
         """Declare a force `vector` [N], in the assembly frame, at a point of a part (see Force)."""
         expect(f'force "{name}": at', at, Point, "part.point(x, y, z)")
-        return self._add("forces", Force(name, at, _vector(vector), script_line(), self._station))
+        line, station = script_line(), self._station
+        return self._add("forces", Force(name=name, at=at, vector=_vector(vector), declared_at=line, station=station))
 
     def measure(
         self,
@@ -104,7 +105,7 @@ class Declarations:
     ) -> Measure:
         """Declare a measure of a point, of two points, of a measurement, or of a CasADi expression of the poses (see Measure).
 
-        `units` are those of an expression, by default mm. A measurement has its own.
+        `units` apply to an expression, by default mm. A measurement has its own.
         """
         axis = None if along is None else direction(along)
         if units is None:

@@ -7,31 +7,32 @@ import importlib  # pandas takes longer to import than all the rest: only if it 
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
+from tolcontact.declaration.checks import Declaration
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import is_length, is_line
 from tolcontact.errors import shown
-from tolcontact.readable import Readable
 
 SEPARATORS = {";": "semicolons", "\t": "tabs"}
 MIN_EIGENVALUE = 1e-12  # of a correlation matrix; of a smaller absolute value it is zero
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Variable(Readable):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Variable(Declaration):
     """A cause that drives several contributors: `drives[label]` times its deviation is added to the draw of each.
 
-    `units` are those of the variable; a factor converts them to the units of its contributor.
+    The variable is in `units`; a factor converts them to the units of its contributor.
     """
 
-    name: str
     tolerance: Tolerance
     drives: Mapping[str, float]
+    name: str
     units: str = "mm"
     declared_at: str = ""
+    noun: ClassVar[str] = "variable"
 
     def faults(self) -> Iterator[str]:
         yield from self.tolerance.faults()
@@ -49,15 +50,16 @@ class Variable(Readable):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Correlation(Readable):
+class Correlation(Declaration):
     """A correlation of contributors: a Gaussian copula with this matrix, which leaves their distributions unchanged."""
 
     labels: tuple[str, ...]
     matrix: tuple[tuple[float, ...], ...]
     declared_at: str = ""
+    noun: ClassVar[str] = "correlation"
 
     @property
-    def name(self) -> str:
+    def name(self) -> str:  # type: ignore[override]
         return ", ".join(map(str, self.labels))
 
     def faults(self) -> Iterator[str]:
@@ -74,8 +76,8 @@ class Correlation(Readable):
             yield "its matrix is not symmetric with ones on the diagonal; expected correlation coefficients, not covariances"
         elif (smallest := float(np.linalg.eigvalsh(matrix).min())) < -MIN_EIGENVALUE:
             yield (
-                f"its matrix is not positive definite (smallest eigenvalue {smallest:.3g}): nothing is correlated like "
-                "that; check the signs, or make the coefficients smaller"
+                f"its matrix is not positive definite (smallest eigenvalue {smallest:.3g}): no variables have "
+                "these correlations; check the signs, or make the coefficients smaller"
             )
         elif smallest < MIN_EIGENVALUE:
             yield (
@@ -89,7 +91,7 @@ class Correlation(Readable):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Population(Readable):
+class Population(Declaration):
     """Measured parts: whole rows of deviations are drawn with replacement, which preserves their correlation.
 
     columns   labels of the contributors
@@ -101,9 +103,10 @@ class Population(Readable):
     values: np.ndarray
     source: str = "given"
     declared_at: str = ""
+    noun: ClassVar[str] = "population"
 
     @property
-    def name(self) -> str:
+    def name(self) -> str:  # type: ignore[override]
         return self.source
 
     def faults(self) -> Iterator[str]:
@@ -155,7 +158,7 @@ def population(source: Any, columns: Mapping[str, str] | None, declared_at: str)
 def _table_of(source: str | Path, title: str, names: Set[str]) -> Any:
     """Return the DataFrame of a CSV file. Raises ValueError if it cannot be read, or if its entries do not match its heading.
 
-    names   the columns that are stated, in which there may be any characters
+    names   the stated columns; their names may have any characters
     """
     pd = importlib.import_module("pandas")
     try:

@@ -3,9 +3,9 @@
 import re
 from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
-from typing import Any
+from typing import Any, ClassVar
 
-from tolcontact.declaration.checks import LENGTH, LENGTH_OR_0, TRUTH, Check, direction_faults, field_faults, one_of
+from tolcontact.declaration.checks import LENGTH, LENGTH_OR_0, TRUTH, Check, Checked, direction_faults, one_of
 from tolcontact.declaration.form import Form
 from tolcontact.declaration.values import Vector, direction as _direction, is_length
 from tolcontact.readable import Readable
@@ -26,10 +26,9 @@ def _lengths(per: Any) -> tuple[Any, ...]:
     return tuple(per) if isinstance(per, list | tuple) else (per,)
 
 
-# Of the options of kinds, and what their values must be; a direction `along` has a sentence of its own.
-OPTIONS: dict[str, Check | None] = {
+# What the values of options must be; a direction `along` has a sentence of its own.
+OPTION_CHECKS = {
     "zone": one_of(ZONES),
-    "along": None,
     "material": one_of(MATERIALS),
     "projected": LENGTH,
     "outside": LENGTH_OR_0,
@@ -73,7 +72,7 @@ class ToleranceKind(Readable):
 
 
 @dataclass(frozen=True, repr=False)
-class GeometricTolerance(Readable):
+class GeometricTolerance(Checked):
     """A zone of full width `width` [mm] (of a round zone the diameter) for a feature.
 
     of          its kind, with the options that it accepts; `features/tolerance_kinds.py` defines the zones
@@ -109,6 +108,8 @@ class GeometricTolerance(Readable):
     cp: float = 1.0
     cpk: float | None = None
 
+    checks: ClassVar = {**OPTION_CHECKS, "rule": one_of(RULES)}
+
     @property
     def kind(self) -> str:
         """The name of its kind in messages, JSON and archives."""
@@ -124,6 +125,11 @@ class GeometricTolerance(Readable):
         """The letters of the datum system: one for each compartment, or several for a common datum."""
         matches = [COMPARTMENT.fullmatch(compartment) for compartment in self._compartments]
         return tuple(tuple(match.group(1).split("-")) for match in matches if match)
+
+    @property
+    def letters(self) -> tuple[str, ...]:
+        """The letters of all its datums."""
+        return tuple(letter for compartment in self.system for letter in compartment)
 
     @property
     def orientation_only(self) -> tuple[bool, ...]:
@@ -148,12 +154,12 @@ class GeometricTolerance(Readable):
 
     @property
     def limits_form_alone(self) -> bool:
-        """Whether it limits no displacement of a feature by itself: a tolerance of form, or a profile without datums."""
+        """Whether it limits no displacement of a feature: a tolerance of form, or a profile without datums."""
         return self.is_form or not (self.of.needs_datums or self.datums)
 
     @property
     def uneven_shift(self) -> float:
-        """The distance [mm], out of the material, of the middle of the zone from the nominal surface."""
+        """The distance [mm], out of the material, from the nominal surface to the middle of an unequally disposed zone."""
         return 0.0 if self.outside is None else self.outside - self.width / 2
 
     def faults(self) -> Iterator[str]:
@@ -162,6 +168,7 @@ class GeometricTolerance(Readable):
             yield f"width is {self.width!r}; expected the full width of the zone in mm, {bound}"
         yield from self._datum_faults()
         yield from self._zone_faults()
+        yield from super().faults()
         yield from self._process_faults()
 
     def _datum_faults(self) -> Iterator[str]:
@@ -172,18 +179,16 @@ class GeometricTolerance(Readable):
         ):
             yield f'datums is {self.datums!r}; expected up to three datums, such as "A|B|C", "A|B(M)", "A-B" or "A><"'
             return
-        letters = [letter for compartment in self.system for letter in compartment]
-        if len(set(letters)) < len(letters):
+        if len(set(self.letters)) < len(self.letters):
             yield f"datums {self.datums!r} names a datum twice"
 
     def _zone_faults(self) -> Iterator[str]:
-        for option in OPTIONS:
+        for option in (*OPTION_CHECKS, "along"):
             value = getattr(self, option)
             is_given = value not in ("", False) if isinstance(value, str | bool) else value is not None
             if is_given and option not in self.of.options:
                 yield f"{option} is given, which {self.kind} does not have; leave it out"
         yield from self._form_faults()
-        yield from field_faults(self, {option: check for option, check in OPTIONS.items() if check is not None})
         if self.zone == "flat" and self.along is None:
             yield 'a flat zone needs a direction across it; give along="x", or a vector'
         yield from direction_faults("along", self.across)
@@ -203,7 +208,6 @@ class GeometricTolerance(Readable):
             yield f'the rule is "{self.rule}"; form is drawn by the rule "{INSIDE}" alone'
 
     def _process_faults(self) -> Iterator[str]:
-        yield from field_faults(self, {"rule": one_of(RULES)})
         if not (is_length(self.cp) and self.cp > 0):
             yield f"cp is {self.cp!r}; expected a number above 0"
         elif self.cpk is not None and not (is_length(self.cpk) and self.cpk <= self.cp):

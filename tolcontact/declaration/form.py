@@ -2,22 +2,18 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
-from tolcontact.declaration.checks import LENGTH, field_faults, one_of, whole_number
-from tolcontact.readable import Readable
+from tolcontact.declaration.checks import LENGTH, Checked, one_of, whole_number
 
 COVARIANCES = ("squared exponential", "matern 5/2", "matern 3/2")
 MAX_MODES = 200
 MIN_LOBES, MAX_LOBES = 2, 12  # one lobe displaces a section
-FORM_CHECKS = {
-    "covariance": one_of(COVARIANCES), "length": LENGTH, "modes": whole_number(1, MAX_MODES),
-    "lobes": whole_number(MIN_LOBES, MAX_LOBES),
-}  # fmt: skip
 
 
 @dataclass(frozen=True, repr=False)
-class Form(Readable):
-    """A random field of heights of a face, without what displaces the face as a whole.
+class Form(Checked):
+    """A random field of heights of a face, orthogonal to displacements of the face as a whole.
 
     covariance   of the heights of two points, by their distance: "squared exponential", "matern 5/2" or "matern 3/2", from
                  smooth to rough
@@ -37,8 +33,13 @@ class Form(Readable):
     lobes: int | None = None
     measured: str | None = None
 
+    checks: ClassVar = {
+        "covariance": one_of(COVARIANCES), "length": LENGTH, "modes": whole_number(1, MAX_MODES),
+        "lobes": whole_number(MIN_LOBES, MAX_LOBES),
+    }  # fmt: skip
+
     def faults(self) -> Iterator[str]:
-        yield from field_faults(self, FORM_CHECKS)
+        yield from super().faults()
         if self.measured is not None and not (isinstance(self.measured, str) and self.measured):
             yield f'measured is {self.measured!r}; expected the path of CSV or PLY files, as in "scans/*.csv"'
         elif self.measured is not None and (self.covariance, self.length, self.lobes) != (COVARIANCES[0], None, None):

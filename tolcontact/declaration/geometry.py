@@ -5,36 +5,33 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tolcontact.declaration.checks import LENGTH, TRUTH, field_faults, one_of
+from tolcontact.declaration.checks import LENGTH, TRUTH, Checked, one_of
 from tolcontact.errors import shown
-from tolcontact.readable import Readable
 
 
 @dataclass(frozen=True, repr=False)
-class Box(Readable):
+class Box(Checked):
     """A block from the origin of its part's frame to (x, y, z) [mm]."""
 
     x: float
     y: float
     z: float
 
-    def faults(self) -> Iterator[str]:
-        yield from field_faults(self, dict.fromkeys("xyz", LENGTH), "box size along ")
+    checks, fault_prefix = dict.fromkeys("xyz", LENGTH), "box size along "
 
     def __str__(self) -> str:
         return f"box {self.x:g} x {self.y:g} x {self.z:g} mm"
 
 
 @dataclass(frozen=True, repr=False)
-class Pin(Readable):
+class Pin(Checked):
     """A round pin about the z axis of its part's frame, from z = -length to 0 [mm]; a `head` of a bolt is above z = 0."""
 
     diameter: float
     length: float
     head: bool = False
 
-    def faults(self) -> Iterator[str]:
-        yield from field_faults(self, {"diameter": LENGTH, "length": LENGTH, "head": TRUTH}, "pin ")
+    checks, fault_prefix = {"diameter": LENGTH, "length": LENGTH, "head": TRUTH}, "pin "
 
     def __str__(self) -> str:
         return f"pin {self.diameter:g} x {self.length:g} mm{' with a head' if self.head else ''}"
@@ -45,10 +42,10 @@ UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}  
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Mesh(Readable):
+class Mesh(Checked):
     """A triangle surface: a file (STL, OBJ, PLY, GLB, STEP), or a `trimesh.Trimesh`. Normals point outward.
 
-    `units` ("mm", "in", ...) are those of the source. By default a STEP file states its own, a GLB file is in m, a Trimesh has
+    `units` ("mm", "in", ...) apply to the source. By default a STEP file states its own, a GLB file is in m, a Trimesh has
     its `units` if they are set, and all others are in mm. STEP faces are triangulated to within `chord` [mm] (by default
     2 um, or 5e-6 of the extent of files beyond 0.4 m, and coarser if that gives too many triangles). They keep their boundary
     representation for `tc.Brep`; this needs the extra `tolcontact[step]`. `body` is the name or the number (from 1) of a body
@@ -60,8 +57,10 @@ class Mesh(Readable):
     body: str | int | None = None
     chord: float | None = None
 
+    checks, fault_prefix = {"chord": LENGTH, "units": one_of(UNITS)}, "mesh "
+
     def faults(self) -> Iterator[str]:
-        yield from field_faults(self, {"chord": LENGTH, "units": one_of([*UNITS])}, "mesh ")
+        yield from super().faults()
         if self.chord is not None and not self.is_step:
             yield "mesh chord is given, but only STEP files are triangulated; leave it out"
         if self.body is not None and not self.is_step:

@@ -4,18 +4,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+from tolcontact.declaration.checks import Declaration
 from tolcontact.declaration.part import Part
-from tolcontact.readable import Readable
 
 MIN_PARTS = 2
 MIN_MEMBERS = 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Joint(Readable):
+class Joint(Declaration):
     """Parts that keep, after the station that joins them, the poses relative to each other that they had there.
 
-    `members` are the joined parts. The first one carries the others: poses of the joint are its poses. A joint that is joined
+    `members` are the joined parts. The pose of the joint is the pose of the first one. A joint that is joined
     again is stated by its parts.
     """
 
@@ -27,7 +27,7 @@ class Joint(Readable):
 
     @property
     def first(self) -> Part:
-        """The part that carries the others."""
+        """The part whose pose is the pose of the joint."""
         return self.members[0]
 
     def faults(self) -> Iterator[str]:
@@ -44,12 +44,12 @@ class Joint(Readable):
 
 
 def parts_of(bodies: Sequence[Part | Joint]) -> tuple[Part, ...]:
-    """Return the parts of which bodies consist, in their order."""
+    """Return the parts of bodies, in their order."""
     return tuple(part for body in bodies for part in (body.members if isinstance(body, Joint) else (body,)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Overlap(Readable):
+class Overlap(Declaration):
     """Parts that may lie in each other, any two of them: press fits, welds, parts that are modelled overlapping.
 
     Neither checks nor runs watch these bodies. A contact pair between two of them still holds for its chosen faces.
@@ -60,7 +60,7 @@ class Overlap(Readable):
     noun: ClassVar[str] = "overlap"
 
     @property
-    def name(self) -> str:
+    def name(self) -> str:  # type: ignore[override]
         return ", ".join(part.name for part in self.parts)
 
     def faults(self) -> Iterator[str]:

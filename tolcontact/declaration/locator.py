@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from tolcontact.declaration.checks import LENGTH_OR_0, STIFFNESS, TRUTH, direction_faults, field_faults
+from tolcontact.declaration.checks import LENGTH_OR_0, STIFFNESS, TRUTH, Checked, Declaration, direction_faults, one_of
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
 from tolcontact.declaration.tolerance import Tolerance, tolerance as _tolerance
 from tolcontact.declaration.values import (
@@ -17,20 +17,19 @@ from tolcontact.declaration.values import (
     text_faults,
     vector as _vector,
 )
-from tolcontact.readable import Readable
 
 USUAL_STIFFNESS = 1.0  # N/mm, of locators that declare none
 FIRST_ORDER, EXACT, BEST_FIT = PLACINGS = ("first order", "exact", "best fit")
 
 
 @dataclass(frozen=True, repr=False)
-class Locator(Readable):
+class Locator(Checked):
     """A point of a part [mm], a direction into the part, and the deviation along it, in the part's own frame.
 
     A positive deviation moves the part along `direction`. `tolerance=None` takes the tolerance of the `locate` call. A
     `one_sided` locator is a support: the part may lift off it along `direction`, but not pass through it. The objective
     "locator stiffness" uses the `stiffness` [N/mm] of two-sided locators, by default 1. Under the objective "seating" a locator
-    with a `stiffness` gives way, like a spring that pulls, too, unless it is one-sided; without one it is rigid. A locator
+    with a `stiffness` is a linear spring, and a one-sided one only pushes; without a stiffness it is rigid. A locator
     `on` a feature of its part touches this feature, and also moves the part by the deviation of the feature at the point. A
     locator of a joint is at a point of any of its parts, which the point itself states: part.point(x, y, z).
     """
@@ -38,11 +37,13 @@ class Locator(Readable):
     name: str
     point: Vector
     direction: Vector
-    tolerance: Tolerance | None
-    one_sided: bool
-    stiffness: float | None
-    on: Feature | None
-    part: Part | None
+    tolerance: Tolerance | None = None
+    one_sided: bool = False
+    stiffness: float | None = None
+    on: Feature | None = None
+    part: Part | None = None
+
+    checks: ClassVar = {"stiffness": STIFFNESS, "one_sided": TRUTH}
 
     def __init__(
         self,
@@ -58,14 +59,11 @@ class Locator(Readable):
     ) -> None:
         if isinstance(point, Point):
             part, on, point = point.part, on or point.on, point.position
-        object.__setattr__(self, "name", name)
-        object.__setattr__(self, "point", _vector(point))
-        object.__setattr__(self, "direction", _direction(direction))
-        object.__setattr__(self, "tolerance", None if tolerance is None else _tolerance(tolerance))
-        object.__setattr__(self, "one_sided", one_sided)
-        object.__setattr__(self, "stiffness", stiffness)
-        object.__setattr__(self, "on", on)
-        object.__setattr__(self, "part", part)
+        vars(self).update(
+            name=name, point=_vector(point), direction=_direction(direction),
+            tolerance=None if tolerance is None else _tolerance(tolerance), one_sided=one_sided, stiffness=stiffness, on=on,
+            part=part,
+        )  # fmt: skip
 
     def faults(self) -> Iterator[str]:
         if not is_finite(self.point):
@@ -73,9 +71,7 @@ class Locator(Readable):
         yield from direction_faults("direction", self.direction)
         if self.tolerance is not None:
             yield from self.tolerance.faults()
-        if self.stiffness is not None:
-            yield from field_faults(self, {"stiffness": STIFFNESS})
-        yield from field_faults(self, {"one_sided": TRUTH})
+        yield from super().faults()
         if not isinstance(self.on, Feature | None):
             yield f"on is a {type(self.on).__name__}; expected a feature of the part, or None"
         if not isinstance(self.part, Part | None):
@@ -89,7 +85,7 @@ class Locator(Readable):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ThreeTwoOne(Readable):
+class ThreeTwoOne(Checked):
     """A 3-2-1 scheme on three faces; its six points follow from their geometry.
 
     A1 and A2 lie on the primary face near the secondary one, `inset` [mm] from its ends, and A3 opposite, half way between
@@ -103,6 +99,8 @@ class ThreeTwoOne(Readable):
     tertiary: Face
     inset: float = 0.0
 
+    checks: ClassVar = {"inset": LENGTH_OR_0}
+
     @property
     def faces(self) -> tuple[Face, Face, Face]:
         return (self.primary, self.secondary, self.tertiary)
@@ -110,7 +108,7 @@ class ThreeTwoOne(Readable):
     def faults(self) -> Iterator[str]:
         for face in self.faces:
             yield from face.faults()
-        yield from field_faults(self, {"inset": LENGTH_OR_0})
+        yield from super().faults()
 
     def __str__(self) -> str:
         return f"3-2-1 on {', '.join(str(face) for face in self.faces)}, {self.inset:g} mm inside the edges"
@@ -123,8 +121,8 @@ def three_two_one(
     return ThreeTwoOne(face_of(primary), face_of(secondary), face_of(tertiary), inset)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Location(Readable):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Location(Declaration):
     """The location of a part: its locators, their common tolerance, and the part that they are `on` (None: the ground).
 
     Locators `on` a feature of another part follow it as it shifts and tilts: a cylinder with its axis.
@@ -139,22 +137,24 @@ class Location(Readable):
     """
 
     part: Part
-    scheme: ThreeTwoOne | tuple[Locator, ...]
-    tolerance: Tolerance | None = None
     on: Part | Feature | None = None
+    tolerance: Tolerance | None = None
+    scheme: ThreeTwoOne | tuple[Locator, ...]
     declared_at: str = ""
     floating: bool = False
     station: str = ""
     joint: str = ""
     placing: str = FIRST_ORDER
 
+    checks: ClassVar = {"placing": one_of(PLACINGS)}
+
     @property
-    def noun(self) -> str:
+    def noun(self) -> str:  # type: ignore[override]
         """The kind of the located body: a part, or a joint."""
         return "joint" if self.joint else "part"
 
     @property
-    def name(self) -> str:
+    def name(self) -> str:  # type: ignore[override]
         """The name of the located body."""
         return self.joint or self.part.name
 
@@ -165,7 +165,7 @@ class Location(Readable):
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """The located part, the part that it is on, and those to which the faces of the scheme refer."""
+        """The located part, the part that it is on, and the parts of the faces of the scheme."""
         return (self.part, *([] if self.parent is None else [self.parent]), *self.mentioned)
 
     @property
@@ -180,14 +180,13 @@ class Location(Readable):
 
     @property
     def mentioned(self) -> tuple[Part, ...]:
-        """The parts to which the faces of the scheme refer."""
+        """The parts of the faces of the scheme, and of their criteria."""
         return tuple(part for face in self.faces for part in face.parts)
 
     def faults(self) -> Iterator[str]:
         yield from self._faces_faults() if isinstance(self.scheme, ThreeTwoOne) else self._locator_faults(self.scheme)
-        if self.placing not in PLACINGS:
-            yield f"placing is {self.placing!r}; expected one of: {', '.join(PLACINGS)}"
-        elif self.placing != FIRST_ORDER and (self.floating or self.has_supports):
+        yield from super().faults()
+        if self.placing in PLACINGS[1:] and (self.floating or self.has_supports):
             yield f'placing="{self.placing}" needs locators that hold both ways; leave floating and one_sided out'
         if self.tolerance is not None:
             yield from (f"locators: {fault}" for fault in self.tolerance.faults())
@@ -251,7 +250,7 @@ class Location(Readable):
 
 
 def _repeating(locators: list[Locator]) -> list[Locator]:
-    """Return the locators whose constraint depends linearly on those of earlier locators."""
+    """Return the locators whose constraint depends linearly on the constraints of earlier locators."""
     points = np.array([locator.point for locator in locators])
     arms = points - points.mean(axis=0)
     arms /= np.abs(arms).max() or 1.0

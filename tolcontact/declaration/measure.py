@@ -11,17 +11,16 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from tolcontact.declaration.checks import TRUTH, direction_faults, field_faults
+from tolcontact.declaration.checks import TRUTH, Declaration, direction_faults
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Part, Point
 from tolcontact.declaration.place import MAX_NUMBER, Place
 from tolcontact.declaration.values import Vector, is_length, is_line
 from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
-from tolcontact.readable import Readable
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Measure(Readable):
+class Measure(Declaration):
     """A number that follows from the poses of the parts.
 
         of one Point                its displacement from its nominal place, along `along` [mm]; its coordinate, if `absolute`
@@ -41,10 +40,11 @@ class Measure(Readable):
     tolerance: float | Deviations | None = None  # a text or another pair only if it is no tolerance
     units: str = "mm"
     declared_at: str = ""
-    limits: tuple[float | None, float | None] | None = None
     absolute: bool | None = None
+    limits: tuple[float | None, float | None] | None = None
     station: str = ""
     noun: ClassVar[str] = "measurement"
+    checks: ClassVar = {"absolute": TRUTH}
 
     def __post_init__(self) -> None:
         with contextlib.suppress(TextFault):  # faults() reports it
@@ -108,7 +108,7 @@ class Measure(Readable):
         if self.to is not None and not isinstance(self.to, Point):
             yield f"to is a {type(self.to).__name__}; expected part.point(x, y, z)"
         yield from self._limits_faults()
-        yield from field_faults(self, {"absolute": TRUTH})
+        yield from super().faults()
         if self.absolute is not None and not isinstance(self.of, Point):
             yield f"absolute is for measurements of points; a {self._noun} has its own value, so leave it out"
 
@@ -123,7 +123,7 @@ class Measure(Readable):
                 "or a function of the poses"
             )
         elif self.along is not None or self.to is not None:
-            yield f"a {self._noun} defines its value by itself; leave out to and along"
+            yield f"a {self._noun} needs no direction; leave out to and along"
         if isinstance(self.of, Measurement):
             yield from self.of.faults()
 

@@ -21,7 +21,7 @@ class Measurement(Readable):
     """A quantity that follows from the poses of parts and the deviations of their features.
 
     kind     its name, in documents and tables
-    units    of its value; a combination has those of its measurements
+    units    of its value; a combination has the units of its measurements
     depth    number of combinations inside each other
     """
 
@@ -61,7 +61,7 @@ class Measurement(Readable):
         return tuple(operand for operand in self.operands if isinstance(operand, Measurement))
 
     def units_among(self, units: Mapping[str, str]) -> set[str]:
-        """Return the units of the value, from those of named measures: several if measurements of unlike units are combined."""
+        """Return the units of the value from the units of named measures: several if it combines unlike measurements."""
         return {self.units}
 
     def faults(self) -> Iterator[str]:
@@ -70,7 +70,7 @@ class Measurement(Readable):
             yield from thing.faults()
 
     def _take_faces(self, **faces: Any) -> None:
-        """Store faces, or those of features. Raises TypeError for what is neither."""
+        """Store faces, or the faces of features. Raises TypeError for anything else."""
         for name, face in faces.items():
             if not isinstance(face, Face | Feature):
                 raise TypeError(f'{self.kind}: {name} is a {type(face).__name__}; expected part.face("+z"), or a feature')
@@ -112,7 +112,7 @@ class Gap(_OfStation):
 class Flush(_OfStation):
     """The height of a station, a point of one part, over a neighbouring outer face of another, perpendicular to this face.
 
-    The face counts beyond its ends, as that of a Gap.
+    The face counts beyond its ends, as for a Gap.
     """
 
     kind = "flush"
@@ -123,24 +123,36 @@ class _OfTwoFaces(Measurement):
     first: Face
     second: Face
 
+    directions: ClassVar[tuple[str, ...]] = ()  # names of fields that may be left out
+
     def __post_init__(self) -> None:
         self._take_faces(first=self.first, second=self.second)
+        for name in self.directions:
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, direction(getattr(self, name)))
 
     @property
     def faces(self) -> tuple[Face, ...]:
         return (self.first, self.second)
 
+    def faults(self) -> Iterator[str]:
+        yield from super().faults()
+        for name in self.directions:
+            yield from direction_faults(name, getattr(self, name))
+
     def __str__(self) -> str:
-        return f"{self.kind} of {self.first} and {self.second}"
+        given = [(name, value) for name in self.directions if (value := getattr(self, name)) is not None]
+        texts = [" {} ({:g}, {:g}, {:g})".format(name, *value) for name, value in given]
+        return "".join([f"{self.kind} of {self.first} and {self.second}", *texts])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Clearance(_OfTwoFaces):
     """The least distance of two faces of different parts, negative where they overlap.
 
-    Of planes it is the least height, perpendicular to the second face, in the region in which they overlap at the present pose;
-    in the region in which they overlap nominally if there is none, or if their rims have more than 2500 pairs of edges. Of a
-    ball or a shaft beside walls it is the least gap of contact (see tolcontact.discretization), of two outer cylinders the
+    Of planes it is the least height, perpendicular to the second face, in their overlap region at the present pose; in their
+    nominal overlap region if they do not overlap there, or if their rims have more than 2500 pairs of edges. Of a ball or a
+    shaft and walls it is the least gap of contact (see tolcontact.discretization), of two outer cylinders the
     distance of their axes, each as long as its face, less both radii. Of all other faces, and of whole parts
     (`part.face()`), it is the least distance of their triangles, negative by the depth of a corner or an edge inside the other
     one. It looks at the corners and edges that are nearest nominally, and where parts move beyond these it is too small, never
@@ -156,7 +168,7 @@ class LargestGap(_OfTwoFaces):
     The gap is measured at places of the first face, perpendicular to the second one, with the form of both, and is negative
     inside the material. The places cover the region of the first face over which the second one lies in the nominal assembly,
     its rim and its corners included. They are a seventh of the least correlation length of form apart; without form there are
-    some 200. The second face counts beyond its ends, as that of a Gap, and its form is that opposite the nominal place.
+    some 200. The second face counts beyond its ends, as for a Gap, and its form is taken opposite the nominal place.
     """
 
     kind = "largest gap"
@@ -166,9 +178,9 @@ class MeanGap(_OfTwoFaces):
     """The mean by area of the gap left between two faces of different parts, at the places of a LargestGap.
 
     Each place counts by the area of the first face that is nearest to it, so that flat faces have the mean of the region where
-    they lie over each other. On curved faces the area is that of triangles, each over the second face or not: where the second
-    face ends over the first one, the mean is off by up to some 0.4 % of the range of gaps. The mean times the area of the
-    region is the volume between both faces.
+    they lie over each other. On curved faces the area is summed over triangles, each over the second face or not: where the
+    second face ends over the first one, the mean is off by up to some 0.4 % of the range of gaps. The mean times the area of
+    the region is the volume between both faces.
     """
 
     kind = "mean gap"
@@ -180,33 +192,22 @@ class AxisDistance(_OfTwoFaces):
 
     By default it is the shortest distance of the two axes, each as long as its face.
 
-    across   a direction: the distance of the points in which both axes, however long, pierce the plane across it through the
+    across   a direction: the distance of the points where both axes, however long, pierce the plane across it through the
              middle of the first axis
     along    a direction: the component of the perpendicular from the middle of the first axis to the second axis, however long
 
     Directions are fixed in the assembly frame.
     """
 
-    kind = "distance of axes"
+    kind, directions = "distance of axes", ("across", "along")
 
     across: Vector | None = None
     along: Vector | None = None
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for name in ("across", "along"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, direction(getattr(self, name)))
-
     def faults(self) -> Iterator[str]:
         yield from super().faults()
-        for name in ("across", "along"):
-            yield from direction_faults(name, getattr(self, name))
         if self.across is not None and self.along is not None:
             yield "across and along are both given; give one of them"
-
-    def __str__(self) -> str:
-        return super().__str__() + _direction_text("across", self.across) + _direction_text("along", self.along)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -214,28 +215,15 @@ class Angle(_OfTwoFaces):
     """The angle [rad] between two planes or axes, by the normals of planes and the axes of cylinders and cones.
 
     Planes and lines have no sense: the second direction is reversed if it is more than a right angle from the first one
-    nominally. Without `about` the angle is that of the two directions in space, from 0 on.
+    nominally. Without `about` it is the angle between the two directions in space, from 0 on.
 
-    about   a direction, fixed in the assembly frame: the angle by which the first direction must turn about it to coincide with
-            the second one, both seen along it, from -pi to pi
+    about   a direction, fixed in the assembly frame: the rotation about it that makes the first direction coincide with the
+            second one, both seen along it, from -pi to pi
     """
 
-    kind = "angle"
-    units = "rad"
+    kind, units, directions = "angle", "rad", ("about",)
 
     about: Vector | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.about is not None:
-            object.__setattr__(self, "about", direction(self.about))
-
-    def faults(self) -> Iterator[str]:
-        yield from super().faults()
-        yield from direction_faults("about", self.about)
-
-    def __str__(self) -> str:
-        return super().__str__() + _direction_text("about", self.about)
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
@@ -267,7 +255,7 @@ class Combination(Measurement):
     def faults(self) -> Iterator[str]:
         yield from super().faults()
         if len(self.operands) < 2:
-            yield f"the {self.kind} is that of {len(self.operands)} measurement(s); expected two or more"
+            yield f"the {self.kind} has {len(self.operands)} measurement(s); expected two or more"
 
     def __str__(self) -> str:
         if len(self.operands) > MAX_LISTED:
@@ -307,7 +295,7 @@ class Difference(Combination):
     def faults(self) -> Iterator[str]:
         yield from super().faults()
         if len(self.operands) > 2:
-            yield f"the difference is that of {len(self.operands)} measurements; expected two"
+            yield f"the difference has {len(self.operands)} measurements; expected two"
 
 
 _KINDS: tuple[type[Measurement], ...] = (
@@ -332,7 +320,3 @@ def stations(start: Point, end: Point, count: int) -> tuple[Point, ...]:
     return tuple(
         point(*((1 - share) * a + share * b for a, b in zip(start.position, end.position, strict=True))) for share in shares
     )
-
-
-def _direction_text(name: str, value: Vector | None) -> str:
-    return "" if value is None else " {} ({:g}, {:g}, {:g})".format(name, *value)

@@ -3,20 +3,22 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
-from tolcontact.declaration.checks import field_faults, one_of
+from tolcontact.declaration.checks import Declaration, one_of
 from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
 from tolcontact.declaration.toleranced import Control, Toleranced, letter_faults
 from tolcontact.declaration.values import Vector, is_finite, script_line, vector
 from tolcontact.readable import Readable
 
+D = TypeVar("D", bound=Declaration)
+
 OUTSIDE, LEAST_SQUARES = ASSOCIATIONS = ("outside", "least squares")  # from a plane to a datum, ISO 5459
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Part(Readable):
+class Part(Declaration):
     """A rigid body: its shape, its place in the nominal assembly, and whether contact may move it.
 
     A point `p` of the part lies at `rotation * p + at` in the nominal assembly frame; `rotation` is a rotation vector [rad],
@@ -30,6 +32,7 @@ class Part(Readable):
     rotation: Vector = (0.0, 0.0, 0.0)
     fixed: bool | None = None
     declared_at: str = field(default_factory=script_line)
+    noun: ClassVar[str] = "part"
     _declared: "list[Feature | Pattern | DatumTargets]" = field(default_factory=list, init=False)
 
     @property
@@ -55,7 +58,7 @@ class Part(Readable):
     ) -> "Feature":
         """Name a face, or two that are opposed, with its tolerances: `part.feature("H1", face, tc.Size(...), datum="B")`.
 
-        `association` is how a plane that leans, or has form, becomes a datum: "outside" or "least squares" (see
+        `association` is how a plane with tilt or form becomes a datum: "outside" or "least squares" (see
         `tolcontact.features`).
         """
         for constituent in constituents:
@@ -66,9 +69,7 @@ class Part(Readable):
                 )
         faces = tuple(constituent for constituent in constituents if isinstance(constituent, Face))
         tolerances = tuple(constituent for constituent in constituents if not isinstance(constituent, Face))
-        feature = Feature(name, self, faces, tolerances, datum, script_line(), association)
-        self.add(feature)
-        return feature
+        return self.add(Feature(name, self, faces, tolerances, datum, script_line(), association))
 
     def pattern(
         self,
@@ -95,22 +96,19 @@ class Part(Readable):
                     "part.face(...), two faces in parentheses, a feature, tc.Size(...), tc.Position(...) or another tolerance"
                 )
         tolerances = tuple(tolerance for tolerance in constituents if isinstance(tolerance, Control))
-        pattern = Pattern(name, self, tuple(members), tolerances, datum, script_line())
-        self.add(pattern)
-        return pattern
+        return self.add(Pattern(name, self, tuple(members), tolerances, datum, script_line()))
 
-    def add(self, declared: "Feature | Pattern | DatumTargets") -> None:
-        """Add what is declared of this part."""
-        self._declared.append(declared)
+    def add(self, declared: D) -> D:
+        """Add a declaration of this part, and return it."""
+        self._declared.append(declared)  # type: ignore[arg-type]
+        return declared
 
     def datum_targets(self, letter: str, *points: "Point") -> "DatumTargets":
         """Declare a datum by points on features: `part.datum_targets("A", pad.point(0, 0, 0), ...)` (see DatumTargets)."""
         for point in points:
             if not isinstance(point, Point):
                 raise TypeError(f'datum "{letter}": {type(point).__name__} is no point; expected feature.point(x, y, z)')
-        targets = DatumTargets(letter, points, script_line())
-        self.add(targets)
-        return targets
+        return self.add(DatumTargets(letter, points, script_line()))
 
     def point(self, x: float, y: float, z: float) -> "Point":
         """Return the point (x, y, z) [mm] of this part, in its own frame."""
@@ -185,12 +183,12 @@ class Point(Readable):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Feature(Toleranced, Readable):
+class Feature(Toleranced):
     """A face of a part, or two that are opposed (a slot, a tab, a thickness), with a name and its tolerances.
 
     A feature may be used in place of a face. Contact, locators and measures on a feature share its deviation, which is positive
-    outward from the material. `datum` is the letter by which tolerances refer to it, and `association` is how a plane becomes
-    that datum if it leans or has form: one of ASSOCIATIONS.
+    outward from the material. Tolerances refer to it by the letter `datum`, and `association` is how a plane with tilt or form
+    becomes that datum: one of ASSOCIATIONS.
     """
 
     name: str
@@ -200,6 +198,8 @@ class Feature(Toleranced, Readable):
     datum: str | None = None
     declared_at: str = ""
     association: str = OUTSIDE
+
+    checks, fault_prefix = {"association": one_of(ASSOCIATIONS)}, "its "
 
     @property
     def members(self) -> "tuple[Feature, ...]":
@@ -220,7 +220,7 @@ class Feature(Toleranced, Readable):
     def faults(self) -> Iterator[str]:
         yield from self.face_faults()
         yield from letter_faults(self.datum)
-        yield from field_faults(self, {"association": one_of(ASSOCIATIONS)}, "its ")
+        yield from super().faults()
         yield from self.tolerance_faults(len(self.faces))
 
     def face_faults(self) -> Iterator[str]:
@@ -239,7 +239,7 @@ class Feature(Toleranced, Readable):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Pattern(Toleranced, Readable):
+class Pattern(Toleranced):
     """Several features of a part that share their tolerances, and may be one datum together.
 
     constituents   of each member: its face, or two that are opposed; or a feature that was declared before
@@ -299,7 +299,7 @@ class Pattern(Toleranced, Readable):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DatumTargets(Readable):
+class DatumTargets(Declaration):
     """A datum that touches its part at points on features, along their normals there, as locators of a fixture do.
 
     Several features may have targets of one datum. More targets than it locks freedoms count by least squares.
@@ -312,7 +312,7 @@ class DatumTargets(Readable):
     declared_at: str = ""
 
     @property
-    def name(self) -> str:
+    def name(self) -> str:  # type: ignore[override]
         return self.letter
 
     @property

@@ -10,6 +10,7 @@ import msgspec
 
 MAX_NUMBER = 1e100  # its square is finite
 MAX_MESSAGE = 300
+MAX_DEPTH = 20  # of values in a document
 PLAIN_TYPES = {
     "int": "a whole number", "float": "a number", "str": "a text", "bool": "true or false", "array": "a list",
     "object": "named values", "null": "null",
@@ -43,7 +44,7 @@ class Place:
     """A place in a document, such as `parts[2].name`.
 
     part     the part whose features an entry there may name
-    record   the entry of the record that it belongs to
+    record   the entry in a list of the document that it belongs to
     """
 
     sources: Sources
@@ -54,6 +55,8 @@ class Place:
     def __getitem__(self, key: str | int) -> "Place":
         if isinstance(key, int):
             return replace(self, path=f"{self.path}[{key}]")
+        if self.path.count(".") > MAX_DEPTH:
+            raise self.error("its values are nested too deeply")
         return replace(self, path=f"{self.path}.{key}" if self.path else key)
 
     @property

@@ -14,11 +14,8 @@ from dataclasses import FrozenInstanceError
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
 from tolcontact.declaration import Assembly
-from tolcontact.declaration.codec import definitions
-from tolcontact.declaration.document import DOCUMENT, assembly_of, to_document
+from tolcontact.declaration.document import assembly_of, json_schema, to_document
 from tolcontact.declaration.geometry import Mesh
 from tolcontact.declaration.measure import Tape
 from tolcontact.declaration.part import Face
@@ -69,18 +66,6 @@ def write_json(assembly: Assembly, path: Path, triangles: Callable[[Face], list[
     document = to_document(assembly, triangles, tapes, path.resolve().parent)
     text = json.dumps({"$schema": SCHEMA_NAME, **document}, indent=1, ensure_ascii=False)
     path.write_text(text + "\n", encoding="utf-8")
-
-
-def json_schema() -> dict[str, Any]:
-    """Return the JSON schema of a model as JSON: names, types, defaults and limits of all that is declared."""
-    root = msgspec.json.schema_components([DOCUMENT], ref_template="#/$defs/{name}")[1]["Document"]
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **root,
-        "title": "tolcontact model",
-        "description": "A declared assembly: lengths in mm, angles in rad, forces in N.",
-        "$defs": definitions(),
-    }
 
 
 if __name__ == "__main__":

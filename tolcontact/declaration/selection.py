@@ -3,11 +3,11 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
-from tolcontact.declaration.checks import LENGTH, TRUTH, field_faults, one_of
+from tolcontact.declaration.checks import LENGTH, TRUTH, Checked, one_of
 from tolcontact.declaration.values import DIRECTIONS, Vector, direction as _direction, is_finite, is_length, vector
 from tolcontact.errors import shown
 from tolcontact.readable import Readable
@@ -16,13 +16,7 @@ from tolcontact.vocabulary import SURFACE_KINDS
 Picker = Callable[[np.ndarray, np.ndarray], np.ndarray]
 FACE_ANGLE = math.radians(1.0)
 KINDS = (*SURFACE_KINDS, "general")  # of surfaces
-FACE_GROUPS = ("slot", "pattern")  # that one of their faces stands for
-
-
-class Selection(Protocol):
-    """A criterion of triangles. A face consists of the triangles that meet all of its criteria."""
-
-    def faults(self) -> Iterator[str]: ...
+FACE_GROUPS = ("slot", "pattern")  # one of their faces selects all of them
 
 
 @dataclass(frozen=True, repr=False)
@@ -70,13 +64,10 @@ class Triangles(Readable):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Picked(Readable):
+class Picked(Checked):
     """Triangles that a function `(centres, normals) -> mask` of arrays (triangle, 3) [mm, -] picks."""
 
     function: Picker
-
-    def faults(self) -> Iterator[str]:
-        yield from ()
 
     def __str__(self) -> str:
         return "(selected)"
@@ -105,14 +96,13 @@ class Inside(Readable):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Near(Readable):
+class Near(Checked):
     """Flat faces, and triangles of curved ones, that face `part` and come within `within` [mm] of it nominally."""
 
     part: Any  # a Part, whose module imports this one
     within: float
 
-    def faults(self) -> Iterator[str]:
-        yield from field_faults(self, {"within": LENGTH})
+    checks: ClassVar = {"within": LENGTH}
 
     def __str__(self) -> str:
         return f"within {self.within:g} mm of {self.part.name}"
@@ -122,8 +112,8 @@ class Near(Readable):
 class Brep(Readable):
     """Faces of the B-rep of a STEP file, each by number (`tolcontact faces` lists them), by name, or by a point [mm].
 
-    With `whole`, each one stands for all faces that make up its surface: the two halves of a hole, or the parts of a bore that
-    keyways interrupt. With `whole="slot"` it stands for the two planes and the two round ends of its slot, and with
+    With `whole`, each one selects all faces that make up its surface: the two halves of a hole, or the parts of a bore that
+    keyways interrupt. With `whole="slot"` it selects the two planes and the two round ends of its slot, and with
     `whole="pattern"` for all equal holes of the body with parallel axes.
     `Brep(3) | Brep("seat")` are the faces of both.
     """
@@ -173,14 +163,13 @@ def _brep_words(which: int | str | Vector) -> str:
 
 
 @dataclass(frozen=True, repr=False)
-class Cylinder(Readable):
+class Cylinder(Checked):
     """Cylindrical faces: of one `radius` [mm] only, and of holes (`inner=True`) or pins (`inner=False`) only."""
 
     radius: float | None = None
     inner: bool | None = None
 
-    def faults(self) -> Iterator[str]:
-        yield from field_faults(self, {"radius": LENGTH, "inner": TRUTH})
+    checks: ClassVar = {"radius": LENGTH, "inner": TRUTH}
 
     def __str__(self) -> str:
         noun = {None: "cylinders", True: "inner cylinders", False: "outer cylinders"}[self.inner]
@@ -188,7 +177,7 @@ class Cylinder(Readable):
 
 
 @dataclass(frozen=True, repr=False)
-class Largest(Readable):
+class Largest(Checked):
     """The largest face of one `kind`; with a `direction` ("+x" to "-z", or a vector), the largest one along it.
 
     The normal of a plane points along the direction; the axis of a cylinder, cone or torus is parallel to it in either sense.
@@ -198,13 +187,15 @@ class Largest(Readable):
     kind: str
     direction: Any = None
 
+    checks: ClassVar = {"kind": one_of(KINDS)}
+
     @property
     def axis(self) -> Vector | None:
         """Unit vector."""
         return None if self.direction is None else _direction(self.direction)
 
     def faults(self) -> Iterator[str]:
-        yield from field_faults(self, {"kind": one_of(KINDS)})
+        yield from super().faults()
         if self.axis is not None and not is_finite(self.axis):
             yield f'unknown direction "{self.direction}"; expected one of {", ".join(DIRECTIONS)}, or a vector'
 
@@ -212,11 +203,14 @@ class Largest(Readable):
         return f"largest {self.kind}" + ("" if self.direction is None else f" facing {self.direction}")
 
 
+Selection = Facing | Triangles | Picked | Inside | Near | Brep | Cylinder | Largest  # a criterion of triangles
+
+
 def criterion(choice: Any) -> Selection:
     """Return the criterion for a direction, indices of triangles, a function, or a criterion. Raises TypeError for others."""
     if isinstance(choice, str):
         return Facing(choice)
-    if isinstance(choice, Facing | Triangles | Picked | Inside | Near | Brep | Cylinder | Largest):
+    if isinstance(choice, Selection):
         return choice
     if callable(choice):
         return Picked(choice)

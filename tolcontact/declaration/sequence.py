@@ -1,32 +1,66 @@
-"""The sequence of stations: which parts are present in each, as which bodies, and what is wrong with that.
+"""Stations of an assembly that is built in steps: the parts and bodies in each, and the faults of their sequence.
 
-A station is a model by itself: its parts, with the locations, contact pairs, forces and measures that it declares, and the
+A station is a model of its own: its parts, with the locations, contact pairs, forces and measures that it declares, and the
 joints that it locates.
 """
 
 from collections.abc import Iterator, Sequence
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
-from tolcontact.declaration.joint import Joint
+from tolcontact.declaration.checks import Declaration
+from tolcontact.declaration.declarations import Declarations, expect
+from tolcontact.declaration.joint import Joint, parts_of
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.part import Part
-from tolcontact.declaration.station import Station
-from tolcontact.declaration.values import group_faults, key_faults, repetitions
-from tolcontact.errors import designation
+from tolcontact.declaration.values import group_faults, key_faults, repetitions, script_line
 
 SETTINGS = {"locations": "locate", "pairs": "contact", "measures": "measure", "forces": "force"}  # lists, and their methods
 
 
-class Line(Protocol):
-    """The assembly that the stations build."""
+Line = Any  # the assembly that the stations build; its module imports this one
 
-    parts: Any
-    locations: Any
-    pairs: Any
-    measures: Any
-    forces: Any
-    stations: Any
-    joints: Any
+
+class Station(Declarations, Declaration):
+    """A step of building or measuring an assembly: `assembly.station(name)` declares it, in the order of the steps.
+
+    Parts and joints are located again in each station; a station that only measures is an inspection. Features belong to parts:
+    their deviations are equal in all stations. A locator is a contributor of its own in each station, "weld.panel.A1".
+    """
+
+    name: str
+    declared_at: str
+    noun: ClassVar[str] = "station"
+
+    def __init__(self, name: str, declared_at: str = "") -> None:
+        self.name, self._station, self.declared_at = name, name, declared_at
+        self._assembly: Declarations | None = None
+
+    def belonging_to(self, assembly: Declarations) -> "Station":
+        """Let the station declare into the lists of an assembly, and return it."""
+        self._assembly = assembly
+        return self
+
+    def join(self, name: str, *bodies: Part | Joint) -> Joint:
+        """Declare that parts, or joints of earlier stations, are joined at the end of this station, and return the joint.
+
+        Later stations locate the joint by points of any of its parts.
+        """
+        for body in bodies:
+            expect(f'join "{name}": a body', body, Part | Joint, "parts and joints, as in weld.join(name, left, right)")
+        return self._add("joints", Joint(name, parts_of(bodies), self.name, script_line()))
+
+    @property
+    def assembly(self) -> Any:
+        if self._assembly is None:
+            raise TypeError(f'station "{self.name}" belongs to no assembly; declare it with assembly.station(name)')
+        return self._assembly
+
+    def faults(self) -> Iterator[str]:
+        if not isinstance(self.name, str):
+            yield f"name is {self.name!r}; expected a text"
+
+    def __str__(self) -> str:
+        return f"station {self.name}"
 
 
 def joined_before(line: Line, station: Station) -> dict[Part, Joint]:
@@ -81,11 +115,11 @@ def sequence_faults(line: Line) -> Iterator[str]:
     for list_name, method in SETTINGS.items():
         for thing in getattr(line, list_name):
             if thing.station not in names:
-                yield f"{designation(thing.noun, thing)} belongs to no station; declare it in one: station.{method}(...)"
+                yield f"{thing.designation} belongs to no station; declare it in one: station.{method}(...)"
     for joint in line.joints:
-        yield from (f"{designation(joint.noun, joint)}: {fault}" for fault in joint.faults())
+        yield from joint.located_faults()
         if joint.station not in names:
-            yield f'{designation(joint.noun, joint)} refers to station "{joint.station}"; the stations are: {", ".join(names)}'
+            yield f'{joint.designation} refers to station "{joint.station}"; the stations are: {", ".join(names)}'
     for station in line.stations:
         yield from _station_faults(line, station)
 
@@ -93,14 +127,14 @@ def sequence_faults(line: Line) -> Iterator[str]:
 def _station_faults(line: Line, station: Station) -> Iterator[str]:
     joined, settings = joined_before(line, station), settings_of(line, station)
     if not settings["locations"]:
-        yield f"{designation(station.noun, station)}: it locates nothing; call {station.name}.locate(...)"
+        yield f"{station.designation}: it locates nothing; call {station.name}.locate(...)"
     bodies: dict[Joint | Part, Location] = {}
     for location in settings["locations"]:
-        yield from (f"{designation(location.noun, location)}: {fault}" for fault in _location_faults(location, joined, station))
+        yield from location.located_faults(_location_faults(location, joined, station))
         body = joined.get(location.part, location.part)
         if body in bodies:
             earlier = bodies[body].declared_at or "an earlier location"
-            place = designation(location.noun, location)
+            place = location.designation
             yield f'{place}: station "{station.name}" locates it twice, first in {earlier}; locate it once'
         bodies.setdefault(body, location)
     present = present_parts(line, station)
@@ -108,7 +142,7 @@ def _station_faults(line: Line, station: Station) -> Iterator[str]:
         for thing in things:
             for part in dict.fromkeys(thing.parts):
                 if part in line.parts and part not in present and not (isinstance(thing, Location) and part is thing.part):
-                    yield f"{designation(thing.noun, thing)}: {_absence(part, joined, station)}"
+                    yield f"{thing.designation}: {_absence(part, joined, station)}"
     yield from _join_faults(line, station, present)
 
 
@@ -139,7 +173,7 @@ def _join_faults(line: Line, station: Station, present: Sequence[Part]) -> Itera
     for joint in line.joints:
         if joint.station != station.name:
             continue
-        place = designation(joint.noun, joint)
+        place = joint.designation
         for part in dict.fromkeys(joint.members):
             if part in joints:
                 yield (

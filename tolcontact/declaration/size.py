@@ -5,18 +5,17 @@ from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
 from typing import Any, ClassVar
 
-from tolcontact.declaration.checks import field_faults, one_of
+from tolcontact.declaration.checks import Checked, one_of
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.tolerance_class import tolerance_class
 from tolcontact.declaration.values import is_length
 from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
-from tolcontact.readable import Readable
 
 MOVES = ("both", "first", "second")
 
 
 @dataclass(frozen=True, repr=False)
-class Size(Readable):
+class Size(Checked):
     """The size of a feature [mm]: the diameter of a cylinder or sphere, the distance of two opposed planes.
 
     `tc.Size(8.1, +0.05, -0.02)` has the limits 8.08 and 8.15, `tc.Size(8.1, 0.05)` has 8.05 and 8.15. The limits may be written
@@ -26,15 +25,17 @@ class Size(Readable):
     """
 
     kind: ClassVar[str] = "size"
+    letters: ClassVar[tuple[str, ...]] = ()  # of datums
+    checks: ClassVar = {"moves": one_of(MOVES)}
 
     nominal: float
     upper: float  # a text or a pair only if it is no tolerance
     lower: float = None  # type: ignore[assignment]  # -upper by default
     _: KW_ONLY
-    distribution: Any = "normal"
     cp: float | None = None
     cpk: float | None = None
     moves: str = "both"
+    distribution: Any = "normal"
     tolerance_class: str = ""
 
     def __post_init__(self) -> None:
@@ -73,7 +74,7 @@ class Size(Readable):
             yield f"{name} is {getattr(self, name)!r}; expected a number in mm"
         else:
             yield from self._limit_faults()
-        yield from field_faults(self, {"moves": one_of(MOVES)})
+        yield from super().faults()
 
     def _limit_faults(self) -> Iterator[str]:
         if not self.nominal > 0:

@@ -15,7 +15,7 @@ MAX_LENGTH = 200  # characters of an entry
 class TitleBlock:
     """The title block of reports of an assembly; empty entries are left out.
 
-    `date` is a text, in any form in which a company writes dates. Without a `title`, reports have the name of the assembly.
+    `date` is a text in any format. Without a `title`, reports have the name of the assembly.
     """
 
     title: str = ""
@@ -43,7 +43,7 @@ class TitleBlock:
         return {f"{TITLE_PREFIX}{name}": value for name, value in self.entries.items() if value}
 
     def overridden(self, entries: Mapping[str, str | None]) -> "TitleBlock":
-        """Return the title block with other entries, as far as they are not None. Raises OptionError for a faulty one."""
+        """Return the title block with other entries, where they are not None. Raises OptionError for a faulty one."""
         block = TitleBlock(**{**self.entries, **{name: value for name, value in entries.items() if value is not None}})
         for fault in block.faults():
             raise OptionError(f"title block: {fault}")

@@ -30,7 +30,7 @@ class Tolerance(Readable):
     The range may be written as on drawings: "±0.1" has the range 0.2, and "+0.1/-0.05" or (-0.05, 0.1) the range 0.15 with a
     shift of 0.025. `shift` [mm] moves the whole distribution. `cp` and `cpk` are the capability of a process with a normal
     distribution: 6 sigma = range / cp, and the mean moves up by a further range / 2 * (1 - cpk / cp).
-    `distribution` may also be a frozen continuous distribution of `scipy.stats`. It defines the spread by itself; leave
+    `distribution` may also be a frozen continuous distribution of `scipy.stats`. It defines the spread alone; leave
     `range` out.
     """
 
@@ -68,7 +68,7 @@ class Tolerance(Readable):
             elif value is not None and self.distribution != "normal":
                 yield f"{option} is given, which goes with a normal distribution; leave it out"
         if self.cpk is not None and (self.cp is None or (is_length(self.cpk) and is_length(self.cp) and self.cpk > self.cp)):
-            yield f"cpk is {self.cpk!r} with cp {self.cp!r}; expected cp, and cpk at most as large"
+            yield f"cpk is {self.cpk!r} with cp {self.cp!r}; expected cp, and cpk not above it"
 
     def _scipy_faults(self) -> Iterator[str]:
         frozen = self.distribution
@@ -91,7 +91,7 @@ class Tolerance(Readable):
 
     @property
     def mean_shift(self) -> float:
-        """The distance [mm] by which `shift` and `cpk` move the distribution."""
+        """The shift [mm] of the distribution by `shift` and `cpk`."""
         capability_shift = 0.0 if self.cp is None or self.cpk is None else float(self.range or 0) / 2 * (1 - self.cpk / self.cp)
         return float(self.shift) + capability_shift
 

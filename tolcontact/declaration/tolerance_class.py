@@ -2,8 +2,8 @@
 
 The tables hold the standard's values in micrometres: the grades IT01 to IT18 of its Table 1, and the fundamental deviations of
 its Tables 2 to 5, for sizes up to 3150 mm. A row begins at the smallest sizes; "-" is no value, and neither is the end of a
-shorter row. The class of a hole has capital letters, and its fundamental deviation is that of the shaft of the same letter,
-mirrored and, for fine grades of K to ZC, increased by a correction.
+shorter row. The class of a hole has capital letters, and its fundamental deviation is the one of the shaft of the same
+letter, mirrored and, for fine grades of K to ZC, increased by a correction.
 """
 
 import re

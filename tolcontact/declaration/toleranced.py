@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator
 from typing import ClassVar
 
+from tolcontact.declaration.checks import Declaration
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Position
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.values import is_length
@@ -12,7 +13,7 @@ Control = Size | GeometricTolerance  # what limits a feature
 LETTER = re.compile(r"[A-Z]{1,2}")
 
 
-class Toleranced:
+class Toleranced(Declaration):
     """A feature or a pattern, with its tolerances.
 
     noun              its name in messages
@@ -70,7 +71,7 @@ class Toleranced:
         tolerances = [tolerance for tolerance in self.geometric if is_length(tolerance.width)]
         for form in (tolerance for tolerance in tolerances if tolerance.is_form):
             for tolerance in tolerances:
-                is_around = not tolerance.is_form and not tolerance.tangent  # form is not that of a tangent plane
+                is_around = not tolerance.is_form and not tolerance.tangent  # a tangent plane has no form
                 contains = is_around and (not form.of.around or tolerance.kind in form.of.around)
                 if contains and tolerance.width < form.width:
                     yield (

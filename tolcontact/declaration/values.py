@@ -40,7 +40,7 @@ def key_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
 
 
 def group_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
-    """Yield the faults of names after which the archive calls groups, in addition to those of `key_faults`."""
+    """Yield the faults of names that become names of groups in the archive, in addition to `key_faults`."""
     for name in dict.fromkeys(names):
         if isinstance(name, str) and len(name) <= MAX_NAME:
             size = len(unicodedata.normalize("NFC", name).encode("utf-8", "replace"))

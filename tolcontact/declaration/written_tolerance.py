@@ -55,7 +55,7 @@ def written(value: Any, *, units: str = "mm", nominal: float | None = None) -> A
     """Return Deviations for texts of limit deviations and for pairs, a number for the text of one; other values as they are.
 
     A tolerance class such as "H7" needs a `nominal` size [mm]. Degrees become radians if the `units` are "rad". Numbers of
-    NumPy become those of Python. Raises TextFault for other texts and pairs.
+    NumPy become numbers of Python. Raises TextFault for other texts and pairs.
     """
     if isinstance(value, list | tuple):
         return _pair(value)

@@ -27,7 +27,7 @@ def check_types(scene: Any, name: str, fastener: Any, through: Any, into: Any, s
 
 
 def station_faults(assembly: Assembly, scene: Assembly | Station) -> Iterator[str]:
-    """Yield the fault of a fastener that an assembly with stations declares by itself."""
+    """Yield the fault of a fastener of an assembly with stations that belongs to none of them."""
     if assembly.stations and scene is assembly:
         yield f"it belongs to no station; declare it in one: tc.fasten({assembly.stations[0].name}, ...)"
 

@@ -52,7 +52,7 @@ def fasten(
 ) -> Part:
     """Declare a fastener in the holes of several parts of a scene, and return its part.
 
-    scene      the assembly, or the station in which its location, contacts and force are declared
+    scene      the assembly, or the station of its location, contacts and force
     fastener   its diameter or its tc.Size, and a part is made; or a part, or the face of its shank
     through    the holes that it passes through, from its head on
     into       a threaded or press-fit hole, which holds it; without one it floats in the clearance of its holes

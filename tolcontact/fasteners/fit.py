@@ -9,10 +9,10 @@ from tolcontact.declaration import Face, Part
 from tolcontact.errors import GeometryFault
 from tolcontact.fasteners.placed_faces import Axis, PlacedCylinder, PlacedPlane, outer_cylinders, placed_cylinder
 
-INTO, SEAT = "into", "seat"  # labels of faces beside "through[0]" and so on
+INTO, SEAT = "into", "seat"  # labels of faces, in addition to "through[0]" and so on
 FREE_END = 0.25  # of the diameter: how far a made shank reaches out of the parts
 ROUNDING = 1e-6  # of a diameter: what counts as nothing
-PRESSED = 1e-3  # of a diameter: how far the axis of a part may be off that of the hole that it goes into
+PRESSED = 1e-3  # of a diameter: distance allowed between the axes of a part and of the hole that it goes into
 MAX_LEAN = 1e-4  # [rad] between the axis of a fastener and the normal of its seat
 
 Holes = Mapping[str, PlacedCylinder]  # by their labels, from the head on
@@ -97,14 +97,13 @@ def part_fit(part: Part, face: Face | None, holes: Holes, seat: PlacedPlane | No
                 "its shank in place of the part"
             )
         shank = candidates[0]
-    towards = _axis_of(list(holes.values()), seat).head
-    axis = Axis(shank.middle, shank.direction * (1.0 if shank.direction @ towards >= 0 else -1.0))
+    axis = shank.axis(_axis_of(list(holes.values()), seat).head)
     return Fit(holes, seat, axis, shank.radius, shank.extent(axis), shank.face)
 
 
 def _reaches(cylinder: PlacedCylinder, hole: PlacedCylinder) -> bool:
     """Return whether the middle of a hole lies within a cylinder."""
-    axis = Axis(cylinder.middle, cylinder.direction)
+    axis = cylinder.axis(cylinder.direction)
     low, high = cylinder.extent(axis)
     return axis.distance(hole.middle) < cylinder.radius and low < axis.station(hole.middle) < high
 
@@ -112,5 +111,4 @@ def _reaches(cylinder: PlacedCylinder, hole: PlacedCylinder) -> bool:
 def _axis_of(holes: list[PlacedCylinder], seat: PlacedPlane | None) -> Axis:
     """Return the axis of the last hole, towards the first one, or out of the seat."""
     first, last = holes[0], holes[-1]
-    towards = seat.normal if seat else first.middle - last.middle
-    return Axis(last.middle, last.direction * (1.0 if last.direction @ towards >= 0 else -1.0))
+    return last.axis(seat.normal if seat else first.middle - last.middle)

@@ -12,7 +12,7 @@ from tolcontact.geometry.faces import face_area
 from tolcontact.geometry.shapes import HEAD_WIDTH
 
 DIGITS = 12  # of places [mm]: what is beyond is rounding
-SAME_FACE = 1 - 1e-6  # share of its area that a face has in common with that of its feature
+SAME_FACE = 1 - 1e-6  # share of its area that a face has in common with the face of its feature
 
 
 def locate(scene: Assembly | Station, name: str, part: Part, fit: Fit) -> None:
@@ -42,7 +42,7 @@ def _hole_locators(part: Part, fit: Fit, hole: PlacedCylinder) -> Iterator[Locat
 
 
 def _seat_locators(part: Part, fit: Fit, seat: PlacedPlane) -> Iterator[Locator]:
-    """Yield supports under the head of a fastener, and above it: it slides on its seat, and neither lifts off nor leans."""
+    """Yield supports under the head of a fastener, and above it: it slides on its seat, and neither lifts off nor tilts."""
     x, y = fit.axis.across
     middle, arm = fit.axis.at(fit.axis.station(seat.point)), HEAD_WIDTH * fit.radius
     for number in range(3):

@@ -38,7 +38,7 @@ class Axis:
         return self.origin + station * self.head
 
     def station(self, point: np.ndarray) -> float:
-        """Return the station [mm] beside a point (3,)."""
+        """Return the station [mm] of the projection of a point (3,)."""
         return float((point - self.origin) @ self.head)
 
     def distance(self, point: np.ndarray) -> float:
@@ -66,13 +66,17 @@ class PlacedCylinder:
         along = self.ends[1] - self.ends[0]
         return along / np.linalg.norm(along)
 
+    def axis(self, towards: np.ndarray) -> Axis:
+        """Return its axis from its middle, in the sense of a vector (3,)."""
+        return Axis(self.middle, self.direction * (1.0 if self.direction @ towards >= 0 else -1.0))
+
     def extent(self, axis: Axis) -> tuple[float, float]:
         """Return the stations [mm] on the axis of a fastener between which it lies."""
         low, high = sorted(axis.station(end) for end in self.ends)
         return low, high
 
     def offset(self, axis: Axis) -> float:
-        """Return the largest distance [mm] of its own axis from that of a fastener."""
+        """Return the largest distance [mm] from its own axis to the axis of a fastener."""
         return max(axis.distance(end) for end in self.ends)
 
 

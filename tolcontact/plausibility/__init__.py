@@ -1,4 +1,4 @@
-"""Look at the nominal assembly as an experienced colleague would, and warn of probable mistakes.
+"""Check whether the nominal assembly is plausible, and warn of probable mistakes.
 
 .. include:: ../guide/plausibility.md
 """

@@ -9,7 +9,6 @@ import numpy as np
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.declaration import Part
 from tolcontact.discretization import Nominal, NominalPart
-from tolcontact.errors import designation
 from tolcontact.features.feature_geometry import CylinderFeature
 from tolcontact.geometry.body_overlap import SolidBody, common_ball
 from tolcontact.interference import Clash
@@ -21,7 +20,7 @@ MIN_THICKNESS_SHARE = 0.02  # of the thinner body: thinner overlaps are not look
 FACET_FACTOR = 2.0  # times the height of round faces over their triangles
 MAX_COMPARED = 1000  # pairs of bodies whose boxes overlap
 MIN_SHARE = 0.005  # of the draws
-MIN_MEASURED = 8  # draws in which the depth of a clash is measured
+MIN_MEASURED = 8  # draws whose depth of a clash is measured
 MAX_TRIANGLES = 20_000  # of both bodies, in all of these draws, if there are more of them
 MAX_CLASHES = 20  # pairs of parts that are named
 
@@ -49,10 +48,10 @@ def clashes(draws: TrialDraws) -> Iterator[str]:
     """
     nominal, watch = draws.program.nominal, draws.program.watch
     declared = {_parts(nominal, pair) for pair in watch.declared}
-    told = set[frozenset[Part]]()
+    reported = set[frozenset[Part]]()
     for clash in draws.clashes:
         parts = _parts(nominal, clash.pair)
-        if parts in told or parts in declared or clash.pair in watch.overlapping or _is_carried(nominal, clash.pair):
+        if parts in reported or parts in declared or clash.pair in watch.overlapping or _is_carried(nominal, clash.pair):
             continue
         if any(nominal.may_differ(body) for body in clash.pair):
             measured = _measured(draws, clash.pair, _rows_with_contact(draws, clash.pair), draws.resolved.poses[:, CORRECTED])
@@ -60,15 +59,15 @@ def clashes(draws: TrialDraws) -> Iterator[str]:
             measured = _measured(draws, clash.pair, clash.rows, draws.poses)
         if measured.share <= MIN_SHARE:
             continue
-        told.add(parts)
-        if len(told) > MAX_CLASHES:
-            yield f"more than {MAX_CLASHES} pairs of parts lie in each other without contact; declare that of these first"
+        reported.add(parts)
+        if len(reported) > MAX_CLASHES:
+            yield f"more than {MAX_CLASHES} pairs of parts lie in each other without contact; declare their contact first"
             return
         moving, reference = moving_first(nominal, clash.pair)
         location = nominal.assembly.location_of(moving.part)
-        basis = ", on which it is located," if location is not None and location.parent is reference.part else ""
+        basis = ", its support," if location is not None and location.parent is reference.part else ""
         yield (
-            f'{designation("part", moving.part)}: it lies in part "{reference.name}"{basis} in {_extent(draws, measured, 0)}, '
+            f'{moving.part.designation}: it lies in part "{reference.name}"{basis} in {_extent(draws, measured, 0)}, '
             f"and no contact holds them apart; declare it: {contact_line(nominal, clash.pair, measured.places[0])}, "
             f"or say that it is meant: {overlap_line(nominal, clash.pair)}"
         )
@@ -94,7 +93,7 @@ def clashes_beyond_faces(draws: TrialDraws) -> Iterator[str]:
             pair = next(pair for pair in nominal.assembly.pairs if {pair.moving.part, pair.reference.part} == parts)
             moving, reference = moving_first(nominal, clash.pair)
             yield (
-                f'{designation("contact pair", pair)}: part "{moving.name}" still lies in part "{reference.name}" beyond the '
+                f'{pair.designation}: part "{moving.name}" still lies in part "{reference.name}" beyond the '
                 f"chosen faces in {_extent(draws, measured, beyond[0])}; declare their contact there, too: "
                 f"{contact_line(nominal, clash.pair, measured.places[beyond[0]])}, or say that it is meant: "
                 f"{overlap_line(nominal, clash.pair)}"
@@ -107,12 +106,13 @@ def _parts(nominal: Nominal, pair: tuple[int, int]) -> frozenset[Part]:
 
 def _is_carried(nominal: Nominal, pair: tuple[int, int]) -> bool:
     """Return whether two bodies are of one joint, so that an earlier station decides how they lie to each other."""
-    carriers = [part.parent if part.carried is not None else number for number, part in ((k, nominal.parts[k]) for k in pair)]
-    return carriers[0] == carriers[1]
+    first, second = ((k, nominal.parts[k]) for k in pair)
+    roots = [part.parent if part.carried is not None else number for number, part in (first, second)]
+    return roots[0] == roots[1]
 
 
 def _rows_with_contact(draws: TrialDraws, pair: tuple[int, int]) -> Int[Array, " k"]:
-    """Return the draws (k,) in which two bodies lie in each other after contact has moved them."""
+    """Return the draws (k,) with two bodies in each other after contact has moved them."""
     clashes = draws.program.watch.clashes(draws.resolved.poses[:, CORRECTED], draws.deviations, among=[pair])
     return next((clash.rows for clash in clashes), np.zeros(0, dtype=int))
 
@@ -175,14 +175,14 @@ def body_overlaps(draws: TrialDraws) -> Iterator[str]:
         if ball is not None and not _is_press_fit(nominal, nominal.parts[i], nominal.parts[j], *ball):
             diameter, place = ball
             yield (
-                f'{designation("part", nominal.parts[i].part)}: it overlaps part "{nominal.parts[j].name}" by about '
+                f'{nominal.parts[i].part.designation}: it overlaps part "{nominal.parts[j].name}" by about '
                 f"{diameter:.2g} mm near ({', '.join(f'{c:.4g}' for c in place)}) in the nominal assembly, and they are no "
                 "contact pair; check their places, declare their contact, or say that it is meant: assembly.may_overlap(...)"
             )
 
 
 def _is_press_fit(nominal: Nominal, left: NominalPart, right: NominalPart, diameter: float, place: np.ndarray) -> bool:
-    """Return whether the ball in which two parts overlap lies at the wall of a hole of one that the other is located in.
+    """Return whether two parts overlap at the wall of a hole of one that the other is located in.
 
     A screw is thicker than its thread, and a dowel than its hole.
     """

@@ -1,4 +1,4 @@
-"""Points that lie off their part, units in which they would not, and directions that do not fit the surface there."""
+"""Points off their part, meshes in other units, and directions that do not fit the surface of their part."""
 
 from collections import defaultdict
 from collections.abc import Iterator
@@ -11,14 +11,13 @@ import numpy as np
 from tolcontact.declaration import Assembly, Mesh, Part
 from tolcontact.declaration.geometry import STEP, UNITS
 from tolcontact.discretization import Nominal, NominalPart
-from tolcontact.errors import designation
 from tolcontact.plausibility.trial_draws import TrialDraws
 
 FAR_SHARE = 0.25  # of a part's size: how far off its box a point may lie
 ON_SURFACE = 1e-4  # of a part's size
 PLAUSIBLE_SIZES = (1.0, 10_000.0)  # of a part [mm]
 MAX_SIZE_RATIO = 10.0  # of parts that touch
-MESH_MARGIN = 0.1  # of a mesh's size: distance up to which points count as on the mesh
+MESH_MARGIN = 0.1  # of a mesh's size: largest distance of a point on the mesh
 MIN_POINT_REACH = 0.25  # of a mesh in a probable unit: the least reach of points, since a mesh large enough holds any points
 OUTWARD, ALONG = 0.5, 0.2  # cosines of the angle between a direction and the normal into the part
 
@@ -49,7 +48,7 @@ def doubtful_units(draws: TrialDraws) -> Iterator[str]:
         if isinstance(geometry, Mesh):
             doubts = chain(_far_point(part, geometry, points[part.part]), _implausible_size(nominal, part, geometry))
             for doubt in islice(doubts, 1):
-                yield f"{designation('part', part.part)}: {geometry} is {float(part.mesh.scale):.4g} mm across, {doubt}"
+                yield f"{part.part.designation}: {geometry} is {float(part.mesh.scale):.4g} mm across, {doubt}"
 
 
 def _far_point(nominal: NominalPart, geometry: Mesh, declared: list[DeclaredPoint]) -> Iterator[str]:
@@ -98,7 +97,7 @@ def _advice(geometry: Mesh, size: float, unit: str) -> str:
 
 
 def _implausible_size(nominal: Nominal, part: NominalPart, geometry: Mesh) -> Iterator[str]:
-    """Yield why the size of a mesh file without any stated units is implausible: alone, or beside a part that it touches."""
+    """Yield why the size of a mesh file without stated units is implausible: alone, or compared with a part that it touches."""
     if geometry.units or not isinstance(geometry.source, str | Path) or _states_units(geometry):
         return
     size, advice = float(part.mesh.scale), _advice(geometry, float(part.mesh.scale), "in")
@@ -134,7 +133,7 @@ def far_points(draws: TrialDraws) -> Iterator[str]:
 
 
 def unfit_directions(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence for each part with locators on its surface whose directions are probably those of the assembly.
+    """Yield a sentence for each part with locators on its surface whose directions are probably stated in the assembly frame.
 
     All of them would then point into the part, while some lie along its surface as they are stated. One-sided locators that
     point out of the part have a sentence each.
@@ -167,7 +166,7 @@ def unfit_directions(draws: TrialDraws) -> Iterator[str]:
 
 
 def parts_in_other_units(draws: TrialDraws) -> list[Part]:
-    """Return the parts whose file is probably in other units, of which a warning of its own says so."""
+    """Return the parts whose file is probably in other units; another warning says so."""
     points = _declared_points(draws)
     return [nominal.part for nominal in draws.program.nominal.last_parts if _probable_unit(nominal, points[nominal.part])]
 
@@ -185,11 +184,11 @@ def _declared_points(draws: TrialDraws) -> "defaultdict[Part, list[DeclaredPoint
     for measure in assembly.measures:
         for point in measure.points:
             if point.position is not None:
-                owner, phrase = designation(measure.noun, measure), f'the point of measurement "{measure.name}"'
+                owner, phrase = measure.designation, f'the point of measurement "{measure.name}"'
                 points[point.part].append(DeclaredPoint(owner, phrase, np.array(point.position)))
     for force in assembly.forces:
         if force.at.position is not None:
-            owner, phrase = designation("force", force), f'the point of force "{force.name}"'
+            owner, phrase = force.designation, f'the point of force "{force.name}"'
             points[force.at.part].append(DeclaredPoint(owner, phrase, np.array(force.at.position)))
     return points
 
@@ -209,7 +208,7 @@ def _outside(points: np.ndarray, bounds: np.ndarray) -> np.ndarray:
 
 
 def _normals_at(nominal: NominalPart, point: np.ndarray) -> np.ndarray:
-    """Return the normals (triangle, 3) of the triangles on which a point (3,) [mm] of a part lies."""
+    """Return the normals (triangle, 3) of the triangles at a point (3,) [mm] of a part."""
     corners, normals = np.asarray(nominal.mesh.triangles), np.asarray(nominal.mesh.face_normals)
     margin = ON_SURFACE * nominal.mesh.scale
     nearby = np.flatnonzero(

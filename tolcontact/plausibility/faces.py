@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from tolcontact.declaration import Assembly, Brep, Face
-from tolcontact.errors import designation
 from tolcontact.geometry.brep_face import describe_faces
 from tolcontact.geometry.faces import Meshes, triangles
 from tolcontact.geometry.files import BREP
@@ -33,10 +32,10 @@ def _faces(assembly: Assembly) -> Iterator[tuple[str, Face]]:
     for part in assembly.parts:
         for feature in part.features:
             for face in feature.faces:
-                yield f'part "{part.name}": {designation("feature", feature)}', face
+                yield f'part "{part.name}": {feature.designation}', face
     for pair in assembly.pairs:
         for face in (pair.moving, pair.reference):
-            yield designation("contact pair", pair), face
+            yield pair.designation, face
 
 
 def _doubts(face: Face, meshes: Meshes) -> Iterator[str]:
@@ -67,7 +66,7 @@ def measured_forms(draws: TrialDraws) -> Iterator[str]:
             if beyond:
                 worst = max(beyond, key=lambda path: widths[path])
                 yield (
-                    f'part "{member.feature.part.name}": {designation(member.feature.noun, member.feature)}: '
+                    f'part "{member.feature.part.name}": {member.feature.designation}: '
                     f"{len(beyond)} of {len(widths)} measured faces are beyond the {pattern.form.kind} of {stated:.4g} mm that "
                     f'is stated; "{Path(worst).name}" has {widths[worst]:.3g} mm; forms are drawn as they were measured, so '
                     "check the tolerance, and the files for outliers"

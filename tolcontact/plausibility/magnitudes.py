@@ -1,4 +1,4 @@
-"""Rotations beyond a full turn, and tolerances that are large beside their part."""
+"""Rotations beyond a full turn, and tolerances that are wide compared with their part."""
 
 import math
 from collections.abc import Iterator
@@ -8,7 +8,6 @@ import numpy as np
 from tolcontact.declaration import Size
 from tolcontact.declaration.values import is_length
 from tolcontact.discretization import NominalPart
-from tolcontact.errors import designation
 from tolcontact.plausibility.declared_points import location_designation, parts_in_other_units
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws
 
@@ -24,13 +23,13 @@ def rotations(draws: TrialDraws) -> Iterator[str]:
         if angle > 2 * math.pi * (1 + 1e-6) or (angle > math.pi * (1 + 1e-6) and (rotation == np.round(rotation)).all()):
             numbers = ", ".join(f"{component:g}" for component in rotation)
             yield (
-                f"{designation('part', nominal.part)}: its rotation ({numbers}) is in rad, a turn by {math.degrees(angle):.4g} "
+                f"{nominal.part.designation}: its rotation ({numbers}) is in rad, a turn by {math.degrees(angle):.4g} "
                 f"degrees; if these are degrees, write rotation=tc.degrees({numbers})"
             )
 
 
 def wide_tolerances(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence for each part with a zone that is wide beside it, or with locators too close together for theirs."""
+    """Yield a sentence for each part with a zone that is wide compared with it, or with locators too close together."""
     in_other_units = parts_in_other_units(draws)
     for nominal in draws.program.nominal.parts:
         if nominal.part in in_other_units:
@@ -41,8 +40,8 @@ def wide_tolerances(draws: TrialDraws) -> Iterator[str]:
         owner, width = max(widths, key=lambda entry: entry[1], default=("", 0.0))
         if width > WIDE_SHARE * size:
             yield (
-                f'{owner}: its tolerance of {width:.4g} mm is wide beside part "{nominal.name}", which is {size:.4g} mm long; '
-                "a tolerance is the full width of its zone, in mm"
+                f'{owner}: its tolerance of {width:.4g} mm is wide compared with part "{nominal.name}", which is {size:.4g} mm '
+                "long; a tolerance is the full width of its zone, in mm"
             )
         elif fault := _tilt(nominal, place):
             yield fault
@@ -53,7 +52,7 @@ def _widths(nominal: NominalPart, place: str) -> list[tuple[str, float]]:
     locators = zip(nominal.locators.labels, nominal.locators.tolerances, strict=True)
     widths = [(f'{place}: locator "{label.rpartition(".")[2]}"', tolerance.width) for label, tolerance in locators]
     for declared in nominal.part.toleranced:
-        where = f'part "{nominal.name}": {designation(declared.noun, declared)}'
+        where = f'part "{nominal.name}": {declared.designation}'
         for tolerance in declared.tolerances:
             width = tolerance.tolerance.width if isinstance(tolerance, Size) else tolerance.width
             if is_length(width):

@@ -9,7 +9,6 @@ from tolcontact import poses as pose
 from tolcontact.compilation import Program
 from tolcontact.declaration import Measure, Point
 from tolcontact.discretization.measured_geometry import Combined, MeshClearance, NominalMeasurement
-from tolcontact.errors import designation
 from tolcontact.plausibility.trial_draws import TrialDraws, spread
 
 FAR_SIGMAS = 100.0  # limits this far from the nominal value do not matter
@@ -25,7 +24,7 @@ def measure_limits(draws: TrialDraws) -> Iterator[str]:
         nominal, limits = float(program.nominal_measures[k]), program.limits(k)
         if limits.are_open or not math.isfinite(nominal):
             continue
-        place = designation(measure.noun, measure)
+        place = measure.designation
         stated = f"limits ({_side(limits.lower)} to {_side(limits.upper)} {measure.units})"
         if limits.outside(np.array(nominal)):
             yield f"{place}: its nominal value {_number(nominal)} is outside of its {stated}; {_cause(program, k, nominal)}"
@@ -36,7 +35,7 @@ def measure_limits(draws: TrialDraws) -> Iterator[str]:
         if MIN_SHARE * distance < sigma and distance > FAR_SIGMAS * sigma + pushed:
             yield (
                 f"{place}: its {stated} are {distance / sigma:.2g} sigma away from its nominal value {_number(nominal)}; check "
-                "their units, and those of the tolerances"
+                "their units, and the units of the tolerances"
             )
 
 
@@ -79,7 +78,7 @@ def _doubts(measure: Measure, clearance: MeshClearance, X: np.ndarray) -> Iterat
     motion = np.linalg.norm(moved[0] - moved[1], axis=2).max(axis=1)
     spare = (clearance.elements.horizon - float(np.linalg.norm(clearance.lines[0, 1] - clearance.lines[0, 0]))) / 2
     if count := int((motion > spare).sum()):
-        place = designation(measure.noun, measure)
+        place = measure.designation
         yield (
             f"{place}: its faces move by more than {spare:.3g} mm in {count} of {len(motion)} draws "
             "without contact; triangles that are not compared may then be nearer, so the clearance is only a lower bound; "

@@ -1,4 +1,4 @@
-"""The look at the nominal assembly: all kinds of warnings, by their names."""
+"""The check of the nominal assembly: all kinds of warnings, by their names."""
 
 import warnings
 from collections.abc import Callable, Iterator

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from tolcontact.discretization import ContactPoints
-from tolcontact.errors import designation
 from tolcontact.geometry.curvature import CHORD_SHARE
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws, spread
 from tolcontact.statics import balances, drawn_contacts
@@ -50,7 +49,7 @@ def pair_clearances(draws: TrialDraws) -> Iterator[str]:
 
 
 def coarse_pairs(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence if the contact points of a pair of curved faces, or its triangles, are coarse beside the tolerances.
+    """Yield a sentence if contact points or triangles of a pair of curved faces are coarse compared with the tolerances.
 
     Errors below the rounding of coordinates in files, which bends flat faces, do not count.
     """
@@ -85,7 +84,7 @@ def _face_pairs(draws: TrialDraws) -> Iterator[tuple[int, ContactPoints, float]]
 
 def _place(draws: TrialDraws, k: int) -> str:
     name = draws.program.nominal.pairs[k].name
-    return designation("contact pair", next(pair for pair in draws.program.nominal.assembly.pairs if pair.name == name))
+    return next(pair for pair in draws.program.nominal.assembly.pairs if pair.name == name).designation
 
 
 def _name(draws: TrialDraws, part: int | None) -> str:
@@ -93,7 +92,7 @@ def _name(draws: TrialDraws, part: int | None) -> str:
 
 
 def unsure_seats(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence for each seat short of which the stated friction can hold its part."""
+    """Yield a sentence for each seat if the stated friction can keep its part off it."""
     assembly = draws.program.nominal.assembly
     if not assembly.forces or all(mu is None for mu in (assembly.mu, *(pair.mu for pair in assembly.pairs))):
         return
@@ -105,5 +104,5 @@ def unsure_seats(draws: TrialDraws) -> Iterator[str]:
                 yield (
                     f'seat "{seat.contact.label}": the forces may not push the part onto it, since friction can hold it short '
                     f"of it: {seat.reserve:.3g} of the stated coefficients suffice, at {holders}; push harder along the seat, "
-                    "let less friction carry, or state the coefficients that are there"
+                    "reduce friction there, or state its actual coefficients"
                 )

@@ -6,20 +6,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tolcontact.declaration.values import DIRECTIONS, direction
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.geometry.analytic_surfaces import Plane
 from tolcontact.geometry.brep_face import number_faces
 from tolcontact.geometry.files import BREP
 from tolcontact.interference import Interference, Watch
 
-AXES = {"+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1)}
 SAME_DIRECTION = 1e-4  # of the cosine of an angle
 
 
 class ClashPlace(NamedTuple):
     """Where two bodies lie in each other.
 
-    triangles   of the mesh of each body: those on which the place may lie, several at an edge and its ends
+    triangles   candidates of the mesh of each body: several at an edge and its ends
     position    (3,) [mm] in the nominal assembly
     """
 
@@ -73,9 +73,9 @@ def face_line(part: NominalPart, triangle: int) -> str:
         face = f'"{stated.name}"' if stated.name and names.count(stated.name) == 1 else str(number + 1)
         whole = "" if stated.surface is None or isinstance(stated.surface, Plane) else ", whole=True"
         return f"{variable}.face(tc.Brep({face}{whole}))"
-    for direction, axis in AXES.items():
-        if normal @ np.array(axis) > 1 - SAME_DIRECTION:
-            return f'{variable}.face("{direction}")'
+    for side in DIRECTIONS:
+        if normal @ np.array(direction(side)) > 1 - SAME_DIRECTION:
+            return f'{variable}.face("{side}")'
     return f"{variable}.face()"
 
 

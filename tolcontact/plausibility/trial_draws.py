@@ -13,7 +13,7 @@ from tolcontact.interference import Clash
 from tolcontact.simulation import Block, simulate_block
 
 DRAWS = 128
-SIGMAS = 3.0  # of a gap or a measure: as far as it varies in nearly all realizations
+SIGMAS = 3.0  # of a gap or a measure: it varies by less in nearly all realizations
 
 
 @dataclass(frozen=True, eq=False)

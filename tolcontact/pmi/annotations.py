@@ -46,7 +46,7 @@ class Tolerance(Readable):
     zone           form of the zone in the file's words: "cylindrical or circular", "spherical", ...; often empty
     projected      length of a projected zone [mm]
     modifiers      in words: "maximum material requirement", "free state", "tangent plane", ...
-    per_unit       length, or lengths of the sides or the diameter of the area, to which the value applies [mm]
+    per_unit       [mm] length that the value applies to, or the lengths of the sides or the diameter of an area
     unit_shape     shape of that area: "square", "circular", "rectangular"
     displacement   of an unequally disposed zone [mm]
     maximum        upper bound of the value [mm]
@@ -108,7 +108,7 @@ class Dimension(Readable):
     unit           "mm" or "rad"; empty without values
     nominal        None if the file states none
     lower, upper   limits of the dimension, not deviations; None on a side where the file states none
-    fit            tolerance class of ISO 286, such as "H7 hole"; `lower` and `upper` are those of the file alone
+    fit            tolerance class of ISO 286, such as "H7 hole"; `lower` and `upper` are stated by the file alone
     modifiers      in words: "theoretical", "auxiliary", "statistical", "controlled radius", "maximum", ...
     face_records, other_records           of the feature of a size, or of that where a location begins
     end_face_records, end_other_records   of the feature where a location ends

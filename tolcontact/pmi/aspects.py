@@ -9,7 +9,7 @@ from tolcontact.pmi.part21 import Parameters, Records
 MAX_VISITS = 2_000_000  # of records, in the search for faces; the largest files of NIST take some thousands
 _FACES = ("ADVANCED_FACE", "FACE_SURFACE", "FACE")
 _USAGES = ("GEOMETRIC_ITEM_SPECIFIC_USAGE", "ITEM_IDENTIFIED_REPRESENTATION_USAGE")
-# From a composite, a pattern or a derived aspect (a centre of symmetry) to the aspects of which it is made.
+# From a composite, a pattern or a derived aspect (a centre of symmetry) to its components.
 _COMPOSITIONS = (
     "SHAPE_ASPECT_RELATIONSHIP", "SHAPE_ASPECT_DERIVING_RELATIONSHIP", "SHAPE_ASPECT_ASSOCIATIVITY",
     "COMPONENT_FEATURE_RELATIONSHIP",

@@ -1,8 +1,7 @@
 """Where on a part the annotations of a file apply: each claims surfaces, which become features."""
 
-from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 
 from tolcontact.declaration.values import Vector
 from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
@@ -11,7 +10,7 @@ from tolcontact.pmi.toleranced_surfaces import TolerancedSurfaces
 from tolcontact.readable import Readable
 
 Annotation = Tolerance | Dimension | Datum
-Place = tuple[frozenset[int], ...]  # of a feature: the numbers of the faces of its surface, or of each of its two planes
+Place = tuple[frozenset[int], ...]  # of a feature: the face indices of its surface, or of each of its two planes
 NO_FACE = "the file states no face for it"  # a reason
 MAX_NAMES = 6  # of features in a reason
 _MEDIAN_KINDS = ("position", "symmetry")  # of two opposed planes: of the middle between them
@@ -33,15 +32,16 @@ class DeclaredAnnotation(Readable):
         return f"{self.annotation}: {names}{f' ({self.reason})' if self.reason else ''}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Claim:
-    """An annotation and the faces that it claims.
+    """An annotation, the faces that it claims, and what becomes of it.
 
     stated    number of faces and targets that the file states for it
     numbers   of its faces on the part
     targets   points of a datum that is established by points alone, with the numbers of their faces
     places    of the features that are to state it
-    reason    why there are none
+    names     of the features that state it
+    refusals  reasons why it is not declared, with the names of the features, or none of them for all
     """
 
     annotation: Annotation
@@ -49,39 +49,28 @@ class Claim:
     numbers: tuple[int, ...]
     targets: tuple[tuple[int, Vector], ...] = ()
     places: tuple[Place, ...] = ()
-    reason: str = ""
+    names: list[str] = field(default_factory=list)
+    refusals: dict[str, list[str]] = field(default_factory=dict)
 
+    def refuse(self, reason: object, name: str = "") -> None:
+        """Note why it is not declared for the feature with a name, or for none."""
+        self.refusals.setdefault(str(reason), []).extend(filter(None, [name]))
 
-class Report:
-    """What becomes of the claims on a part: names of the features that state them, and why others do not."""
-
-    def __init__(self, claims: Sequence[Claim]) -> None:
-        self.names: dict[Claim, list[str]] = defaultdict(list)
-        self._refusals: dict[Claim, dict[str, list[str]]] = {claim: {} for claim in claims}
-        for claim in claims:
-            if claim.reason:
-                self.refuse(claim, claim.reason)
-
-    def refuse(self, claim: Claim, reason: object, name: str = "") -> None:
-        """Note why a claim is not declared for the feature with a name, or for none."""
-        self._refusals[claim].setdefault(str(reason), []).extend(filter(None, [name]))
-
-    def is_refused(self, claim: Claim) -> bool:
-        return bool(self._refusals[claim])
-
-    def reasons(self, claim: Claim) -> list[str]:
-        """Return why a claim is not declared: each reason with the names of the features, unless it is for all."""
+    @property
+    def reasons(self) -> list[str]:
+        """Why it is not declared: each reason with the names of the features, unless it is for all."""
         reasons = []
-        for reason, names in self._refusals[claim].items():
+        for reason, names in self.refusals.items():
             listed = f"{', '.join(names[:MAX_NAMES])}{', ...' if len(names) > MAX_NAMES else ''}: "
-            reasons.append(f"{listed if names and len(names) < len(claim.places) else ''}{reason}")
+            reasons.append(f"{listed if names and len(names) < len(self.places) else ''}{reason}")
         return reasons
 
-    def result(self, claim: Claim) -> DeclaredAnnotation:
-        """Return what became of a claim."""
-        missing = [missing_faces(claim.stated - len(claim.numbers), claim.stated)] if claim.numbers else []
-        reasons = dict.fromkeys(filter(None, [*missing, *self.reasons(claim)]))
-        return DeclaredAnnotation(claim.annotation, tuple(dict.fromkeys(self.names[claim])), "; ".join(reasons))
+    @property
+    def result(self) -> DeclaredAnnotation:
+        """What became of it."""
+        missing = [missing_faces(self.stated - len(self.numbers), self.stated)] if self.numbers else []
+        reasons = dict.fromkeys(filter(None, [*missing, *self.reasons]))
+        return DeclaredAnnotation(self.annotation, tuple(dict.fromkeys(self.names)), "; ".join(reasons))
 
 
 def missing_faces(missing: int, stated: int) -> str:
@@ -97,16 +86,15 @@ def claims_of(pmi: Pmi, surfaces: TolerancedSurfaces) -> list[Claim]:
     claims = [_datum_claim(datum, surfaces) for datum in pmi.datums]
     toleranced: tuple[Tolerance | Dimension, ...] = (*pmi.dimensions, *pmi.tolerances)
     claims += [Claim(one, len(one.face_records), tuple(surfaces.numbers(one.face_records))) for one in toleranced]
-    located: dict[Claim, Claim] = {}
     place_of: dict[int, Place] = {}
     for claim in sorted(claims, key=lambda claim: len(claim.numbers)):
         try:
             _check(claim.annotation)
-            located[claim] = replace(claim, places=tuple(_places(claim, surfaces, place_of)))
+            claim.places = tuple(_places(claim, surfaces, place_of))
         except Undeclared as reason:
-            located[claim] = replace(claim, reason=str(reason))
-        place_of = {number: place for place in located[claim].places for surface in place for number in surface} | place_of
-    return [located[claim] for claim in claims]
+            claim.refuse(reason)
+        place_of = {number: place for place in claim.places for surface in place for number in surface} | place_of
+    return claims
 
 
 def _datum_claim(datum: Datum, surfaces: TolerancedSurfaces) -> Claim:
@@ -137,7 +125,7 @@ def _check(annotation: Annotation) -> None:
 
 
 def _places(claim: Claim, surfaces: TolerancedSurfaces, place_of: dict[int, Place]) -> list[Place]:
-    """Return the places of a claim: those of earlier claims on the same faces, and new ones."""
+    """Return the places of a claim: places of earlier claims on the same faces, and new ones."""
     numbers = claim.numbers
     if not numbers and isinstance(claim.annotation, Datum) and claim.annotation.targets:
         raise Undeclared("none of its targets is on a face of the part")

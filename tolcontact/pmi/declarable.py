@@ -90,12 +90,12 @@ def size(stated: Dimension, nominal: float, *, is_inner: bool) -> Size:
         raise Undeclared(f"its limits {lower:g} and {upper:g} leave no width")
     if not lower - MAX_SIZE_DIFFERENCE * (upper - lower) <= nominal <= upper + MAX_SIZE_DIFFERENCE * (upper - lower):
         raise Undeclared(f"its limits are {lower:.6g} to {upper:.6g}, and the size of the shape is {nominal:.6g}")
-    middle = round(nominal, _DIGITS)  # the kernel's numbers differ from those of the file in their last digits
+    middle = round(nominal, _DIGITS)  # the kernel's numbers differ from the file's in their last digits
     return Size(middle, round(upper - middle, _DIGITS), round(lower - middle, _DIGITS))
 
 
 def _limits(stated: Dimension, nominal: float, is_inner: bool) -> tuple[float, float]:
-    """Return the limits of a size [mm]: those of a dimension, else those of its tolerance class. Raises Undeclared."""
+    """Return the limits of a size [mm], from its dimension or else from its tolerance class. Raises Undeclared."""
     factor = 2.0 if "radius" in stated.name else 1.0
     if stated.lower is not None and stated.upper is not None:
         if stated.unit != "mm":

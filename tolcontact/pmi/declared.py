@@ -10,7 +10,7 @@ from tolcontact.geometry.brep_face import describe_faces
 from tolcontact.geometry.shapes import shape
 from tolcontact.geometry.step_listing import LISTING_CHORD, FacesOfRecords, bodies_in, faces_of_records, part_name
 from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
-from tolcontact.pmi.claims import NO_FACE, Annotation, Claim, DeclaredAnnotation, Report, missing_faces
+from tolcontact.pmi.claims import NO_FACE, Annotation, Claim, DeclaredAnnotation, missing_faces
 from tolcontact.pmi.drafts import Declared, declare_features
 from tolcontact.pmi.reading import read_pmi
 from tolcontact.readable import Readable
@@ -76,19 +76,19 @@ def features_from_pmi(part: Part) -> DeclaredPmi:
         raise OptionError(f"{name}: {error}") from error
     if pmi.is_empty:
         raise OptionError(f"{name}: its file states no tolerances, dimensions or datums as AP242 does")
-    features, claims, report = declare_features(part, pmi, read)
-    return DeclaredPmi(features, tuple(map(report.result, claims)))
+    features, claims = declare_features(part, pmi, read)
+    return DeclaredPmi(features, tuple(claim.result for claim in claims))
 
 
 def declared_file(path: Path, pmi: Pmi) -> DeclaredFile:
-    """Declare the PMI of a file on its bodies, as far as features can state it.
+    """Declare the PMI of a file on its bodies, where features can state it.
 
     A body that stands at several places is declared once. Raises OptionError if the file has no shapes that can be used.
     """
     model = Assembly(path.stem)
     bodies, faces = bodies_in(path), faces_of_records(path)
     parts, known, faults = list[Part](), set[frozenset[int]](), list[str]()
-    reports = list[tuple[list[Claim], Report]]()
+    claims = list[list[Claim]]()
     for body in bodies:
         records = frozenset(record for record, face in faces.items() if body.number in face.bodies) & _records(pmi)
         if not records or records in known:
@@ -101,7 +101,7 @@ def declared_file(path: Path, pmi: Pmi) -> DeclaredFile:
             faults.append(f"body {body.number}: {fault}")
             continue
         part = model.part(part_name(body), geometry, at=body.at, rotation=body.rotation)
-        reports.append(declare_features(part, pmi, read)[1:])
+        claims.append(declare_features(part, pmi, read)[1])
         parts.append(part)
         kinds = {face.number: face.kind for face in describe_faces(read)}
         faces |= {record: replace(faces[record], kind=kinds[faces[record].number]) for record in records}
@@ -112,12 +112,12 @@ def declared_file(path: Path, pmi: Pmi) -> DeclaredFile:
             (annotation, "none of its faces is on a body" if annotation.face_records else NO_FACE) for annotation in _all(pmi)
         )
         return DeclaredFile(pmi, (), tuple(DeclaredAnnotation(annotation, (), reason) for annotation, reason in reasons), faces)
-    merged = tuple(_merged(parts, reports, k) for k in range(len(reports[0][0])))
+    merged = tuple(_merged(parts, of_parts) for of_parts in zip(*claims, strict=True))
     return DeclaredFile(pmi, tuple(parts), merged, faces, tuple(faults))
 
 
 def _records(pmi: Pmi) -> frozenset[int]:
-    """Return the records of all faces to which annotations apply."""
+    """Return the records of all annotated faces."""
     ends = (record for dimension in pmi.dimensions for record in dimension.end_face_records)
     return frozenset((*(record for annotation in _all(pmi) for record in annotation.face_records), *ends))
 
@@ -126,15 +126,14 @@ def _all(pmi: Pmi) -> tuple[Annotation, ...]:
     return (*pmi.datums, *pmi.dimensions, *pmi.tolerances)
 
 
-def _merged(parts: Sequence[Part], reports: Sequence[tuple[list[Claim], Report]], k: int) -> DeclaredAnnotation:
-    """Return what became of annotation `k` on all parts together."""
-    claims = [(part, claims[k], report) for part, (claims, report) in zip(parts, reports, strict=True)]
-    placed = [entry for entry in claims if entry[1].numbers] or claims[:1]
+def _merged(parts: Sequence[Part], claims: Sequence[Claim]) -> DeclaredAnnotation:
+    """Return what became of an annotation on all parts together, from its claims on each of them."""
+    placed = [(part, claim) for part, claim in zip(parts, claims, strict=True) if claim.numbers] or [(parts[0], claims[0])]
     names, reasons = list[str](), list[str]()
-    for part, claim, report in placed:
-        names += [f"{part.name}.{name}" if len(parts) > 1 else name for name in report.names[claim]]
-        reasons += [f"{part.name}: {reason}" if len(placed) > 1 else reason for reason in report.reasons(claim)]
-    _, claim, _ = claims[0]
-    missing = claim.stated - sum(len(placed_claim.numbers) for _, placed_claim, _ in placed)
-    reasons += [missing_faces(missing, claim.stated)] if 0 < missing < claim.stated else []
-    return DeclaredAnnotation(claim.annotation, tuple(dict.fromkeys(names)), "; ".join(dict.fromkeys(reasons)))
+    for part, claim in placed:
+        names += [f"{part.name}.{name}" if len(parts) > 1 else name for name in claim.names]
+        reasons += [f"{part.name}: {reason}" if len(placed) > 1 else reason for reason in claim.reasons]
+    stated = claims[0].stated
+    missing = stated - sum(len(claim.numbers) for _, claim in placed)
+    reasons += [missing_faces(missing, stated)] if 0 < missing < stated else []
+    return DeclaredAnnotation(claims[0].annotation, tuple(dict.fromkeys(names)), "; ".join(dict.fromkeys(reasons)))

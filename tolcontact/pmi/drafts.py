@@ -1,17 +1,17 @@
 """Declaration of features, patterns and datum targets of a part from the PMI of its file.
 
 Annotations of one surface make up a draft. Drafts become features one after the other, each after its datums and with as many
-of its tolerances as go together; a report collects the reasons for the others. The part gets each
-feature as it is made, since patterns ask it for their members.
+of its tolerances as go together; the claims of the others get the reasons. The part gets each feature as it is made, since
+patterns ask it for their members.
 """
 
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 from tolcontact.declaration import Brep, DatumTargets, Face, Feature, Part, Pattern
-from tolcontact.declaration.feature_tolerance import GeometricTolerance
 from tolcontact.declaration.size import Size
+from tolcontact.declaration.toleranced import Control
 from tolcontact.declaration.values import Vector, script_line
 from tolcontact.errors import GeometryFault
 from tolcontact.features import Features, datum_order
@@ -22,12 +22,11 @@ from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.files import Shape
 from tolcontact.pmi import declarable
 from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
-from tolcontact.pmi.claims import Claim, Place, Report, claims_of
+from tolcontact.pmi.claims import Claim, Place, claims_of
 from tolcontact.pmi.declarable import Undeclared
 from tolcontact.pmi.toleranced_surfaces import TolerancedSurfaces
 
-Constituent = Size | GeometricTolerance
-Statement = tuple[Claim, Constituent]
+Statement = tuple[Claim, Control]
 Declared = Feature | Pattern | DatumTargets
 
 
@@ -38,7 +37,7 @@ class Draft:
     faces       of each member
     geometries  of each member
     datum       claim of the datum that it is
-    borrowed    drafts whose features make up a pattern that is a datum alone, or on which targets are
+    borrowed    drafts whose features make up a pattern that is a datum alone, or have the targets
     targets     points of a datum, one for each of `borrowed`
     """
 
@@ -56,18 +55,17 @@ class Draft:
         return self.datum.annotation.letter if self.datum and isinstance(self.datum.annotation, Datum) else None
 
 
-def declare_features(part: Part, pmi: Pmi, read: Shape) -> tuple[tuple[Declared, ...], list[Claim], Report]:
-    """Declare the features that PMI states of a part with a shape; return them, and what became of each claim."""
+def declare_features(part: Part, pmi: Pmi, read: Shape) -> tuple[tuple[Declared, ...], list[Claim]]:
+    """Declare the features that PMI states of a part with a shape; return them and all claims."""
     surfaces = TolerancedSurfaces(read)
     claims = claims_of(pmi, surfaces)
-    report = Report(claims)
     meshes = {part: read}
-    drafts = _drafts(part, meshes, claims, surfaces, report)
-    declared = _Trial(part, meshes, report).features(drafts)
-    return tuple(declared[draft] for draft in drafts if draft in declared), claims, report
+    drafts = _drafts(part, meshes, claims, surfaces)
+    declared = _Trial(part, meshes).features(drafts)
+    return tuple(declared[draft] for draft in drafts if draft in declared), claims
 
 
-def _drafts(part: Part, meshes: Meshes, claims: Sequence[Claim], surfaces: TolerancedSurfaces, report: Report) -> list[Draft]:
+def _drafts(part: Part, meshes: Meshes, claims: Sequence[Claim], surfaces: TolerancedSurfaces) -> list[Draft]:
     """Return drafts of the features and patterns of a part."""
     drafts: dict[Place, Draft] = {}
     for claim in claims:
@@ -78,15 +76,15 @@ def _drafts(part: Part, meshes: Meshes, claims: Sequence[Claim], surfaces: Toler
                     drafts[place] = _draft(name, part, meshes, place)
                 drafts[place] = _with_claim(drafts[place], claim)
             except (Undeclared, GeometryFault) as reason:
-                report.refuse(claim, reason, name)
-    datums = [claim for claim in claims if isinstance(claim.annotation, Datum) and not report.is_refused(claim)]
+                claim.refuse(reason, name)
+    datums = [claim for claim in claims if isinstance(claim.annotation, Datum) and not claim.refusals]
     targeted = [claim for claim in datums if claim.targets]
     common_datums: dict[frozenset[Place], Claim] = {}
     for claim in datums:
         if len(claim.places) > 1 and not claim.targets:
             earlier = common_datums.setdefault(frozenset(claim.places), claim)
             if earlier is not claim and isinstance(earlier.annotation, Datum):
-                report.refuse(claim, f"its surfaces are datum {earlier.annotation.letter} already")
+                claim.refuse(f"its surfaces are datum {earlier.annotation.letter} already")
     separate = [*common_datums.keys(), *(frozenset([place]) for claim in targeted for place in claim.places)]
     patterns = []
     for pattern, places in list(_patterns(drafts, separate)):
@@ -114,7 +112,7 @@ def _draft(name: str, part: Part, meshes: Meshes, place: Place) -> Draft:
 def _with_claim(draft: Draft, claim: Claim) -> Draft:
     """Return a draft of a feature with what a claim states. Raises Undeclared."""
     (geometry,) = draft.geometries
-    constituent: Constituent
+    constituent: Control
     match claim.annotation:
         case Datum():
             if len(claim.places) > 1 or claim.targets:
@@ -154,7 +152,7 @@ def _patterns(drafts: Mapping[Place, Draft], datums: Collection[frozenset[Place]
 
 
 def _keeps_together(claim: Claim) -> bool:
-    """Return whether the zones of several features of a tolerance keep their places to each other, as those of a pattern do."""
+    """Return whether the zones of several features of a tolerance keep their places to each other, as in a pattern."""
     stated = claim.annotation
     return isinstance(stated, Tolerance) and (
         stated.kind == "position" or stated.refines is not None or "common zone" in stated.modifiers
@@ -180,25 +178,25 @@ def _common_datum(claim: Claim, drafts: Mapping[Place, Draft]) -> Draft:
 class _Trial:
     """The features of a part as numbers, and what drafts become of them one after the other."""
 
-    def __init__(self, part: Part, meshes: Meshes, report: Report) -> None:
-        self._part, self._meshes, self._report = part, meshes, report
+    def __init__(self, part: Part, meshes: Meshes) -> None:
+        self._part, self._meshes = part, meshes
         self._numbers = Features(0)
         self._declared: dict[Draft, Declared] = {}
         for earlier in datum_order(part)[0]:
             self._add(earlier, self._numbers)
 
     def features(self, drafts: Sequence[Draft]) -> dict[Draft, Declared]:
-        """Declare the features of drafts, each after its datums and members, as far as their tolerances go together."""
+        """Declare the features of drafts, each after its datums and members, with the tolerances that go together."""
         needed = {member for draft in drafts for member in draft.borrowed}
         letters = {None, *self._numbers.datums(0)}
-        stated = {draft: draft.stated for draft in drafts}
-        stated = self._followable(drafts, stated, letters | {draft.letter for draft in drafts}, "is not declared")
+        known_letters = letters | {draft.letter for draft in drafts}
+        stated = {draft: _following(draft, draft.stated, known_letters, "is not declared") for draft in drafts}
         waiting = list(drafts)
         while waiting:
             ready = [
                 draft
                 for draft in waiting
-                if not any(letters_of(constituent) - letters for _, constituent in stated[draft])
+                if not any(set(constituent.letters) - letters for _, constituent in stated[draft])
                 and not any(member in waiting for member in draft.borrowed)
             ]
             for draft in ready:
@@ -211,57 +209,40 @@ class _Trial:
             letters |= {draft.letter for draft in ready}
             if not ready:  # a circle: its first draft with tolerances goes without those that lead into it
                 first = next(draft for draft in waiting if stated[draft])
-                stated |= self._followable([first], stated, letters, "refers back to it")
+                stated[first] = _following(first, stated[first], letters, "refers back to it")
         return self._declared
-
-    def _followable(
-        self,
-        drafts: Sequence[Draft],
-        stated: Mapping[Draft, tuple[Statement, ...]],
-        letters: Collection[str | None],
-        reason: str,
-    ) -> dict[Draft, tuple[Statement, ...]]:
-        """Return the statements of each draft that refer to datums with some letters only."""
-        followable = dict[Draft, tuple[Statement, ...]]()
-        for draft in drafts:
-            absent = {claim: letters_of(constituent) - set(letters) for claim, constituent in stated[draft]}
-            for claim, missing in absent.items():
-                if missing:
-                    self._report.refuse(claim, f"datum {min(missing)} {reason}", draft.name)
-            followable[draft] = tuple(statement for statement in stated[draft] if not absent[statement[0]])
-        return followable
 
     def _made(self, draft: Draft, stated: Sequence[Statement], *, is_needed: bool) -> Declared | None:
         """Return a feature with all that it can state together; None if that is nothing."""
-        tolerances: tuple[Constituent, ...] = ()
-        datum, name, refuse = draft.datum, draft.letter or draft.name, self._report.refuse
+        tolerances: tuple[Control, ...] = ()
+        datum, name = draft.datum, draft.letter or draft.name
         absent = [member.letter or member.name for member in draft.borrowed if member not in self._declared]
         if absent and datum:
-            refuse(datum, f"of its surfaces, {', '.join(dict.fromkeys(absent))} could not be declared")
+            datum.refuse(f"of its surfaces, {', '.join(dict.fromkeys(absent))} could not be declared")
             return None
         if datum and draft.letter in self._numbers.datums(0):
-            refuse(datum, self._fault(self._feature(draft, ())) or f"the part has a datum {draft.letter} already")
+            datum.refuse(self._fault(self._feature(draft, ())) or f"the part has a datum {draft.letter} already")
             if draft.borrowed:
                 return None
             draft = replace(draft, datum=None)
             datum, name = None, draft.name
         for claim, constituent in sorted(stated, key=lambda statement: not isinstance(statement[1], Size)):
             if reason := self._fault(self._feature(draft, (*tolerances, constituent))):
-                refuse(claim, reason, name)
+                claim.refuse(reason, name)
             else:
-                self._report.names[claim].append(name)
+                claim.names.append(name)
                 tolerances = (*tolerances, constituent)
         if not (tolerances or datum or is_needed):
             return None
         declared = self._feature(draft, tolerances)
         reason = self._fault(declared)
         if datum and reason:
-            refuse(datum, reason)
+            datum.refuse(reason)
         elif datum:
-            self._report.names[datum].append(name)
+            datum.names.append(name)
         return None if reason else declared
 
-    def _feature(self, draft: Draft, tolerances: tuple[Constituent, ...]) -> Declared:
+    def _feature(self, draft: Draft, tolerances: tuple[Control, ...]) -> Declared:
         """Return what a draft declares with some tolerances."""
         name, letter, part = draft.letter or draft.name, draft.letter, self._part
         if len(draft.faces) == 1:
@@ -290,8 +271,12 @@ class _Trial:
         return ""
 
 
-def letters_of(constituent: Constituent) -> set[str]:
-    """Return the letters of the datums to which a tolerance refers."""
-    if isinstance(constituent, Size):
-        return set()
-    return {letter for compartment in constituent.system for letter in compartment}
+def _following(draft: Draft, stated: Sequence[Statement], letters: Set[str | None], reason: str) -> tuple[Statement, ...]:
+    """Return the statements of a draft that refer to datums with some letters only; the claims of the others are refused."""
+    following = list[Statement]()
+    for claim, tolerance in stated:
+        if missing := set(tolerance.letters) - letters:
+            claim.refuse(f"datum {min(missing)} {reason}", draft.name)
+        else:
+            following.append((claim, tolerance))
+    return tuple(following)

@@ -25,7 +25,7 @@ _TOKEN = re.compile(
 
 
 class Reference(int):
-    """The number of a record, to which a parameter refers."""
+    """The number of a record in a parameter."""
 
 
 class Word(str):
@@ -62,11 +62,11 @@ class Parameters(tuple[Value, ...]):
         return value if isinstance(value, str) and not isinstance(value, Word) else ""
 
     def reference(self, index: int) -> int:
-        """Return the number of the first record to which a parameter refers, or 0."""
+        """Return the first record number in a parameter, or 0."""
         return next(iter(self.references(index)), 0)
 
     def references(self, index: int) -> list[int]:
-        """Return the numbers of all records to which a parameter refers, also within lists and types."""
+        """Return all record numbers in a parameter, also within lists and types."""
         return [value for value in flat(self.value(index)) if isinstance(value, Reference)]
 
     def words(self, index: int) -> list[str]:
@@ -103,7 +103,7 @@ class Records:
         return len(self._text.bodies)
 
     def names(self) -> Iterable[str]:
-        """Return the names of all entities in the file, but those of most shapes."""
+        """Return the names of all entities in the file, without most shapes."""
         return self._text.numbers.keys()
 
     def numbers(self, *entities: str) -> list[int]:
@@ -230,7 +230,7 @@ def _measure(records: Records, parameters: Parameters, conversions: int) -> Quan
 
 
 def _unit(records: Records, number: int, conversions: int) -> Quantity | None:
-    """Return a unit of length or of angle in mm or rad; None for any other, and for one that is defined by itself."""
+    """Return a unit of length or of angle in mm or rad; None for any other, and for a circular definition."""
     instance = records.entities(number)
     if "CONVERSION_BASED_UNIT" in instance and conversions:
         return _quantity(records, instance["CONVERSION_BASED_UNIT"].reference(1), conversions - 1)

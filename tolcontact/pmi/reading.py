@@ -12,7 +12,7 @@ from tolcontact.pmi.part21 import Records
 from tolcontact.pmi.tolerances import tolerances_of
 
 MAX_SIZE = 2_000_000_000  # [byte]; reading takes several times as much memory
-HEAD_SIZE = 10_000  # [byte], by which the kind of a file is recognized
+HEAD_SIZE = 10_000  # [byte] of a file that show its kind
 _EXPECTED = "expected a STEP file of AP242, edition 1 to 3 (.stp, .step)"
 # Other kinds of files, by their beginnings and suffixes.
 _KINDS = (

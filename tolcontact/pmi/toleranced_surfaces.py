@@ -17,7 +17,7 @@ from tolcontact.geometry.files import STATED_FACES, Shape
 
 MAX_OPPOSED_ERROR = 1e-3  # [rad] between two planes that count as parallel
 MAX_ANGLE = 0.01  # [rad] between directions of faces that may be parts of one surface: fitted ones differ by much less
-MAX_DISTANCE = 1e-3  # of a part's size: of a point from the face on which it is
+MAX_DISTANCE = 1e-3  # of a part's size: from a point to its face
 _ROUND = ("cylinder", "cone", "sphere", "torus")
 
 
@@ -36,18 +36,18 @@ class TolerancedSurfaces:
         self.faces: Sequence[FaceInFile] = describe_faces(mesh)
 
     def numbers(self, records: Iterable[int]) -> list[int]:
-        """Return the numbers of the faces that some records are, without those that are not on this part."""
+        """Return the face indices of some records on this part."""
         return [self._numbers[record] for record in records if record in self._numbers]
 
     def number_at(self, point: Vector) -> int | None:
-        """Return the number of the face on which a point lies; None if it lies on none, or where faces meet."""
+        """Return the index of the face of a point; None if it lies on none, or where faces meet."""
         numbers, distance = faces_at(self._mesh, point)
         return numbers[0] if len(numbers) == 1 and distance < MAX_DISTANCE * self._mesh.scale else None
 
     def surfaces(self, numbers: Iterable[int]) -> list[frozenset[int]]:
         """Return the surfaces that some faces make up, each with all of its faces.
 
-        Planes are one surface if they lie in one plane. A round face stands for the whole surface around its axis.
+        Planes are one surface if they lie in one plane. A round face represents the whole surface around its axis.
         """
         remaining = list(dict.fromkeys(number for stated in numbers for number in self._whole(stated)))
         surfaces = []
@@ -73,7 +73,7 @@ class TolerancedSurfaces:
         return bool(np.linalg.norm(self.normal(surfaces[0]) + self.normal(surfaces[1])) < MAX_OPPOSED_ERROR)
 
     def _are_one(self, number: int, other: int) -> bool:
-        """Return whether two faces are parts of one surface. Most are told apart by their numbers alone."""
+        """Return whether two faces are parts of one surface. Most differ in their kind or direction."""
         face, next_face = self.faces[number - 1], self.faces[other - 1]
         if face.kind != next_face.kind or face.is_inner != next_face.is_inner:
             return False

@@ -78,7 +78,7 @@ def _modifiers(records: Records, record: int) -> tuple[str, ...]:
 
 
 def _length_in(records: Records, record: int, entity: str) -> float | None:
-    """Return the length [mm] to which the first parameter of an entity refers, if the record is of it."""
+    """Return the length [mm] in the first parameter of an entity, if the record is of it."""
     return length(records, records.entities(record).get(entity, Parameters()).reference(0))
 
 

@@ -1,21 +1,20 @@
-"""Every analysis of a model beside its run: its group in an archive, its title, its variables and their labels."""
+"""Every analysis of a model: its group in an archive, its title, its variables and their labels."""
 
 from dataclasses import dataclass, replace
 
-from tolcontact.vocabulary.archive import GAP_MIN, KKT_RESIDUAL, MEASURED, ROTATION, STATUS, TRANSLATION
+from tolcontact.vocabulary.archive import GAP_MIN, KKT_RESIDUAL, MEASURED, ROTATION, STATION_POSES, STATUS, TRANSLATION
 from tolcontact.vocabulary.labels import (
     AXES,
     AXIS,
     BODY_AXIS,
-    CONTRIBUTOR,
     MEASURE,
     STATE,
     STATES,
     STATUS_MEANING,
     STATUS_MEANINGS,
     ArchiveVariable,
+    variable,
 )
-from tolcontact.vocabulary.stations import STATION_POSES
 from tolcontact.vocabulary.summary import ESTIMATE, INTERVAL, OUTSIDE
 
 ANALYSES_GROUP = "statistics"  # the group of an archive that holds a group for each analysis
@@ -35,9 +34,9 @@ FIXED_LABELS = {
 
 @dataclass(frozen=True, eq=False)
 class AnalysisRecord:
-    """The form in which an analysis is returned and archived; `title` is a format of the assembly's name and of attributes.
+    """The form of an analysis, as it is returned and archived; `title` is a format of the assembly's name and of attributes.
 
-    Variables `of_stations` are only those of an assembly that is built in stations.
+    Only assemblies that are built in stations have variables `of_stations`.
     """
 
     name: str
@@ -61,7 +60,7 @@ class AnalysisRecord:
 
 
 def _by_status(*dims: str) -> ArchiveVariable:
-    return ArchiveVariable("by_status", (*dims, STATUS_MEANING), "i8", "number of realizations", "1")
+    return variable(f"i8 by_status({', '.join((*dims, STATUS_MEANING))})", "number of realizations", "1")
 
 
 _INDEX = (MEASURE, STATE, GROUP, INTERVAL)
@@ -69,23 +68,21 @@ CONTRIBUTIONS = AnalysisRecord(
     "contributions",
     "contributions to the measurements of {assembly}",
     (
-        ArchiveVariable("first", _INDEX, "f8", "first-order Sobol' index: share of variance by a group alone", "1"),
-        ArchiveVariable("total", _INDEX, "f8", "total Sobol' index: share of variance by a group and its interactions", "1"),
-        ArchiveVariable("minor", (GROUP,), "i1", "1: estimated together with all other minor groups; 0: by itself", "1"),
-        ArchiveVariable(
-            "minor_total", (MEASURE, STATE, INTERVAL), "f8", "total Sobol' index of all minor groups together", "1"
+        variable(
+            "f8 first(measure, state, group, interval)", "first-order Sobol' index: share of variance by a group alone", "1"
         ),
-        ArchiveVariable(
-            "shapley",
-            (MEASURE, STATE, UNIT, INTERVAL),
-            "f8",
-            "Shapley effect: share of variance, also of what is correlated",
+        variable(
+            "f8 total(measure, state, group, interval)",
+            "total Sobol' index: share of variance by a group and its interactions",
             "1",
         ),
-        ArchiveVariable(
-            "linear", (MEASURE, GROUP), "f8", "share of variance by the linear sensitivities at the nominal assembly", "1"
+        variable("i1 minor(group)", "1: estimated together with all other minor groups; 0: alone", "1"),
+        variable("f8 minor_total(measure, state, interval)", "total Sobol' index of all minor groups together", "1"),
+        variable(
+            "f8 shapley(measure, state, unit, interval)", "Shapley effect: share of variance, also of what is correlated", "1"
         ),
-        ArchiveVariable("missed", (MEASURE, STATE, INTERVAL), "f8", "share of variance that the linear prediction misses", "1"),
+        variable("f8 linear(measure, group)", "share of variance by the linear sensitivities at the nominal assembly", "1"),
+        variable("f8 missed(measure, state, interval)", "share of variance that the linear prediction misses", "1"),
         _by_status(),
     ),
 )
@@ -93,24 +90,16 @@ SENSITIVITIES = AnalysisRecord(
     "sensitivities",
     "sensitivities of the measurements of {assembly}",
     (
-        ArchiveVariable("nominal", (MEASURE, CONTRIBUTOR), "f8", "derivative of the raw measure at the nominal assembly"),
-        ArchiveVariable(
-            "leverage", (CONTRIBUTOR,), "f8", "largest displacement of the located part for a unit of its locator", "1"
-        ),
-        ArchiveVariable("sensitivity", (MEASURE, STATE, CONTRIBUTOR, INTERVAL), "f8", "mean derivative over all realizations"),
-        ArchiveVariable(
-            "spread", (MEASURE, STATE, CONTRIBUTOR), "f8", "standard deviation of the derivative over realizations"
-        ),
-        ArchiveVariable(
-            "by_contact",
-            (MEASURE, CONTACT, CONTRIBUTOR, INTERVAL),
-            "f8",
+        variable("f8 nominal(measure, contributor)", "derivative of the raw measure at the nominal assembly"),
+        variable("f8 leverage(contributor)", "largest displacement of the located part for a unit of its locator", "1"),
+        variable("f8 sensitivity(measure, state, contributor, interval)", "mean derivative over all realizations"),
+        variable("f8 spread(measure, state, contributor)", "standard deviation of the derivative over realizations"),
+        variable(
+            "f8 by_contact(measure, contact, contributor, interval)",
             "mean derivative with contact: where parts stay apart, and where they touch",
         ),
-        ArchiveVariable(
-            "changing", (CONTRIBUTOR, INTERVAL), "f8", "share of realizations with a kink or a jump within the step", "1"
-        ),
-        ArchiveVariable("step", (CONTRIBUTOR,), "f8", "step of the differences, up and down"),
+        variable("f8 changing(contributor, interval)", "share of realizations with a kink or a jump within the step", "1"),
+        variable("f8 step(contributor)", "step of the differences, up and down"),
         _by_status(),
     ),
 )
@@ -119,13 +108,13 @@ WORST_CASE = AnalysisRecord(
     "worst_case",
     "worst cases of the measurements of {assembly}",
     (
-        ArchiveVariable("worst", _EXTREME, "f8", "worst-case minimum and maximum, found by searches"),
-        ArchiveVariable("deviations", (*_EXTREME, CONTRIBUTOR), "f8", "combination of deviations that gives it"),
-        ArchiveVariable("bound", _EXTREME, "f8", "linear estimate of the worst case, which large tilts may exceed"),
-        ArchiveVariable("random", _EXTREME, "f8", "worst of the random combinations"),
-        ArchiveVariable("agreeing", _EXTREME, "i8", "number of searches that ended at the worst case", "1"),
-        ArchiveVariable("ends", _EXTREME, "i8", "number of different values that searches ended at", "1"),
-        ArchiveVariable("unseen", _EXTREME, "f8", "expected share of starts that lead to ends not seen", "1"),
+        variable("f8 worst(measure, state, end)", "worst-case minimum and maximum, found by searches"),
+        variable("f8 deviations(measure, state, end, contributor)", "combination of deviations that gives it"),
+        variable("f8 bound(measure, state, end)", "linear estimate of the worst case, which large tilts may exceed"),
+        variable("f8 random(measure, state, end)", "worst of the random combinations"),
+        variable("i8 agreeing(measure, state, end)", "number of searches that ended at the worst case", "1"),
+        variable("i8 ends(measure, state, end)", "number of different values that searches ended at", "1"),
+        variable("f8 unseen(measure, state, end)", "expected share of starts that lead to ends not seen", "1"),
         replace(_by_status(), long_name="number of realizations simulated"),
         *(
             replace(variable, dims=(CASE, *variable.dims[1:]))
@@ -138,10 +127,10 @@ TAILS = AnalysisRecord(
     "tails",
     "rare events of {assembly}",
     (
-        ArchiveVariable("probability", (EVENT, INTERVAL), "f8", "probability of a rare event", "1"),
-        ArchiveVariable("disagreement", (EVENT,), "f8", "factor between two searches for the event; 1: they agree", "1"),
-        ArchiveVariable("stop", (EVENT,), "i1", "1: many values were at a limit, and none beyond; 0: not so", "1"),
-        ArchiveVariable("simulated", (EVENT,), "i8", "number of realizations simulated", "1"),
+        variable("f8 probability(event, interval)", "probability of a rare event", "1"),
+        variable("f8 disagreement(event)", "factor between two searches for the event; 1: they agree", "1"),
+        variable("i1 stop(event)", "1: many values were at a limit, and none beyond; 0: not so", "1"),
+        variable("i8 simulated(event)", "number of realizations simulated", "1"),
         replace(_by_status(EVENT), long_name="number of realizations simulated"),
     ),
 )
@@ -149,45 +138,37 @@ ALLOCATION = AnalysisRecord(
     "allocation",
     "allocation of tolerances of {assembly}",
     (
-        ArchiveVariable("range", (GROUP, STAGE), "f8", "full width of the zones of a group; not a number if they differ"),
-        ArchiveVariable("factor", (GROUP,), "f8", "full width after / before", "1"),
-        ArchiveVariable("cost", (GROUP, STAGE), "f8", "cost of the ranges", "1"),
-        ArchiveVariable(
-            "kept", (REQUIREMENT, STAGE, INTERVAL), "f8", "share outside of the limits, or Ppk, in a fresh run", "1"
-        ),
-        ArchiveVariable("met", (REQUIREMENT,), "i1", "1: kept in the fresh run after; 0: not, by any ranges found", "1"),
-        ArchiveVariable("required", (REQUIREMENT,), "f8", "share outside of the limits at most, or Ppk at least", "1"),
-        ArchiveVariable("idle", (GROUP,), "i1", "1: no influence on any requirement, so the ranges stay; 0: not so", "1"),
-        ArchiveVariable("effect", (MEASURE, OF_EFFECT, GROUP, INTERVAL), "f8", "change if zones were a tenth narrower"),
+        variable("f8 range(group, stage)", "full width of the zones of a group; not a number if they differ"),
+        variable("f8 factor(group)", "full width after / before", "1"),
+        variable("f8 cost(group, stage)", "cost of the ranges", "1"),
+        variable("f8 kept(requirement, stage, interval)", "share outside of the limits, or Ppk, in a fresh run", "1"),
+        variable("i1 met(requirement)", "1: kept in the fresh run after; 0: not, by any ranges found", "1"),
+        variable("f8 required(requirement)", "share outside of the limits at most, or Ppk at least", "1"),
+        variable("i1 idle(group)", "1: no influence on any requirement, so the ranges stay; 0: not so", "1"),
+        variable("f8 effect(measure, of_effect, group, interval)", "change if zones were a tenth narrower"),
     ),
 )
 RELOCATION = AnalysisRecord(
     "relocation",
     "place of {locator} in {assembly}",
     (
-        ArchiveVariable("point", (STAGE, AXIS), "f8", "place of the locator, in its part's own frame", "mm"),
-        ArchiveVariable("reached", (STAGE, INTERVAL), "f8", "what is to be least, in a fresh run"),
-        ArchiveVariable("change", (INTERVAL,), "f8", "6 sigma after / before; or share outside, after minus before", "1"),
-        ArchiveVariable("unresolved", (STAGE,), "i8", "number of realizations of the fresh run that were not resolved", "1"),
-        ArchiveVariable("tried", (TRIAL, AXIS), "f8", "places tried, in the part's own frame", "mm"),
-        ArchiveVariable("tried_value", (TRIAL,), "f8", "what is to be least, at the places tried"),
+        variable("f8 point(stage, axis)", "place of the locator, in its part's own frame", "mm"),
+        variable("f8 reached(stage, interval)", "value of the objective in a fresh run"),
+        variable("f8 change(interval)", "6 sigma after / before; or share outside, after minus before", "1"),
+        variable("i8 unresolved(stage)", "number of realizations of the fresh run that were not resolved", "1"),
+        variable("f8 tried(trial, axis)", "trial positions, in the part's own frame", "mm"),
+        variable("f8 tried_value(trial)", "value of the objective at each trial position"),
     ),
 )
 SEATING = AnalysisRecord(
     "seating",
     "friction at the seats of {assembly}",
     (
-        ArchiveVariable(
-            "critical", (SEAT,), "f8", "least coefficient of friction that can hold the part short of the seat", "1"
+        variable("f8 critical(seat)", "least coefficient of friction that can hold the part short of the seat", "1"),
+        variable(
+            "f8 reserve(seat)", "least factor of the stated coefficients at which the part can be held short of the seat", "1"
         ),
-        ArchiveVariable(
-            "reserve",
-            (SEAT,),
-            "f8",
-            "least factor of the stated coefficients at which the part can be held short of the seat",
-            "1",
-        ),
-        ArchiveVariable("share", (SEAT, HOLDER), "f8", "share of the normal forces that then hold the part", "1"),
+        variable("f8 share(seat, holder)", "share of the normal forces that then hold the part", "1"),
     ),
 )
 _RECORDS = CONTRIBUTIONS, SENSITIVITIES, WORST_CASE, TAILS, ALLOCATION, RELOCATION, SEATING

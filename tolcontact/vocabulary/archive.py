@@ -1,98 +1,56 @@
-"""Every variable of an archive."""
+"""Variables of an archive: its coordinates and root, contact, fields, and the groups station/NAME of stations."""
 
 import unicodedata
 
 from tolcontact.vocabulary.labels import (
     AXIS,
-    BLOCK,
     BODY_AXIS,
     BOUND,
-    CHECKPOINT,
     COMPONENT,
-    CORNER,
-    FACE,
     MEASURE,
-    NUMBER,
     PAIR,
     PART,
-    POINT,
-    REALIZATION,
     ROW_VARIABLE,
     STATE,
     STATUS_MEANINGS,
     UNFINISHED,
-    VERTEX,
-    ArchiveVariable,
     label,
+    variable,
 )
-from tolcontact.vocabulary.surface import CLASH_DEPTH, CLASH_OTHER, CLASH_PART, CLASHES
+from tolcontact.vocabulary.surface import CLASH_DEPTH, CLASH_OTHER, CLASH_PART, CLASHES, surface_variables
 from tolcontact.vocabulary.variation import DEVIATION
 
 BREP_FACE, ROUND_POINT = "brep_face", "round_point"
-SURFACE_KINDS = ("plane", "cylinder", "cone", "sphere", "torus")  # in the order of their numbers
 TOUCHING_GAP = 1e-4  # mm: a contact point with a smaller gap touches
-KINDS_MEAN = {"flag_values": list(range(len(SURFACE_KINDS))), "flag_meanings": " ".join(SURFACE_KINDS)}
 
 
-def surface_variables(prefix: str, dim: str, surface: str) -> dict[str, ArchiveVariable]:
-    """Return the variables of a surface, by the names of the attributes that they hold."""
-    return {
-        "kind": ArchiveVariable(f"{prefix}_kind", (dim,), "i1", f"kind of {surface}; -1: not known", "1", KINDS_MEAN),
-        "origin": ArchiveVariable(
-            f"{prefix}_point",
-            (dim, AXIS),
-            "f8",
-            f"a point of {surface}, if it is a plane, or its centre; of a cone the apex",
-            "mm",
-        ),
-        "axis": ArchiveVariable(
-            f"{prefix}_axis", (dim, AXIS), "f8", f"unit normal or axis of {surface}; of a cone from the apex inward", "1"
-        ),
-        "radius": ArchiveVariable(
-            f"{prefix}_radius", (dim,), "f8", f"radius of {surface}; of a torus that of the tube's middle", "mm"
-        ),
-        "minor": ArchiveVariable(f"{prefix}_tube_radius", (dim,), "f8", f"radius of the tube, if {surface} is a torus", "mm"),
-        "angle": ArchiveVariable(f"{prefix}_angle", (dim,), "f8", f"angle between axis and {surface}, if it is a cone", "rad"),
-    }
-
-
-BREP_OF_FACE = ArchiveVariable("brep_of_face", (FACE,), "i4", "number of the B-rep face of each triangle, counted from 0")
+BREP_OF_FACE = variable("i4 brep_of_face(face)", "number of the B-rep face of each triangle, counted from 0")
 OF_BREP_FACE = surface_variables("surface", BREP_FACE, "the surface of a B-rep face, as the file stated it")
-NAME_OF_BREP_FACE = ArchiveVariable(
-    "surface_name", (BREP_FACE,), str, "what the file calls a B-rep face; empty: it has no name"
-)
+NAME_OF_BREP_FACE = variable("str surface_name(brep_face)", "what the file calls a B-rep face; empty: it has no name")
 
-POINT_OF_ROUND = ArchiveVariable(
-    "point_of_round", (ROUND_POINT,), "i4", "number of the contact point that is one of round faces, counted from 0"
+POINT_OF_ROUND = variable(
+    "i4 point_of_round(round_point)", "number of the contact point that is one of round faces, counted from 0"
 )
 OF_WALL = surface_variables("wall", ROUND_POINT, "the wall that a ball or shaft may touch, nominal")
 OF_ROUND = {
-    "is_hollow": ArchiveVariable("wall_is_hollow", (ROUND_POINT,), "i1", "1 if the wall is around the ball or shaft", "1"),
-    "towards": ArchiveVariable(
-        "wall_middle", (ROUND_POINT, AXIS), "f8", "unit vector from a hollow wall's axis to its middle", "1"
+    "is_hollow": variable("i1 wall_is_hollow(round_point)", "1 if the wall is around the ball or shaft", "1"),
+    "towards": variable("f8 wall_middle(round_point, axis)", "unit vector from a hollow wall's axis to its middle", "1"),
+    "opening": variable("f8 wall_opening(round_point)", "angle that a hollow wall reaches to either side; pi: whole", "rad"),
+    "cut": variable(
+        "f8 wall_end(round_point, axis)", "unit normal of the plane at the end of the wall; 0: the shaft itself ends", "1"
     ),
-    "opening": ArchiveVariable(
-        "wall_opening", (ROUND_POINT,), "f8", "angle that a hollow wall reaches to either side; pi: whole", "rad"
-    ),
-    "cut": ArchiveVariable(
-        "wall_end", (ROUND_POINT, AXIS), "f8", "unit normal of the plane in which the wall ends; 0: the shaft itself ends", "1"
-    ),
-    "centre": ArchiveVariable(
-        "round_centre", (ROUND_POINT, AXIS), "f8", "centre of the ball, or of the shaft's end, nominal", "mm"
-    ),
-    "axis": ArchiveVariable(
-        "round_axis", (ROUND_POINT, AXIS), "f8", "unit vector of the shaft's axis, nominal; 0 of a ball", "1"
-    ),
-    "radius": ArchiveVariable("round_radius", (ROUND_POINT,), "f8", "radius of the ball or shaft", "mm"),
-    "on_moving": ArchiveVariable(
-        "round_on_moving", (ROUND_POINT,), "i1", "1 if ball or shaft belong to the moving part, 0 if the wall does", "1"
+    "centre": variable("f8 round_centre(round_point, axis)", "centre of the ball, or of the shaft's end, nominal", "mm"),
+    "axis": variable("f8 round_axis(round_point, axis)", "unit vector of the shaft's axis, nominal; 0 of a ball", "1"),
+    "radius": variable("f8 round_radius(round_point)", "radius of the ball or shaft", "mm"),
+    "on_moving": variable(
+        "i1 round_on_moving(round_point)", "1 if ball or shaft belong to the moving part, 0 if the wall does", "1"
     ),
 }
 ROUND = (POINT_OF_ROUND, *OF_WALL.values(), *OF_ROUND.values())
 KNOWN_SURFACES = (BREP_OF_FACE, *OF_BREP_FACE.values())
 
 
-NUMBERS = ArchiveVariable(REALIZATION, (REALIZATION,), "i8", "number of the realization", "1", {"standard_name": "realization"})
+NUMBERS = variable("i8 realization(realization)", "number of the realization", "1", {"standard_name": "realization"})
 COORDINATES = (
     NUMBERS,
     label(STATE, "state: raw as located, corrected after contact"),
@@ -103,61 +61,41 @@ COORDINATES = (
     label(BODY_AXIS, "axis of the part's nominal orientation"),
 )
 
-MEASURED = ArchiveVariable(
-    "measured",
-    (REALIZATION, STATE, MEASURE),
-    "f8",
+MEASURED = variable(
+    "f8 measured(realization, state, measure)",
     "value of a measure: displacement of a point, distance of two points, or the user's expression",
     "mm",
 )
-TRANSLATION = ArchiveVariable(
-    "translation",
-    (REALIZATION, STATE, PART, AXIS),
-    "f8",
-    "t of the pose x = R x0 + t, x0 in the nominal assembly frame",
-    "mm",
+TRANSLATION = variable(
+    "f8 translation(realization, state, part, axis)", "t of the pose x = R x0 + t, x0 in the nominal assembly frame", "mm"
 )
-ROTATION = ArchiveVariable(
-    "rotation",
-    (REALIZATION, STATE, PART, AXIS, BODY_AXIS),
-    "f8",
-    "R of the pose x = R x0 + t; rows are assembly axes",
-    "1",
+ROTATION = variable(
+    "f8 rotation(realization, state, part, axis, body_axis)", "R of the pose x = R x0 + t; rows are assembly axes", "1"
 )
-GAP_MIN = ArchiveVariable(
-    "gap_min",
-    (REALIZATION, STATE, PAIR),
-    "f8",
+GAP_MIN = variable(
+    "f8 gap_min(realization, state, pair)",
     "smallest gap of all contact points of a pair, larger by coordinate_error if there is one; negative: penetration",
     "mm",
 )
-ACTIVE = ArchiveVariable("active", (REALIZATION, PAIR), "i4", "number of active contact points in the raw state", "1")
-CARRYING = ArchiveVariable(
-    "carrying", (REALIZATION, PAIR), "i4", "number of contact points under load in the corrected state", "1"
-)
-REACTION = ArchiveVariable("reaction", (REALIZATION, PAIR), "f8", "sum of the reactions of the contact points of a pair")
-KKT_RESIDUAL = ArchiveVariable(
-    "kkt_residual",
-    (REALIZATION,),
-    "f8",
+ACTIVE = variable("i4 active(realization, pair)", "number of active contact points in the raw state", "1")
+CARRYING = variable("i4 carrying(realization, pair)", "number of contact points under load in the corrected state", "1")
+REACTION = variable("f8 reaction(realization, pair)", "sum of the reactions of the contact points of a pair")
+KKT_RESIDUAL = variable(
+    "f8 kkt_residual(realization)",
     "largest residual of the optimality conditions of the contact problem; in an exact resolution also its last step",
     "mm",
 )
-ITERATIONS = ArchiveVariable("iterations", (REALIZATION,), "i4", "number of linear steps that the contact problem took", "1")
-STARTS = ArchiveVariable("starts", (REALIZATION,), "i1", "number of places that the steps were started from", "1")
-SECOND_ANSWERS = ArchiveVariable("second_answers", (REALIZATION,), "i4", "number of QPs that another solver had to answer", "1")
-SEARCHED = ArchiveVariable(
-    "searched",
-    (REALIZATION,),
-    "i1",
+ITERATIONS = variable("i4 iterations(realization)", "number of linear steps that the contact problem took", "1")
+STARTS = variable("i1 starts(realization)", "number of places that the steps were started from", "1")
+SECOND_ANSWERS = variable("i4 second_answers(realization)", "number of QPs that another solver had to answer", "1")
+SEARCHED = variable(
+    "i1 searched(realization)",
     "1: contact points were projected again, or found, at the poses themselves, and gap_min refers to those; "
     "0: it refers to the archived ones",
     "1",
 )
-STATUS = ArchiveVariable(
-    "status",
-    (REALIZATION,),
-    "i1",
+STATUS = variable(
+    "i1 status(realization)",
     "outcome of the realization",
     None,
     {
@@ -188,146 +126,101 @@ POSES = (TRANSLATION, ROTATION)
 
 BY_REALIZATION = (*ROWS, DEVIATION)
 ROW_VARIABLE_LABEL = label(ROW_VARIABLE, "variable of realizations")
-ROW_CHECKSUM = ArchiveVariable(
-    "row_checksum",
-    (BLOCK, ROW_VARIABLE),
-    "i8",
+ROW_CHECKSUM = variable(
+    "i8 row_checksum(block, row_variable)",
     "CRC-32 of the values of a variable in a block of `block_rows` realizations (the last one may be shorter), little-endian; "
     "-1: unfinished",
     "1",
 )
 
-MEASURE_NOMINAL = ArchiveVariable("measure_nominal", (MEASURE,), "f8", "value of the measure in the nominal assembly")
-MEASURE_TOLERANCE = ArchiveVariable(
-    "measure_tolerance",
-    (MEASURE,),
-    "f8",
-    "full width of the allowed zone; NaN if it is open",
+MEASURE_NOMINAL = variable("f8 measure_nominal(measure)", "value of the measure in the nominal assembly")
+MEASURE_TOLERANCE = variable("f8 measure_tolerance(measure)", "full width of the allowed zone; NaN if it is open")
+LOWER_LIMIT = variable("f8 measure_lower_limit(measure)", "least allowed value of the measure; NaN if that side is open")
+UPPER_LIMIT = variable("f8 measure_upper_limit(measure)", "largest allowed value of the measure; NaN if that side is open")
+MEASURE_ACCURACY = variable(
+    "f8 measure_accuracy(measure)", "by how much a value may be beyond a limit and still count as at the limit"
 )
-LOWER_LIMIT = ArchiveVariable(
-    "measure_lower_limit", (MEASURE,), "f8", "least allowed value of the measure; NaN if that side is open"
-)
-UPPER_LIMIT = ArchiveVariable(
-    "measure_upper_limit", (MEASURE,), "f8", "largest allowed value of the measure; NaN if that side is open"
-)
-MEASURE_ACCURACY = ArchiveVariable(
-    "measure_accuracy", (MEASURE,), "f8", "by how much a value may be beyond a limit and still count as at the limit"
-)
-QUANTITY = ArchiveVariable(
-    "measure_quantity",
-    (MEASURE,),
-    str,
+QUANTITY = variable(
+    "str measure_quantity(measure)",
     "what a measure is the value of: displacement, coordinate, distance, deviation of distance, a kind of measurement such as "
     "gap, clearance or angle, or expression of the poses",
 )
-MEASURE_UNITS = ArchiveVariable("measure_units", (MEASURE,), str, "units of the measure")
+MEASURE_UNITS = variable("str measure_units(measure)", "units of the measure")
 
 MEASURE_LINE, LINE_END = "measure_line", "line_end"
-MEASURE_OF_LINE = ArchiveVariable(
-    "measure_of_line", (MEASURE_LINE,), "i4", "number of the measure that a line shows, counted from 0"
-)
-LINE_ENDS = ArchiveVariable(
-    "measure_line_ends",
-    (MEASURE_LINE, LINE_END, AXIS),
-    "f8",
+MEASURE_OF_LINE = variable("i4 measure_of_line(measure_line)", "number of the measure that a line shows, counted from 0")
+LINE_ENDS = variable(
+    "f8 measure_line_ends(measure_line, line_end, axis)",
     "ends of the lines that show what is measured, nominal; gaps, axes and directions",
     "mm",
 )
 
-DECLARATION = ArchiveVariable("declaration", (), str, "the declared model as JSON, enough to rebuild it")
-MESH_VERTICES = ArchiveVariable("vertices", (VERTEX, AXIS), "f8", "vertices of a mesh in its part's own frame", "mm")
-MESH_FACES = ArchiveVariable("faces", (FACE, CORNER), "i4", "vertex numbers of each triangle, counted from 0")
+DECLARATION = variable("str declaration()", "the declared model as JSON, enough to rebuild it")
+MESH_VERTICES = variable("f8 vertices(vertex, axis)", "vertices of a mesh in its part's own frame", "mm")
+MESH_FACES = variable("i4 faces(face, corner)", "vertex numbers of each triangle, counted from 0")
 
-PAIR_OF_POINT = ArchiveVariable("pair_of_point", (POINT,), "i4", "number of the pair of each contact point, counted from 0")
-MOVING_PART = ArchiveVariable("moving_part", (PAIR,), "i4", "number of the moving part of each pair, counted from 0")
-REFERENCE_PART = ArchiveVariable("reference_part", (PAIR,), "i4", "number of the reference part of each pair, -1: the ground")
-MOVING_POINT = ArchiveVariable("moving_point", (POINT, AXIS), "f8", "P^m: contact point of the moving part, nominal", "mm")
-REFERENCE_POINT = ArchiveVariable(
-    "reference_point", (POINT, AXIS), "f8", "P^r: its projection on the reference part, nominal", "mm"
-)
-REFERENCE_NORMAL = ArchiveVariable(
-    "reference_normal", (POINT, AXIS), "f8", "n^r: outward unit normal of the reference part there, nominal", "1"
+PAIR_OF_POINT = variable("i4 pair_of_point(point)", "number of the pair of each contact point, counted from 0")
+MOVING_PART = variable("i4 moving_part(pair)", "number of the moving part of each pair, counted from 0")
+REFERENCE_PART = variable("i4 reference_part(pair)", "number of the reference part of each pair, -1: the ground")
+MOVING_POINT = variable("f8 moving_point(point, axis)", "P^m: contact point of the moving part, nominal", "mm")
+REFERENCE_POINT = variable("f8 reference_point(point, axis)", "P^r: its projection on the reference part, nominal", "mm")
+REFERENCE_NORMAL = variable(
+    "f8 reference_normal(point, axis)", "n^r: outward unit normal of the reference part there, nominal", "1"
 )
 
-POINT_STIFFNESS = ArchiveVariable(
-    "point_stiffness", (POINT,), "f8", "stiffness of a contact point that gives way; infinite: it is rigid", "N mm-1"
-)
-LOCATOR_OF_POINT = ArchiveVariable(
-    "locator_of_point",
-    (POINT,),
-    "i4",
+POINT_STIFFNESS = variable("f8 point_stiffness(point)", "stiffness of a contact point; infinite: it is rigid", "N mm-1")
+LOCATOR_OF_POINT = variable(
+    "i4 locator_of_point(point)",
     "number of the one-sided locator that a contact point represents, whose deviation is subtracted from its gap; -1: none",
 )
 
-BOUNDED = ArchiveVariable(
-    "bounded", (PAIR,), "i1", "1: faces end, and places of contact are found at every pose; 0: contact points are fixed", "1"
+BOUNDED = variable(
+    "i1 bounded(pair)", "1: faces end, and places of contact are found at every pose; 0: contact points are fixed", "1"
 )
-PLANE_ERROR = ArchiveVariable(
-    "plane_error",
-    (PAIR,),
-    "f8",
+PLANE_ERROR = variable(
+    "f8 plane_error(pair)",
     "largest error of fixed contact points in the depth of contact, at 1024 raw poses; NaN: not compared",
     "mm",
 )
 
 COMPONENT_LABEL = label(COMPONENT, "component of the displacement")
-FIELD_VERTICES = ArchiveVariable("vertices", (VERTEX, AXIS), "f8", "surface points of the part, nominal", "mm")
+FIELD_VERTICES = variable("f8 vertices(vertex, axis)", "surface points of the part, nominal", "mm")
 FIELD_FACES = MESH_FACES
-FIELD_MEAN = ArchiveVariable("mean", (STATE, VERTEX, COMPONENT), "f8", "mean displacement of a surface point", "mm")
-FIELD_SIX_SIGMA = ArchiveVariable(
-    "six_sigma",
-    (STATE, VERTEX, COMPONENT),
-    "f8",
-    "six standard deviations of the displacement of a surface point",
-    "mm",
+FIELD_MEAN = variable("f8 mean(state, vertex, component)", "mean displacement of a surface point", "mm")
+FIELD_SIX_SIGMA = variable(
+    "f8 six_sigma(state, vertex, component)", "six standard deviations of the displacement of a surface point", "mm"
 )
 BOUND_LABEL = label(BOUND, "bound of a 95 % confidence interval")
-FIELD_INTERVAL = ArchiveVariable(
-    "magnitude_six_sigma_interval",
-    (STATE, VERTEX, BOUND),
-    "f8",
+FIELD_INTERVAL = variable(
+    "f8 magnitude_six_sigma_interval(state, vertex, bound)",
     "95 % confidence interval of six standard deviations of the displacement magnitude",
     "mm",
 )
-FIELD_REALIZATIONS = ArchiveVariable("realizations", (), "i8", "number of realizations that the displacement field covers", "1")
-MAGNITUDE_REALIZATIONS = ArchiveVariable(
-    "magnitude_realizations",
-    (),
-    "i8",
+FIELD_REALIZATIONS = variable("i8 realizations()", "number of realizations that the displacement field covers", "1")
+MAGNITUDE_REALIZATIONS = variable(
+    "i8 magnitude_realizations()",
     "number of realizations, the first ones, that the magnitude of the displacement field covers",
     "1",
 )
 FIELDS = (FIELD_MEAN, FIELD_SIX_SIGMA, FIELD_INTERVAL, FIELD_REALIZATIONS, MAGNITUDE_REALIZATIONS)
-TOUCHING_SHARE = ArchiveVariable(
-    "touching",
-    (POINT,),
-    "f8",
-    f"share of realizations in which a contact point touches, corrected: gap below {TOUCHING_GAP} mm; NaN: not known",
+TOUCHING_SHARE = variable(
+    "f8 touching(point)",
+    f"share of realizations with a touching contact point, corrected: gap below {TOUCHING_GAP} mm; NaN: not known",
     "1",
 )
-TOUCHING_INTERVAL = ArchiveVariable("touching_interval", (POINT, BOUND), "f8", "its 95 % confidence interval", "1")
-TOUCHING_REALIZATIONS = ArchiveVariable(
-    "touching_realizations", (), "i8", "number of realizations, of the first ones, that this share is of", "1"
+TOUCHING_INTERVAL = variable("f8 touching_interval(point, bound)", "its 95 % confidence interval", "1")
+TOUCHING_REALIZATIONS = variable(
+    "i8 touching_realizations()", "number of realizations, of the first ones, that this share is of", "1"
 )
 TOUCHING = (TOUCHING_SHARE, TOUCHING_INTERVAL, TOUCHING_REALIZATIONS)
-GROUP_CHECKSUM = ArchiveVariable(
-    "checksum",
-    (),
-    "i8",
-    "CRC-32 of the variables of this group that may be overwritten, in their order; -1: being written",
-    "1",
+GROUP_CHECKSUM = variable(
+    "i8 checksum()", "CRC-32 of the variables of this group that may be overwritten, in their order; -1: being written", "1"
 )
-SUMMED_ROWS = ArchiveVariable(
-    "summed_rows", (CHECKPOINT,), "i8", "number of realizations in the sums of a checkpoint; -1: none", "1"
+SUMMED_ROWS = variable("i8 summed_rows(checkpoint)", "number of realizations in the sums of a checkpoint; -1: none", "1")
+FIELD_SUMS = variable(
+    "f8 sums(checkpoint, state, number)", "running sums of the displacement field; an unfinished run continues from them", "1"
 )
-FIELD_SUMS = ArchiveVariable(
-    "sums",
-    (CHECKPOINT, STATE, NUMBER),
-    "f8",
-    "running sums of the displacement field, from which an unfinished run continues",
-    "1",
-)
-SUMS_CHECKSUM = ArchiveVariable("sums_checksum", (CHECKPOINT,), "i8", "CRC-32 of the sums of a checkpoint", "1")
+SUMS_CHECKSUM = variable("i8 sums_checksum(checkpoint)", "CRC-32 of the sums of a checkpoint", "1")
 
 
 def group_of(part: str) -> str:
@@ -342,3 +235,29 @@ def group_of(part: str) -> str:
 def field_of(part: str) -> str:
     """Return the path of a part's displacement field."""
     return f"field/{group_of(part)}"
+
+
+STATIONS_GROUP, STATION_PART = "station", "station_part"
+
+MEASURE_STATION = variable("str measure_station(measure)", "station of a measure")
+PAIR_STATION = variable("str pair_station(pair)", "station of a contact pair")
+PART_STATION = variable("str part_station(part)", "last station with a part, and of its pose")
+OF_STATIONS = (MEASURE_STATION, PAIR_STATION, PART_STATION)
+
+STATION_PART_LABEL = label(STATION_PART, "part in the station")
+STATION_TRANSLATION = variable(
+    "f8 station_translation(realization, state, station_part, axis)", f"{TRANSLATION.long_name}; in the station", "mm"
+)
+STATION_ROTATION = variable(
+    "f8 station_rotation(realization, state, station_part, axis, body_axis)", f"{ROTATION.long_name}; in the station", "1"
+)
+STATION_STATUS = variable(
+    "i1 station_status(realization)", "outcome of the realization in the station", None, STATUS.attributes
+)
+STATION_POSES = (STATION_TRANSLATION, STATION_ROTATION)
+STATION_ROWS = (*STATION_POSES, STATION_STATUS)
+
+
+def station_group(station: str) -> str:
+    """Return the path of a station's group."""
+    return f"{STATIONS_GROUP}/{group_of(station)}"

@@ -1,6 +1,7 @@
 """Labels, statuses and dimensions that archives, summaries and comparisons share; and the variables that they label."""
 
 import enum
+import re
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,12 +25,14 @@ SOLVER, RUN, DESIGN, STATUS_MEANING, EXTENT = "solver", "run", "design", "status
 BOUNDS = ("lower", "upper")
 MONTE_CARLO, LATIN_HYPERCUBE, SOBOL = PLANS = ("monte-carlo", "latin hypercube", "sobol")  # sampling plans
 REPLICATE = 256  # realizations that the last two draw together, independent of all others
-# Attributes of archives and summaries: the depth [mm] up to which bodies are tested for interference, and what is not tested.
+# Attributes of archives and summaries: the largest depth [mm] in the test for interference, and what is not tested.
 INTERFERENCE_DEPTH, NOT_WATCHED = "interference_depth", "not_watched"
 METHOD_ATTRIBUTES = ("resolution", "objective", "active_set")  # of archives, summaries and analyses
 KEPT = ("measures", "poses", "all")
 TITLE_PREFIX = "document_"  # of the attributes of an archive that hold its title block
 FIELD_CHOICES = ("some", "all", "none")  # besides a number
+
+_DECLARATION = re.compile(r"(\w+) (\w+)\(([\w, ]*)\)")
 
 UNFINISHED = -1
 CHECKSUM = "crc32"  # attribute: checksum of a variable that is written once
@@ -75,6 +78,16 @@ class ArchiveVariable:
     def entry(self, values: Any, **attributes: Any) -> tuple[tuple[str, ...], Any, dict[str, Any]]:
         """Return dimensions, values and attributes as xarray.Dataset takes them; `attributes` replace or add to its own."""
         return self.dims, values, {**self.all_attributes, **attributes}
+
+
+def variable(
+    declaration: str, long_name: str, units: str | None = None, attributes: dict[str, Any] | None = None
+) -> ArchiveVariable:
+    """Return the variable of a declaration in the notation of ncdump, as in "f8 measured(realization, state, measure)"."""
+    kind, name, dims = _DECLARATION.fullmatch(declaration).groups()  # type: ignore[union-attr]
+    return ArchiveVariable(
+        name, tuple(dims.split(", ")) if dims else (), str if kind == "str" else kind, long_name, units, attributes or {}
+    )
 
 
 def label(name: str, long_name: str) -> ArchiveVariable:

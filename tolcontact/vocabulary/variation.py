@@ -1,97 +1,65 @@
-"""Variables of an archive that describe what varies: contributors, locators, faces of features, and planes of their datums."""
+"""Variables of an archive for what varies: contributors, locators, faces of features, planes of their datums, and form."""
 
-from tolcontact.vocabulary.labels import (
-    AXIS,
-    CONTRIBUTOR,
-    FEATURE_FACE,
-    FREEDOM,
-    LOCATOR,
-    PAIR,
-    POINT,
-    REALIZATION,
-    ArchiveVariable,
-    label,
-)
+from tolcontact.vocabulary.labels import CONTRIBUTOR, FEATURE_FACE, FREEDOM, LOCATOR, label, variable
+from tolcontact.vocabulary.surface import surface_variables
 
 FREEDOMS = ("tau x", "tau y", "tau z", "rho x", "rho y", "rho z")
 
-DEVIATION = ArchiveVariable(
-    "deviation",
-    (REALIZATION, CONTRIBUTOR),
-    "f8",
+DEVIATION = variable(
+    "f8 deviation(realization, contributor)",
     "deviation of a contributor: of a locator along its direction, of a freedom or the size of a feature, or of a variable; "
     "with what shared variables add to it",
     "mm",
 )
 CONTRIBUTOR_LABEL = label(CONTRIBUTOR, "contributor, as part.locator, part.feature.freedom, or a variable's name")
-CONTRIBUTOR_SOURCE = ArchiveVariable("source", (CONTRIBUTOR,), str, "what a contributor is of: locator, feature or variable")
-CONTRIBUTOR_UNITS = ArchiveVariable("contributor_units", (CONTRIBUTOR,), str, "units of the deviation of a contributor")
-TOLERANCE_RANGE = ArchiveVariable(
-    "tolerance_range",
-    (CONTRIBUTOR,),
-    "f8",
+CONTRIBUTOR_SOURCE = variable("str source(contributor)", "what a contributor is of: locator, feature or variable")
+CONTRIBUTOR_UNITS = variable("str contributor_units(contributor)", "units of the deviation of a contributor")
+TOLERANCE_RANGE = variable(
+    "f8 tolerance_range(contributor)",
     "full width of the tolerance zone; NaN if the distribution alone defines the spread",
     "mm",
 )
-DISTRIBUTION = ArchiveVariable(
-    "distribution",
-    (CONTRIBUTOR,),
-    str,
+DISTRIBUTION = variable(
+    "str distribution(contributor)",
     "distribution of the deviation; of a feature its tolerance, and the rule from zone to spread",
 )
-MEAN_SHIFT = ArchiveVariable(
-    "mean_shift",
-    (CONTRIBUTOR,),
-    "f8",
-    "mean of the contributor's own distribution, without what shared variables add to it",
-    "mm",
+MEAN_SHIFT = variable(
+    "f8 mean_shift(contributor)", "mean of the contributor's own distribution, without what shared variables add to it", "mm"
 )
 
 LOCATOR_LABEL = label(LOCATOR, "locator, as part.locator: contributors of the same number")
-STIFFNESS = ArchiveVariable("stiffness", (LOCATOR,), "f8", "stiffness of the locator", "N mm-1")
-ONE_SIDED = ArchiveVariable("one_sided", (LOCATOR,), "i1", "1: a support that the part may lift off, 0: held both ways")
-LOCATOR_POINT = ArchiveVariable("locator_point", (LOCATOR, AXIS), "f8", "where the locator holds its part, nominal", "mm")
-LOCATOR_DIRECTION = ArchiveVariable(
-    "locator_direction", (LOCATOR, AXIS), "f8", "direction of the deviation, into the part", "1"
-)
-FACE_OF_LOCATOR = ArchiveVariable(
-    "face_of_locator", (LOCATOR,), "i4", "number of the feature's face that a locator stands against, counted from 0; -1: none"
-)
+STIFFNESS = variable("f8 stiffness(locator)", "stiffness of the locator", "N mm-1")
+ONE_SIDED = variable("i1 one_sided(locator)", "1: a support that the part may lift off, 0: two-sided")
+LOCATOR_POINT = variable("f8 locator_point(locator, axis)", "where the locator holds its part, nominal", "mm")
+LOCATOR_DIRECTION = variable("f8 locator_direction(locator, axis)", "direction of the deviation, into the part", "1")
+FACE_OF_LOCATOR = variable("i4 face_of_locator(locator)", "index of the feature's face at a locator; -1: none")
 
-GROUND_OF_LOCATOR = ArchiveVariable(
-    "ground_of_locator",
-    (LOCATOR,),
-    "i4",
+GROUND_OF_LOCATOR = variable(
+    "i4 ground_of_locator(locator)",
     "number of the feature, of another part, that a locator is on and moves with, counted from 0 as faces are; -1: none",
 )
 
 FREEDOM_LABEL = label(FREEDOM, "component of a small displacement p -> p + tau + rho x (p - centre)")
-FEATURE_OF_FACE = ArchiveVariable("feature_of_face", (FEATURE_FACE,), str, "feature that a face belongs to, as part.feature")
-FACE_CENTRE = ArchiveVariable(
-    "face_centre", (FEATURE_FACE, AXIS), "f8", "centre about which a feature's face turns, nominal", "mm"
-)
-FACE_TWIST = ArchiveVariable(
-    "face_twist",
-    (FEATURE_FACE, FREEDOM, CONTRIBUTOR),
-    "f8",
-    "displacement tau [mm], rho [rad] of a feature's face, nominal frame, for deviations of 1",
+FEATURE_OF_FACE = variable("str feature_of_face(feature_face)", "feature that a face belongs to, as part.feature")
+FACE_CENTRE = variable("f8 face_centre(feature_face, axis)", "centre of rotation of a feature's face, nominal", "mm")
+FACE_TWIST = variable(
+    "f8 face_twist(feature_face, freedom, contributor)",
+    "displacement tau [mm], rho [rad] of a feature's face per unit deviation, nominal frame",
     "1",
 )
-FACE_HEIGHT = ArchiveVariable(
-    "face_height",
-    (FEATURE_FACE, CONTRIBUTOR),
-    "f8",
-    "how much farther out of the material a feature's face lies everywhere, for deviations of 1",
+FACE_HEIGHT = variable(
+    "f8 face_height(feature_face, contributor)",
+    "outward offset of a feature's face per unit deviation",
     "1",
 )
-FACE_OF_MOVING = ArchiveVariable(
-    "face_of_moving", (PAIR,), "i4", "number of the feature's face that the moving side of a pair is, counted from 0; -1: none"
+FACE_OF_MOVING = variable(
+    "i4 face_of_moving(pair)", "number of the feature's face that the moving side of a pair is, counted from 0; -1: none"
 )
-FACE_OF_REFERENCE = ArchiveVariable(
-    "face_of_reference", (PAIR,), "i4", "number of the feature's face that the reference side is, counted from 0; -1: none"
+FACE_OF_REFERENCE = variable(
+    "i4 face_of_reference(pair)", "number of the feature's face that the reference side is, counted from 0; -1: none"
 )
-FACING = ArchiveVariable(
-    "facing", (POINT,), "f8", "-n^m . n^r: share of the moving face's height by which it comes nearer at a contact point", "1"
+FACING = variable(
+    "f8 facing(point)", "-n^m . n^r: share of the moving face's outward offset that closes the gap at a contact point", "1"
 )
 FEATURE_FACES = (
     FEATURE_OF_FACE, FACE_CENTRE, FREEDOM_LABEL, FACE_TWIST, FACE_HEIGHT, FACE_OF_MOVING, FACE_OF_REFERENCE, FACING,
@@ -100,34 +68,87 @@ FEATURE_FACES = (
 
 TANGENT, TANGENT_PLACE, COORDINATE, TANGENT_FREEDOM = "tangent", "tangent_place", "plane_coordinate", "tangent_freedom"
 
-TANGENT_FACE = ArchiveVariable(
-    "tangent_face", (TANGENT,), "i4", "number of the feature's face that a plane touches, counted from 0"
-)
-TANGENT_CONTRIBUTOR = ArchiveVariable(
-    "tangent_contributor",
-    (TANGENT, COORDINATE),
-    "i4",
+TANGENT_FACE = variable("i4 tangent_face(tangent)", "number of the feature's face that a plane touches, counted from 0")
+TANGENT_CONTRIBUTOR = variable(
+    "i4 tangent_contributor(tangent, plane_coordinate)",
     "number of the contributor that is the offset or a tilt of the plane, from the datum by least squares, counted from 0; -1: "
     "it makes no difference",
 )
-TANGENT_LEANING = ArchiveVariable(
-    "tangent_leaning",
-    (TANGENT, COORDINATE, CONTRIBUTOR),
-    "f8",
-    "offset and tilts of the face from the datum by least squares, for deviations of 1",
+TANGENT_LEANING = variable(
+    "f8 tangent_leaning(tangent, plane_coordinate, contributor)",
+    "offset and tilts of the face from the least-squares datum per unit deviation",
 )
-TANGENT_FREE = ArchiveVariable(
-    "tangent_free", (TANGENT, COORDINATE, TANGENT_FREEDOM), "f8", "offset and tilts in which the plane may lie; 0: no more", "1"
+TANGENT_FREE = variable(
+    "f8 tangent_free(tangent, plane_coordinate, tangent_freedom)",
+    "possible offsets and tilts of the plane; 0: no more",
+    "1",
 )
-FACE_OF_TANGENT_PLACE = ArchiveVariable(
-    "face_of_tangent_place", (TANGENT_PLACE,), "i4", "number of the feature's face that a place is on, counted from 0"
+FACE_OF_TANGENT_PLACE = variable(
+    "i4 face_of_tangent_place(tangent_place)", "number of the feature's face that a place is on, counted from 0"
 )
-TANGENT_PLACE_AT = ArchiveVariable(
-    "tangent_place_at", (TANGENT_PLACE, AXIS), "f8", "place that a plane may touch, nominal", "mm"
-)
-TANGENT_HEIGHT = ArchiveVariable(
-    "tangent_height", (TANGENT_PLACE, COORDINATE), "f8", "height of a plane at the place, for an offset or a tilt of 1 mm", "1"
+TANGENT_PLACE_AT = variable("f8 tangent_place_at(tangent_place, axis)", "place that a plane may touch, nominal", "mm")
+TANGENT_HEIGHT = variable(
+    "f8 tangent_height(tangent_place, plane_coordinate)", "height of a plane at the place, for an offset or a tilt of 1 mm", "1"
 )
 TANGENTS = (
     TANGENT_FACE, TANGENT_CONTRIBUTOR, TANGENT_LEANING, TANGENT_FREE, FACE_OF_TANGENT_PLACE, TANGENT_PLACE_AT, TANGENT_HEIGHT,
+)  # fmt: skip
+
+
+FORM_STATION, FORM_MODE, FORM_TERM = "form_station", "form_mode", "form_term"
+
+FORM_COVARIANCE = variable(
+    "str form_covariance(feature_face)", "covariance of the form of a feature's face, by distance; empty: it keeps its shape"
+)
+FORM_LENGTH = variable(
+    "f8 form_length(feature_face)", "correlation length of the form, across the axis of a surface with one; NaN: none", "mm"
+)
+FORM_LENGTH_ALONG = variable(
+    "f8 form_length_along(feature_face)", "correlation length of the form along the axis of its surface; NaN: none", "mm"
+)
+FORM_LOBES = variable(
+    "i4 form_lobes(feature_face)", "number of lobes around the axis that all of the form has; 0: any number", "1"
+)
+FORM_ASSOCIATED = variable(
+    "str form_associated(feature_face)",
+    'what the form is measured from: the "surface", the "circles" of sections across its axis, or its "lines"; empty: none',
+)
+FORM_START, FORM_END = (
+    variable(f"f8 form_{end}(feature_face)", f"place along the axis at the {end} of the face; NaN: no form", "mm")
+    for end in ("start", "end")
+)
+FORM_SURFACE = surface_variables("form_surface", FEATURE_FACE, "the surface of a face with form, nominal")
+FORM_SPREAD = variable(
+    "f8 form_spread(feature_face)",
+    "standard deviation of the coefficients of the form's modes; NaN: none, or one for each, as measured",
+    "mm",
+)
+FORM_LEFT_OUT = variable(
+    "f8 form_left_out(feature_face)",
+    "share of the variance of the form that the modes leave out, or of the mean square of measured forms; NaN: none",
+    "1",
+)
+FORM_MEAN_ZONE = variable(
+    "f8 form_mean_zone(feature_face)", "mean width of the minimum zones of faces with this form; NaN: none", "mm"
+)
+FORM_CONTRIBUTOR = variable(
+    "i4 form_contributor(feature_face, form_mode)",
+    "number of the contributor that is the coefficient of a mode, counted from 0; -1: none",
+)
+FACE_OF_FORM_STATION = variable(
+    "i4 face_of_station(form_station)", "number of the feature's face whose form a station is of, counted from 0"
+)
+FORM_STATION_PLACE = variable("f8 station(form_station, axis)", "point of the covariance, nominal", "mm")
+FORM_STATION_WEIGHT = variable(
+    "f8 station_weight(form_station, form_mode)", "factor of the covariance with a station in the height of a mode", "1"
+)
+FORM_REMOVED = variable(
+    "f8 form_removed(feature_face, form_mode, form_term)",
+    "growth, translation, and rotation [mm-1] about the origin, of the face as a whole, which is subtracted from a mode",
+    "1",
+)
+FORMS = (
+    FORM_COVARIANCE, FORM_LENGTH, FORM_LENGTH_ALONG, FORM_LOBES, FORM_ASSOCIATED, FORM_START, FORM_END,
+    *FORM_SURFACE.values(), FORM_SPREAD, FORM_LEFT_OUT, FORM_MEAN_ZONE, FORM_CONTRIBUTOR, FACE_OF_FORM_STATION,
+    FORM_STATION_PLACE, FORM_STATION_WEIGHT, FORM_REMOVED,
 )  # fmt: skip

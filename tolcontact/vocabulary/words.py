@@ -41,6 +41,6 @@ def reaction_words(units: str) -> ReactionWords:
         return ReactionWords("mean\nreaction, N", "The reaction of a pair is the sum of the contact forces at its points.")
     return ReactionWords(
         f"mean\nmultiplier, {units}",
-        "The multiplier of a pair is the sum of the Lagrange multipliers of its contact points. It tells how strongly the pair "
+        "The multiplier of a pair is the sum of the Lagrange multipliers of its contact points. It says how strongly the pair "
         "displaces its parts, compared with other pairs. It is no force, because the objective has no stiffness and no force.",
     )
