@@ -7,8 +7,7 @@ import typer
 
 from tolcontact import archive as archives, report as reports, workflow
 from tolcontact.cli.app import Archive, AsCsv, AsJson, Overwrite, app, examples, flag, only_one
-from tolcontact.cli.json_output import print_data
-from tolcontact.cli.output import check_page, check_spreadsheet, console, print_summary
+from tolcontact.cli.output import check_page, check_spreadsheet, console, print_data, print_summary
 from tolcontact.cli.progress import waiting
 from tolcontact.cli.title_options import Author, Company, Date, PartNumber, Revision, Title, title_entries
 from tolcontact.declaration.title_block import title_block_of

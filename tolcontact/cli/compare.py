@@ -23,8 +23,7 @@ from tolcontact.cli.app import (
     or_,
     set_options,
 )
-from tolcontact.cli.json_output import print_data
-from tolcontact.cli.output import check_page, console
+from tolcontact.cli.output import check_page, console, print_data
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
