@@ -14,7 +14,7 @@ from tolcontact.cli import app as common
 from tolcontact.cli.analyses import COMMANDS, REQUIRED, AnalysisCommand
 from tolcontact.cli.output import console, print_data
 from tolcontact.cli.progress import shown_progress
-from tolcontact.report.text import analysis_text
+from tolcontact.report import analysis_text
 from tolcontact.simulation.cluster import client_of
 from tolcontact.workflow.models import DEFAULT_SOLVER, is_archive
 

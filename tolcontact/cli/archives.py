@@ -12,7 +12,6 @@ from tolcontact.cli.progress import waiting
 from tolcontact.cli.title_options import Author, Company, Date, PartNumber, Revision, Title, title_entries
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.errors import shown
-from tolcontact.report.text import capability_text
 from tolcontact.vocabulary import ESTIMATE, MEASURE_UNITS, STATISTIC, units_of
 
 
@@ -34,7 +33,7 @@ def summary(
     elif as_json:
         print_data(estimates)
     elif limits:
-        console().print(capability_text(estimates))
+        console().print(reports.capability_text(estimates))
     else:
         print_summary(estimates)
 

@@ -27,7 +27,6 @@ from tolcontact.cli.output import check_page, console, print_data
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
-from tolcontact.report.text import comparison_text, runs_text
 from tolcontact.simulation.cluster import client_of
 from tolcontact.workflow.comparison import compare as compare_solvers, compare_runs, named_archives
 from tolcontact.workflow.models import DEFAULT_SOLVER
@@ -97,7 +96,7 @@ def compare(
     if as_json:
         print_data(comparison)
     else:
-        console().print((runs_text if all(are_archives) else comparison_text)(comparison))
+        console().print((reports.runs_text if all(are_archives) else reports.comparison_text)(comparison))
         if report is not None:
             typer.echo(f"\nreport: {shown(str(report))}")
 

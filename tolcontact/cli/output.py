@@ -11,7 +11,6 @@ from rich.console import Console
 
 from tolcontact import report
 from tolcontact.errors import OptionError
-from tolcontact.report.text import summary_text
 from tolcontact.vocabulary import BY_STATUS, UNRESOLVED
 
 FAILED_SHARE = 0.001
@@ -45,7 +44,7 @@ def check_spreadsheet(path: Path, *, overwrite: bool = False) -> None:
 
 def print_summary(summary: xr.Dataset) -> None:
     """Print the summary of a run. Raises typer.Exit with code 1 if too many realizations were not resolved."""
-    console().print(summary_text(summary))
+    console().print(report.summary_text(summary))
     failed = sum(int(summary[BY_STATUS.name][status]) for status in UNRESOLVED)
     if failed > FAILED_SHARE * summary.attrs["realizations"]:
         typer.echo(f"error: {failed} realizations were not resolved, more than {FAILED_SHARE:.1%} of all", err=True)

@@ -19,24 +19,15 @@ from tolcontact.discretization import Nominal, discretize
 from tolcontact.errors import ArchiveError, ModelError
 from tolcontact.replacing import replacing
 from tolcontact.report.analysis_tables import analysis_report, archived_analysis
-from tolcontact.report.archived_settings import archived_settings
+from tolcontact.report.comparison_text import change_table, runs_lines, value_table
 from tolcontact.report.contributor_shares import ContributorShares, contributor_shares
 from tolcontact.report.figures import grouped, limits_text
 from tolcontact.report.html.charts import bars_of, charts_of, compared_charts, relations_of
 from tolcontact.report.html.scene import gap_rows, scene_of, view_of
-from tolcontact.report.model_tables import model_tables
+from tolcontact.report.model_tables import archived_settings, model_tables
 from tolcontact.report.results_table import COLUMNS, SIDES, result_rows, share_heading
-from tolcontact.report.text.runs import CHANGES, VALUES, change_rows, runs_lines, value_rows
-from tolcontact.report.text.summary import contact_lines, measure_rows, notes, pair_columns, pair_rows
+from tolcontact.report.summary_text import contact_lines, measure_table, pair_table
 from tolcontact.statistics.verdict import VERDICT_RULE
-from tolcontact.vocabulary import (
-    CONTRIBUTORS,
-    ESTIMATES_NOTE,
-    GLOSSARY,
-    SIMULATION_SETTINGS,
-    STATE_WORDS,
-    reaction_words,
-)  # fmt: skip
 
 HERE = Path(__file__).parent
 GENERATOR = '<meta name="generator" content="tolcontact">'
@@ -57,8 +48,8 @@ SCRIPTS = {
 TITLE_ENTRIES = {"part_number": "part number", "revision": "revision", "author": "author", "date": "date"}
 MAX_ROWS = 15  # of the table of an analysis, above a fold
 WORDS = {
-    "states": STATE_WORDS, "rule": VERDICT_RULE, "glossary": GLOSSARY, "estimates_note": ESTIMATES_NOTE,
-    "contributors_heading": CONTRIBUTORS, "settings_heading": SIMULATION_SETTINGS,
+    "states": terms.STATE_WORDS, "rule": VERDICT_RULE, "glossary": terms.GLOSSARY, "estimates_note": terms.ESTIMATES_NOTE,
+    "contributors_heading": terms.CONTRIBUTORS, "settings_heading": terms.SIMULATION_SETTINGS,
 }  # fmt: skip
 MAX_BARS = 15  # of a chart
 CASES_NOTE = "Those with contact are the first of the single realizations above."
@@ -155,7 +146,7 @@ def comparison_page(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> 
     measures = []
     for name in comparison["measure"].values:
         measure = comparison.sel(measure=name)
-        tables = [{"columns": VALUES, "rows": value_rows(measure)}, {"columns": CHANGES, "rows": change_rows(measure)}]
+        tables = [value_table(measure), change_table(measure)]
         measures.append({"name": str(name), "units": str(measure["measure_units"].values), "tables": tables})
     values = {
         "title": comparison.attrs["title"],
@@ -174,7 +165,7 @@ def summary_table(summary: xr.Dataset) -> str:
 def _page(kind: str, values: dict[str, Any], data: dict[str, Any]) -> str:
     """Return a page of a kind, which selects its template and scripts."""
     scripts = [_as_is(file) for file in SCRIPTS[kind]]
-    data |= {"states": STATE_WORDS}
+    data |= {"states": terms.STATE_WORDS}
     return _template(kind).render(
         **WORDS,
         data=jinja2.utils.htmlsafe_json_dumps(data, dumps=_plain_json),
@@ -217,8 +208,8 @@ def _results(summary: xr.Dataset) -> dict[str, Any]:
 
 
 def _pairs(summary: xr.Dataset) -> dict[str, Any]:
-    explanation = reaction_words(summary["reaction"].attrs["units"]).explanation
-    return {"columns": pair_columns(summary), "rows": pair_rows(summary), "explanation": explanation}
+    table, explanation = pair_table(summary), terms.reaction_words(summary["reaction"].attrs["units"]).explanation
+    return {"columns": table.columns, "rows": table.rows, "explanation": explanation}
 
 
 def _details(summary: xr.Dataset, shares: Sequence[ContributorShares]) -> list[dict[str, Any]]:
@@ -226,14 +217,14 @@ def _details(summary: xr.Dataset, shares: Sequence[ContributorShares]) -> list[d
     details = []
     for name, contributors in zip(summary["measure"].values, shares, strict=True):
         measure = summary.sel(measure=name)
-        rows = measure_rows(measure)
+        table = measure_table(measure)
         details.append(
             {
                 "name": str(name),
                 "units": str(measure["measure_units"].values),
                 "limits": limits_text(measure),
-                "rows": rows,
-                "note": "; ".join(notes(rows)),
+                "rows": table.rows,
+                "note": "; ".join(table.remarks),
                 "contributors": contributors,
             }
         )
