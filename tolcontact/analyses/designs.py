@@ -21,12 +21,12 @@ REDRAWN_START = 1 << 40  # number of the first realization of B; no run is that 
 
 
 class Design(ABC):
-    """Deviations in the form of Draws: realization k size + m is member m of base realization k."""
+    """Deviations in the form of Draws: realization k size + m is member m of base realization k.
 
-    @property
-    @abstractmethod
-    def size(self) -> int:
-        """The number of realizations of each base realization."""
+    size   number of realizations of each base realization
+    """
+
+    size: int
 
     @abstractmethod
     def members(self, seed: int, start: int, stop: int) -> np.ndarray:
@@ -48,11 +48,7 @@ class SteppedDraws(Design):
     def __init__(self, draws: Draws, columns: np.ndarray, steps: np.ndarray) -> None:
         self._draws, self._columns, self._steps = draws, columns, steps
         self._drive = draws.drive_matrix
-
-    @property
-    def size(self) -> int:
-        """The number of realizations of each base realization."""
-        return 1 + 2 * len(self._columns)
+        self.size = 1 + 2 * len(columns)
 
     def members(self, seed: int, start: int, stop: int) -> np.ndarray:
         """Return deviations (base, member, contributor) of base realizations `start` to `stop`."""
@@ -75,11 +71,7 @@ class MixedDraws(Design):
 
     def __init__(self, draws: Draws, groups: Sequence[np.ndarray]) -> None:
         self._draws, self._groups = draws, groups
-
-    @property
-    def size(self) -> int:
-        """The number of realizations of each base realization."""
-        return 2 + len(self._groups)
+        self.size = 2 + len(groups)
 
     def members(self, seed: int, start: int, stop: int) -> np.ndarray:
         """Return deviations (base, member, contributor) of base realizations `start` to `stop`."""
@@ -102,17 +94,13 @@ class ReleasedDraws(Design):
 
     def __init__(self, draws: Draws, units: Mapping[str, np.ndarray]) -> None:
         self._draws, self._names = draws, list(units)
+        self.size = 1 + len(units)
         self._unit = {draws.labels[column]: k for k, columns in enumerate(units.values()) for column in columns}
         self._unit |= {
             rows: self._unit[draws.labels[int(columns[0])]]
             for rows, (columns, _) in zip(draws.population_labels, draws.populations, strict=True)
             if draws.labels[int(columns[0])] in self._unit
         }
-
-    @property
-    def size(self) -> int:
-        """The number of realizations of each base realization."""
-        return 1 + len(self._names)
 
     def positions(self, seed: int, start: int, stop: int) -> np.ndarray:
         """Return the positions (base, unit) of the units in the random orders of base realizations."""
