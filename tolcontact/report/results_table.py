@@ -10,7 +10,7 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.report.figures import grouped, number, percent, plain
 from tolcontact.report.table import Table
-from tolcontact.statistics.verdict import FAILS, UNDECIDED, Verdict, verdict
+from tolcontact.statistics.capability import FAILS, UNDECIDED, Verdict, verdict
 
 PPM_BELOW = 0.01  # if all shares are smaller, the table states them in ppm
 DIGITS_OF_COUNTS = 2  # significant digits of the number of realizations that would decide

@@ -18,7 +18,7 @@ from tolcontact.report.contributor_shares import contributor_shares
 from tolcontact.report.model_tables import archived_settings, model_tables
 from tolcontact.report.results_table import STATISTICS, result_rows
 from tolcontact.report.table import Table
-from tolcontact.statistics.verdict import VERDICT_RULE
+from tolcontact.statistics.capability import VERDICT_RULE
 from tolcontact.vocabulary import units_of
 
 MAX_WIDTH = 48  # characters of a column

@@ -27,7 +27,7 @@ from tolcontact.report.html.scene import gap_rows, scene_of, view_of
 from tolcontact.report.model_tables import archived_settings, model_tables
 from tolcontact.report.results_table import COLUMNS, SIDES, result_rows, share_heading
 from tolcontact.report.summary_text import contact_lines, measure_table, pair_table
-from tolcontact.statistics.verdict import VERDICT_RULE
+from tolcontact.statistics.capability import VERDICT_RULE
 
 HERE = Path(__file__).parent
 GENERATOR = '<meta name="generator" content="tolcontact">'
