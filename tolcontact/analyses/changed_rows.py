@@ -78,13 +78,13 @@ class ChangedRows:
 
         Groups that change none of the first rows share the search in the remaining ones.
         """
-        first, others = np.split(rows, [FIRST_ROWS])
-        first_hits = self.of_sets([(np.array([group]), first) for group in groups], changed_logs)
-        if not len(others):
+        leading, remaining = np.split(rows, [FIRST_ROWS])
+        first_hits = self.of_sets([(np.array([group]), leading) for group in groups], changed_logs)
+        if not len(remaining):
             return first_hits
         is_frequent = np.array([len(hits.rows) > 0 for hits in first_hits], dtype=bool)
-        further = dict(self.shared(groups[~is_frequent], changed_logs, others))
-        frequent = self.of_sets([(np.array([group]), others) for group in groups[is_frequent]], changed_logs)
+        further = dict(self.shared(groups[~is_frequent], changed_logs, remaining))
+        frequent = self.of_sets([(np.array([group]), remaining) for group in groups[is_frequent]], changed_logs)
         further |= zip(groups[is_frequent].tolist(), frequent, strict=True)
         return [
             Hits(*map(np.concatenate, zip(hits, further[group], strict=True))) if group in further else hits
@@ -149,14 +149,14 @@ def narrowing_effects(trials: ScaledTrials) -> np.ndarray:
     limits = [program.limits(number) for number in range(len(program.nominal.measures))]
     ones = np.ones(len(trials))
     rows = np.arange(effect_samples(trials.samples, len(trials)))
-    factors, first = list(ones - STEP * np.eye(len(trials))), rows[:MIN_DECISIVE]
-    present, *firsts = trials.corrected_rows([ones, *factors], [rows, *[first] * len(trials)])
+    factors, leading = list(ones - STEP * np.eye(len(trials))), rows[:MIN_DECISIVE]
+    present, *firsts = trials.corrected_rows([ones, *factors], [rows, *[leading] * len(trials)])
     negligible = NEGLIGIBLE * present.std(axis=0)
-    groups = [k for k, x in enumerate(firsts) if (np.abs(x - present[: len(first)]).max(axis=0) > negligible).any()]
-    others = trials.corrected_rows([factors[k] for k in groups], [rows[len(first) :]] * len(groups))
+    groups = [k for k, x in enumerate(firsts) if (np.abs(x - present[: len(leading)]).max(axis=0) > negligible).any()]
+    remaining = trials.corrected_rows([factors[k] for k in groups], [rows[len(leading) :]] * len(groups))
     effects = np.zeros((len(limits), len(terms.EFFECTS), len(trials), len(terms.ESTIMATE)))
-    for group, other in zip(groups, others, strict=True):
-        narrowed = np.concatenate([firsts[group], other])
+    for group, values in zip(groups, remaining, strict=True):
+        narrowed = np.concatenate([firsts[group], values])
         for measure, limits_of_measure in enumerate(limits):
             batches = [np.array_split(values[:, measure], BATCHES) for values in (narrowed, present)]
             spreads = [np.array([6 * x.std(ddof=1) for x in values]) for values in batches]

@@ -63,6 +63,12 @@ def summarize(results: xr.DataTree) -> Summary:
     The attribute `realizations` is the number of finished realizations, `samples` the number that the run was started with.
     Raises ArchiveError if fewer than MIN_REALIZATIONS realizations are finished.
     """
+    dataset = _estimates(results)
+    return Summary(dataset.data_vars, dataset.coords, dataset.attrs)
+
+
+def _estimates(results: xr.DataTree) -> xr.Dataset:
+    """Return the dataset of `summarize`."""
     count = finished(results)
     if count < MIN_REALIZATIONS:
         raise ArchiveError(f"{count} realizations are finished, too few for statistics; continue with --resume")
@@ -81,7 +87,7 @@ def summarize(results: xr.DataTree) -> Summary:
         **_field_values(results),
     }
     units = {terms.PAIR_REACTION: {"units": rows[terms.REACTION.name].attrs["units"]}}
-    return Summary(
+    return xr.Dataset(
         {variable.name: variable.entry(array, **units.get(variable, {})) for variable, array in values.items()},
         _coordinates(rows, combinations)
         | {terms.MEASURE_STOPS: (terms.MEASURE, of_measures.stops), terms.CLASH: clashes.labels},
