@@ -17,8 +17,8 @@ from tolcontact.simulation.cluster import client_of
 from tolcontact.statistics import Summary
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.accessor import summarize
-from tolcontact.workflow.archived_run import SURFACES, write_run
 from tolcontact.workflow.models import DEFAULT_SOLVER
+from tolcontact.workflow.runs import SURFACES, write_run
 from tolcontact.workflow.until import Target
 
 Until = Annotated[

@@ -2,6 +2,7 @@
 
 import base64
 from collections.abc import Sequence
+from dataclasses import fields
 from typing import Any, NamedTuple
 
 import fast_simplification
@@ -115,16 +116,13 @@ def _add_gaps(pairs: list[Scene], states: SingleStates, count: int) -> None:
 
 
 def packed_marks(marks: Marks) -> Scene:
-    """Return locators, contact points, measures and forces as the data of a page."""
+    """Return annotations by kind as the data of a page."""
     return {
-        "locators": marks.locators,
-        "contacts": [
-            {key: packed(value) if isinstance(value, np.ndarray) else value for key, value in pair.items()}
-            for pair in marks.contacts
-        ],
-        "measures": marks.measures,
-        "features": marks.features,
-        "forces": marks.forces,
+        field.name: [
+            {key: packed(value) if isinstance(value, np.ndarray) else value for key, value in mark.items()}
+            for mark in getattr(marks, field.name)
+        ]
+        for field in fields(marks)
     }
 
 
