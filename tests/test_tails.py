@@ -11,7 +11,7 @@ from scipy import stats
 import tolcontact as tc
 from tests import cases
 from tests.helpers import PAPER, SEATED, call, nightly
-from tolcontact.analyses.engine import Engine
+from tolcontact.analyses.analysis import Engine
 from tolcontact.analyses.tails import NotAssemblable
 from tolcontact.simulation import map_blocks
 from tolcontact.statistics.intervals import Estimate

@@ -11,12 +11,10 @@ import scipy
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import Analysis
-from tolcontact.analyses.changed_rows import ChangedRows, effect_samples, narrowing_effects
-from tolcontact.analyses.engine import VERIFICATION_FACTOR, Progress
+from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Progress
 from tolcontact.analyses.grouping import check_grouping, owners
 from tolcontact.analyses.requirement import MIN_DECISIVE, Requirement
-from tolcontact.analyses.scaled_trials import STEP, ScaledTrials, Trial
+from tolcontact.analyses.scaled_trials import STEP, ChangedRows, ScaledTrials, Trial, effect_samples, narrowing_effects
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.statistics.intervals import Estimate

@@ -14,7 +14,7 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.allowed_space import AllowedRegion
-from tolcontact.analyses.engine import Engine
+from tolcontact.analyses.analysis import Engine
 
 RANDOM_DIRECTIONS = 4  # tried by a search at each step
 END_SHARES = 0.5 ** np.arange(9)  # of the way to a far end, for trial points

@@ -9,8 +9,7 @@ import scipy
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import Analysis
-from tolcontact.analyses.engine import VERIFICATION_FACTOR, Engine, Progress
+from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Engine, Progress
 from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly, Locator, ThreeTwoOne
 from tolcontact.discretization import Nominal, NominalPart, discretize

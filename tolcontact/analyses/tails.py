@@ -11,8 +11,7 @@ import xarray as xr
 from scipy.special import gammaincc, ndtr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import Analysis
-from tolcontact.analyses.engine import Engine, Progress
+from tolcontact.analyses.analysis import Analysis, Engine, Progress
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
