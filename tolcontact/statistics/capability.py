@@ -16,13 +16,13 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy import special
 
 from tolcontact.limits import Limits
 from tolcontact.statistics.intervals import (
     CONFIDENCE,
     UNDEFINED,
     Estimate,
+    binomial_quantile,
     from_standardized_influence,
     is_constant,
     percentiles,
@@ -167,17 +167,10 @@ def values_below(n: int) -> np.ndarray:
     """Return simulated numbers of the values below the percentiles, among `n` values, (percentile, trial)."""
     u = scrambled_points(TRIALS, len(PERCENTS), np.random.default_rng(0).spawn(1)[0]).T
     p = np.array(PERCENTS) / 100
-    below_low = _hits(u[0], np.full(TRIALS, n), p[0])
-    below_median = below_low + _hits(u[1], n - below_low, (p[1] - p[0]) / (1 - p[0]))
-    below_high = below_median + _hits(u[2], n - below_median, (p[2] - p[1]) / (1 - p[1]))
+    below_low = binomial_quantile(u[0], np.full(TRIALS, n), p[0])
+    below_median = below_low + binomial_quantile(u[1], n - below_low, (p[1] - p[0]) / (1 - p[0]))
+    below_high = below_median + binomial_quantile(u[2], n - below_median, (p[2] - p[1]) / (1 - p[1]))
     return np.array([below_low, below_median, below_high])
-
-
-def _hits(u: np.ndarray, n: np.ndarray, p: float) -> np.ndarray:
-    """Return quantiles `u` of binomial distributions."""
-    k = np.maximum(np.ceil(np.nan_to_num(special.bdtrik(u, np.maximum(n, 1), p))), 0).astype(np.int64)
-    k -= (k > 0) & (special.bdtr(np.maximum(k - 1, 0), np.maximum(n, 1), p) >= u)
-    return np.where(n > 0, np.minimum(k, n), 0)
 
 
 class Verdict(NamedTuple):

@@ -73,11 +73,12 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
     if count < MIN_REALIZATIONS:
         raise ArchiveError(f"{count} realizations are finished, too few for statistics; continue with --resume")
     rows = results.to_dataset().isel({terms.REALIZATION: slice(count)})
-    combinations, smallest, of_measures = contact.combinations(rows), _smallest_range(results, rows), measure_estimates(rows)
+    combinations, smallest = contact.combinations(rows), _smallest_range(results, rows)
+    statistics, changes, stops = measure_estimates(rows)
     rigid, clashes = _is_rigid(results), Clashes(rows)
     values = {
-        terms.STATISTIC_VALUE: of_measures.statistics,
-        terms.CHANGE: of_measures.changes,
+        terms.STATISTIC_VALUE: statistics,
+        terms.CHANGE: changes,
         **_status_values(rows, rigid),
         **_contact_values(rows, combinations),
         terms.STEPS: _steps(rows),
@@ -89,8 +90,7 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
     units = {terms.PAIR_REACTION: {"units": rows[terms.REACTION.name].attrs["units"]}}
     return xr.Dataset(
         {variable.name: variable.entry(array, **units.get(variable, {})) for variable, array in values.items()},
-        _coordinates(rows, combinations)
-        | {terms.MEASURE_STOPS: (terms.MEASURE, of_measures.stops), terms.CLASH: clashes.labels},
+        _coordinates(rows, combinations) | {terms.MEASURE_STOPS: (terms.MEASURE, stops), terms.CLASH: clashes.labels},
         {
             "title": results.attrs["title"],
             "realizations": count,
