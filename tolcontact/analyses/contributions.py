@@ -7,6 +7,7 @@ index of all minor groups bounds the first-order and total index of each of them
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -152,7 +153,7 @@ def contributions(
     if samples is None:
         samples = int(np.clip((BUDGET - engine.simulated) // realizations_each, MIN_SAMPLES, MAX_SAMPLES))
     engine.total = engine.simulated + samples * realizations_each
-    measured, A, _ = engine.simulate_design(mixed, samples, seed=seed, observe=_FirstDeviations(mixed.size))
+    measured, A, _ = engine.simulate_design(mixed, samples, seed=seed, observe=partial(_first_deviations, mixed.size))
     slopes, A = total_derivatives(program), program.draws.without_shared_causes(A[:, 0])
     values = {
         **_indices(screening, measured, program.accuracies),
@@ -221,12 +222,7 @@ def _linear_shares(program: Program, deviations: np.ndarray, slopes: np.ndarray,
     return variances / variances.sum() if variances.sum() > 0 else np.full(len(variances), np.nan)
 
 
-@dataclass(frozen=True)
-class _FirstDeviations:
-    """An observer of measures, deviations of the first of every `size` realizations, and statuses."""
-
-    size: int
-
-    def __call__(self, block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        deviations = block.deviations[-block.start % self.size :: self.size]
-        return block.measured.copy(), deviations.copy(), block.status.copy()
+def _first_deviations(size: int, block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the measures, the deviations of the first of every `size` realizations, and the statuses of a block."""
+    deviations = block.deviations[-block.start % size :: size]
+    return block.measured.copy(), deviations.copy(), block.status.copy()

@@ -53,16 +53,13 @@ class SteppedDraws(Design):
     def members(self, seed: int, start: int, stop: int) -> np.ndarray:
         """Return deviations (base, member, contributor) of base realizations `start` to `stop`."""
         members = np.repeat(self._draws(seed=seed, start=start, stop=stop)[:, None], self.size, axis=1)
-        count = len(self._columns)
-        for k, (column, step) in enumerate(zip(self._columns, self._steps, strict=True), start=1):
-            members[:, k, column] += step
-            members[:, count + k, column] -= step
-            for driven in np.flatnonzero(self._drive[column]):
-                members[:, k, driven] += step * self._drive[column, driven]
-                members[:, count + k, driven] -= step * self._drive[column, driven]
-            if self._drive[column].any():  # a datum depends on the tilts that a cause drives
-                self._draws.add_shifts(members[:, k])
-                self._draws.add_shifts(members[:, count + k])
+        count, width = len(self._columns), members.shape[2]
+        changes = self._steps[:, None] * (np.eye(width) + self._drive)[self._columns]
+        members[:, 1 : count + 1] += changes
+        members[:, count + 1 :] -= changes
+        for k in np.flatnonzero(self._drive[self._columns].any(axis=1)):  # a datum depends on the tilts that a cause drives
+            self._draws.add_shifts(members[:, 1 + k])
+            self._draws.add_shifts(members[:, 1 + count + k])
         return members
 
 

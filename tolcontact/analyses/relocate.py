@@ -146,7 +146,7 @@ class TrialPositions:
         A `fresh` run has other draws, and more of them.
         """
         analysis, scheme = self._analysis, list(self._scheme)
-        scheme[self._number] = at_point(scheme[self._number], point)
+        scheme[self._number] = replace(scheme[self._number], point=point)
         solver, method = analysis.program.plugin.name, analysis.program.method
         nominal = discretize(self._with_locators(tuple(scheme)), presses=method.minimizes.presses)
         program = compile_program(nominal, solver, method)
@@ -208,14 +208,6 @@ def declared_locators(nominal: Nominal, part: NominalPart) -> tuple[Locator, ...
         name, point_of = locators.labels[number].removeprefix(f"{part.located}."), owner.part if part.owners else None
         scheme.append(Locator(name, point, direction, on=on, part=point_of))
     return tuple(scheme)
-
-
-def at_point(locator: Locator, point: np.ndarray) -> Locator:
-    """Return the same locator at another point (3,) [mm]."""
-    return Locator(
-        locator.name, point, locator.direction, locator.tolerance, one_sided=locator.one_sided, stiffness=locator.stiffness,
-        on=locator.on, part=locator.part,
-    )  # fmt: skip
 
 
 def _corners(between: tuple[Any, Any]) -> tuple[np.ndarray, np.ndarray]:

@@ -92,7 +92,8 @@ def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock |
         "details": _details(summary, shares),
         "model": model_tables(results),
         "contact": list(contact_lines(summary, summary.attrs["realizations"])),
-        "pairs": _pairs(summary) if summary.sizes["pair"] else None,
+        "pairs": pair_table(summary) if summary.sizes["pair"] else None,
+        "reactions": terms.reaction_words(summary["reaction"].attrs["units"]).explanation,
         "tables": list(tables_of(results)),
         "contributions": (indices := contributions_of(results)),
         "max_rows": MAX_ROWS,
@@ -205,11 +206,6 @@ def _plain_json(data: Any, **_: Any) -> str:
 
 def _results(summary: xr.Dataset) -> dict[str, Any]:
     return {"columns": COLUMNS, "shares": share_heading(summary), "sides": SIDES, "rows": result_rows(summary)}
-
-
-def _pairs(summary: xr.Dataset) -> dict[str, Any]:
-    table, explanation = pair_table(summary), terms.reaction_words(summary["reaction"].attrs["units"]).explanation
-    return {"columns": table.columns, "rows": table.rows, "explanation": explanation}
 
 
 def _details(summary: xr.Dataset, shares: Sequence[ContributorShares]) -> list[dict[str, Any]]:
