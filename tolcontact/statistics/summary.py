@@ -11,7 +11,7 @@ from tolcontact.errors import ArchiveError
 from tolcontact.readable import Pictured
 from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import contact, intervals
-from tolcontact.statistics.contact import Clashes, surface_values
+from tolcontact.statistics.contact import surface_values
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.measure_statistics import STATISTICS, MeasuredValues, limits, measure_estimates
 from tolcontact.vocabulary import ArchiveVariable
@@ -75,7 +75,7 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
     rows = results.to_dataset().isel({terms.REALIZATION: slice(count)})
     combinations, smallest = contact.combinations(rows), _smallest_range(results, rows)
     statistics, changes, stops = measure_estimates(rows)
-    rigid, clashes = _is_rigid(results), Clashes(rows)
+    rigid, (clashes, clash_names) = _is_rigid(results), contact.clashes(rows)
     values = {
         terms.STATISTIC_VALUE: statistics,
         terms.CHANGE: changes,
@@ -83,14 +83,14 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
         **_contact_values(rows, combinations),
         terms.STEPS: _steps(rows),
         terms.PENETRATION: _penetration(rows, rigid),
-        **clashes.values(),
+        **clashes,
         **surface_values(results, terms.NOTICED_SHARE * smallest),
         **_field_values(results),
     }
     units = {terms.PAIR_REACTION: {"units": rows[terms.REACTION.name].attrs["units"]}}
     return xr.Dataset(
         {variable.name: variable.entry(array, **units.get(variable, {})) for variable, array in values.items()},
-        _coordinates(rows, combinations) | {terms.MEASURE_STOPS: (terms.MEASURE, stops), terms.CLASH: clashes.labels},
+        _coordinates(rows, combinations) | {terms.MEASURE_STOPS: (terms.MEASURE, stops), terms.CLASH: clash_names},
         {
             "title": results.attrs["title"],
             "realizations": count,
