@@ -146,7 +146,7 @@ class TrialPositions:
         A `fresh` run has other draws, and more of them.
         """
         analysis, scheme = self._analysis, list(self._scheme)
-        scheme[self._number] = replace(scheme[self._number], point=point)
+        scheme[self._number] = replace(scheme[self._number], point=(point[0], point[1], point[2]))
         solver, method = analysis.program.plugin.name, analysis.program.method
         nominal = discretize(self._with_locators(tuple(scheme)), presses=method.minimizes.presses)
         program = compile_program(nominal, solver, method)

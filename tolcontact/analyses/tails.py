@@ -74,9 +74,8 @@ def tails(
         sides = [k for k, search in enumerate(searches) if search.number == number]
         scores, side_tails = zip(*(results[k] for k in sides), strict=True)
         # If the other limit can be exceeded, a limit that acts as a stop would only add its detection bound, so it is left out.
-        exceedable_tails = [tail for score, tail in zip(scores, side_tails, strict=True) if not score.is_stop]
-        is_undefined = any(score.is_undefined for score in scores)
-        event_tails.append(UNDEFINED_TAIL if is_undefined else either(exceedable_tails or side_tails))
+        exceedable = [tail for score, tail in zip(scores, side_tails, strict=True) if not score.is_stop] or side_tails
+        event_tails.append(UNDEFINED_TAIL if any(score.is_undefined for score in scores) else either(exceedable))
         stops.append(any(score.is_stop for score in scores))
         statuses.append(np.sum([engines[k].statuses for k in sides], axis=0))
     values = {
