@@ -16,7 +16,7 @@ from tests.helpers import call
 from tolcontact.declaration.script import load_model, write_json
 from tolcontact.plausibility.trial_draws import TrialDraws
 from tolcontact.report.results_table import result_rows, verdict_lines
-from tolcontact.report.text.summary import contact_lines
+from tolcontact.report.summary_text import contact_lines
 from tolcontact.testing import assert_no_clashes, assert_resolved
 
 CLEARANCE, SIGMA = 0.05, 0.1  # mm

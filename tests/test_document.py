@@ -12,7 +12,7 @@ from tests.helpers import nightly
 from tests.test_report import browser, needs_browser, open_page  # noqa: F401
 from tolcontact.report import summary_text, write_page
 from tolcontact.report.html import page_of
-from tolcontact.report.text.table import FigureTable
+from tolcontact.report.table import Table
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +101,7 @@ def test_headings_of_several_lines_stand_at_the_bottom(archive):
     lines = console.file.getvalue().splitlines()
     place = next(k for k, line in enumerate(lines) if line.endswith("specification"))
     assert lines[place - 1].strip() == "out of" and "mean" in lines[place] and max(map(len, lines)) <= 80
-    console.print(FigureTable(["a", "two\nlines"], [["x", "1"]]))
+    console.print(Table("", ["a", "two\nlines"], [["x", "1"]]))
     assert [line.rstrip() for line in console.file.getvalue().splitlines()[-4:]] == [
         "     two",
         "a  lines",
@@ -113,7 +113,7 @@ def test_headings_of_several_lines_stand_at_the_bottom(archive):
 def test_a_label_stands_beside_the_first_line_of_its_figures_in_tables_that_are_too_wide():
     console = Console(width=80, file=StringIO(), highlight=False)
     label = "a label of many words that is wrapped since the table is too wide"
-    console.print(FigureTable(["", "mean", "two\nlines"], [[label, "1 [0, 2]", "3 [2, 4]"], ["b", f"{'9' * 40} [0, 2]", ""]]))
+    console.print(Table("", ["", "mean", "two\nlines"], [[label, "1 [0, 2]", "3 [2, 4]"], ["b", f"{'9' * 40} [0, 2]", ""]]))
     lines = [line.rstrip() for line in console.file.getvalue().splitlines()]
     assert lines[0].endswith("two") and lines[1].split() == ["mean", "lines"]
     first = next(line for line in lines if line.startswith("a label"))

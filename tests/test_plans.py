@@ -91,7 +91,7 @@ def test_intervals_of_replicates_cover(name):
             "mean": intervals.mean(x),
             "6 sigma": intervals.standard_deviation(x, times=6),
             "share": intervals.proportion(x.map(lambda piece: piece > 1)),
-            "95 %": intervals.percentile(x, 95),
+            "95 %": intervals.percentiles(x, [95])[0],
             "skewness": skewness(x.map(lambda piece: np.minimum(piece, 1))),
         }
         for word, (estimate, lower, upper) in found.items():

@@ -9,7 +9,7 @@ from tests import cases
 from tolcontact.report.figures import plain
 from tolcontact.report.results_table import result_rows, share_heading, share_in, share_units, verdict_lines, verdict_text
 from tolcontact.statistics import intervals
-from tolcontact.statistics.verdict import ALLOWED_SHARE, FAILS, MEETS, UNDECIDED, verdict
+from tolcontact.statistics.capability import ALLOWED_SHARE, FAILS, MEETS, UNDECIDED, verdict
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from tolcontact.archive import Run
 from tolcontact.checksums import crc32
 from tolcontact.errors import ArchiveError
 from tolcontact.vocabulary import UNFINISHED
-from tolcontact.workflow.archived_run import write_archive
+from tolcontact.workflow.runs import write_archive
 
 SETTINGS = Run(seed=3, samples=9000, keep="measures", surfaces=0, fields="some")
 

@@ -24,7 +24,7 @@ TRUTH = {
     "mean": (lambda x, g: intervals.mean(x), 0.398942),
     "variance": (lambda x, g: intervals.variance(x), 0.340845),
     "6 sigma": (lambda x, g: intervals.standard_deviation(x, times=6), 6 * np.sqrt(0.340845)),
-    "95 %": (lambda x, g: intervals.percentile(x, 95), stats.norm.ppf(0.95)),
+    "95 %": (lambda x, g: intervals.percentiles(x, [95])[0], stats.norm.ppf(0.95)),
     "share": (lambda x, g: intervals.proportion(x > 1), stats.norm.sf(1)),
     "variance ratio": (lambda x, g: intervals.variance_ratio(x, g), 0.340845),
     "shift": (lambda x, g: intervals.mean(x - g), 0.398942),
@@ -53,7 +53,7 @@ def test_a_sample_that_is_read_in_pieces_gives_the_same_as_one_that_is_sorted(ti
     ranks = [0, 1, 17, 2500, 2501, 5001, 5002]
     assert (pieces[0].ordered(ranks) == np.sort(x)[ranks]).all()
     for percent in (0.135, 5, 50, 99.865):
-        estimate, *bounds = intervals.percentile(pieces[0], percent)
+        estimate, *bounds = intervals.percentiles(pieces[0], [percent])[0]
         assert estimate == pytest.approx(np.percentile(x, percent), rel=1e-12)
         assert set(bounds) <= {-np.inf, np.inf, *x}
     assert intervals.variance_ratio(*pieces) == pytest.approx(intervals.variance_ratio(x, y), rel=1e-12)
@@ -62,7 +62,7 @@ def test_a_sample_that_is_read_in_pieces_gives_the_same_as_one_that_is_sorted(ti
 
 
 def test_a_percentile_beyond_the_sample_has_no_bound():
-    _, lower, upper = intervals.percentile(np.random.default_rng(0).normal(size=1000), 0.135)
+    _, lower, upper = intervals.percentiles(np.random.default_rng(0).normal(size=1000), [0.135])[0]
     assert lower == -np.inf and np.isfinite(upper)
 
 
@@ -84,7 +84,7 @@ def test_intervals_of_spreads_cover_in_small_samples(size):
         found = intervals.variance(before), intervals.variance_ratio(0.6 * before + 0.8 * other, before)
         covered += [lower <= 1 <= upper for _, lower, upper in found]
         for percent in (0.135, 50):
-            estimate, lower, upper = intervals.percentile(before, percent)
+            estimate, lower, upper = intervals.percentiles(before, [percent])[0]
             assert lower <= estimate <= upper
     assert (covered / REPEATS > 0.92).all()
 
@@ -164,7 +164,7 @@ def test_intervals_are_those_of_scipys_distributions():
             below, above = stats.binom.ppf([0.025, 0.975], n, p / 100).astype(int)
             ordered = np.sort(x)
             expected = (ordered[below - 1] if below >= 1 else -np.inf, ordered[above] if above < n else np.inf)
-            assert intervals.percentile(x, p)[1:] == expected
+            assert intervals.percentiles(x, [p])[0][1:] == expected
         for k in {0, 1, n // 3, n}:
             hits = np.arange(n) < k
             bounds = stats.binomtest(k, n).proportion_ci(0.95, method="exact")

@@ -11,8 +11,8 @@ from scipy import stats
 import tolcontact as tc
 from tests import cases
 from tests.helpers import PAPER, SEATED, call, nightly
-from tolcontact.analyses.engine import Engine
-from tolcontact.analyses.tails import not_assemblable
+from tolcontact.analyses.analysis import Engine
+from tolcontact.analyses.tails import NotAssemblable
 from tolcontact.simulation import map_blocks
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.rare import Tail, either, sufficient_tail, tail_probability
@@ -165,7 +165,7 @@ def test_ra1_as_a_run_counts_it(method, samples):
 def test_normal_scores_are_drawn_as_in_a_run():
     """CASES C6, rotations alone; larger deviations do not make assembly possible again."""
     program = tc.build(cases.square_pins("rotations"), solver="daqp", method=SEATED)
-    score = not_assemblable(Engine(program, map_blocks))
+    score = NotAssemblable(Engine(program, map_blocks))
     u = np.random.default_rng(3).standard_normal((24, len(program.draws.varying)))
     stuck = np.stack([score(factor * u) for factor in 1.3 ** np.arange(7)])
     assert (stuck[1:] >= stuck[:-1]).all() and set(np.unique(stuck)) == {-1.0, 1.0}

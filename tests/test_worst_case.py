@@ -18,8 +18,7 @@ from tests.helpers import PAPER, call, nightly
 from tests.test_datums import plate
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.allowed_space import AllowedRegion
-from tolcontact.analyses.analysis import Analysis
-from tolcontact.analyses.engine import Engine
+from tolcontact.analyses.analysis import Analysis, Engine
 from tolcontact.analyses.extreme_search import Effort, Evaluation
 from tolcontact.analyses.worst_case import Influences, search_worst_case
 from tolcontact.simulation import map_blocks

@@ -14,7 +14,7 @@ from tests import cases
 from tests.cases import stations
 from tests.helpers import contents
 from tolcontact.archive import Run
-from tolcontact.workflow.archived_run import write_archive
+from tolcontact.workflow.runs import write_archive
 
 folder, step = Path(sys.argv[1]), int((*sys.argv, 1)[2])
 whole = folder / "whole.nc"

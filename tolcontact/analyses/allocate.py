@@ -11,14 +11,10 @@ import scipy
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import Analysis
-from tolcontact.analyses.changed_rows import ChangedRows
-from tolcontact.analyses.engine import VERIFICATION_FACTOR, Progress
+from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Progress
 from tolcontact.analyses.grouping import check_grouping, owners
-from tolcontact.analyses.idle_groups import IdleSearch
-from tolcontact.analyses.narrowing_effects import effect_samples, narrowing_effects
 from tolcontact.analyses.requirement import MIN_DECISIVE, Requirement
-from tolcontact.analyses.scaled_trials import STEP, ScaledTrials, Trial
+from tolcontact.analyses.scaled_trials import STEP, ChangedRows, ScaledTrials, Trial, effect_samples, narrowing_effects
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.statistics.intervals import Estimate
@@ -77,37 +73,23 @@ def allocate(
     requirements = _requirements(require, program, samples)
     curves = _curves(costs, groups := _groups(program, by))
     trials = ScaledTrials(analysis.engine(_expected(samples, len(groups))), list(groups.values()), seed, samples)
-    prices = Prices([curves.get(name, 0.0) for name in groups], np.array([name in curves for name in groups]))
-    search = Search(trials, requirements, prices)
+    prices = [curves.get(name, 0.0) for name in groups]
+    search = Search(trials, requirements, prices, np.array([name in curves for name in groups]))
     logs, estimates, is_met = _allocated(search, _expected(samples, 0))
     factors = np.exp(np.stack([np.zeros(len(groups)), logs], axis=1))
     values = {
         "range": np.array(_ranges(program, groups))[:, None] * factors,
         "factor": factors[:, 1],
-        "cost": [[_cost(curve, factor) for factor in row] for curve, row in zip(prices.curves, factors, strict=True)],
+        "cost": [[_cost(curve, factor) for factor in row] for curve, row in zip(prices, factors, strict=True)],
         "kept": np.array(estimates).swapaxes(0, 1),
         "met": np.array(is_met, dtype=np.int8),
         "required": [requirement.value for requirement in requirements],
         "idle": search.idle.astype(np.int8),
-        "effect": narrowing_effects(trials, program),
+        "effect": narrowing_effects(trials),
     }
     labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
     limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR, "idle_tried": search.tested_rows}
     return analysis.dataset(values, labels, samples=samples, fresh=VERIFICATION_FACTOR * samples, by=by, **limits)
-
-
-@dataclass(frozen=True, eq=False)
-class Prices:
-    """The cost curves of groups, and whether their ranges may change (group,)."""
-
-    curves: Sequence[Cost]
-    is_free: np.ndarray
-
-    def total(self, logs: np.ndarray) -> float:
-        """Return the cost of the groups that may change, at logarithms of the factors (group,)."""
-        return math.fsum(
-            _cost(curve, factor) for curve, factor, free in zip(self.curves, np.exp(logs), self.is_free, strict=True) if free
-        )
 
 
 def _requirements(require: str | Sequence[str], program: Program, samples: int) -> list[Requirement]:
@@ -199,29 +181,39 @@ def _margins(requirements: Sequence[Requirement], corrected: np.ndarray) -> np.n
 
 @dataclass(eq=False)
 class Search:
-    """The search for the least cost with sufficient margins, in logarithms of the factors (group,)."""
+    """The search for the least cost with sufficient margins, in logarithms of the factors (group,).
+
+    curves    cost of each group
+    priced    (group,) whether the range of a group may change, unless it is idle
+    """
 
     trials: ScaledTrials
     requirements: Sequence[Requirement]
-    prices: Prices
+    curves: Sequence[Cost]
+    priced: np.ndarray
     idle: np.ndarray = field(init=False)  # (group,) whether a group has no known influence on any requirement
     tested_rows: int = field(init=False, default=0)  # number of realizations in the latest test of that
 
     def __post_init__(self) -> None:
-        self.idle = self.prices.is_free.copy()
+        self.idle = self.priced.copy()
 
     @property
     def is_free(self) -> np.ndarray:
         """Whether the range of a group may change, (group,)."""
-        return self.prices.is_free & ~self.idle
+        return self.priced & ~self.idle
+
+    def cost(self, logs: np.ndarray) -> float:
+        """Return the cost of the groups that may change, at logarithms of the factors (group,)."""
+        factors = zip(self.curves, np.exp(logs), self.priced, strict=True)
+        return math.fsum(_cost(curve, factor) for curve, factor, is_priced in factors if is_priced)
 
     def release(self, logs: np.ndarray, trial: Trial) -> bool:
         """Free the ranges of idle groups that have an influence at `logs`; return whether there are any.
 
         trial   the trial at `logs`
         """
-        before, search = self.idle, IdleSearch(self._changes(logs, trial), (MIN_FACTOR, MAX_FACTOR))
-        self.idle, self.tested_rows = search.idle(before), len(search.rows)
+        before, changes = self.idle, self._changes(logs, trial)
+        self.idle, self.tested_rows = changes.idle(before, (MIN_FACTOR, MAX_FACTOR)), len(changes.resolved_rows)
         return bool((before & ~self.idle).any())
 
     def least_cost(self, logs: np.ndarray, trial: Trial, aims: np.ndarray) -> tuple[np.ndarray, Trial]:
@@ -251,7 +243,7 @@ class Search:
                 break
             if slopes is None:
                 slopes = self._slopes(logs, trial)
-                penalty = PENALTY * self.prices.total(logs) / max(float(np.abs(slopes).sum()), 1e-300)
+                penalty = PENALTY * self.cost(logs) / max(float(np.abs(slopes).sum()), 1e-300)
             candidate = self._step(margins, slopes, logs, radius)
             candidate_trial = self.trials.trial_within(np.exp(candidate), most_unresolved)
             if candidate_trial is None:
@@ -282,7 +274,7 @@ class Search:
         return math.fsum(requirement.shortfall(corrected[:, requirement.measure]) for requirement in self.requirements)
 
     def _merit(self, logs: np.ndarray, margins: np.ndarray, penalty: float) -> float:
-        return self.prices.total(logs) + penalty * float(np.maximum(-margins, 0).sum())
+        return self.cost(logs) + penalty * float(np.maximum(-margins, 0).sum())
 
     def _slopes(self, logs: np.ndarray, trial: Trial) -> np.ndarray:
         """Return derivatives (requirement, group) of the margins, by central differences; 0 for groups that do not change.
@@ -321,7 +313,7 @@ class Search:
         upper = np.where(self.is_free, np.minimum(logs + radius, np.log(MAX_FACTOR)), logs)
         bounds = scipy.optimize.Bounds(lower, upper)
         solution = scipy.optimize.minimize(
-            self.prices.total, logs, method="SLSQP", bounds=bounds, constraints={"type": "ineq", "fun": approximate},
+            self.cost, logs, method="SLSQP", bounds=bounds, constraints={"type": "ineq", "fun": approximate},
             options={"maxiter": 200},
         )  # fmt: skip
         if not solution.success:

@@ -1,6 +1,13 @@
-"""Contributions to the variance of a measure, with and without contact."""
+"""Contributions to the variance of a measure, with and without contact.
 
+Screening: few realizations show which groups of contributors matter for any measure; the others are estimated as one group.
+The total index of a set of groups is at least the total index of each group in it: T_i <= T_u for i in u. So the joint total
+index of all minor groups bounds the first-order and total index of each of them, and costs as much as one group.
+"""
+
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -8,19 +15,96 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import Analysis
+from tolcontact.analyses.analysis import Analysis, Engine, Progress
 from tolcontact.analyses.designs import MixedDraws, ReleasedDraws
-from tolcontact.analyses.engine import Engine, Progress
 from tolcontact.analyses.grouping import check_grouping, independent_groups, owners
 from tolcontact.analyses.linear_model import total_derivatives
-from tolcontact.analyses.screening import SCREENING_SAMPLES, Screening, screened
 from tolcontact.compilation import Program
 from tolcontact.simulation import Block
+from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.statistics.sobol_indices import missed, shapley_effects, sobol_indices
 from tolcontact.workflow.models import Choice, Model
 
+MIN_GROUPS = 17  # fewer are not screened
+SCREENING_SAMPLES, START = 128, 1 << 38  # base realizations of a screening, and the number of the first one
+MINOR_SHARE = 0.01  # of the variance of any measure in any state: the largest joint share of minor groups
+MIN_EFFECTIVE = 16  # effective base realizations behind the variance of a measure: with fewer, no group is minor
 BUDGET = 60_000  # realizations in total that determine the default number of base realizations
 MIN_SAMPLES, MAX_SAMPLES = 512, 4096  # base realizations by default
+
+
+@dataclass(frozen=True, eq=False)
+class Screening:
+    """Groups of contributors, divided into major and minor ones.
+
+    groups     columns of deviations by group
+    is_minor   (group,)
+    totals     (measure, state, group): rough total indices; NaN where nothing varies
+    """
+
+    groups: Mapping[str, np.ndarray]
+    is_minor: np.ndarray
+    totals: np.ndarray
+
+    @classmethod
+    def none(cls, groups: Mapping[str, np.ndarray]) -> "Screening":
+        """Return a screening without minor groups."""
+        return cls(groups, np.zeros(len(groups), dtype=bool), np.zeros((0, 0, len(groups))))
+
+    @property
+    def estimated(self) -> list[np.ndarray]:
+        """The columns of the estimated groups: each major group, then all minor groups as one, if there are any."""
+        columns = list(self.groups.values())
+        minor = [columns[k] for k in np.flatnonzero(self.is_minor)]
+        return [columns[k] for k in np.flatnonzero(~self.is_minor)] + ([np.concatenate(minor)] if minor else [])
+
+    def of_all_groups(
+        self, estimates: tuple[list[Estimate], list[Estimate]], measure: int, state: int
+    ) -> tuple[list[Estimate], list[Estimate], Estimate]:
+        """Return first-order and total indices of all groups, and the joint total index of the minor ones.
+
+        `estimates` are first-order and total indices of the estimated groups. The interval of a minor group extends from 0 to
+        the joint upper bound of all minor groups.
+        """
+        if not self.is_minor.any():
+            return *estimates, Estimate(0.0, 0.0, 0.0)
+        together = estimates[1][-1]
+        bounded = [self._bounded(float(total), together) for total in self.totals[measure, state]]
+        first_order, total = (
+            [bounded[k] if minor else next(major) for k, minor in enumerate(self.is_minor)] for major in map(iter, estimates)
+        )
+        return first_order, total, together
+
+    def _bounded(self, total: float, together: Estimate) -> Estimate:
+        """Return the index of a minor group from its rough total and the joint total of all minor groups."""
+        if np.isnan(together.value):
+            return UNDEFINED
+        upper = together.value if np.isnan(together.upper) else max(together.upper, 0.0)
+        return Estimate(min(np.nan_to_num(total), upper), 0.0 * together.upper, together.upper)
+
+
+def screened(engine: Engine, groups: Mapping[str, np.ndarray], seed: int) -> Screening:
+    """Return the screening of groups by total indices, with separate realizations. Few groups are all estimated."""
+    if len(groups) < MIN_GROUPS:
+        return Screening.none(groups)
+    design = MixedDraws(engine.program.draws, list(groups.values()))
+    measured, _ = engine.simulate_design(design, SCREENING_SAMPLES, seed=seed, start=START)
+    totals, accuracies = [], engine.program.accuracies
+    for states, accuracy in zip(measured.transpose(3, 2, 0, 1), accuracies, strict=True):
+        totals.append([[index.value for index in sobol_indices(f, accuracy)[1]] for f in states])
+        if any(0 < _effective_count(f) < MIN_EFFECTIVE for f in states):
+            return Screening.none(groups)
+    shares = np.nan_to_num(np.array(totals)).reshape(-1, len(groups))
+    order = np.argsort(shares.max(axis=0, initial=0.0), kind="stable")
+    is_minor = np.zeros(len(groups), dtype=bool)
+    is_minor[order] = (shares[:, order].cumsum(axis=1) <= MINOR_SHARE).all(axis=0)
+    return Screening(groups, is_minor, np.array(totals)) if is_minor.sum() > 1 else Screening.none(groups)
+
+
+def _effective_count(f: np.ndarray) -> float:
+    """Return the effective number of base realizations behind the variance of f (n, 2 + group); 0 without variance."""
+    squares = ((f[:, :2] - f[:, :2].mean()) ** 2).mean(axis=1)
+    return float(squares.sum() ** 2 / (squares**2).sum()) if squares.any() else 0.0
 
 
 def contributions(
@@ -46,7 +130,7 @@ def contributions(
     the contributors that it drives; these have groups of their own if they also vary on their own. Contributors that do not
     vary are left out.
     With more than 16 groups and 256 samples, a screening of 128 base realizations selects minor groups, which jointly have at
-    most 1 % of the variance of any measure; they are estimated as one group (see tolcontact.analyses.screening).
+    most 1 % of the variance of any measure; they are estimated as one group (see tolcontact.analyses.contributions).
     `samples` is the number of base realizations: samples (2 + groups) are simulated, and samples (1 + units) more for Shapley
     effects, in addition to the screening. The default follows from 60 000 realizations in total, and is between 512 and 4096.
     `progress` is called with the number of finished realizations and the total.
@@ -69,7 +153,7 @@ def contributions(
     if samples is None:
         samples = int(np.clip((BUDGET - engine.simulated) // realizations_each, MIN_SAMPLES, MAX_SAMPLES))
     engine.total = engine.simulated + samples * realizations_each
-    measured, A, _ = engine.simulate_design(mixed, samples, seed=seed, observe=_FirstDeviations(mixed.size))
+    measured, A, _ = engine.simulate_design(mixed, samples, seed=seed, observe=partial(_first_deviations, mixed.size))
     slopes, A = total_derivatives(program), program.draws.without_shared_causes(A[:, 0])
     values = {
         **_indices(screening, measured, program.accuracies),
@@ -138,12 +222,7 @@ def _linear_shares(program: Program, deviations: np.ndarray, slopes: np.ndarray,
     return variances / variances.sum() if variances.sum() > 0 else np.full(len(variances), np.nan)
 
 
-@dataclass(frozen=True)
-class _FirstDeviations:
-    """An observer of measures, deviations of the first of every `size` realizations, and statuses."""
-
-    size: int
-
-    def __call__(self, block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        deviations = block.deviations[-block.start % self.size :: self.size]
-        return block.measured.copy(), deviations.copy(), block.status.copy()
+def _first_deviations(size: int, block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the measures, the deviations of the first of every `size` realizations, and the statuses of a block."""
+    deviations = block.deviations[-block.start % size :: size]
+    return block.measured.copy(), deviations.copy(), block.status.copy()

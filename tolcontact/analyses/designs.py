@@ -21,12 +21,12 @@ REDRAWN_START = 1 << 40  # number of the first realization of B; no run is that 
 
 
 class Design(ABC):
-    """Deviations in the form of Draws: realization k size + m is member m of base realization k."""
+    """Deviations in the form of Draws: realization k size + m is member m of base realization k.
 
-    @property
-    @abstractmethod
-    def size(self) -> int:
-        """The number of realizations of each base realization."""
+    size   number of realizations of each base realization
+    """
+
+    size: int
 
     @abstractmethod
     def members(self, seed: int, start: int, stop: int) -> np.ndarray:
@@ -48,25 +48,18 @@ class SteppedDraws(Design):
     def __init__(self, draws: Draws, columns: np.ndarray, steps: np.ndarray) -> None:
         self._draws, self._columns, self._steps = draws, columns, steps
         self._drive = draws.drive_matrix
-
-    @property
-    def size(self) -> int:
-        """The number of realizations of each base realization."""
-        return 1 + 2 * len(self._columns)
+        self.size = 1 + 2 * len(columns)
 
     def members(self, seed: int, start: int, stop: int) -> np.ndarray:
         """Return deviations (base, member, contributor) of base realizations `start` to `stop`."""
         members = np.repeat(self._draws(seed=seed, start=start, stop=stop)[:, None], self.size, axis=1)
-        count = len(self._columns)
-        for k, (column, step) in enumerate(zip(self._columns, self._steps, strict=True), start=1):
-            members[:, k, column] += step
-            members[:, count + k, column] -= step
-            for driven in np.flatnonzero(self._drive[column]):
-                members[:, k, driven] += step * self._drive[column, driven]
-                members[:, count + k, driven] -= step * self._drive[column, driven]
-            if self._drive[column].any():  # a datum depends on the tilts that a cause drives
-                self._draws.add_shifts(members[:, k])
-                self._draws.add_shifts(members[:, count + k])
+        count, width = len(self._columns), members.shape[2]
+        changes = self._steps[:, None] * (np.eye(width) + self._drive)[self._columns]
+        members[:, 1 : count + 1] += changes
+        members[:, count + 1 :] -= changes
+        for k in np.flatnonzero(self._drive[self._columns].any(axis=1)):  # a datum depends on the tilts that a cause drives
+            self._draws.add_shifts(members[:, 1 + k])
+            self._draws.add_shifts(members[:, 1 + count + k])
         return members
 
 
@@ -75,11 +68,7 @@ class MixedDraws(Design):
 
     def __init__(self, draws: Draws, groups: Sequence[np.ndarray]) -> None:
         self._draws, self._groups = draws, groups
-
-    @property
-    def size(self) -> int:
-        """The number of realizations of each base realization."""
-        return 2 + len(self._groups)
+        self.size = 2 + len(groups)
 
     def members(self, seed: int, start: int, stop: int) -> np.ndarray:
         """Return deviations (base, member, contributor) of base realizations `start` to `stop`."""
@@ -102,17 +91,13 @@ class ReleasedDraws(Design):
 
     def __init__(self, draws: Draws, units: Mapping[str, np.ndarray]) -> None:
         self._draws, self._names = draws, list(units)
+        self.size = 1 + len(units)
         self._unit = {draws.labels[column]: k for k, columns in enumerate(units.values()) for column in columns}
         self._unit |= {
             rows: self._unit[draws.labels[int(columns[0])]]
             for rows, (columns, _) in zip(draws.population_labels, draws.populations, strict=True)
             if draws.labels[int(columns[0])] in self._unit
         }
-
-    @property
-    def size(self) -> int:
-        """The number of realizations of each base realization."""
-        return 1 + len(self._names)
 
     def positions(self, seed: int, start: int, stop: int) -> np.ndarray:
         """Return the positions (base, unit) of the units in the random orders of base realizations."""

@@ -5,6 +5,7 @@ random directions, and then points on the way to the far end of the region along
 the gain is sufficient; otherwise its step shrinks. It ends when its step is small. Searches that meet share simulated points.
 """
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -13,8 +14,7 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.allowed_space import AllowedRegion
-from tolcontact.analyses.engine import Engine
-from tolcontact.analyses.ridge import ridge_end
+from tolcontact.analyses.analysis import Engine
 
 RANDOM_DIRECTIONS = 4  # tried by a search at each step
 END_SHARES = 0.5 ** np.arange(9)  # of the way to a far end, for trial points
@@ -127,15 +127,12 @@ class Searches:
         They start at the best points according to `measured` (n, state, measure), and at random ones among the others.
         """
         searches, ones = [], np.ones(effort.best + effort.random, dtype=int)
-        for measure in range(measured.shape[2]):
-            for state in range(measured.shape[1]):
-                for sense in terms.SENSES:
-                    values = np.nan_to_num(sense * measured[:, state, measure], nan=-np.inf)
-                    order = np.argsort(-values, kind="stable")
-                    worse = order[effort.best : max(int(np.isfinite(values).sum()), effort.best + 1)]
-                    rows = np.concatenate([order[: effort.best], rng.choice(worse, effort.random)])
-                    goal = sense * ones, state * ones, measure * ones
-                    searches.append(cls(*goal, starts[rows], values[rows], 1.0 * ones))
+        for measure, state, sense in itertools.product(range(measured.shape[2]), range(measured.shape[1]), terms.SENSES):
+            values = np.nan_to_num(sense * measured[:, state, measure], nan=-np.inf)
+            order = np.argsort(-values, kind="stable")
+            worse = order[effort.best : max(int(np.isfinite(values).sum()), effort.best + 1)]
+            rows = np.concatenate([order[: effort.best], rng.choice(worse, effort.random)])
+            searches.append(cls(sense * ones, state * ones, measure * ones, starts[rows], values[rows], 1.0 * ones))
         return cls(*(np.concatenate([getattr(search, field.name) for search in searches]) for field in fields(cls)))
 
     def take(self, rows: np.ndarray) -> "Searches":
@@ -188,26 +185,16 @@ class Searcher:
         self._ranges[region.moves] = (region.upper - region.lower)[region.moves]
         self._compass = np.diag(self._ranges)[region.moves]
 
-    def search(self, searches: Searches, advanced: Callable[[float], None]) -> None:
-        """Move until all steps are small. `advanced` is called with the finished share of the search."""
-        self._search(searches, self._finest_step, advanced)
+    def search(
+        self, searches: Searches, advanced: Callable[[float], None] = lambda share: None, *, fineness: float = 1.0,
+        limit: float | None = None,
+    ) -> None:  # fmt: skip
+        """Move until all steps are small. `advanced` is called with the finished share of the search.
 
-    def polish(self, searches: Searches) -> None:
-        """Continue the searches with contact, including along kinks, until they gain no more, or have cost too much."""
-        limit = (1 + POLISHING_SHARE) * self._evaluation.count
-        for _ in range(MAX_POLISHES):
-            values = searches.value.copy()
-            searches.step[searches.state == terms.CORRECTED] = POLISHING_STEP
-            self._search(searches, self._finest_step * POLISHED, lambda _: None, limit)
-            gains = searches.value > values + MIN_POLISH * self._spread[searches.measure]
-            if not gains.any() or self._evaluation.count > limit:
-                break
-        self.finish(searches, limit)
-
-    def _search(
-        self, searches: Searches, finest_step: float, advanced: Callable[[float], None], limit: float | None = None
-    ) -> None:
-        """Move until all steps are small; with a `limit`, also along kinks, until that many combinations were tried."""
+        fineness   factor of the finest step
+        limit      number of combinations at which the search ends; with a limit it also moves along kinks
+        """
+        finest_step = self._finest_step * fineness
         for _ in range(MAX_STEPS):
             rows = np.flatnonzero(searches.step > finest_step)
             if not rows.size or (limit is not None and self._evaluation.count > limit):
@@ -223,6 +210,18 @@ class Searcher:
             steps = np.log(np.maximum(searches.step, finest_step)[searches.state == terms.CORRECTED])
             advanced(float(steps.mean() / math.log(finest_step)))
 
+    def polish(self, searches: Searches) -> None:
+        """Continue the searches with contact, including along kinks, until they gain no more, or have cost too much."""
+        limit = (1 + POLISHING_SHARE) * self._evaluation.count
+        for _ in range(MAX_POLISHES):
+            values = searches.value.copy()
+            searches.step[searches.state == terms.CORRECTED] = POLISHING_STEP
+            self.search(searches, fineness=POLISHED, limit=limit)
+            gains = searches.value > values + MIN_POLISH * self._spread[searches.measure]
+            if not gains.any() or self._evaluation.count > limit:
+                break
+        self.finish(searches, limit)
+
     def meet(self, searches: Searches, count: int) -> None:
         """Move searches with contact to the best of `count` consecutive ones if the measure grows all the way there."""
         best = np.repeat(searches.best_of(count).point, count, axis=0)
@@ -230,8 +229,7 @@ class Searcher:
         if rows.size:
             behind = searches.take(rows)
             ways = behind.point[:, None] + WAY_SHARES[:, None] * (best[rows] - behind.point)[:, None]
-            fixed = np.setdiff1d(self._region.varies, self._region.moves)
-            ways[:, :, fixed] = best[rows][:, None, fixed]
+            ways[:, :, self._region.fixed] = best[rows][:, None, self._region.fixed]
             values = np.column_stack([behind.value, behind.values_at(ways, self._evaluation)])
             ends = np.flatnonzero((np.diff(values, axis=1) >= -ROUNDING * self._spread[behind.measure][:, None]).all(axis=1))
             behind.point[ends], behind.value[ends] = ways[ends, -1], values[ends, -1]
@@ -269,17 +267,23 @@ class Searcher:
         """
         steps = step[:, None, None] * np.vstack([self._compass, -self._compass, directions, -directions])
         steps *= self._searched(searches)[:, None]
-        n, count, width = steps.shape
-        points, flat = np.repeat(searches.point, count, axis=0), steps.reshape(-1, width)
-        candidates = (points + self._region.reach(points, flat)[:, None] * flat).reshape(n, count, width)
+        candidates = self._region.stepped(searches.point, steps)
         values = searches.values_at(candidates, self._evaluation)
         up, down = slice(0, len(self._compass)), slice(len(self._compass), 2 * len(self._compass))
-        distances = (candidates[:, up] - candidates[:, down])[:, :, self._region.moves].diagonal(axis1=1, axis2=2)
+        return candidates, values, self._slopes(candidates[:, up] - candidates[:, down], values[:, up], values[:, down])
+
+    def _slopes(self, ways: np.ndarray, ends: np.ndarray, starts: np.ndarray) -> np.ndarray:
+        """Return slopes (n, contributor) from values at the ends of ways, one along each moving contributor; 0 if undefined.
+
+        ways           (n, move, contributor)
+        ends, starts   (n, move) values
+        """
+        distances = ways[:, :, self._region.moves].diagonal(axis1=1, axis2=2)
         with np.errstate(invalid="ignore", divide="ignore"):
-            rise = np.where(distances > 0, (values[:, up] - values[:, down]) / distances, 0.0)
-        slopes = np.zeros_like(searches.point)
+            rise = np.where(distances != 0, (ends - starts) / distances, 0.0)
+        slopes = np.zeros((len(ways), ways.shape[2]))
         slopes[:, self._region.moves] = np.where(np.isfinite(rise), rise, 0.0)
-        return candidates, values, slopes
+        return slopes
 
     def _searched(self, searches: Searches) -> np.ndarray:
         """Return whether each search uses each contributor, (n, contributor)."""
@@ -300,7 +304,7 @@ class Searcher:
             slopes = self._one_sided_slopes(nearby)
             shape = len(rows), NEARBY_POINTS
             ends = [
-                ridge_end(self._region, search_point, step * self._ranges * is_searched, *model)
+                self._region.ridge_end(search_point, step * self._ranges * is_searched, *model)
                 for search_point, step, is_searched, *model in zip(
                     stalled.point, stalled.step, self._searched(stalled),
                     nearby.point.reshape(*shape, -1), nearby.value.reshape(shape), slopes.reshape(*shape, -1), strict=True,
@@ -316,26 +320,17 @@ class Searcher:
         shares = self._rng.uniform(-1, 1, points.point.shape) * self._searched(points)
         shares[::NEARBY_POINTS] = 0.0
         offsets = shares * points.step[:, None] * self._ranges
-        points.point = points.point + self._region.reach(points.point, offsets)[:, None] * offsets
+        points.point = self._region.stepped(points.point, offsets[:, None])[:, 0]
         points.value = points.values_at(points.point[:, None], self._evaluation)[:, 0]
         return points
 
     def _one_sided_slopes(self, searches: Searches) -> np.ndarray:
         """Return slopes (n, contributor) by short steps towards the centre of the region; 0 for unused contributors."""
-        n, width = searches.point.shape
         towards = np.where(searches.point > self._region.middle, -1.0, 1.0) * self._ranges * self._searched(searches)
-        steps = (NEARBY_STEP * searches.step[:, None] * towards)[:, None] * np.eye(width)[self._region.moves]
-        points = np.repeat(searches.point, len(self._region.moves), axis=0)
-        candidates = (
-            points + self._region.reach(points, steps.reshape(-1, width))[:, None] * steps.reshape(-1, width)
-        ).reshape(n, -1, width)
+        steps = (NEARBY_STEP * searches.step[:, None] * towards)[:, None] * np.eye(len(self._ranges))[self._region.moves]
+        candidates = self._region.stepped(searches.point, steps)
         values = searches.values_at(candidates, self._evaluation)
-        distances = (candidates - searches.point[:, None])[:, :, self._region.moves].diagonal(axis1=1, axis2=2)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            rise = np.where(distances != 0, (values - searches.value[:, None]) / distances, 0.0)
-        slopes = np.zeros_like(searches.point)
-        slopes[:, self._region.moves] = np.where(np.isfinite(rise), rise, 0.0)
-        return slopes
+        return self._slopes(candidates - searches.point[:, None], values, searches.value[:, None])
 
     def _move_towards(self, searches: Searches, ends: np.ndarray) -> np.ndarray:
         """Move a share of the way to far ends (n, contributor), if the gain suffices. Return whether each search moved, (n,).
@@ -343,6 +338,5 @@ class Searcher:
         Measured parts are always taken from the far end, since there are no values between their rows.
         """
         candidates = searches.point[:, None] + END_SHARES[:, None] * (ends - searches.point)[:, None]
-        fixed = np.setdiff1d(self._region.varies, self._region.moves)
-        candidates[:, :, fixed] = ends[:, None, fixed]
+        candidates[:, :, self._region.fixed] = ends[:, None, self._region.fixed]
         return searches.move(candidates, searches.values_at(candidates, self._evaluation), self._min_gain(searches))

@@ -18,11 +18,12 @@ widens the bounds.
 import contextlib
 import ctypes
 import functools
+import itertools
 import os
 import platform
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy
@@ -46,135 +47,99 @@ def farthest_poses(program: Program, region: AllowedRegion, model: LinearModel) 
     bounds = np.empty((len(model.measures), len(terms.STATES), len(terms.ENDS)))
     # With stations, reactions in a later one do not act on the motions in an earlier one.
     has_optimum = program.method.objective == "all points" and not program.stations
-    reactions = _reactions(model, region) if has_optimum else None
-    for measure in range(len(model.measures)):
-        for end, sense in enumerate(terms.SENSES):
-            raw = _Problem(model, region, measure, sense, is_moved=False, reactions=None)
-            moved = _Problem(model, region, measure, sense, is_moved=True, reactions=reactions)
-            unbounded = model.kinked[0, measure], model.kinked[:, measure].any()
-            bounds[measure, :, end] = [
-                sense * np.inf if is_unbounded else model.measures[measure] + sense * problem.bound()
-                for problem, is_unbounded in zip((raw, moved), unbounded, strict=True)
-            ]
+    problems = [_Problem(model, region), _Problem(model, region, is_moved=True, has_optimum=has_optimum)]
+    for measure, (end, sense) in itertools.product(range(len(model.measures)), enumerate(terms.SENSES)):
+        unbounded = model.kinked[0, measure], model.kinked[:, measure].any()
+        bounds[measure, :, end] = [
+            sense * np.inf if is_unbounded else model.measures[measure] + sense * problem.bound(measure, sense)
+            for problem, is_unbounded in zip(problems, unbounded, strict=True)
+        ]
     return bounds
 
 
-@dataclass(frozen=True, eq=False)
-class _Reactions:
-    """The data of the optimality conditions of the objective "all points".
-
-    hessian           (freedom, freedom) of the objective
-    largest_gap       (row,) bound of each gap at a corrected pose [mm]
-    largest_reaction  (row,) bound of each reaction
-    """
-
-    hessian: np.ndarray
-    largest_gap: np.ndarray
-    largest_reaction: np.ndarray
-
-
-def _reactions(model: LinearModel, region: AllowedRegion) -> _Reactions | None:
-    """Return bounds of gaps and reactions.
-
-    The result is None if there are too many rows, if contact points do not constrain all freedoms, or if no motion opens all
-    gaps.
-    """
-    A, hessian = model.gaps_by_motion, 2 * model.displacements.T @ model.displacements
-    if not 0 < len(A) <= MAX_BINARY or model.round_pairs or np.linalg.cond(hessian) >= MAX_CONDITION:
-        return None
-    # A motion d that opens all gaps by 1, with the least sum of |d|: nearly the least energy suffices.
-    freedoms, eye = A.shape[1], np.eye(A.shape[1])
-    lift = scipy.optimize.milp(
-        np.r_[np.zeros(freedoms), np.ones(freedoms)],
-        constraints=[
-            scipy.optimize.LinearConstraint(np.hstack([A, np.zeros_like(A)]), 1.0, np.inf),
-            scipy.optimize.LinearConstraint(np.hstack([eye, eye]), 0.0, np.inf),
-            scipy.optimize.LinearConstraint(np.hstack([-eye, eye]), 0.0, np.inf),
-        ],
-        bounds=scipy.optimize.Bounds(-np.inf, np.inf),
-    )
-    if not lift.success:
-        return None
-    d = lift.x[:freedoms]
-    energy = float(np.sqrt(d @ hessian @ d))
-    slopes = region.slopes(model.gaps_by_deviations)
-    middle, half = (region.lower + region.upper) / 2, (region.upper - region.lower) / 2
-    lowest = model.gaps + slopes @ middle - np.abs(slopes) @ half
-    highest = model.gaps + slopes @ middle + np.abs(slopes) @ half
-    deepest = max(float(-lowest.min()), 0.0)
-    # The corrected motion has no more energy than `deepest` d, which opens all gaps; this also bounds the sum of reactions.
-    opening = np.sqrt(np.einsum("ij,jk,ik->i", A, np.linalg.inv(hessian), A)) * deepest * energy
-    return _Reactions(hessian, np.maximum(highest + opening, 1e-9), np.full(len(A), max(deepest, 1e-9) * energy**2))
-
-
 class _Problem:
-    """The largest sense * (measure - nominal) over points x of the region and motions y.
+    """Linear constraints on points x of the region, with motions y if `is_moved`.
 
-    With `reactions`, also over reactions r, and over binaries b of rows that are active (1) or open (0).
+    With the optimality conditions of the objective "all points", also on reactions r, and on binaries b of rows that are active
+    (1) or open (0).
     """
 
     def __init__(
-        self,
-        model: LinearModel,
-        region: AllowedRegion,
-        measure: int,
-        sense: int,
-        *,
-        is_moved: bool,
-        reactions: _Reactions | None,
-    ) -> None:
-        self._region = region
-        contributors = len(region.lower)
-        freedoms = model.by_motion.shape[1] if is_moved else 0
-        binaries = 0 if reactions is None else len(model.gaps)
-        self._width = contributors + freedoms + 2 * binaries
-        self._goal = np.zeros(self._width)
-        self._goal[:contributors] = sense * region.slopes(model.by_deviations[measure])
-        self._goal[contributors : contributors + freedoms] = sense * model.by_motion[measure, :freedoms]
+        self, model: LinearModel, region: AllowedRegion, *, is_moved: bool = False, has_optimum: bool = False
+    ) -> None:  # fmt: skip
+        self._region, self._model = region, model
+        self._freedoms = model.by_motion.shape[1] if is_moved else 0
+        limits = self._limits() if has_optimum else None
+        contributors, binaries = len(region.lower), 0 if limits is None else len(model.gaps)
+        self._width = contributors + self._freedoms + 2 * binaries
         self._integer = np.r_[np.zeros(self._width - binaries), np.ones(binaries)]
         lower, upper = np.full(self._width, -np.inf), np.full(self._width, np.inf)
         lower[:contributors], upper[:contributors] = region.lower, region.upper
-        if reactions is not None:
-            lower[-2 * binaries :], upper[-2 * binaries :] = 0.0, np.r_[reactions.largest_reaction, np.ones(binaries)]
-        self._bounds = scipy.optimize.Bounds(lower, upper)
         self._constraints: list[scipy.optimize.LinearConstraint] = []
-        if freedoms:
-            self._add_contact(model)
-        if reactions is not None:
-            self._add_optimality(model, reactions)
+        gaps = np.hstack([region.slopes(model.gaps_by_deviations), model.gaps_by_motion])
+        if self._freedoms:  # gaps are non-negative, and bilateral locators keep their positions
+            self._constraints += self._rows(gaps, -model.gaps, np.inf)
+            self._constraints += self._rows(np.hstack([np.zeros((len(model.bilateral), contributors)), model.bilateral]), 0, 0)
+        if limits is not None:
+            largest_gap, largest_reaction = limits
+            lower[-2 * binaries :], upper[-2 * binaries :] = 0.0, np.r_[largest_reaction, np.ones(binaries)]
+            eye, zeros = np.eye(binaries), np.zeros((binaries, binaries))
+            # Reactions balance the objective's gradient; a row is active only if its gap is closed.
+            balance = np.hstack([np.zeros((self._freedoms, contributors)), _hessian(model), -model.gaps_by_motion.T])
+            self._constraints += self._rows(balance, 0, 0)
+            self._constraints += self._rows(np.hstack([np.zeros_like(gaps), eye, -largest_reaction * eye]), -np.inf, 0)
+            self._constraints += self._rows(np.hstack([gaps, zeros, largest_gap * eye]), -np.inf, largest_gap - model.gaps)
+        self._bounds = scipy.optimize.Bounds(lower, upper)
 
-    def _add_contact(self, model: LinearModel) -> None:
-        """Constrain gaps to be non-negative, and bilateral locators to their positions."""
-        self._add(np.hstack([self._region.slopes(model.gaps_by_deviations), model.gaps_by_motion]), -model.gaps, np.inf)
-        self._add(np.hstack([np.zeros((len(model.bilateral), len(self._region.lower))), model.bilateral]), 0.0, 0.0)
+    def _limits(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return bounds of gaps at a corrected pose (row,) [mm], and of reactions (row,).
 
-    def _add_optimality(self, model: LinearModel, reactions: _Reactions) -> None:
-        """Balance the objective's gradient by the reactions; a row is active only if its gap is closed."""
-        gaps = np.hstack([self._region.slopes(model.gaps_by_deviations), model.gaps_by_motion])
-        count, freedoms = model.gaps_by_motion.shape
-        eye, zeros = np.eye(count), np.zeros((count, count))
-        self._add(
-            np.hstack([np.zeros((freedoms, len(self._region.lower))), reactions.hessian, -model.gaps_by_motion.T]), 0.0, 0.0
+        The result is None if there are too many rows, if contact points do not constrain all freedoms, or if no motion opens
+        all gaps.
+        """
+        model, region = self._model, self._region
+        A, hessian = model.gaps_by_motion, _hessian(model)
+        if not 0 < len(A) <= MAX_BINARY or model.round_pairs or np.linalg.cond(hessian) >= MAX_CONDITION:
+            return None
+        # A motion d that opens all gaps by 1, with the least sum of |d|: nearly the least energy suffices.
+        freedoms, eye = A.shape[1], np.eye(A.shape[1])
+        lift = scipy.optimize.milp(
+            np.r_[np.zeros(freedoms), np.ones(freedoms)],
+            constraints=[
+                scipy.optimize.LinearConstraint(np.hstack([A, np.zeros_like(A)]), 1.0, np.inf),
+                scipy.optimize.LinearConstraint(np.hstack([eye, eye]), 0.0, np.inf),
+                scipy.optimize.LinearConstraint(np.hstack([-eye, eye]), 0.0, np.inf),
+            ],
+            bounds=scipy.optimize.Bounds(-np.inf, np.inf),
         )
-        self._add(np.hstack([np.zeros_like(gaps), eye, -reactions.largest_reaction * eye]), -np.inf, 0.0)
-        self._add(np.hstack([gaps, zeros, reactions.largest_gap * eye]), -np.inf, reactions.largest_gap - model.gaps)
+        if not lift.success:
+            return None
+        d = lift.x[:freedoms]
+        energy = float(np.sqrt(d @ hessian @ d))
+        slopes = region.slopes(model.gaps_by_deviations)
+        centre, reach = (region.lower + region.upper) / 2, np.abs(slopes) @ ((region.upper - region.lower) / 2)
+        lowest, highest = model.gaps + slopes @ centre - reach, model.gaps + slopes @ centre + reach
+        deepest = max(float(-lowest.min()), 0.0)
+        # The corrected motion has no more energy than `deepest` d, which opens all gaps; this also bounds the sum of reactions.
+        opening = np.sqrt(np.einsum("ij,jk,ik->i", A, np.linalg.inv(hessian), A)) * deepest * energy
+        return np.maximum(highest + opening, 1e-9), np.full(len(A), max(deepest, 1e-9) * energy**2)
 
-    def _add(self, rows: np.ndarray, lower: np.ndarray | float, upper: np.ndarray | float) -> None:
-        """Add constraints with rows (row, variable) of the first variables."""
-        if len(rows):
-            self._constraints.append(
-                scipy.optimize.LinearConstraint(np.pad(rows, ((0, 0), (0, self._width - rows.shape[1]))), lower, upper)
-            )
+    def _rows(self, rows: np.ndarray, lower: np.ndarray | float, upper: np.ndarray | float) -> list[Any]:
+        """Return the constraint with rows (row, variable) of the first variables; nothing if there are no rows."""
+        padded = np.pad(rows, ((0, 0), (0, self._width - rows.shape[1])))
+        return [scipy.optimize.LinearConstraint(padded, lower, upper)] if len(rows) else []
 
-    def bound(self) -> float:
-        """Return an upper bound; infinite if there is none."""
-        planes, ends = self._region.planes()
-        bound, contributors = np.inf, len(self._region.lower)
+    def bound(self, measure: int, sense: int) -> float:
+        """Return an upper bound of sense * (measure - nominal); infinite if there is none."""
+        goal, contributors = np.zeros(self._width), len(self._region.lower)
+        goal[:contributors] = sense * self._region.slopes(self._model.by_deviations[measure])
+        goal[contributors : contributors + self._freedoms] = sense * self._model.by_motion[measure, : self._freedoms]
+        constraints, bound, (planes, ends) = list(self._constraints), np.inf, self._region.planes()
         for _ in range(MAX_ROUNDS):
-            self._add(planes, -np.inf, ends)
+            constraints += self._rows(planes, -np.inf, ends)
             with muted_c_stdout():  # HiGHS prints a line when a solution needs another solve in the space of all variables
                 solution = scipy.optimize.milp(
-                    -self._goal, constraints=self._constraints, bounds=self._bounds, integrality=self._integer,
+                    -goal, constraints=constraints, bounds=self._bounds, integrality=self._integer,
                     options={"time_limit": MAX_SECONDS},
                 )  # fmt: skip
             if solution.x is None:
@@ -184,6 +149,11 @@ class _Problem:
             if not len(planes):
                 break
         return bound
+
+
+def _hessian(model: LinearModel) -> np.ndarray:
+    """Return the quadratic term (freedom, freedom) of the objective "all points"."""
+    return np.asarray(2 * model.displacements.T @ model.displacements)
 
 
 @functools.cache

@@ -6,6 +6,7 @@ import numpy as np
 
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
+from tolcontact.statistics.linear_shares import joined_columns
 from tolcontact.variation.contributors import FORM
 from tolcontact.variation.draws import Draws
 from tolcontact.vocabulary import GROUPED_BY
@@ -38,20 +39,4 @@ def independent_groups(
 
     Without `correlated`, groups that are correlated by declaration remain separate.
     """
-    leader = list(range(len(owners)))
-
-    def find(column: int) -> int:
-        while leader[column] != column:
-            column = leader[column]
-        return column
-
-    first_column: dict[str, int] = {}
-    joined = [[first_column.setdefault(owner, column), column] for column, owner in enumerate(owners)]
-    for columns in [*joined, *draws.dependent(correlated=correlated)]:
-        for column in columns[1:]:
-            lower, upper = sorted((find(int(columns[0])), find(int(column))))
-            leader[upper] = lower
-    members: dict[int, list[int]] = {}
-    for column in np.flatnonzero(varies).tolist():
-        members.setdefault(find(column), []).append(column)
-    return {" + ".join(dict.fromkeys(owners[k] for k in columns)): np.array(columns) for columns in members.values()}
+    return joined_columns(owners, draws.dependent(correlated=correlated), np.flatnonzero(varies))

@@ -9,8 +9,7 @@ import scipy
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import Analysis
-from tolcontact.analyses.engine import VERIFICATION_FACTOR, Engine, Progress
+from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Engine, Progress
 from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly, Locator, ThreeTwoOne
 from tolcontact.discretization import Nominal, NominalPart, discretize
@@ -58,22 +57,21 @@ def relocate(
     )  # fmt: skip
     analysis.check_affordable(VERIFICATION_FACTOR * samples)
     goal = Goal.parse(least, analysis.program)
-    trials = RelocatedTrials(analysis.program.nominal.assembly, analysis, locator, goal.measure)
-    places = TrialPositions(trials, goal, *_corners(between))
-    places.try_grid()
-    if not np.isfinite(places.values).any():
-        lower, upper = places.lower.tolist(), places.upper.tolist()
+    trials = TrialPositions(analysis, locator, goal, *_corners(between))
+    trials.try_grid()
+    if not np.isfinite(trials.values).any():
+        lower, upper = trials.lower.tolist(), trials.upper.tolist()
         raise OptionError(f'"{locator}" cannot stand anywhere between {lower} and {upper}; choose other corners')
-    places.search()
-    best = places.points[int(np.nanargmin(places.values))]
+    trials.search()
+    best = trials.points[int(np.nanargmin(trials.values))]
     (before, lost_before), (after, lost_after) = (trials.measured(point, fresh=True) for point in (trials.point, best))
     values = {
         "point": [trials.point, best],
         "reached": [goal.estimate(before), goal.estimate(after)],
         "change": goal.change(before, after),
         "unresolved": [lost_before, lost_after],
-        "tried": places.points,
-        "tried_value": places.values,
+        "tried": trials.points,
+        "tried_value": trials.values,
     }
     attributes = {"locator": locator, "least": least, "samples": samples, "fresh": VERIFICATION_FACTOR * samples}
     return analysis.dataset(values, {}, units=goal.units, **attributes)
@@ -116,11 +114,20 @@ class Goal:
         return two_samples.share_shift(*hits, paired=True)
 
 
-class RelocatedTrials:
-    """Simulations of one measure of the assembly with a locator at other positions, on the same draws."""
+class TrialPositions:
+    """Simulations of the assembly with a locator at trial positions in a box, on the same draws.
 
-    def __init__(self, assembly: Assembly, analysis: Analysis, locator: str, measure: int) -> None:
-        self._assembly, self.analysis, self._measure = assembly, analysis, measure
+    lower, upper    (3,) corners of the box [mm]
+    points, values  of all trials: positions (3,) [mm], and the values of the goal
+    """
+
+    def __init__(self, analysis: Analysis, locator: str, goal: Goal, lower: np.ndarray, upper: np.ndarray) -> None:
+        self._analysis, self._goal, self.lower, self.upper = analysis, goal, lower, upper
+        self._sides = np.flatnonzero(upper > lower)
+        self._count = GRID_POINTS[len(self._sides)]
+        self._shares: list[np.ndarray] = []
+        self.points: list[np.ndarray] = []
+        self.values: list[float] = []
         nominal = analysis.program.nominal
         if locator not in nominal.locators.labels:
             raise OptionError(f'there is no locator "{locator}"; expected one of: {", ".join(nominal.locators.labels)}')
@@ -138,39 +145,22 @@ class RelocatedTrials:
 
         A `fresh` run has other draws, and more of them.
         """
-        analysis, scheme = self.analysis, list(self._scheme)
-        scheme[self._number] = at_point(scheme[self._number], point)
+        analysis, scheme = self._analysis, list(self._scheme)
+        scheme[self._number] = replace(scheme[self._number], point=(point[0], point[1], point[2]))
         solver, method = analysis.program.plugin.name, analysis.program.method
         nominal = discretize(self._with_locators(tuple(scheme)), presses=method.minimizes.presses)
         program = compile_program(nominal, solver, method)
         engine = Engine(program, analysis.blocks)
         start = VERIFICATION_FACTOR * analysis.samples if fresh else 0
         measured, _ = engine.simulate(start or analysis.samples, start=start, seed=analysis.seed)
-        return measured[:, terms.CORRECTED, self._measure].copy(), engine.unresolved
+        return measured[:, terms.CORRECTED, self._goal.measure].copy(), engine.unresolved
 
     def _with_locators(self, scheme: tuple[Locator, ...]) -> Assembly:
         """Return the assembly with other locators of the part."""
-        locations = self._assembly.locations
-        part, station = self._part.part, self._part.station
-        return self._assembly.replaced(
-            locations=[replace(x, scheme=scheme) if x.part is part and x.station == station else x for x in locations]
+        assembly, part, station = self._analysis.program.nominal.assembly, self._part.part, self._part.station
+        return assembly.replaced(
+            locations=[replace(x, scheme=scheme) if x.part is part and x.station == station else x for x in assembly.locations]
         )
-
-
-class TrialPositions:
-    """Trial positions in a box, and the value of the goal at each.
-
-    lower, upper    (3,) corners of the box [mm]
-    points, values  of all trials
-    """
-
-    def __init__(self, trials: RelocatedTrials, goal: Goal, lower: np.ndarray, upper: np.ndarray) -> None:
-        self._trials, self._goal, self.lower, self.upper = trials, goal, lower, upper
-        self._sides = np.flatnonzero(upper > lower)
-        self._count = GRID_POINTS[len(self._sides)]
-        self._shares: list[np.ndarray] = []
-        self.points: list[np.ndarray] = []
-        self.values: list[float] = []
 
     def try_grid(self) -> None:
         """Try a grid of positions."""
@@ -193,15 +183,14 @@ class TrialPositions:
         point = self.lower + np.zeros(3)
         point[self._sides] += shares * (self.upper - self.lower)[self._sides]
         try:
-            measured, _ = self._trials.measured(point)
+            measured, _ = self.measured(point)
             value = self._goal.estimate(measured).value
         except ModelError:
             value = np.inf
         self._shares.append(shares)
         self.points.append(point)
         self.values.append(value)
-        progress = self._trials.analysis.progress
-        if progress:
+        if progress := self._analysis.progress:
             progress(len(self.values), self._count ** len(self._sides) + MAX_TRIALS)
         return value
 
@@ -219,14 +208,6 @@ def declared_locators(nominal: Nominal, part: NominalPart) -> tuple[Locator, ...
         name, point_of = locators.labels[number].removeprefix(f"{part.located}."), owner.part if part.owners else None
         scheme.append(Locator(name, point, direction, on=on, part=point_of))
     return tuple(scheme)
-
-
-def at_point(locator: Locator, point: np.ndarray) -> Locator:
-    """Return the same locator at another point (3,) [mm]."""
-    return Locator(
-        locator.name, point, locator.direction, locator.tolerance, one_sided=locator.one_sided, stiffness=locator.stiffness,
-        on=locator.on, part=locator.part,
-    )  # fmt: skip
 
 
 def _corners(between: tuple[Any, Any]) -> tuple[np.ndarray, np.ndarray]:

@@ -7,9 +7,8 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import Analysis
+from tolcontact.analyses.analysis import Analysis, Progress
 from tolcontact.analyses.designs import SteppedDraws
-from tolcontact.analyses.engine import Progress
 from tolcontact.analyses.linear_model import leverages, total_derivatives
 from tolcontact.compilation import Program
 from tolcontact.simulation import Block

@@ -11,13 +11,12 @@ import xarray as xr
 from scipy.special import gammaincc, ndtr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import Analysis
-from tolcontact.analyses.engine import Engine, Progress
+from tolcontact.analyses.analysis import Analysis, Engine, Progress
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
 from tolcontact.statistics.intervals import UNDEFINED
-from tolcontact.statistics.rare import NEGLIGIBLE, Score, Tail, either, sufficient_tail
+from tolcontact.statistics.rare import NEGLIGIBLE, Tail, either, sufficient_tail
 from tolcontact.variation.draws import MIN_UNIFORM
 from tolcontact.workflow.models import Choice, Model
 
@@ -64,20 +63,21 @@ def tails(
     if samples is None:
         samples = int(np.clip(BUDGET // len(events), *DEFAULT_RANGE))
     searches = [
-        _Search(event, number, side, samples // len(event.sides))
-        for number, event in enumerate(events.values())
-        for side in range(len(event.sides))  # each has its own region, and could hide the region of the other
+        _Search(make_score, samples // len(sides), number, side)
+        for number, sides in enumerate(events.values())
+        for side, make_score in enumerate(sides)  # each has its own region, and could hide the region of the other
     ]
-    results = _run_searches(analysis, searches, len(events) * samples)
+    with analysis.engines(len(searches), len(events) * samples) as engines:
+        results = _run_searches(analysis, searches, engines)
     event_tails, statuses, stops = [], [], []
     for number in range(len(events)):
-        sides = [result for search, result in zip(searches, results, strict=True) if search.number == number]
+        sides = [k for k, search in enumerate(searches) if search.number == number]
+        scores, side_tails = zip(*(results[k] for k in sides), strict=True)
         # If the other limit can be exceeded, a limit that acts as a stop would only add its detection bound, so it is left out.
-        exceedable_tails = [side.tail for side in sides if not side.is_stop]
-        is_undefined = any(side.is_undefined for side in sides)
-        event_tails.append(UNDEFINED_TAIL if is_undefined else either(exceedable_tails or [side.tail for side in sides]))
-        stops.append(any(side.is_stop for side in sides))
-        statuses.append(np.sum([side.statuses for side in sides], axis=0))
+        exceedable = [tail for score, tail in zip(scores, side_tails, strict=True) if not score.is_stop] or side_tails
+        event_tails.append(UNDEFINED_TAIL if any(score.is_undefined for score in scores) else either(exceedable))
+        stops.append(any(score.is_stop for score in scores))
+        statuses.append(np.sum([engines[k].statuses for k in sides], axis=0))
     values = {
         "probability": [tail.probability for tail in event_tails],
         "disagreement": [tail.disagreement for tail in event_tails],
@@ -101,65 +101,41 @@ def simulated_scores(engine: Engine, u: np.ndarray) -> tuple[np.ndarray, np.ndar
     return engine.simulate_deviations(draws.from_numbers(numbers, len(u)))
 
 
-class _Event(NamedTuple):
-    """An event: the scores of its mutually exclusive sides, and whether these state how near it is."""
-
-    sides: list[Callable[[Engine], Score]]
-    leads: bool
-
-
 class _Search(NamedTuple):
     """The search for one side of the event with index `number`, with about `samples` realizations."""
 
-    event: _Event
+    make_score: "Callable[[Engine], _Beyond | NotAssemblable]"
+    samples: int
     number: int
     side: int
-    samples: int
 
-    def run(self, engine: Engine, seed: int) -> "_SearchResult":
-        """Return the result of the search."""
-        score, rng = self.event.sides[self.side](engine), np.random.default_rng([seed, self.number, self.side])
+    def run(self, engine: Engine, seed: int) -> "tuple[_Beyond | NotAssemblable, Tail]":
+        """Return the score of the search, with what it has seen, and its result."""
+        score, rng = self.make_score(engine), np.random.default_rng([seed, self.number, self.side])
         dimensions = len(engine.program.draws.varying)
-        tail = sufficient_tail(score, dimensions, samples=self.samples, rng=rng, leads=self.event.leads)
-        is_stop, is_undefined = (score.is_stop, score.is_undefined) if isinstance(score, _Beyond) else (False, False)
-        return _SearchResult(tail, is_stop, is_undefined, engine.statuses)
+        return score, sufficient_tail(score, dimensions, samples=self.samples, rng=rng, leads=score.leads)
 
 
-class _SearchResult(NamedTuple):
-    """The result of a search, and the number of realizations by status.
-
-    is_stop       values stop at the limit
-    is_undefined  the measure is not a number in realizations of non-negligible probability
-    """
-
-    tail: Tail
-    is_stop: bool
-    is_undefined: bool
-    statuses: np.ndarray
-
-
-def _run_searches(analysis: Analysis, searches: Sequence[_Search], total: int) -> list[_SearchResult]:
+def _run_searches(analysis: Analysis, searches: Sequence[_Search], engines: Sequence[Engine]) -> list[Any]:
     """Return the results of all searches. They are independent, and run concurrently in threads of this process."""
     longest_first = sorted(range(len(searches)), key=lambda k: -searches[k].samples)
     pool = ThreadPoolExecutor(analysis.threads)
-    with analysis.engines(len(searches), total) as engines:
-        try:
-            running = {k: pool.submit(searches[k].run, engines[k], analysis.seed) for k in longest_first}
-            return [running[k].result() for k in range(len(searches))]
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)  # normally none is left; a stopped analysis does not wait
+    try:
+        running = {k: pool.submit(searches[k].run, engines[k], analysis.seed) for k in longest_first}
+        return [running[k].result() for k in range(len(searches))]
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)  # normally none is left; a stopped analysis does not wait
 
 
-def _events(program: Program) -> dict[str, _Event]:
-    """Return the events of a program by name. Raises OptionError if it has none."""
-    events = {}
+def _events(program: Program) -> "dict[str, list[Callable[[Engine], Any]]]":
+    """Return the scores of the mutually exclusive sides of each event. Raises OptionError if there is no event."""
+    events: dict[str, list[Callable[[Engine], Any]]] = {}
     for number, measure in enumerate(program.nominal.measures):
         limits = program.limits(number)
         if not limits.are_open:
-            sides: list[Callable[[Engine], Score]] = [partial(_Beyond, measure=number, limits=side) for side in limits.sides]
-            events[f"{measure.name} outside limits"] = _Event(sides, leads=True)
+            events[f"{measure.name} outside limits"] = [partial(_Beyond, measure=number, limits=side) for side in limits.sides]
     if program.method.is_exact and program.nominal.pairs:
-        events["not assemblable"] = _Event([not_assemblable], leads=False)
+        events["not assemblable"] = [NotAssemblable]
     if not events:
         raise OptionError(
             f'"{program.nominal.assembly.name}" has no rare event: no measurement has limits, and parts can always be '
@@ -169,7 +145,13 @@ def _events(program: Program) -> dict[str, _Event]:
 
 
 class _Beyond:
-    """The score of one side of a measure's limits: the excess of values over the limit and their accuracy."""
+    """The score of one side of a measure's limits: the excess of values over the limit and their accuracy.
+
+    leads          whether scores outside the event state how near it is
+    is_undefined   whether the measure is not a number in realizations of non-negligible probability
+    """
+
+    leads = True
 
     def __init__(self, engine: Engine, measure: int, limits: Limits) -> None:
         self._engine, self._measure, self._limits = engine, measure, limits
@@ -191,11 +173,14 @@ class _Beyond:
         return self._beyond == 0 and self._at_limit >= MIN_AT_STOP
 
 
-def not_assemblable(engine: Engine) -> Score:
-    """Return the score of the event that parts cannot be assembled: 1 inside, -1 outside."""
+class NotAssemblable:
+    """The score of the event that parts cannot be assembled: 1 inside, -1 outside."""
 
-    def score(u: np.ndarray) -> np.ndarray:
-        _, status = simulated_scores(engine, u)
+    leads = is_stop = is_undefined = False
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+
+    def __call__(self, u: np.ndarray) -> np.ndarray:
+        _, status = simulated_scores(self._engine, u)
         return np.where(status == terms.Status.NOT_ASSEMBLABLE, 1.0, -1.0)
-
-    return score

@@ -8,8 +8,7 @@ import xarray as xr
 
 from tolcontact import poses, vocabulary as terms
 from tolcontact.analyses.allowed_space import AllowedRegion
-from tolcontact.analyses.analysis import Analysis
-from tolcontact.analyses.engine import Engine, Progress
+from tolcontact.analyses.analysis import Analysis, Engine, Progress
 from tolcontact.analyses.extreme_search import Effort, Evaluation, Searcher, Searches
 from tolcontact.analyses.farthest_pose import farthest_poses
 from tolcontact.analyses.linear_model import LinearModel, linear_model

@@ -1,5 +1,5 @@
 from . import (
-    analyses as analyses,
+    analysis_command as analysis_command,
     app as app,
     archives as archives,
     compare as compare,

@@ -1,58 +1,38 @@
-"""The commands of all analyses, from one table: shared options are declared once."""
+"""The commands of all analyses: one table, for the list of commands and for their options."""
 
-import functools
-import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.allocate import allocate
-from tolcontact.analyses.contributions import contributions
-from tolcontact.analyses.relocate import relocate
-from tolcontact.analyses.seating import seating
-from tolcontact.analyses.sensitivities import sensitivities
-from tolcontact.analyses.tails import tails
-from tolcontact.analyses.worst_case import worst_case
-from tolcontact.archive import open_archive
-from tolcontact.cli import app as common, commands
-from tolcontact.cli.json_output import print_data
-from tolcontact.cli.output import console
-from tolcontact.cli.progress import shown_progress
 from tolcontact.errors import OptionError
-from tolcontact.report.text import analysis_text
-from tolcontact.simulation.cluster import client_of
-from tolcontact.workflow.models import DEFAULT_SOLVER, is_archive
 
-SHARED = {  # options of analyses, with their defaults, and the argument of an analysis that an option needs
-    "seed": (common.Seed, 1, "seed"), "solver": (common.Solver, DEFAULT_SOLVER, "solver"),
-    "resolution": (common.Resolution, None, "method"), "objective": (common.Objective, None, "method"),
-    "as_json": (common.AsJson, False, "model"), "as_csv": (common.AsCsv, False, "model"), "into": (common.Into, None, "into"),
-    "workers": (common.Workers, None, "client"), "scheduler": (common.Scheduler, None, "client"),
-    "quiet": (common.Quiet, False, "progress"),
-}  # fmt: skip
+if TYPE_CHECKING:
+    import xarray as xr
+
 CORNER = "X,Y,Z"
-REQUIRED = inspect.Parameter.empty
-By = Annotated[str, typer.Option(help=f"How contributors are grouped: {common.or_(terms.GROUPED_BY)}.")]
-Frame = Callable[[xr.Dataset], Any]
+REQUIRED: Any = ...  # the default of an option without one
+By = Annotated[str, typer.Option(help=f"How contributors are grouped: {', '.join(terms.GROUPED_BY)}.")]
+Frame = Callable[["xr.Dataset"], Any]
 
 
 @dataclass(frozen=True)
 class AnalysisCommand:
     """A command for one analysis of a model.
 
+    purpose    its line in the list of commands, and the beginning of its help text
+    analysis   the name of its function in `tolcontact`
     samples    the meaning of the number of samples, for the help text; empty for an analysis without simulations
     frame      function that makes the data frame for --csv
-    options    specific options by parameter: their typer annotations, and defaults (REQUIRED: none)
+    options    specific options by parameter: their typer annotations, and defaults
     arguments  function that makes the arguments of the analysis from these options, where they differ
     """
 
     name: str
-    analysis: Callable[..., xr.Dataset]
+    purpose: str
+    analysis: str
     record: terms.AnalysisRecord
     samples: str
     examples: tuple[str, ...]
@@ -60,79 +40,11 @@ class AnalysisCommand:
     options: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
     arguments: Callable[[dict[str, Any]], dict[str, Any]] = lambda options: options
 
-    def register(self) -> None:
-        """Add the command to the application."""
-        options = {
-            "context": (typer.Context, REQUIRED),
-            "model": (common.AnalysedModel, REQUIRED),
-            **self.options,
-            **self._samples,
-            **{
-                name: (annotation, default)
-                for name, (annotation, default, needed) in SHARED.items()
-                if needed in self._parameters
-            },
-        }
-        command = functools.partial(self._run)
-        command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-            [
-                inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=annotation, default=default)
-                for name, (annotation, default) in options.items()
-            ]
-        )
-        command.__annotations__ = {}  # type: ignore[attr-defined]
-        common.app.command(self.name, help=commands.COMMANDS[self.name][1], epilog=common.examples(*self.examples))(command)
-
-    @property
-    def _parameters(self) -> Mapping[str, inspect.Parameter]:
-        return inspect.signature(self.analysis).parameters
-
-    @property
-    def _samples(self) -> dict[str, tuple[Any, Any]]:
-        """The option of the number of samples, if there is one."""
-        if not self.samples:
-            return {}
-        default = self._parameters["samples"].default
-        kind = int if default is not None else int | None
-        return {"samples": (Annotated[kind, typer.Option(help=self.samples)], default)}  # type: ignore[valid-type]
-
-    def _run(
-        self, *, context: typer.Context, model: Path, as_json: bool, as_csv: bool, resolution: str | None = None,
-        objective: str | None = None, workers: int | None = None, scheduler: str | None = None, quiet: bool = True,
-        **options: Any,
-    ) -> None:  # fmt: skip
-        common.only_one(json=as_json, csv=as_csv)
-        if is_archive(model):
-            options |= {name: value for name, value in _settings_of_run(model, context).items() if name in self._parameters}
-        arguments = self.arguments(options)
-        with shown_progress(model.stem, 1, quiet=quiet) as show, client_of(workers, scheduler) as client:
-            method = common.method_choices(resolution=resolution, objective=objective)
-            shared = {"method": method, "client": client, "progress": show}
-            arguments |= {name: value for name, value in shared.items() if name in self._parameters}
-            dataset = self.analysis(model, **arguments)
-        if as_json:
-            print_data(dataset)
-        elif as_csv:
-            typer.echo(self.frame(dataset).to_csv(lineterminator="\n"), nl=False)
-        else:
-            console().print(analysis_text(self.record, dataset))
-        if "met" in dataset and not dataset["met"].all():
-            names = ", ".join(f'"{name}"' for name in dataset["requirement"].values[dataset["met"].values == 0])
-            typer.echo(f"error: not met: {names}", err=True)
-            raise typer.Exit(1)
-
-
-def _settings_of_run(archive: Path, context: typer.Context) -> dict[str, Any]:
-    """Return the seed and the solver of an archive's run, unless options of the command line replace them."""
-    with open_archive(archive) as results:
-        settings = {"seed": int(results.attrs["seed"]), "solver": str(results.attrs["solver"])}
-    return {name: value for name, value in settings.items() if name not in common.set_options(context)}
-
 
 def _intervals(name: str) -> Frame:
     """Return a function for frames with the estimates of a variable, their intervals, and the units of labels as columns."""
 
-    def frame(dataset: xr.Dataset) -> Any:
+    def frame(dataset: "xr.Dataset") -> Any:
         values = dataset[name].to_dataset("interval").to_dataframe()
         return values[[*terms.ESTIMATE, *(column for column in values if str(column).endswith("_units"))]]
 
@@ -142,7 +54,7 @@ def _intervals(name: str) -> Frame:
 def _columns(names: list[str], dim: str) -> Frame:
     """Return a function for frames of variables, with a column for each label of a dimension."""
 
-    def frame(dataset: xr.Dataset) -> Any:
+    def frame(dataset: "xr.Dataset") -> Any:
         values = dataset[names].to_dataframe().unstack(dim)
         values.columns = [" ".join(column) for column in values.columns]
         return values
@@ -150,7 +62,7 @@ def _columns(names: list[str], dim: str) -> Frame:
     return frame
 
 
-def _trials(dataset: xr.Dataset) -> Any:
+def _trials(dataset: "xr.Dataset") -> Any:
     return dataset["tried"].to_pandas().assign(value=dataset["tried_value"].values).set_index("x")
 
 
@@ -184,7 +96,8 @@ def _corner(text: str, option: str) -> tuple[float, ...]:
 COMMANDS = (
     AnalysisCommand(
         "contributions",
-        contributions,
+        "Print the contributors that cause the variance of each measurement, with and without contact.",
+        "contributions",
         terms.CONTRIBUTIONS,
         "Number of base realizations; each is simulated again for every group that matters. "
         "Default: 60 000 realizations in all, but 512 to 4096 base realizations.",
@@ -194,7 +107,8 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "sensitivities",
-        sensitivities,
+        "Print how much each measurement changes with each contributor, with and without contact.",
+        "sensitivities",
         terms.SENSITIVITIES,
         "Number of realizations.",
         ("sensitivities model.py", "sensitivities model.py --samples 200 --csv > slopes.csv"),
@@ -202,7 +116,8 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "tails",
-        tails,
+        "Print rare-event (ppm) estimates: how often measurements are outside their limits, or parts cannot be assembled.",
+        "tails",
         terms.TAILS,
         "Approximate largest number of realizations for each event; by default all events share 60 000. "
         "The analysis stops at a quarter of them if these suffice.",
@@ -211,7 +126,8 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "worst",
-        worst_case,
+        "Print the worst-case minimum and maximum of each measurement, and the deviations that give them.",
+        "worst_case",
         terms.WORST_CASE,
         "Number of random combinations; three searches for each extreme start for every 256 of them.",
         ("worst model.py", "worst model.py --samples 20000 --json > worst.json"),
@@ -219,7 +135,8 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "allocate",
-        allocate,
+        "Print the tolerance ranges of least cost for what is required, and the ranges to tighten first.",
+        "allocate",
         terms.ALLOCATION,
         "Number of realizations of each trial.",
         (
@@ -252,7 +169,8 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "relocate",
-        relocate,
+        "Print the position of a locator, within a box, at which a measurement varies least.",
+        "relocate",
         terms.RELOCATION,
         "Number of realizations of each trial.",
         (
@@ -278,12 +196,11 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "seating",
-        seating,
+        "Print the least friction at which parts can be held short of their locators and seats, and what holds them.",
+        "seating",
         terms.SEATING,
         "",
         ("seating model.py", "seating model.py --csv > friction.csv"),
         lambda dataset: dataset[["critical", "reserve"]].to_dataframe(),
     ),
 )
-for _command in COMMANDS:
-    _command.register()

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 MIN_COLUMNS = 40  # of a terminal: warnings are wrapped to no fewer
 
 
-app = typer.Typer(
+app: typer.Typer = typer.Typer(
     cls=Commands,
     help="Tolerance analysis of rigid assemblies with contact resolved in every realization.",
     no_args_is_help=True,

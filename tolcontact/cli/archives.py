@@ -7,13 +7,11 @@ import typer
 
 from tolcontact import archive as archives, report as reports, workflow
 from tolcontact.cli.app import Archive, AsCsv, AsJson, Overwrite, app, examples, flag, only_one
-from tolcontact.cli.json_output import print_data
-from tolcontact.cli.output import check_page, check_spreadsheet, console, print_summary
+from tolcontact.cli.output import check_page, check_spreadsheet, console, print_data, print_summary
 from tolcontact.cli.progress import waiting
 from tolcontact.cli.title_options import Author, Company, Date, PartNumber, Revision, Title, title_entries
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.errors import shown
-from tolcontact.report.text import capability_text
 from tolcontact.vocabulary import ESTIMATE, MEASURE_UNITS, STATISTIC, units_of
 
 
@@ -35,7 +33,7 @@ def summary(
     elif as_json:
         print_data(estimates)
     elif limits:
-        console().print(capability_text(estimates))
+        console().print(reports.capability_text(estimates))
     else:
         print_summary(estimates)
 

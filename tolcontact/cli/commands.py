@@ -6,31 +6,11 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from tolcontact import cli, interrupts, shape_worker
+from tolcontact.cli import analyses
 
 # The module of each command in this folder, and its line in the list of commands.
 COMMANDS = {
-    "contributions": (
-        "analyses",
-        "Print the contributors that cause the variance of each measurement, with and without contact.",
-    ),
-    "sensitivities": ("analyses", "Print how much each measurement changes with each contributor, with and without contact."),
-    "tails": (
-        "analyses",
-        "Print rare-event (ppm) estimates: how often measurements are outside their limits, or parts cannot be assembled.",
-    ),
-    "worst": (
-        "analyses",
-        "Print the worst-case minimum and maximum of each measurement, and the deviations that give them.",
-    ),
-    "allocate": (
-        "analyses",
-        "Print the tolerance ranges of least cost for what is required, and the ranges to tighten first.",
-    ),
-    "relocate": ("analyses", "Print the position of a locator, within a box, at which a measurement varies least."),
-    "seating": (
-        "analyses",
-        "Print the least friction at which parts can be held short of their locators and seats, and what holds them.",
-    ),
+    **{command.name: ("analysis_command", command.purpose) for command in analyses.COMMANDS},
     "summary": ("archives", "Print the statistics of an archive."),
     "report": (
         "archives",

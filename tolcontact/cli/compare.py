@@ -10,25 +10,11 @@ import xarray as xr
 
 from tolcontact import report as reports
 from tolcontact.archive import locked_archive, open_archive, replacing_archive
-from tolcontact.cli.app import (
-    AsJson,
-    Overwrite,
-    Samples,
-    Scheduler,
-    Seed,
-    Workers,
-    app,
-    examples,
-    method_choices,
-    or_,
-    set_options,
-)
-from tolcontact.cli.json_output import print_data
-from tolcontact.cli.output import check_page, console
+from tolcontact.cli import app as common
+from tolcontact.cli.output import check_page, console, print_data
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
-from tolcontact.report.text import comparison_text, runs_text
 from tolcontact.simulation.cluster import client_of
 from tolcontact.workflow.comparison import compare as compare_solvers, compare_runs, named_archives
 from tolcontact.workflow.models import DEFAULT_SOLVER
@@ -37,8 +23,8 @@ SEVERAL = "One or more of {}. Default: the model's."
 MODEL_OPTIONS = ("solvers", "samples", "seed", "resolution", "objective", "workers", "scheduler")
 
 
-@app.command(
-    epilog=examples(
+@common.app.command(
+    epilog=common.examples(
         "compare model.py --solvers daqp,qpoases", "compare model.py --resolution linearized,exact",
         "compare before.nc after.nc --report both.html",
     )
@@ -52,18 +38,18 @@ def compare(
     solvers: Annotated[
         str, typer.Option(help="Names of solvers, separated by commas; the first one is the reference.")
     ] = DEFAULT_SOLVER,
-    samples: Samples = 1000,
-    seed: Seed = 1,
-    resolution: Annotated[str | None, typer.Option(help=SEVERAL.format(or_(RESOLUTIONS)))] = None,
-    objective: Annotated[str | None, typer.Option(help=SEVERAL.format(or_(OBJECTIVES)))] = None,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    as_json: AsJson = False,
+    samples: common.Samples = 1000,
+    seed: common.Seed = 1,
+    resolution: Annotated[str | None, typer.Option(help=SEVERAL.format(common.or_(RESOLUTIONS)))] = None,
+    objective: Annotated[str | None, typer.Option(help=SEVERAL.format(common.or_(OBJECTIVES)))] = None,
+    workers: common.Workers = None,
+    scheduler: common.Scheduler = None,
+    as_json: common.AsJson = False,
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also write the comparison to a new netCDF file.")] = None,
     report: Annotated[
         Path | None, typer.Option(metavar="FILE.html", help="For archives: also write a page for a browser.")
     ] = None,
-    overwrite: Overwrite = False,
+    overwrite: common.Overwrite = False,
 ) -> None:
     """Compare solvers, resolutions or objectives of a model on the same draws, or archives with each other.
 
@@ -72,7 +58,7 @@ def compare(
     are_archives = [path.suffix.lower() == ".nc" for path in inputs]
     if not all(are_archives) and len(inputs) > 1:
         raise OptionError(f"{', '.join(map(str, inputs))} are neither one model nor archives (.nc)")
-    options = [name for name in MODEL_OPTIONS if name in set_options(context)]
+    options = [name for name in MODEL_OPTIONS if name in common.set_options(context)]
     if all(are_archives) and options:
         raise OptionError(f"--{options[0]} applies to a model; archives have their own")
     if report is not None:
@@ -84,7 +70,9 @@ def compare(
             comparison = _compare_archives(inputs, report)
         else:
             methods = [
-                method_choices(resolution=name, objective=goal) for name in _names(resolution) for goal in _names(objective)
+                common.method_choices(resolution=name, objective=goal)
+                for name in _names(resolution)
+                for goal in _names(objective)
             ]
             with client_of(workers, scheduler) as client:
                 comparison = compare_solvers(
@@ -98,7 +86,7 @@ def compare(
     if as_json:
         print_data(comparison)
     else:
-        console().print((runs_text if all(are_archives) else comparison_text)(comparison))
+        console().print((reports.runs_text if all(are_archives) else reports.comparison_text)(comparison))
         if report is not None:
             typer.echo(f"\nreport: {shown(str(report))}")
 

@@ -10,18 +10,7 @@ from typing import Annotated
 import typer
 
 from tolcontact.archive import open_archive
-from tolcontact.cli.app import (
-    Model,
-    Objective,
-    Overwrite,
-    Resolution,
-    Solver,
-    app,
-    examples,
-    flag,
-    method_choices,
-    show_warnings,
-)
+from tolcontact.cli import app as common
 from tolcontact.cli.output import check_page
 from tolcontact.cli.progress import waiting
 from tolcontact.declaration import Assembly
@@ -38,7 +27,7 @@ from tolcontact.workflow.models import DEFAULT_SOLVER, build
 STARTER = Path(__file__).with_name("starter.py")
 
 
-@app.command(epilog=examples("new bracket"))
+@common.app.command(epilog=common.examples("new bracket"))
 def new(name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the model; its script is NAME.py.")]) -> None:
     """Write a small model with comments as a starting point."""
     path = Path(name if name.endswith(".py") else f"{name}.py")
@@ -62,22 +51,22 @@ def new(name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the mo
     typer.echo(f"model: {shown(str(path))}\nnext: tolcontact check {shown(str(path))}")
 
 
-@app.command(epilog=examples("check model.py", "check model.py --view"))
+@common.app.command(epilog=common.examples("check model.py", "check model.py --view"))
 def check(
-    model: Model,
-    solver: Solver = DEFAULT_SOLVER,
-    resolution: Resolution = None,
-    objective: Objective = None,
-    view: Annotated[bool, flag("--view", "Also open the page of `tolcontact view`, with marked faults.")] = False,
+    model: common.Model,
+    solver: common.Solver = DEFAULT_SOLVER,
+    resolution: common.Resolution = None,
+    objective: common.Objective = None,
+    view: Annotated[bool, common.flag("--view", "Also open the page of `tolcontact view`, with marked faults.")] = False,
 ) -> None:
     """Check a model and its options without a run; list all faults and probable mistakes."""
     assembly, doubts = None, list[warnings.WarningMessage]()
     try:
         with waiting(f"checking {model}"), warnings.catch_warnings(record=True) as doubts:
             assembly = load_model(model)
-            program = build(assembly, solver=solver, method=method_choices(resolution=resolution, objective=objective))
+            program = build(assembly, solver=solver, method=common.method_choices(resolution=resolution, objective=objective))
     except ModelError as error:
-        show_warnings(doubts)
+        common.show_warnings(doubts)
         if view and assembly is not None:
             _open_view(assembly, None, error.faults, temporary_page(model))
         raise
@@ -91,7 +80,7 @@ def check(
         typer.echo(f"  contact {pair.name}: {program.contact_in_words(k)}")
     if program.stored_coordinates:
         typer.echo(f"  {program.stored_coordinates}")
-    show_warnings(doubts)
+    common.show_warnings(doubts)
     count = {0: "", 1: ", 1 warning"}.get(len(doubts), f", {len(doubts)} warnings")
     typer.echo(f"no faults found{count}")
 
@@ -103,14 +92,14 @@ def _open_view(model: Assembly, nominal: Nominal | None, faults: Sequence[str], 
     typer.launch(str(path))
 
 
-@app.command(epilog=examples("view model.py", "view parts.stp", "view model.py --out page.html"))
+@common.app.command(epilog=common.examples("view model.py", "view parts.stp", "view model.py --out page.html"))
 def view(
     source: Annotated[Path, typer.Argument(metavar="MODEL|FILE.nc|FILE.stp", help="A model, an archive, or a STEP file.")],
     out: Annotated[
         Path | None,
         typer.Option(metavar="FILE.html", help="Page to write. Default: a temporary page, opened in the browser."),
     ] = None,
-    overwrite: Overwrite = False,
+    overwrite: common.Overwrite = False,
 ) -> None:
     """Show an assembly before a run: faces, features with their tolerances, locators, contact points and nominal gaps.
 

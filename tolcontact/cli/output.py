@@ -1,15 +1,16 @@
 """Output of results on standard output, and checks of output files."""
 
+import json
 import sys
 from pathlib import Path
 
+import numpy as np
 import typer
 import xarray as xr
 from rich.console import Console
 
 from tolcontact import report
 from tolcontact.errors import OptionError
-from tolcontact.report.text import summary_text
 from tolcontact.vocabulary import BY_STATUS, UNRESOLVED
 
 FAILED_SHARE = 0.001
@@ -43,8 +44,27 @@ def check_spreadsheet(path: Path, *, overwrite: bool = False) -> None:
 
 def print_summary(summary: xr.Dataset) -> None:
     """Print the summary of a run. Raises typer.Exit with code 1 if too many realizations were not resolved."""
-    console().print(summary_text(summary))
+    console().print(report.summary_text(summary))
     failed = sum(int(summary[BY_STATUS.name][status]) for status in UNRESOLVED)
     if failed > FAILED_SHARE * summary.attrs["realizations"]:
         typer.echo(f"error: {failed} realizations were not resolved, more than {FAILED_SHARE:.1%} of all", err=True)
         raise typer.Exit(1)
+
+
+def print_data(dataset: xr.Dataset) -> None:
+    """Print a dataset as JSON, which has no NaN or infinity: they are null, and the texts "Infinity" and "-Infinity"."""
+    data = dataset.reset_coords()
+    numbers = {name: values.copy(data=_as_json(values.values)) for name, values in data.items() if values.dtype.kind == "f"}
+    typer.echo(json.dumps(data.assign(numbers).to_dict(), allow_nan=False, default=_plain))
+
+
+def _as_json(values: np.ndarray) -> np.ndarray:
+    objects = values.astype(object)
+    for word, places in ((None, np.isnan(values)), ("Infinity", values == np.inf), ("-Infinity", values == -np.inf)):
+        objects[places] = word
+    return objects
+
+
+def _plain(value: object) -> object:
+    """Return a NumPy number as a JSON value."""
+    return value.item() if isinstance(value, np.generic) else str(value)

@@ -25,7 +25,7 @@ from tolcontact.pmi import Datum, Dimension, Pmi, Tolerance, read_pmi
 from tolcontact.pmi.claims import Annotation
 from tolcontact.pmi.declared import DeclaredFile, declared_file
 from tolcontact.pmi.script import script
-from tolcontact.report.text.table import FILE_WIDTH
+from tolcontact.report.table import FILE_WIDTH
 
 MAX_ROWS = 2000  # of a table, which takes a second; a drawing has about a hundred
 _CSV = (

@@ -9,43 +9,16 @@ import typer
 
 from tolcontact import report as reports
 from tolcontact.archive import Run, open_unchecked
-from tolcontact.cli.app import (
-    Model,
-    Objective,
-    Overwrite,
-    Quiet,
-    Resolution,
-    Samples,
-    Scheduler,
-    Seed,
-    Solver,
-    Workers,
-    app,
-    examples,
-    flag,
-    method_choices,
-    or_,
-)
+from tolcontact.cli import app as common, title_options
 from tolcontact.cli.output import check_page, print_summary
 from tolcontact.cli.progress import shown_progress, stopped
-from tolcontact.cli.title_options import (
-    Author,
-    Company,
-    Date,
-    PartNumber,
-    Revision,
-    Title,
-    note_kept_title,
-    title_entries,
-    titled_model,
-)
 from tolcontact.errors import OptionError, shown
 from tolcontact.simulation.cluster import client_of
 from tolcontact.statistics import Summary
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.accessor import summarize
-from tolcontact.workflow.archived_run import SURFACES, write_run
 from tolcontact.workflow.models import DEFAULT_SOLVER
+from tolcontact.workflow.runs import SURFACES, write_run
 from tolcontact.workflow.until import Target
 
 Until = Annotated[
@@ -56,8 +29,8 @@ Until = Annotated[
 ]
 
 
-@app.command(
-    epilog=examples(
+@common.app.command(
+    epilog=common.examples(
         "run model.py --samples 10000",
         "run model.py --out run.nc --report run.html",
         "run model.py --out run.nc --resume",
@@ -65,35 +38,35 @@ Until = Annotated[
     )
 )
 def run(
-    model: Model,
-    samples: Samples = 1000,
-    seed: Seed = 1,
-    solver: Solver = DEFAULT_SOLVER,
-    resolution: Resolution = None,
-    objective: Objective = None,
+    model: common.Model,
+    samples: common.Samples = 1000,
+    seed: common.Seed = 1,
+    solver: common.Solver = DEFAULT_SOLVER,
+    resolution: common.Resolution = None,
+    objective: common.Objective = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Archive to write.")] = None,
-    overwrite: Overwrite = False,
-    resume: Annotated[bool, flag("--resume", "Continue the archive if it exists.")] = False,
-    keep: Annotated[str, typer.Option(help=f"Variables to archive for each realization: {or_(KEPT)}.")] = "all",
+    overwrite: common.Overwrite = False,
+    resume: Annotated[bool, common.flag("--resume", "Continue the archive if it exists.")] = False,
+    keep: Annotated[str, typer.Option(help=f"Variables to archive for each realization: {common.or_(KEPT)}.")] = "all",
     fields: Annotated[
         str,
         typer.Option(metavar="some|all|N|none", help="Number of realizations behind magnitudes of displacement fields."),
     ] = "some",
-    plan: Annotated[str, typer.Option(help=f"Plan of the draws: {or_(PLANS)}.")] = MONTE_CARLO,
+    plan: Annotated[str, typer.Option(help=f"Plan of the draws: {common.or_(PLANS)}.")] = MONTE_CARLO,
     until: Until = None,
     surfaces: Annotated[
         int, typer.Option(help="Number of realizations that are checked between contact points, on the surfaces.")
     ] = SURFACES,
     report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Also write a page for a browser.")] = None,
-    title: Title = None,
-    part_number: PartNumber = None,
-    author: Author = None,
-    revision: Revision = None,
-    date: Date = None,
-    company: Company = None,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    quiet: Quiet = False,
+    title: title_options.Title = None,
+    part_number: title_options.PartNumber = None,
+    author: title_options.Author = None,
+    revision: title_options.Revision = None,
+    date: title_options.Date = None,
+    company: title_options.Company = None,
+    workers: common.Workers = None,
+    scheduler: common.Scheduler = None,
+    quiet: common.Quiet = False,
 ) -> None:
     """Simulate a model with and without contact, and print the statistics of its measurements.
 
@@ -101,9 +74,9 @@ def run(
     and if an interval is not as narrow as --until states.
     """
     _check_files(out, report, overwrite=overwrite, resume=resume)
-    method = method_choices(resolution=resolution, objective=objective)
-    titles = title_entries(title, part_number, author, revision, date, company)
-    note_kept_title(out if resume else None, titles)
+    method = common.method_choices(resolution=resolution, objective=objective)
+    titles = title_options.title_entries(title, part_number, author, revision, date, company)
+    title_options.note_kept_title(out if resume else None, titles)
     # A stop first restores the cursor.
     with (
         stopped(out, done := [0, samples]),
@@ -117,7 +90,7 @@ def run(
             show(*done)
 
         path = write_run(
-            functools.partial(titled_model, model, titles),
+            functools.partial(title_options.titled_model, model, titles),
             Run(seed, samples, keep, surfaces, int(fields) if fields.isdigit() else fields, plan),
             out or Path(folder) / "results.nc", solver=solver, method=method, overwrite=overwrite and out is not None,
             resume=resume, until=until, client=client, progress=progress,

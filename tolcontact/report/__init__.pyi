@@ -1,3 +1,5 @@
+from .analysis_tables import analysis_text as analysis_text
+from .comparison_text import comparison_text as comparison_text, runs_text as runs_text
 from .figures import grouped as grouped
 from .html import (
     is_page as is_page,
@@ -8,10 +10,4 @@ from .html import (
 )
 from .notebook import results_html as results_html
 from .spreadsheet import write_spreadsheet as write_spreadsheet
-from .text import (
-    analysis_text as analysis_text,
-    capability_text as capability_text,
-    comparison_text as comparison_text,
-    runs_text as runs_text,
-    summary_text as summary_text,
-)
+from .summary_text import capability_text as capability_text, summary_text as summary_text

@@ -6,29 +6,21 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
+from rich.console import Group
+from rich.text import Text
 
 from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
 from tolcontact.errors import ArchiveError
 from tolcontact.limits import GAP_ACCURACY
 from tolcontact.report.figures import grouped, number, percent, share
+from tolcontact.report.table import Table
 
 SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are only counted
 SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are only counted
 AT_END = 1.001  # times the smallest factor of a tolerance: below this, it is as small as permitted
 MAX_HOLDERS = 3  # of a part, in a table
 FEW_SEARCHES = 0.25  # of all: if no more than this share end at a value, a remark states that there may be worse ones
-
-
-@dataclass(frozen=True)
-class AnalysisTable:
-    """A table with its title, and remarks below it; a detail is left out of the page."""
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    remarks: Sequence[str] = ()
-    is_detail: bool = False
 
 
 @dataclass(frozen=True)
@@ -43,7 +35,7 @@ class AnalysisReport:
     name: str
     count: str
     notes: Sequence[str]
-    tables: Sequence[AnalysisTable]
+    tables: Sequence[Table]
 
 
 def archived_analysis(results: xr.DataTree, record: terms.AnalysisRecord) -> xr.Dataset | None:
@@ -62,6 +54,13 @@ def archived_analysis(results: xr.DataTree, record: terms.AnalysisRecord) -> xr.
 def analysis_report(record: terms.AnalysisRecord, dataset: xr.Dataset) -> AnalysisReport:
     """Return the report of the dataset of an analysis."""
     return _REPORTS[record.name](dataset)
+
+
+def analysis_text(record: terms.AnalysisRecord, dataset: xr.Dataset) -> Group:
+    """Return the dataset of an analysis as something that rich prints."""
+    report = analysis_report(record, dataset)
+    title = Text(f"{dataset.attrs['title']}: {report.count}", style="bold")
+    return Group(title, *map(Text, report.notes), *report.tables)
 
 
 def _lost(count: int) -> list[str]:
@@ -83,7 +82,7 @@ def _contributions(dataset: xr.Dataset) -> AnalysisReport:
     return AnalysisReport("Contributions", f"{grouped(dataset.attrs['realizations'])} realizations", notes, tables)
 
 
-def _shares(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
+def _shares(dataset: xr.Dataset) -> Iterator[Table]:
     """Yield shares of groups, the largest total share first; and Shapley effects, if there are any."""
     measure = str(dataset["measure"].values)
     raw, corrected = (percent(dataset["missed"].sel(state=state).values) for state in terms.STATES)
@@ -111,9 +110,9 @@ def _shares(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
         remarks.append(f"{int(dataset['minor'].sum())} minor ones, estimated together: with contact {together} in total")
     columns = ["", "without\ncontact", "with contact,\nalone", "in total", "linear"]
     if not dataset.sizes["unit"]:
-        yield AnalysisTable(measure, columns, rows, [*remarks, *missed], is_detail=True)
+        yield Table(measure, columns, rows, [*remarks, *missed], is_detail=True)
         return
-    yield AnalysisTable(measure, columns, rows, remarks, is_detail=True)
+    yield Table(measure, columns, rows, remarks, is_detail=True)
     effects = dataset["shapley"].sel(interval="estimate")
     rows = [
         [str(dataset["unit"].values[k]), *(percent(dataset["shapley"].sel(state=s).values[k]) for s in terms.STATES)]
@@ -121,7 +120,7 @@ def _shares(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
         if not abs(float(effects.isel(unit=k).max())) < SMALL_SHARE
     ]
     title = f"{measure}: Shapley effects, which divide what is correlated"
-    yield AnalysisTable(title, ["", *terms.STATE_WORDS], rows, missed, is_detail=True)
+    yield Table(title, ["", *terms.STATE_WORDS], rows, missed, is_detail=True)
 
 
 def _by_size(shares: xr.DataArray) -> np.ndarray:
@@ -142,11 +141,11 @@ def _sensitivities(dataset: xr.Dataset) -> AnalysisReport:
     if order:
         rows = [[str(dataset["contributor"].values[k]), f"{leverage[k]:.3g}"] for k in order]
         title = "Leverage of locators: the largest displacement of a point of their part for 1 mm"
-        tables.append(AnalysisTable(title, ["", "leverage"], rows))
+        tables.append(Table(title, ["", "leverage"], rows))
     return AnalysisReport("Sensitivities", f"{grouped(dataset.attrs['realizations'])} realizations", notes, tables)
 
 
-def _slopes(dataset: xr.Dataset) -> AnalysisTable:
+def _slopes(dataset: xr.Dataset) -> Table:
     """Return the derivatives of a measure, starting with the contributors that have the largest effect."""
     mean = np.abs(dataset["sensitivity"].sel(interval="estimate").values).max(axis=0)
     size = np.fmax(mean, dataset["spread"].max("state").values)
@@ -164,7 +163,7 @@ def _slopes(dataset: xr.Dataset) -> AnalysisTable:
     small = dataset.sizes["contributor"] - len(rows)
     title = f"{dataset['measure'].values} ({dataset['measure_units'].values} for a unit of each)"
     columns = ["", "nominal", "apart", "touching", "all", "spread", "kinks"]
-    return AnalysisTable(title, columns, rows, [f"and {small} with next to no effect"] if small else [])
+    return Table(title, columns, rows, [f"and {small} with next to no effect"] if small else [])
 
 
 def _worst_case(dataset: xr.Dataset) -> AnalysisReport:
@@ -185,7 +184,7 @@ def _worst_case(dataset: xr.Dataset) -> AnalysisReport:
     return AnalysisReport("Worst cases", f"{grouped(int(counts.sum()))} combinations", notes, tables)
 
 
-def _extremes(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
+def _extremes(dataset: xr.Dataset) -> Iterator[Table]:
     """Yield both ends of a measure in both states, and the combinations that cause the corrected ends."""
     rows, searches = [], int(dataset.attrs["searches"])
     for state in terms.STATES:
@@ -204,14 +203,14 @@ def _extremes(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
     if int(dataset["agreeing"].min()) <= FEW_SEARCHES * searches:
         remarks.append("Where few searches met, there may be worse combinations; more --samples find more.")
     title = f"{dataset['measure'].values} [{dataset['measure_units'].values}]"
-    yield AnalysisTable(title, ["", "found", "linear", "searches"], rows, remarks)
+    yield Table(title, ["", "found", "linear", "searches"], rows, remarks)
     deviations = dataset["deviations"].isel(state=terms.CORRECTED).transpose("contributor", "end").values
     combination = [
         [str(label), *(f"{value:+.4g}" for value in values)]
         for label, values in zip(dataset["contributor"].values, deviations, strict=True)
         if np.abs(values).max() > 0
     ]
-    yield AnalysisTable("", ["deviations, with contact", *terms.EXTREME_WORDS], combination, is_detail=True)
+    yield Table("", ["deviations, with contact", *terms.EXTREME_WORDS], combination, is_detail=True)
 
 
 def _tails(dataset: xr.Dataset) -> AnalysisReport:
@@ -230,7 +229,7 @@ def _tails(dataset: xr.Dataset) -> AnalysisReport:
         notes.append(f"{event}: values stop at a limit; none was found beyond it.")
     for event in dataset["event"].values[np.isnan(dataset["probability"].values[:, 0])]:
         notes.append(f"{event}: the measurement is not a number in some realizations, so its probability is not defined.")
-    return AnalysisReport("Rare events", count, notes, [AnalysisTable("", ["", "ppm"], rows)])
+    return AnalysisReport("Rare events", count, notes, [Table("", ["", "ppm"], rows)])
 
 
 def _allocation(dataset: xr.Dataset) -> AnalysisReport:
@@ -245,8 +244,8 @@ def _allocation(dataset: xr.Dataset) -> AnalysisReport:
         ranges.append([str(group), *widths, f"{float(row['factor']):.3g}", _remark_on(row, dataset.attrs)])
     before, after = dataset["cost"].sum("group").values
     tables = [
-        AnalysisTable("", ["required", *terms.STAGES], requirements),
-        AnalysisTable(f"Cost {before:.4g} before, {after:.4g} after", ["tolerance", *terms.STAGES, "factor", ""], ranges),
+        Table("", ["required", *terms.STAGES], requirements),
+        Table(f"Cost {before:.4g} before, {after:.4g} after", ["tolerance", *terms.STAGES, "factor", ""], ranges),
         *(_effects(dataset["effect"].sel(measure=measure)) for measure in dataset["measure"].values),
     ]
     notes = [f"Requirements in fresh runs of {grouped(dataset.attrs['fresh'])} realizations; 95 % intervals."]
@@ -277,14 +276,14 @@ def _remark_on(row: xr.Dataset, attributes: dict) -> str:
     return "smallest allowed" if at_floor else "largest allowed" if at_ceiling else ""
 
 
-def _effects(effect: xr.DataArray) -> AnalysisTable:
+def _effects(effect: xr.DataArray) -> Table:
     """Return the effects (of_effect, group, interval) on a measure, starting with the largest one."""
     rows = []
     for k in np.argsort(effect.values[0, :, 0], kind="stable"):
         spread, outside = effect.values[:, k]
         rows.append([str(effect["group"].values[k]), number(spread, sign=True), _ppm(outside, "+")])
     title = f"{effect['measure'].values} [{effect['measure_units'].values}]: changes if zones were a tenth narrower than before"
-    return AnalysisTable(title, ["", *terms.EFFECTS], rows)
+    return Table(title, ["", *terms.EFFECTS], rows)
 
 
 def _relocation(dataset: xr.Dataset) -> AnalysisReport:
@@ -302,7 +301,7 @@ def _relocation(dataset: xr.Dataset) -> AnalysisReport:
         f"{samples} realizations for each trial position;",
         f"{fresh} fresh ones for the figures below, with 95 % intervals.\n",
     ]
-    table = AnalysisTable("", columns, rows, _lost(int(dataset["unresolved"].max())))
+    table = Table("", columns, rows, _lost(int(dataset["unresolved"].max())))
     return AnalysisReport("Position of a locator", f"{grouped(dataset.sizes['trial'])} trial positions", notes, [table])
 
 
@@ -317,7 +316,7 @@ def _seating(dataset: xr.Dataset) -> AnalysisReport:
         notes.append(f"They do not touch there, so they hold nothing: {dataset.attrs['open_pairs']}.")
     rows = [_seat(dataset.isel(seat=k)) for k in range(dataset.sizes["seat"])]
     columns = ["", "critical", "reserve", "held by"]
-    return AnalysisReport("Seating", f"{len(rows)} seats", notes, [AnalysisTable("", columns, rows)])
+    return AnalysisReport("Seating", f"{len(rows)} seats", notes, [Table("", columns, rows)])
 
 
 def _seat(dataset: xr.Dataset) -> list[str]:

@@ -9,7 +9,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.report.figures import grouped, percent
-from tolcontact.statistics.linear_shares import MIN_R2, LinearShares, linear_shares, required_realizations
+from tolcontact.statistics.linear_shares import MIN_R2, LinearShares, joined_columns, linear_shares, required_realizations
 
 MAX_REALIZATIONS = 20_000  # for the estimate of shares; more would not change the displayed digits
 MAX_CONTRIBUTORS = 1000  # above this, a regression would take too long
@@ -75,23 +75,10 @@ def _groups(results: xr.DataTree, sample: xr.Dataset, columns: np.ndarray) -> di
     """Return the positions in `columns` of each group, by name."""
     labels = [str(label) for label in sample[terms.CONTRIBUTOR].values]
     owners = [_owner(label, source) for label, source in zip(labels, sample[terms.CONTRIBUTOR_SOURCE.name].values, strict=True)]
-    leader = {owner: owner for owner in owners}
-
-    def find(owner: str) -> str:
-        while leader[owner] != owner:
-            owner = leader[owner]
-        return owner
-
-    owner_of = dict(zip(labels, owners, strict=True))
-    for together in _drawn_together(results):
-        joined = [find(owner_of[label]) for label in together if label in owner_of]
-        for owner in joined[1:]:
-            leader[find(owner)] = find(joined[0])
-    members: dict[str, list[int]] = {}
-    for position, column in enumerate(columns):
-        members.setdefault(find(owners[column]), []).append(position)
-    names = {key: " + ".join(dict.fromkeys(owners[columns[k]] for k in positions)) for key, positions in members.items()}
-    return {names[key]: np.array(positions) for key, positions in members.items()}
+    numbers = {label: column for column, label in enumerate(labels)}
+    sets = [[numbers[label] for label in together if label in numbers] for together in _drawn_together(results)]
+    groups = joined_columns(owners, [joined for joined in sets if joined], columns)
+    return {name: np.searchsorted(columns, group) for name, group in groups.items()}
 
 
 def _owner(label: str, source: str) -> str:

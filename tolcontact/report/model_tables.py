@@ -1,9 +1,9 @@
-"""The tables of a declared model as its archive holds it: parts, features, locators, contact pairs and measurements."""
+"""A declared model as its archive holds it: tables of parts, features, locators, pairs and measurements; settings."""
 
 import json
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,52 +12,27 @@ from tolcontact import vocabulary as terms
 from tolcontact.declaration.document import tolerance_of_entry
 from tolcontact.errors import ArchiveError
 from tolcontact.report.figures import plain
+from tolcontact.report.table import Cell, Table
 
 Entry = dict[str, Any]
-Cell = str | float | None
+SETTINGS = (
+    "solver", "resolution", "objective", "regularization", "eta", "active_set", "search", "method_from", "sampler", "seed",
+    "samples", "kept", "fields", "versions", "history", "format",
+)  # fmt: skip
 
 
-class ModelTable(NamedTuple):
-    """A table of declared things; numbers stay numbers, and missing cells are None."""
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[Cell]]
-
-    @property
-    def texts(self) -> list[list[str]]:
-        """The rows as texts."""
-        return [[cell_text(cell) for cell in row] for row in self.rows]
-
-    @property
-    def is_number(self) -> list[bool]:
-        """Whether each column has numbers."""
-        return [any(isinstance(row[k], float) for row in self.rows) for k in range(len(self.columns))]
-
-
-def cell_text(cell: Cell) -> str:
-    """Return a cell as a text."""
-    return "" if cell is None else plain(cell) if isinstance(cell, float) else cell
-
-
-def model_tables(results: xr.DataTree) -> list[ModelTable]:
+def model_tables(results: xr.DataTree) -> list[Table]:
     """Return the tables of the model that have rows. Raises ArchiveError for a damaged declaration."""
     document = json.loads(str(results["model"][terms.DECLARATION.name].values))
-    makers: tuple[Callable[[Entry, xr.DataTree], ModelTable], ...] = (_parts, _features, _locators, _pairs, _measurements)
+    makers: tuple[Callable[[Entry, xr.DataTree], Table], ...] = (_parts, _features, _locators, _pairs, _measurements)
     try:
         tables = [make(document, results) for make in makers]
     except (LookupError, TypeError, ValueError) as error:
         raise ArchiveError(f"the declared model in the archive is damaged: {type(error).__name__}: {error}") from error
-    return [_filled(table) for table in tables if table.rows]
+    return [table.without_empty_columns() for table in tables if table.rows]
 
 
-def _filled(table: ModelTable) -> ModelTable:
-    """Return a table without columns that are empty in all rows."""
-    filled = [k for k in range(len(table.columns)) if any(row[k] not in (None, "") for row in table.rows)]
-    return ModelTable(table.title, [table.columns[k] for k in filled], [[row[k] for k in filled] for row in table.rows])
-
-
-def _parts(document: Entry, results: xr.DataTree) -> ModelTable:
+def _parts(document: Entry, results: xr.DataTree) -> Table:
     supports = {location["part"]: location["on"] or "the ground" for location in document["locations"]}
     rows = []
     for part in document["parts"]:
@@ -65,10 +40,10 @@ def _parts(document: Entry, results: xr.DataTree) -> ModelTable:
         shape = f"box {_triple(geometry['box'])} mm" if "box" in geometry else str(next(iter(geometry.values())))
         support = "fixed" if part.get("fixed") else f"located on {supports.get(part['name'], 'nothing')}"
         rows.append([part["name"], shape, _triple(part["at"]), support])
-    return ModelTable("Parts", ["part", "shape", "position, mm", "held"], rows)
+    return Table("Parts", ["part", "shape", "position, mm", "held"], rows)
 
 
-def _features(document: Entry, results: xr.DataTree) -> ModelTable:
+def _features(document: Entry, results: xr.DataTree) -> Table:
     rows = [
         [
             part["name"],
@@ -84,10 +59,10 @@ def _features(document: Entry, results: xr.DataTree) -> ModelTable:
         for part in document["parts"]
         for target in part.get("datum_targets", [])
     ]
-    return ModelTable("Features, datums and tolerances", ["part", "feature", "datum", "tolerances, mm"], rows + targets)
+    return Table("Features, datums and tolerances", ["part", "feature", "datum", "tolerances, mm"], rows + targets)
 
 
-def _locators(document: Entry, results: xr.DataTree) -> ModelTable:
+def _locators(document: Entry, results: xr.DataTree) -> Table:
     sample = results["sample"].to_dataset()
     labels = [str(label) for label in sample[terms.LOCATOR].values]
     numbers = {str(label): k for k, label in enumerate(sample[terms.CONTRIBUTOR].values)}
@@ -103,7 +78,7 @@ def _locators(document: Entry, results: xr.DataTree) -> ModelTable:
             kind += f", {float(sample[terms.STIFFNESS.name].values[k]):g} N/mm"
         rows.append([part, name, _triple(at), _triple(along), width if math.isfinite(width) else None, distribution, kind])
     columns = ["part", "locator", "point, mm", "direction", f"{terms.ZONE_WIDTH}, mm", "distribution", "held"]
-    return ModelTable("Locators", columns, rows)
+    return Table("Locators", columns, rows)
 
 
 def _compliant_locators(contact: xr.Dataset) -> set[int]:
@@ -114,7 +89,7 @@ def _compliant_locators(contact: xr.Dataset) -> set[int]:
     return set(contact[terms.LOCATOR_OF_POINT.name].values[gives].tolist())
 
 
-def _pairs(document: Entry, results: xr.DataTree) -> ModelTable:
+def _pairs(document: Entry, results: xr.DataTree) -> Table:
     contact = results["contact"].to_dataset()
     counts = np.zeros(0, dtype=int)
     if terms.PAIR_OF_POINT.name in contact:
@@ -131,10 +106,10 @@ def _pairs(document: Entry, results: xr.DataTree) -> ModelTable:
         for k, pair in enumerate(document["pairs"])
     ]
     columns = ["contact pair", "moving part", "reference part", "contact points", *(["stiffness, N/mm"] if gives else [])]
-    return ModelTable("Contact pairs", columns, rows)
+    return Table("Contact pairs", columns, rows)
 
 
-def _measurements(document: Entry, results: xr.DataTree) -> ModelTable:
+def _measurements(document: Entry, results: xr.DataTree) -> Table:
     root = results.to_dataset()
     rows: list[list[Cell]] = []
     for k, measure in enumerate(document["measures"]):
@@ -149,7 +124,7 @@ def _measurements(document: Entry, results: xr.DataTree) -> ModelTable:
             ]
         )  # fmt: skip
     columns = [terms.MEASUREMENT, "of", "to", "along", "units", "nominal", "lower limit", "upper limit"]
-    return ModelTable("Measurements", columns, rows)
+    return Table("Measurements", columns, rows)
 
 
 def _quantity(measure: Entry) -> str:
@@ -176,3 +151,8 @@ def _end(point: Entry | None) -> str:
 
 def _triple(values: Sequence[float]) -> str:
     return f"({', '.join(plain(float(value), 1.0) for value in values)})"
+
+
+def archived_settings(results: xr.DataTree) -> dict[str, Any]:
+    """Return the settings that an archive states, by the names of its attributes."""
+    return {name: results.attrs[name] for name in SETTINGS}

@@ -9,7 +9,8 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.report.figures import grouped, number, percent, plain
-from tolcontact.statistics.verdict import FAILS, UNDECIDED, Verdict, verdict
+from tolcontact.report.table import Table
+from tolcontact.statistics.capability import FAILS, UNDECIDED, Verdict, verdict
 
 PPM_BELOW = 0.01  # if all shares are smaller, the table states them in ppm
 DIGITS_OF_COUNTS = 2  # significant digits of the number of realizations that would decide
@@ -141,13 +142,8 @@ def verdict_lines(summary: xr.Dataset) -> Iterator[str]:
             yield f"{full_name(measure)}: {text}" + ("" if text.startswith(UNDECIDED) else " its limits") + reservation(summary)
 
 
-def overview_columns() -> list[str]:
-    """Return the headings of the short table of a terminal."""
-    return ["", "mean", "6 sigma", terms.PPK, terms.OUT_OF_SPECIFICATION_COLUMN]
-
-
-def overview_rows(summary: xr.Dataset) -> list[list[str]]:
-    """Return rows of each measurement and state: mean, 6 sigma, Ppk and share out of specification."""
+def overview_table(summary: xr.Dataset) -> Table:
+    """Return the short table of a terminal: mean, 6 sigma, Ppk and share out of specification by measure and state."""
     rows, units = [], share_units(summary)
     for name in summary["measure"].values:
         measure = summary.sel(measure=name)
@@ -156,4 +152,4 @@ def overview_rows(summary: xr.Dataset) -> list[list[str]]:
         for word, state in zip(terms.STATE_WORDS, terms.STATES, strict=True):
             mean, spread, ppk, outside = values.sel(state=state).values
             rows.append([f"  {word}", number(mean), number(spread), number(ppk), with_units(outside, units)])
-    return rows
+    return Table("", ["", "mean", "6 sigma", terms.PPK, terms.OUT_OF_SPECIFICATION_COLUMN], rows)

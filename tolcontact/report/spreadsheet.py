@@ -2,9 +2,9 @@
 
 import importlib
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,24 +14,16 @@ from tolcontact.declaration import TitleBlock
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.errors import ArchiveError, OptionError
 from tolcontact.replacing import replacing
-from tolcontact.report.archived_settings import archived_settings
 from tolcontact.report.contributor_shares import contributor_shares
-from tolcontact.report.model_tables import model_tables
+from tolcontact.report.model_tables import archived_settings, model_tables
 from tolcontact.report.results_table import STATISTICS, result_rows
-from tolcontact.statistics.verdict import VERDICT_RULE
+from tolcontact.report.table import Table
+from tolcontact.statistics.capability import VERDICT_RULE
 from tolcontact.vocabulary import units_of
 
 MAX_WIDTH = 48  # characters of a column
 FORMULA_SIGNS = ("=", "+", "-", "@")  # a text that begins with one of them might be run as a formula
 INTERVAL = ("", ", lower end of its 95 % interval", ", upper end of its 95 % interval")
-
-
-class Sheet(NamedTuple):
-    """A table of texts and numbers; None is an empty cell."""
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[Any]]
 
 
 def write_spreadsheet(results: xr.DataTree, summary: xr.Dataset, path: Path, title_block: TitleBlock | None = None) -> None:
@@ -67,7 +59,7 @@ def write_spreadsheet(results: xr.DataTree, summary: xr.Dataset, path: Path, tit
         raise ArchiveError(f'spreadsheet "{path}" cannot be written: {error.strerror}') from error
 
 
-def sheets_of(results: xr.DataTree, summary: xr.Dataset, titles: TitleBlock) -> Iterator[Sheet]:
+def sheets_of(results: xr.DataTree, summary: xr.Dataset, titles: TitleBlock) -> Iterator[Table]:
     """Yield the tables of a report in the order of its page."""
     yield _document(results, summary, titles)
     yield _results(summary)
@@ -75,11 +67,10 @@ def sheets_of(results: xr.DataTree, summary: xr.Dataset, titles: TitleBlock) -> 
     yield _contributors(results, summary)
     if summary.sizes["pair"]:
         yield _contact(summary)
-    for table in model_tables(results):
-        yield Sheet(table.title, table.columns, table.rows)
+    yield from model_tables(results)
 
 
-def _document(results: xr.DataTree, summary: xr.Dataset, titles: TitleBlock) -> Sheet:
+def _document(results: xr.DataTree, summary: xr.Dataset, titles: TitleBlock) -> Table:
     rows = [[name.replace("_", " "), entry] for name, entry in titles.entries.items() if entry]
     rows += [
         ["simulation", summary.attrs["title"]],
@@ -87,10 +78,10 @@ def _document(results: xr.DataTree, summary: xr.Dataset, titles: TitleBlock) -> 
         ["verdict", VERDICT_RULE],
         *map(list, archived_settings(results).items()),
     ]
-    return Sheet("Document", ["entry", "value"], rows)
+    return Table("Document", ["entry", "value"], rows)
 
 
-def _results(summary: xr.Dataset) -> Sheet:
+def _results(summary: xr.Dataset) -> Table:
     heads = [f"{name}{end}" for name in (*STATISTICS[:3], "share below limit", "share above limit") for end in INTERVAL]
     rows = [
         [
@@ -108,10 +99,10 @@ def _results(summary: xr.Dataset) -> Sheet:
         for figures in row.states
     ]
     labels = [terms.MEASUREMENT, "units", "quantity", "verdict", "nominal", "lower limit", "upper limit", "contact"]
-    return Sheet("Results", [*labels, *heads], rows)
+    return Table("Results", [*labels, *heads], rows)
 
 
-def _statistics(summary: xr.Dataset) -> Sheet:
+def _statistics(summary: xr.Dataset) -> Table:
     rows = []
     for name in summary["measure"].values:
         measure = summary.sel(measure=name)
@@ -121,28 +112,28 @@ def _statistics(summary: xr.Dataset) -> Sheet:
                 values = measure["statistic_value"].sel(state=state, statistic=statistic).values
                 if np.isfinite(values[0]):
                     rows.append([str(name), terms.WORD_OF_STATE[state], str(statistic), units_of(statistic, units), *values])
-    return Sheet("Statistics", [terms.MEASUREMENT, "contact", "statistic", "units", *terms.ESTIMATE], rows)
+    return Table("Statistics", [terms.MEASUREMENT, "contact", "statistic", "units", *terms.ESTIMATE], rows)
 
 
-def _contributors(results: xr.DataTree, summary: xr.Dataset) -> Sheet:
+def _contributors(results: xr.DataTree, summary: xr.Dataset) -> Table:
     rows: list[list[Any]] = []
     for name, shares in zip(summary["measure"].values, contributor_shares(results, summary.attrs["realizations"]), strict=True):
         rows += [[str(name), group, *(100 * values)] for group, values in zip(shares.groups, shares.shares, strict=True)] or [
             [str(name), shares.note, None, None, None]
         ]
-    return Sheet(
+    return Table(
         terms.CONTRIBUTORS, [terms.MEASUREMENT, "contributor", *(f"share of variance{end}, %" for end in INTERVAL)], rows
     )
 
 
-def _contact(summary: xr.Dataset) -> Sheet:
+def _contact(summary: xr.Dataset) -> Table:
     heading = terms.reaction_words(summary["reaction"].attrs["units"]).heading.replace("\n", " ")
     rows = []
     for pair in summary["pair"].values:
         of_pair = summary.sel(pair=pair)
         rows.append([str(pair), *of_pair["carried"].values, *of_pair["reaction"].sel(of_reaction=terms.MEAN).values])
     heads = [f"{terms.IN_CONTACT.replace(chr(10), ' ')}{end}" for end in INTERVAL] + [f"{heading}{end}" for end in INTERVAL]
-    return Sheet("Contact", ["contact pair", *heads], rows)
+    return Table("Contact", ["contact pair", *heads], rows)
 
 
 def _plain(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Capability of a measure: the shares beyond its limits, and Pp and Ppk, by percentiles and for a normal distribution.
+"""Capability of a measure: shares beyond its limits and their verdict; Pp and Ppk, by percentiles and as if normal.
 
 Contact truncates and skews distributions, so the figures by percentiles (the general method of ISO 22514-2) come first: half of
 the values lie below X50, and 99.73 % between X0.135 and X99.865.
@@ -13,25 +13,35 @@ With one limit, Ppk comes from its side, and there is no Pp. For a normal distri
 import math
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
-from scipy import special
 
 from tolcontact.limits import Limits
 from tolcontact.statistics.intervals import (
     CONFIDENCE,
     UNDEFINED,
     Estimate,
+    binomial_quantile,
     from_standardized_influence,
     is_constant,
     percentiles,
     proportion,
+    proportion_of,
 )
 from tolcontact.statistics.sample import Sample
 from tolcontact.variation.sobol_points import scrambled_points
 
 PERCENTS = 0.135, 50.0, 99.865
 TRIALS = 1 << 11  # simulated triples of percentiles; an interval covers 95 % of them
+ALLOWED_SHARE = 0.0027  # share of a normal distribution beyond three standard deviations: Ppk 1 on both sides
+MEETS, FAILS, UNDECIDED = "meets", "does not meet", "undecided"
+GROWTH = 1.25  # of the number of realizations between two trials
+MAX_REALIZATIONS = 1e8  # more are not proposed
+VERDICT_RULE = (
+    f'"{MEETS}": the 95 % interval of the share out of specification, with contact, lies at or below {ALLOWED_SHARE:.2%}; '
+    f'"{FAILS}": it lies above; "{UNDECIDED}": it contains {ALLOWED_SHARE:.2%}'.replace("%", " %")
+).replace("95  %", "95 %")
 
 
 def share_below(x: Sample, limits: Limits) -> Estimate:
@@ -157,14 +167,41 @@ def values_below(n: int) -> np.ndarray:
     """Return simulated numbers of the values below the percentiles, among `n` values, (percentile, trial)."""
     u = scrambled_points(TRIALS, len(PERCENTS), np.random.default_rng(0).spawn(1)[0]).T
     p = np.array(PERCENTS) / 100
-    below_low = _hits(u[0], np.full(TRIALS, n), p[0])
-    below_median = below_low + _hits(u[1], n - below_low, (p[1] - p[0]) / (1 - p[0]))
-    below_high = below_median + _hits(u[2], n - below_median, (p[2] - p[1]) / (1 - p[1]))
+    below_low = binomial_quantile(u[0], np.full(TRIALS, n), p[0])
+    below_median = below_low + binomial_quantile(u[1], n - below_low, (p[1] - p[0]) / (1 - p[0]))
+    below_high = below_median + binomial_quantile(u[2], n - below_median, (p[2] - p[1]) / (1 - p[1]))
     return np.array([below_low, below_median, below_high])
 
 
-def _hits(u: np.ndarray, n: np.ndarray, p: float) -> np.ndarray:
-    """Return quantiles `u` of binomial distributions."""
-    k = np.maximum(np.ceil(np.nan_to_num(special.bdtrik(u, np.maximum(n, 1), p))), 0).astype(np.int64)
-    k -= (k > 0) & (special.bdtr(np.maximum(k - 1, 0), np.maximum(n, 1), p) >= u)
-    return np.where(n > 0, np.minimum(k, n), 0)
+class Verdict(NamedTuple):
+    """The verdict on a measurement.
+
+    word   one of MEETS, FAILS, UNDECIDED
+    more   number of additional realizations that would probably decide; 0 if it is decided, infinite if too many
+    """
+
+    word: str
+    more: float = 0.0
+
+
+def verdict(share: np.ndarray, realizations: int) -> Verdict | None:
+    """Return the verdict on a share (estimate, lower, upper) out of specification; None for a share that is not a number."""
+    estimate, lower, upper = (float(value) for value in share)
+    if not all(map(math.isfinite, (estimate, lower, upper))):
+        return None
+    word = _word(lower, upper)
+    return Verdict(word, _more(estimate, realizations) if word == UNDECIDED else 0.0)
+
+
+def _word(lower: float, upper: float) -> str:
+    return MEETS if upper <= ALLOWED_SHARE else FAILS if lower > ALLOWED_SHARE else UNDECIDED
+
+
+def _more(estimate: float, realizations: int) -> float:
+    """Return the number of additional independent realizations that would decide if the estimate did not change."""
+    count = float(realizations)
+    while count < MAX_REALIZATIONS:
+        count *= GROWTH
+        if _word(*proportion_of(estimate * count, count)[1:]) != UNDECIDED:
+            return math.ceil(count - realizations)
+    return math.inf

@@ -83,6 +83,39 @@ class TouchingShares:
         return estimates[:, 0], estimates[:, 1:], self._realizations
 
 
+def touching(results: xr.DataTree) -> xr.Dataset:
+    """Return how often each contact point touches in the corrected state, as an archived share with its interval.
+
+    touching   (point, interval): gaps below 1e-4 mm, in at most the first 2048 realizations (fewer above 10 000 points),
+               without realizations that are `searched`
+    pair       (point) name of its pair
+    point      (point, axis) of the moving part, nominal [mm]
+
+    The attribute `realizations` is their number. It is 0, and shares are NaN, if the archive does not keep the poses (or, where
+    gaps depend on them, the deviations).
+    """
+    contact, names = results["contact"].to_dataset(), results.to_dataset()[terms.PAIR].values
+    pair_of_point, points = np.zeros(0, dtype=int), np.zeros((0, len(terms.AXES)))  # for a model without contact
+    if terms.PAIR_OF_POINT.name in contact:
+        pair_of_point, points = contact[terms.PAIR_OF_POINT.name].values, contact[terms.MOVING_POINT.name].values
+    values, count = np.full((len(pair_of_point), len(terms.ESTIMATE)), np.nan), 0
+    if len(points):
+        share, interval, realizations = (contact[variable.name].values for variable in terms.TOUCHING)
+        values, count = np.column_stack([share, interval]), int(realizations)
+    return xr.Dataset(
+        {
+            "touching": ((terms.POINT, terms.INTERVAL), values, {"units": "1"}),
+            "point": ((terms.POINT, terms.AXIS), points, {"units": "mm"}),
+        },
+        coords={
+            "pair": (terms.POINT, names.astype(str)[pair_of_point]),
+            terms.AXIS: list(terms.AXES),
+            terms.INTERVAL: list(terms.ESTIMATE),
+        },
+        attrs={"realizations": count},
+    )
+
+
 def surface_values(results: xr.DataTree, limit: float) -> dict[ArchiveVariable, Any]:
     """Return the results of the surface check, with shares of depths above `limit` [mm]."""
     surface = results["surface"].to_dataset()
@@ -116,52 +149,32 @@ def _share(depths: np.ndarray, at_random: np.ndarray, limit: float) -> np.ndarra
     return np.array(intervals.proportion((np.nan_to_num(depths[at_random]) > limit).any(axis=1)))
 
 
-class Clashes:
-    """The clashes between parts in the rows of an archive.
+def clashes(rows: xr.Dataset) -> tuple[dict[ArchiveVariable, Any], list[str]]:
+    """Return the share of realizations with clashes, the counts and depths of pairs of parts, and the names of these pairs.
 
-    watched     number of realizations that were tested
-    clashing    number of these with penetration between parts without declared contact
-    counts      number of realizations with a pair as the deepest one; by both parts, and whether contact is declared
-    depths      [mm], by the same keys: their largest depth; missing if none was measured
+    A clash is a penetration of bodies. The share is that of pairs without declared contact, of all tested realizations. The
+    most frequent pairs are those that are the deepest in their realization; their depth [mm] is NaN if none was measured.
     """
-
-    def __init__(self, rows: xr.Dataset) -> None:
-        self.watched, self.clashing = 0, 0
-        self.counts = Counter[tuple[int, int, bool]]()
-        self.depths = dict[tuple[int, int, bool], float]()
-        self._parts = [str(name) for name in rows[terms.PART].values]
-        for piece in pieces(rows[VARIABLES]):
-            self._add(*(np.asarray(piece[name].values) for name in VARIABLES))
-
-    def _add(self, clashes: np.ndarray, depth: np.ndarray, part: np.ndarray, other: np.ndarray) -> None:
-        self.watched += int((clashes >= 0).sum())
-        self.clashing += int((clashes > 0).sum())
-        is_pair = np.all([(index >= 0) & (index < len(self._parts)) for index in (part, other)], axis=0)
-        pairs = np.column_stack([part, other, clashes == 0])[is_pair].astype(int)
-        labels, places = np.unique(pairs, axis=0, return_inverse=True)
-        for k, (first, second, is_declared) in enumerate(labels.tolist()):
-            pair, depths = (first, second, bool(is_declared)), depth[is_pair][places.ravel() == k]
-            self.counts[pair] += len(depths)
-            if np.isfinite(depths).any():
-                self.depths[pair] = max(self.depths.get(pair, 0.0), float(np.nanmax(depths)))
-
-    @property
-    def pairs(self) -> list[tuple[int, int, bool]]:
-        """The pairs of parts that clash most frequently."""
-        return [pair for pair, _ in self.counts.most_common(MAX_PAIRS)]
-
-    @property
-    def labels(self) -> list[str]:
-        """The names of both parts of each pair."""
-        return [f"{self._parts[first]} / {self._parts[second]}" for first, second, _ in self.pairs]
-
-    def values(self) -> dict[ArchiveVariable, Any]:
-        """Return the share of realizations with clashes, and the counts and depths of each pair of parts."""
-        share = intervals.proportion_of(self.clashing, self.watched) if self.watched else intervals.UNDEFINED
-        return {
-            terms.WATCHED: self.watched,
-            terms.CLASH_SHARE: np.array(share),
-            terms.CLASH_COUNT: np.array([self.counts[pair] for pair in self.pairs], dtype=np.int64),
-            terms.CLASH_LARGEST_DEPTH: np.array([self.depths.get(pair, np.nan) for pair in self.pairs]),
-            terms.CLASH_DECLARED: np.array([is_declared for *_, is_declared in self.pairs], dtype=np.int8),
-        }
+    names = [str(name) for name in rows[terms.PART].values]
+    watched, clashing, counts, depths = 0, 0, Counter[tuple[int, int, bool]](), dict[tuple[int, int, bool], float]()
+    for piece in pieces(rows[VARIABLES]):
+        clash_counts, depth, part, other = (np.asarray(piece[name].values) for name in VARIABLES)
+        watched += int((clash_counts >= 0).sum())
+        clashing += int((clash_counts > 0).sum())
+        is_pair = np.all([(index >= 0) & (index < len(names)) for index in (part, other)], axis=0)
+        parts_and_kind = np.column_stack([part, other, clash_counts == 0])[is_pair].astype(int)
+        labels, places = np.unique(parts_and_kind, axis=0, return_inverse=True)
+        for k, (first_part, second_part, is_declared) in enumerate(labels.tolist()):
+            pair, pair_depths = (first_part, second_part, bool(is_declared)), depth[is_pair][places.ravel() == k]
+            counts[pair] += len(pair_depths)
+            if np.isfinite(pair_depths).any():
+                depths[pair] = max(depths.get(pair, 0.0), float(np.nanmax(pair_depths)))
+    pairs = [pair for pair, _ in counts.most_common(MAX_PAIRS)]
+    values = {
+        terms.WATCHED: watched,
+        terms.CLASH_SHARE: np.array(intervals.proportion_of(clashing, watched) if watched else intervals.UNDEFINED),
+        terms.CLASH_COUNT: np.array([counts[pair] for pair in pairs], dtype=np.int64),
+        terms.CLASH_LARGEST_DEPTH: np.array([depths.get(pair, np.nan) for pair in pairs]),
+        terms.CLASH_DECLARED: np.array([is_declared for *_, is_declared in pairs], dtype=np.int8),
+    }
+    return values, [f"{names[first_part]} / {names[second_part]}" for first_part, second_part, _ in pairs]

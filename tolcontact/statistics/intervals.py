@@ -168,11 +168,6 @@ def percentiles(x: np.ndarray | Sample, percents: Sequence[float]) -> list[Estim
     return estimates
 
 
-def percentile(x: np.ndarray | Sample, percent: float) -> Estimate:
-    """Return one of `percentiles`."""
-    return percentiles(x, [percent])[0]
-
-
 def proportion(hits: np.ndarray | Sample) -> Estimate:
     """Return the share of True in a sample of booleans with the exact (Clopper-Pearson) interval."""
     hits = Sample.of(hits)
@@ -258,8 +253,8 @@ def _quantile_ranks(n: int, p: float) -> _QuantileRanks:
     """Return the ranks for the quantile `p` of `n` values."""
     place = (n - 1) * p
     floor = int(np.floor(place))
-    bounds = _binomial_quantile(_LOWER, n, p) - 1, _binomial_quantile(_UPPER, n, p)
-    return _QuantileRanks(*bounds, floor, min(floor + 1, n - 1), place - floor)
+    lower, upper = (int(k) for k in binomial_quantile([_LOWER, _UPPER], n, p))
+    return _QuantileRanks(lower - 1, upper, floor, min(floor + 1, n - 1), place - floor)
 
 
 def _values_at(x: Sample, ranks: Sequence[_QuantileRanks]) -> np.ndarray:
@@ -267,7 +262,9 @@ def _values_at(x: Sample, ranks: Sequence[_QuantileRanks]) -> np.ndarray:
     return x.ordered([min(max(rank, 0), x.count - 1) for quantile in ranks for rank in quantile[:4]]).reshape(-1, 4)
 
 
-def _binomial_quantile(q: float, n: int, p: float) -> int:
-    """Return the least number of hits among n trials of probability p that is not exceeded with probability q."""
-    k = max(int(np.ceil(special.bdtrik(q, n, p))), 0)
-    return k - 1 if k > 0 and special.bdtr(k - 1, n, p) >= q else k
+def binomial_quantile(q: ArrayLike, n: ArrayLike, p: float) -> np.ndarray:
+    """Return the least numbers of hits among `n` trials of probability p that are not exceeded with probability `q`."""
+    n, trials = np.asarray(n), np.maximum(n, 1)
+    k = np.maximum(np.ceil(np.nan_to_num(special.bdtrik(q, trials, p))), 0).astype(np.int64)
+    k -= (k > 0) & (special.bdtr(np.maximum(k - 1, 0), trials, p) >= q)
+    return np.where(n > 0, np.minimum(k, n), 0)

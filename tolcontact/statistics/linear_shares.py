@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from tolcontact.statistics import intervals
 
@@ -31,6 +32,24 @@ class LinearShares(NamedTuple):
 def required_realizations(contributors: int) -> int:
     """Return the smallest number of realizations for an estimate of shares."""
     return max(ROWS_PER_CONTRIBUTOR * (contributors + 1), 10 * BLOCKS)
+
+
+def joined_columns(owners: Sequence[str], sets: Sequence[Sequence[int]], columns: np.ndarray) -> dict[str, np.ndarray]:
+    """Return some columns (k,) by group: all columns of an owner, and the columns of a set, are in the same group.
+
+    owners   of all columns; the name of a group lists the owners of its columns
+    """
+    first_column: dict[str, int] = {}
+    links = [[first_column.setdefault(owner, column), column] for column, owner in enumerate(owners)]
+    links += [[int(joined[0]), int(column)] for joined in sets for column in joined[1:]]
+    graph = scipy.sparse.coo_array(
+        (np.ones(len(links)), np.array(links, dtype=int).reshape(-1, 2).T), shape=(len(owners), len(owners))
+    )
+    _, labels = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    members: dict[int, list[int]] = {}
+    for column in columns.tolist():
+        members.setdefault(int(labels[column]), []).append(column)
+    return {" + ".join(dict.fromkeys(owners[k] for k in group)): np.array(group) for group in members.values()}
 
 
 def linear_shares(x: np.ndarray, y: np.ndarray, groups: Sequence[np.ndarray]) -> list[LinearShares | None]:

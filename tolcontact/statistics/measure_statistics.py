@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -62,29 +61,21 @@ STATISTICS: dict[str, Callable[[MeasuredValues], Estimate]] = {
 }
 
 
-class MeasureEstimates(NamedTuple):
-    """The estimates of all measures.
+def measure_estimates(rows: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return statistics, changes and stops of all measures; the values of one measure are in memory at a time.
 
     statistics  (measure, state, statistic, interval)  all `STATISTICS`
     changes     (measure, change_of, interval)         from raw to corrected
     stops       (measure,)                             the sides, "lower" or "upper" or both, at which corrected values stop
                                                        (see without_stops)
     """
-
-    statistics: np.ndarray
-    changes: np.ndarray
-    stops: np.ndarray
-
-
-def measure_estimates(rows: xr.Dataset) -> MeasureEstimates:
-    """Return the estimates of all measures; the values of one measure are in memory at a time."""
     statistics, changes, stops = [], [], []
     for number, limits_of_measure in enumerate(limits(rows)):
         raw, corrected = (MeasuredValues(rows, number, state, limits_of_measure) for state in terms.STATES)
         statistics.append([[statistic(x) for statistic in STATISTICS.values()] for x in (raw, corrected)])
         changes.append(_changes(raw.sample, corrected.sample))
         stops.append(_stops(corrected))
-    return MeasureEstimates(np.array(statistics), np.array(changes), np.array(stops, dtype=object))
+    return np.array(statistics), np.array(changes), np.array(stops, dtype=object)
 
 
 def _stops(x: MeasuredValues) -> str:

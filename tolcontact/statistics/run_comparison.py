@@ -14,7 +14,7 @@ from tolcontact.realizations import pieces
 from tolcontact.statistics import intervals, two_samples
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.statistics.sample import Sample, measured_sample
-from tolcontact.statistics.summary_dataset import summarize
+from tolcontact.statistics.summary import summarize
 
 DRAW_ATTRIBUTES = ("seed", "sampler")  # attributes that determine the random numbers of a realization
 

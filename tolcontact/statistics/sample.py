@@ -1,5 +1,6 @@
 """A sample that is read piece by piece, as often as needed, so that it need not fit into memory."""
 
+import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache, cached_property
 
@@ -12,9 +13,6 @@ from tolcontact.realizations import pieces
 
 MAX_SORTED_VALUES = 1 << 20  # larger samples are not sorted in memory
 MAX_KEPT_VALUES = 1 << 20  # more values are read from the file for each statistic
-DIGIT = 16  # bits
-COUNTED_DIGITS = 2
-MAX_PREFIXES = 16  # counted in one pass, in 25 MB
 MIN_REPLICATES = 16
 ROUNDING = 1e-20  # of the variance of realizations: a smaller variance between replicates counts as 0
 STANDARDIZED_MOMENTS = 17  # the fourth powers of influences on the fourth moment, and the zeroth
@@ -101,61 +99,22 @@ class Sample:
         return sums / self.count
 
     def ordered(self, ranks: Sequence[int]) -> np.ndarray:
-        """Return the order statistics at ranks from 0 (least) to count - 1; NaN if a value is not finite.
-
-        A sample that does not fit into memory is not sorted. Its values are counted by their leading digits instead, and only
-        the values with the leading digits of the required ones are sorted.
-        """
-        if not np.isfinite(self.mean):
-            return np.full(len(ranks), np.nan)
-        if self.count <= self.max_sorted:
-            return self._sorted[list(ranks)]
-        # The leading digits of the required keys, and the rank of each key among the values with these leading digits.
-        prefixes, inner_ranks, bits = np.zeros(len(ranks), dtype=np.uint64), np.array(ranks, dtype=np.int64), 64
-        for _ in range(COUNTED_DIGITS):
-            bits -= DIGIT
-            unique_prefixes, prefix_numbers = np.unique(prefixes, return_inverse=True)
-            for start in range(0, len(unique_prefixes), MAX_PREFIXES):
-                counted = unique_prefixes[start : start + MAX_PREFIXES]
-                cumulative = self._digit_counts(counted, bits).cumsum(axis=1)
-                for k in np.flatnonzero((prefix_numbers >= start) & (prefix_numbers < start + len(counted))):
-                    of_prefix = cumulative[prefix_numbers[k] - start]
-                    digit = np.searchsorted(of_prefix, inner_ranks[k], side="right")
-                    inner_ranks[k] -= of_prefix[digit - 1] if digit else 0
-                    prefixes[k] = (prefixes[k] << np.uint64(DIGIT)) | np.uint64(digit)
-        keys, counts = self._counted_keys(np.unique(prefixes), bits)
-        before = np.searchsorted(keys, prefixes << np.uint64(bits))
-        cumulative = counts.cumsum()
-        places = np.concatenate([[0], cumulative])[before] + inner_ranks
-        return _values(keys[np.searchsorted(cumulative, places, side="right")])
+        """Return the order statistics at ranks from 0 (least) to count - 1; NaN if a value is not finite."""
+        return np.array(self._sorted[list(ranks)]) if np.isfinite(self.mean) else np.full(len(ranks), np.nan)
 
     @cached_property
     def _sorted(self) -> np.ndarray:
-        return np.sort(np.concatenate(list(self.pieces())))
-
-    def _digit_counts(self, prefixes: np.ndarray, shift: int) -> np.ndarray:
-        """Return the counts (prefix, digit) of each digit after each prefix in the keys shifted by `shift` bits."""
-        counts = np.zeros(len(prefixes) << DIGIT, dtype=np.int64)
+        """The values in ascending order; those of a sample that does not fit into memory are in a temporary file."""
+        if self.count <= self.max_sorted:
+            return np.sort(np.concatenate(list(self.pieces())))
+        with tempfile.TemporaryFile() as file:  # it exists until the array is gone
+            values = np.memmap(file, dtype=float, mode="w+", shape=(self.count,))
+        start = 0
         for piece in self.pieces():
-            keys = _keys(piece) >> np.uint64(shift)
-            numbers = np.searchsorted(prefixes, keys >> np.uint64(DIGIT)).clip(max=len(prefixes) - 1)
-            matches = prefixes[numbers] == keys >> np.uint64(DIGIT)
-            digits = (keys[matches] & np.uint64((1 << DIGIT) - 1)).astype(np.int64)
-            counts += np.bincount((numbers[matches] << DIGIT) + digits, minlength=len(counts))
-        return counts.reshape(len(prefixes), -1)
-
-    def _counted_keys(self, prefixes: np.ndarray, shift: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the distinct keys, in order, that begin with a prefix (all except `shift` bits), and their counts."""
-        found, times = [np.zeros(0, np.uint64)], [np.zeros(0, np.int64)]
-        for piece in self.pieces():
-            keys = _keys(piece)
-            leading = keys >> np.uint64(shift)
-            numbers = np.searchsorted(prefixes, leading).clip(max=len(prefixes) - 1)
-            different, counts = np.unique(keys[prefixes[numbers] == leading], return_counts=True)
-            found.append(different)
-            times.append(counts)
-        different, numbers = np.unique(np.concatenate(found), return_inverse=True)
-        return different, np.bincount(numbers, np.concatenate(times), minlength=len(different)).astype(np.int64)
+            values[start : start + len(piece)] = piece
+            start += len(piece)
+        values.sort()
+        return values
 
 
 def measured_sample(rows: xr.Dataset, measure: int, state: str) -> Sample:
@@ -171,17 +130,3 @@ def measured_sample(rows: xr.Dataset, measure: int, state: str) -> Sample:
 
     is_kept = rows.sizes[terms.REALIZATION] <= MAX_KEPT_VALUES
     return Sample(cache(lambda: list(read())) if is_kept else read, terms.REPLICATE if is_planned else 1)
-
-
-_SIGN = np.uint64(1 << 63)
-
-
-def _keys(x: np.ndarray) -> np.ndarray:
-    """Return unsigned integers in the order of the floating-point numbers `x`."""
-    bits = np.ascontiguousarray(x, dtype=float).view(np.uint64)
-    return np.where(bits & _SIGN, ~bits, bits | _SIGN)
-
-
-def _values(keys: np.ndarray) -> np.ndarray:
-    """Return the floating-point numbers of some keys."""
-    return np.where(keys & _SIGN, keys ^ _SIGN, ~keys).view(float)

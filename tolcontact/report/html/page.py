@@ -19,24 +19,15 @@ from tolcontact.discretization import Nominal, discretize
 from tolcontact.errors import ArchiveError, ModelError
 from tolcontact.replacing import replacing
 from tolcontact.report.analysis_tables import analysis_report, archived_analysis
-from tolcontact.report.archived_settings import archived_settings
+from tolcontact.report.comparison_text import change_table, runs_lines, value_table
 from tolcontact.report.contributor_shares import ContributorShares, contributor_shares
 from tolcontact.report.figures import grouped, limits_text
 from tolcontact.report.html.charts import bars_of, charts_of, compared_charts, relations_of
 from tolcontact.report.html.scene import gap_rows, scene_of, view_of
-from tolcontact.report.model_tables import model_tables
+from tolcontact.report.model_tables import archived_settings, model_tables
 from tolcontact.report.results_table import COLUMNS, SIDES, result_rows, share_heading
-from tolcontact.report.text.runs import CHANGES, VALUES, change_rows, runs_lines, value_rows
-from tolcontact.report.text.summary import contact_lines, measure_rows, notes, pair_columns, pair_rows
-from tolcontact.statistics.verdict import VERDICT_RULE
-from tolcontact.vocabulary import (
-    CONTRIBUTORS,
-    ESTIMATES_NOTE,
-    GLOSSARY,
-    SIMULATION_SETTINGS,
-    STATE_WORDS,
-    reaction_words,
-)  # fmt: skip
+from tolcontact.report.summary_text import contact_lines, measure_table, pair_table
+from tolcontact.statistics.capability import VERDICT_RULE
 
 HERE = Path(__file__).parent
 GENERATOR = '<meta name="generator" content="tolcontact">'
@@ -57,8 +48,8 @@ SCRIPTS = {
 TITLE_ENTRIES = {"part_number": "part number", "revision": "revision", "author": "author", "date": "date"}
 MAX_ROWS = 15  # of the table of an analysis, above a fold
 WORDS = {
-    "states": STATE_WORDS, "rule": VERDICT_RULE, "glossary": GLOSSARY, "estimates_note": ESTIMATES_NOTE,
-    "contributors_heading": CONTRIBUTORS, "settings_heading": SIMULATION_SETTINGS,
+    "states": terms.STATE_WORDS, "rule": VERDICT_RULE, "glossary": terms.GLOSSARY, "estimates_note": terms.ESTIMATES_NOTE,
+    "contributors_heading": terms.CONTRIBUTORS, "settings_heading": terms.SIMULATION_SETTINGS,
 }  # fmt: skip
 MAX_BARS = 15  # of a chart
 CASES_NOTE = "Those with contact are the first of the single realizations above."
@@ -101,7 +92,8 @@ def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock |
         "details": _details(summary, shares),
         "model": model_tables(results),
         "contact": list(contact_lines(summary, summary.attrs["realizations"])),
-        "pairs": _pairs(summary) if summary.sizes["pair"] else None,
+        "pairs": pair_table(summary) if summary.sizes["pair"] else None,
+        "reactions": terms.reaction_words(summary["reaction"].attrs["units"]).explanation,
         "tables": list(tables_of(results)),
         "contributions": (indices := contributions_of(results)),
         "max_rows": MAX_ROWS,
@@ -155,7 +147,7 @@ def comparison_page(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> 
     measures = []
     for name in comparison["measure"].values:
         measure = comparison.sel(measure=name)
-        tables = [{"columns": VALUES, "rows": value_rows(measure)}, {"columns": CHANGES, "rows": change_rows(measure)}]
+        tables = [value_table(measure), change_table(measure)]
         measures.append({"name": str(name), "units": str(measure["measure_units"].values), "tables": tables})
     values = {
         "title": comparison.attrs["title"],
@@ -174,7 +166,7 @@ def summary_table(summary: xr.Dataset) -> str:
 def _page(kind: str, values: dict[str, Any], data: dict[str, Any]) -> str:
     """Return a page of a kind, which selects its template and scripts."""
     scripts = [_as_is(file) for file in SCRIPTS[kind]]
-    data |= {"states": STATE_WORDS}
+    data |= {"states": terms.STATE_WORDS}
     return _template(kind).render(
         **WORDS,
         data=jinja2.utils.htmlsafe_json_dumps(data, dumps=_plain_json),
@@ -216,24 +208,19 @@ def _results(summary: xr.Dataset) -> dict[str, Any]:
     return {"columns": COLUMNS, "shares": share_heading(summary), "sides": SIDES, "rows": result_rows(summary)}
 
 
-def _pairs(summary: xr.Dataset) -> dict[str, Any]:
-    explanation = reaction_words(summary["reaction"].attrs["units"]).explanation
-    return {"columns": pair_columns(summary), "rows": pair_rows(summary), "explanation": explanation}
-
-
 def _details(summary: xr.Dataset, shares: Sequence[ContributorShares]) -> list[dict[str, Any]]:
     """Return the details of each measurement: limits, contributors, and all estimates as rows of texts."""
     details = []
     for name, contributors in zip(summary["measure"].values, shares, strict=True):
         measure = summary.sel(measure=name)
-        rows = measure_rows(measure)
+        table = measure_table(measure)
         details.append(
             {
                 "name": str(name),
                 "units": str(measure["measure_units"].values),
                 "limits": limits_text(measure),
-                "rows": rows,
-                "note": "; ".join(notes(rows)),
+                "rows": table.rows,
+                "note": "; ".join(table.remarks),
                 "contributors": contributors,
             }
         )

@@ -2,7 +2,8 @@
 
 import base64
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from dataclasses import fields
+from typing import Any
 
 import fast_simplification
 import igl
@@ -30,15 +31,8 @@ EXTREMES = 5  # of each measure, on either side
 MAX_REALIZATIONS = 300
 
 
-class SingleRealization(NamedTuple):
-    """A realization, and the reason to show it."""
-
-    row: int
-    reason: str
-
-
-def single_realizations(results: xr.DataTree) -> list[SingleRealization]:
-    """Return realizations in the order of the page, without duplicates; extremes refer to corrected measures."""
+def single_realizations(results: xr.DataTree) -> dict[int, str]:
+    """Return realizations in the order of the page, with the reason to show each; extremes refer to corrected measures."""
     done = finished(results)
     rows = results.to_dataset().isel({terms.REALIZATION: slice(done)})
     reasons: dict[int, str] = {}
@@ -50,7 +44,7 @@ def single_realizations(results: xr.DataTree) -> list[SingleRealization]:
         if len(reasons) >= MAX_REALIZATIONS:
             break
         reasons.setdefault(int(row), "at random")
-    return [SingleRealization(row, reason) for row, reason in list(reasons.items())[:MAX_REALIZATIONS]]
+    return dict(list(reasons.items())[:MAX_REALIZATIONS])
 
 
 def _extremes(rows: xr.Dataset, measure: int) -> tuple[np.ndarray, np.ndarray]:
@@ -82,7 +76,7 @@ Scene = dict[str, Any]
 def scene_of(results: xr.DataTree, summary: xr.Dataset) -> Scene:
     """Return the scene of an archive in the nominal assembly frame [mm], without data that the archive lacks."""
     singles = single_realizations(results)
-    states = SingleStates(results, np.array([single.row for single in singles], dtype=int))
+    states = SingleStates(results, np.array(list(singles), dtype=int))
     scene = {
         "parts": _parts(results, states),
         **packed_marks(marks_of(results)),
@@ -115,16 +109,13 @@ def _add_gaps(pairs: list[Scene], states: SingleStates, count: int) -> None:
 
 
 def packed_marks(marks: Marks) -> Scene:
-    """Return locators, contact points, measures and forces as the data of a page."""
+    """Return annotations by kind as the data of a page."""
     return {
-        "locators": marks.locators,
-        "contacts": [
-            {key: packed(value) if isinstance(value, np.ndarray) else value for key, value in pair.items()}
-            for pair in marks.contacts
-        ],
-        "measures": marks.measures,
-        "features": marks.features,
-        "forces": marks.forces,
+        field.name: [
+            {key: packed(value) if isinstance(value, np.ndarray) else value for key, value in mark.items()}
+            for mark in getattr(marks, field.name)
+        ]
+        for field in fields(marks)
     }
 
 
@@ -151,23 +142,21 @@ def _part(name: str, field: xr.Dataset, count: int, states: SingleStates) -> Sce
     return entries
 
 
-def _realizations(results: xr.DataTree, singles: list[SingleRealization]) -> Scene:
+def _realizations(results: xr.DataTree, singles: dict[int, str]) -> Scene:
     """Return archived worst cases, then single realizations; motions (realization, state, part, 12) are R - I and t."""
-    order = np.argsort([single.row for single in singles], kind="stable")
-    rank = np.empty(len(order), dtype=int)
-    rank[order] = np.arange(len(order))
-    rows = results.to_dataset().isel({terms.REALIZATION: np.array([single.row for single in singles], dtype=int)[order]})
+    ascending, places = np.unique(np.array(list(singles), dtype=int), return_inverse=True)
+    rows = results.to_dataset().isel({terms.REALIZATION: ascending})
     worst = archived_analysis(results, terms.WORST_CASE)
     cases = [] if worst is None else [str(case).split(" ", 1) for case in worst[terms.CASE].values]
     names = [f"worst-case {terms.WORD_OF_END[end]}: {measure}" for end, measure in cases]
 
     def values_of(variable: terms.ArchiveVariable) -> np.ndarray:
-        values = rows[variable.name].values[rank]
+        values = rows[variable.name].values[places]
         return values if worst is None else np.concatenate([worst[variable.name].values, values])
 
     entries: Scene = {
         "worstCases": len(names),
-        "names": names + [f"realization {single.row} ({single.reason})" for single in singles],
+        "names": names + [f"realization {row} ({reason})" for row, reason in singles.items()],
         "status": [terms.STATUS_MEANINGS[status] for status in values_of(terms.STATUS)],
         "residual": packed(values_of(terms.KKT_RESIDUAL)),
         "gaps": packed(values_of(terms.GAP_MIN)),
@@ -178,16 +167,15 @@ def _realizations(results: xr.DataTree, singles: list[SingleRealization]) -> Sce
     return entries
 
 
-def _stations(results: xr.DataTree, singles: list[SingleRealization]) -> list[Scene]:
+def _stations(results: xr.DataTree, singles: dict[int, str]) -> list[Scene]:
     """Return the scenes of stations, with the motions of archived worst cases, then of single realizations."""
     worst = archived_analysis(results, terms.WORST_CASE)
-    order = np.argsort([single.row for single in singles], kind="stable")
-    rows, rank = np.array([single.row for single in singles], dtype=int)[order], np.argsort(order, kind="stable")
+    rows, places = np.unique(np.array(list(singles), dtype=int), return_inverse=True)
     stations = stations_of(results)
     for station in stations:
         if (poses := station_poses(results, station["name"], rows)) is not None:
             cases = worst_poses(results, station["name"], worst)
-            R, t = (np.concatenate([of_cases, of_rows[rank]]) for of_cases, of_rows in zip(cases, poses, strict=True))
+            R, t = (np.concatenate([of_cases, of_rows[places]]) for of_cases, of_rows in zip(cases, poses, strict=True))
             station["motions"] = _motions(R - np.eye(3), t)
     return stations
 

@@ -1,36 +1,66 @@
-"""A table of figures that fits into the width of the terminal."""
+"""A table: the same for the terminal, where it fits into the width, for the page and for the spreadsheet."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import zip_longest
+from typing import Any
 
+import rich.table
 from rich import box
 from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderResult
-from rich.table import Table
 from rich.text import Text
 
+from tolcontact.report.figures import plain
+
+Cell = str | float | None  # None is an empty cell
 NAME_WIDTH = 12  # longer names and labels may be wrapped
 FILE_WIDTH = 80  # of tables in files and pipes
 BETWEEN = "  "  # separator of columns
 
 
 @dataclass(frozen=True)
-class FigureTable:
-    """A table with columns as wide as their cells. If they do not fit, each interval is printed below its estimate."""
+class Table:
+    """A table with its title, and remarks below it; numbers stay numbers. A detail is left out of the page.
 
+    In a terminal, columns are as wide as their cells. If they do not fit, each interval is printed below its estimate.
+    """
+
+    title: str
     columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
+    rows: Sequence[Sequence[Any]]
+    remarks: Sequence[str] = ()
+    is_detail: bool = False
+
+    @property
+    def texts(self) -> list[list[str]]:
+        """The rows as texts."""
+        return [["" if cell is None else plain(cell) if isinstance(cell, float) else cell for cell in row] for row in self.rows]
+
+    @property
+    def is_number(self) -> list[bool]:
+        """Whether each column has numbers."""
+        return [any(isinstance(row[k], float) for row in self.rows) for k in range(len(self.columns))]
+
+    def without_empty_columns(self) -> "Table":
+        """Return the table without columns that are empty in all rows."""
+        filled = [k for k in range(len(self.columns)) if any(row[k] not in (None, "") for row in self.rows)]
+        return replace(self, columns=[self.columns[k] for k in filled], rows=[[row[k] for k in filled] for row in self.rows])
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        width = options.max_width if console.is_terminal else FILE_WIDTH
+        if self.title:
+            yield Text(f"\n{self.title}", style="bold")
+        yield from self._figures(options.max_width if console.is_terminal else FILE_WIDTH)
+        yield from map(Text, self.remarks)
+
+    def _figures(self, width: int) -> RenderResult:
         rows = [[cell.split("\n") for cell in row] for row in self.rows]
         if self._full_width(rows) > width:
             rows = [[cell.replace(" [", "\n[").split("\n") for cell in row] for row in self.rows]
         if self._full_width(rows) <= width:
             yield from self._lines(rows)
             return
-        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
+        table = rich.table.Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
         for k, (heading, least) in enumerate(zip(zip(*self._headings(), strict=True), self._widths(rows), strict=True)):
             min_width = min(least, NAME_WIDTH) if k == 0 else None
             table.add_column("\n".join(heading), justify="left" if k == 0 else "right", no_wrap=k > 0, min_width=min_width)

@@ -1,7 +1,8 @@
 """The summary of a run as text."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -9,37 +10,16 @@ from rich.console import Group
 from rich.padding import Padding
 from rich.text import Text
 
+from tolcontact import vocabulary as terms
 from tolcontact.report.figures import NO_INTERVAL, grouped, limits_text, number, percent, settled, share
-from tolcontact.report.results_table import full_name, overview_columns, overview_rows, verdict_lines
-from tolcontact.report.text.table import FigureTable
-from tolcontact.vocabulary import (
-    ABOVE,
-    BELOW,
-    CAPABILITY,
-    ESTIMATES_NOTE,
-    IN_CONTACT,
-    NOTICED_SHARE,
-    OUT_OF_SPECIFICATION,
-    OUTSIDE,
-    PP,
-    PP_NORMAL,
-    PPK,
-    PPK_NORMAL,
-    SHARES,
-    SHIFT,
-    SPREAD_RATIO,
-    STATE_WORDS,
-    STATES,
-    VARIANCE_RATIO,
-    WORD_OF_STATE,
-    reaction_words,
-)
+from tolcontact.report.results_table import full_name, overview_table, verdict_lines
+from tolcontact.report.table import Table
 
-RAW, CORRECTED = STATES
-CHANGE_OF_STATISTIC = {"mean": SHIFT, "6 sigma": SPREAD_RATIO, "variance": VARIANCE_RATIO}
-SHORT_LABELS = {"standard deviation": "std. dev.", BELOW: "below the lower limit", ABOVE: "above the upper limit",
-                OUTSIDE: OUT_OF_SPECIFICATION}  # fmt: skip
-PERCENTILE_COUNTERPART = {PP_NORMAL: PP, PPK_NORMAL: PPK}
+RAW, CORRECTED = terms.STATES
+CHANGE_OF_STATISTIC = {"mean": terms.SHIFT, "6 sigma": terms.SPREAD_RATIO, "variance": terms.VARIANCE_RATIO}
+SHORT_LABELS = {"standard deviation": "std. dev.", terms.BELOW: "below the lower limit", terms.ABOVE: "above the upper limit",
+                terms.OUTSIDE: terms.OUT_OF_SPECIFICATION}  # fmt: skip
+PERCENTILE_COUNTERPART = {terms.PP_NORMAL: terms.PP, terms.PPK_NORMAL: terms.PPK}
 APART = "* differs from the index by percentiles: the measurement is not normally distributed"
 WITHOUT = (
     f"{NO_INTERVAL} no interval: std. dev., 6 sigma and variance need 10 realizations; skewness\n"
@@ -52,16 +32,15 @@ def summary_text(summary: xr.Dataset) -> Group:
     return Group(*_sections(summary))
 
 
-def _sections(summary: xr.Dataset) -> Iterator[Text | FigureTable | Padding]:
+def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
     count = summary.attrs["realizations"]
     yield Text(f"{summary.attrs['title']}: {count} realizations", style="bold")
     if summary.attrs["samples"] > count:
         yield Text(f"{grouped(count)} of {grouped(summary.attrs['samples'])} realizations are done; continue with --resume")
-    yield Text(f"{ESTIMATES_NOTE}.\nChanges are from the same draws.\n")
-    yield FigureTable(overview_columns(), overview_rows(summary))
+    yield Text(f"{terms.ESTIMATES_NOTE}.\nChanges are from the same draws.\n")
+    yield overview_table(summary)
     yield from map(Text, verdict_lines(summary))
-    for measure in summary["measure"].values:
-        yield from _measure_section(summary.sel(measure=measure))
+    yield from (measure_table(summary.sel(measure=measure)) for measure in summary["measure"].values)
     magnitudes = int(summary["magnitude_realizations"])
     yield Text("\n6 sigma of the displacement magnitude over the surface of each part (mm)", style="bold")
     if magnitudes < count:
@@ -73,7 +52,7 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | FigureTable | Padding]:
         yield Padding(Text(line), (0, 0, 0, 2), expand=False)
     if summary.sizes["pair"]:
         yield Text()
-        yield FigureTable(pair_columns(summary), pair_rows(summary))
+        yield pair_table(summary)
 
 
 def capability_text(summary: xr.Dataset) -> Group:
@@ -83,33 +62,28 @@ def capability_text(summary: xr.Dataset) -> Group:
     )
 
 
-def _limits(summary: xr.Dataset) -> Iterator[Text | FigureTable]:
+def _limits(summary: xr.Dataset) -> Iterator[Text | Table]:
     for name in summary["measure"].values:
         measure = summary.sel(measure=name)
-        yield Text(f"\n{name} ({measure['measure_units'].values}): {limits_text(measure) or 'no limits'}", style="bold")
-        if limits_text(measure):
-            rows = measure_rows(measure.sel(statistic=[*SHARES, *CAPABILITY]))
-            yield FigureTable(["", *STATE_WORDS], [row[:-1] for row in rows])
-            yield from map(Text, notes(rows))
+        title = f"{name} ({measure['measure_units'].values}): {limits_text(measure) or 'no limits'}"
+        if not limits_text(measure):
+            yield Text(f"\n{title}", style="bold")
+            continue
+        table = measure_table(measure.sel(statistic=[*terms.SHARES, *terms.CAPABILITY]))
+        yield replace(table, title=title, columns=table.columns[:-1], rows=[row[:-1] for row in table.rows])
 
 
-def _measure_section(measure: xr.Dataset) -> Iterator[Text | FigureTable]:
+def measure_table(measure: xr.Dataset) -> Table:
+    """Return all estimates of a measurement in both states, with their changes and the meaning of marks in its cells."""
     units, quantity = str(measure["measure_units"].values), str(measure["measure_quantity"].values)
     subtitle = ", ".join(text for text in (quantity, limits_text(measure)) if text)
-    yield Text(f"\n{full_name(measure)} ({units}){': ' if subtitle else ''}{subtitle}", style="bold")
-    rows = measure_rows(measure)
-    yield FigureTable(["", *STATE_WORDS, "change"], rows)
-    yield from map(Text, notes(rows))
-
-
-def notes(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return the meaning of marks in the cells of `measure_rows`."""
+    title, rows = f"{full_name(measure)} ({units}){': ' if subtitle else ''}{subtitle}", _measure_rows(measure)
     cells = [cell for row in rows for cell in row]
     marks = {APART: any(cell.startswith("*") for cell in cells), WITHOUT: any(NO_INTERVAL in cell for cell in cells)}
-    return [note for note, is_there in marks.items() if is_there]
+    return Table(title, ["", *terms.STATE_WORDS, "change"], rows, [note for note, is_there in marks.items() if is_there])
 
 
-def measure_rows(measure: xr.Dataset) -> list[list[str]]:
+def _measure_rows(measure: xr.Dataset) -> list[list[str]]:
     """Return rows of label, both states and change of a measurement; * marks an index that differs from the percentile one."""
     rows = []
     estimates = dict(
@@ -117,9 +91,9 @@ def measure_rows(measure: xr.Dataset) -> list[list[str]]:
     )
     changes = dict(zip(measure["change_of"].values, measure["change"].values, strict=True))
     for statistic, values in estimates.items():
-        if statistic in (*SHARES, *CAPABILITY) and not any(math.isfinite(value[0]) for value in values):
+        if statistic in (*terms.SHARES, *terms.CAPABILITY) and not any(math.isfinite(value[0]) for value in values):
             continue
-        if statistic in SHARES:
+        if statistic in terms.SHARES:
             rows.append([SHORT_LABELS[statistic], *map(share, values), ""])
             continue
         label, figures = SHORT_LABELS.get(statistic, statistic), [number(value) for value in values]
@@ -141,15 +115,15 @@ def _are_disjoint(a: np.ndarray, b: np.ndarray) -> bool:
     return bool(a[1] > b[2] or b[1] > a[2])
 
 
-def _field_table(summary: xr.Dataset) -> FigureTable:
+def _field_table(summary: xr.Dataset) -> Table:
     """Return the table of the displacement fields of the parts that move."""
     rows = []
     for part in summary["part"].values[_is_moving(summary)]:
         for state in (RAW, CORRECTED):
             field = summary["field_extreme"].sel(part=part, state=state)
             extremes = [number(field.sel(extreme=extreme).values) for extreme in ("least", "largest")]
-            rows.append([str(part), WORD_OF_STATE[state], *extremes])
-    return FigureTable(["part", "", "smallest", "largest"], rows)
+            rows.append([str(part), terms.WORD_OF_STATE[state], *extremes])
+    return Table("", ["part", "", "smallest", "largest"], rows)
 
 
 def _is_moving(summary: xr.Dataset) -> np.ndarray:
@@ -157,18 +131,14 @@ def _is_moving(summary: xr.Dataset) -> np.ndarray:
     return np.asarray((summary["field_extreme"].values != 0).any(axis=(1, 2, 3)))
 
 
-def pair_columns(summary: xr.Dataset) -> list[str]:
-    """Return the heading of `pair_rows`."""
-    return ["contact pair", IN_CONTACT, reaction_words(summary["reaction"].attrs["units"]).heading, "95th\npercentile"]
-
-
-def pair_rows(summary: xr.Dataset) -> list[list[str]]:
-    """Return rows of each pair: the share of realizations with contact, and its reaction."""
+def pair_table(summary: xr.Dataset) -> Table:
+    """Return the share of realizations with contact, and the reaction, of each pair."""
     rows = []
     for pair in summary["pair"].values:
         mean, *_, high = summary["reaction"].sel(pair=pair).values
         rows.append([str(pair), percent(summary["carried"].sel(pair=pair).values), number(mean), number(high)])
-    return rows
+    heading = terms.reaction_words(summary["reaction"].attrs["units"]).heading
+    return Table("", ["contact pair", terms.IN_CONTACT, heading, "95th\npercentile"], rows)
 
 
 def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
@@ -244,12 +214,13 @@ def _clashes_of(summary: xr.Dataset, *, is_declared: bool) -> list[str]:
 def _between(summary: xr.Dataset, count: int) -> Iterator[str]:
     """Yield lines about penetration between contact points, and about contact beyond the ends of faces."""
     checked, depth, overhang = (float(summary[name]) for name in ("surfaces_checked", "surface_penetration", "beside"))
-    limit = NOTICED_SHARE * summary.attrs["smallest_range"]
+    limit = terms.NOTICED_SHARE * summary.attrs["smallest_range"]
     if math.isfinite(depth):
         yield f"largest penetration between surfaces: {settled(depth):.3g} mm ({checked:.0f} of {count} checked)"
         if depth > limit:
             share = percent(summary["penetrating_share"].values)
-            yield f"penetration between surfaces above {NOTICED_SHARE:.0%} of the smallest tolerance: {share} of realizations"
+            least = f"{terms.NOTICED_SHARE:.0%} of the smallest tolerance"
+            yield f"penetration between surfaces above {least}: {share} of realizations"
         if depth > limit and depth > 2 * float(summary["penetration"].sel(state=CORRECTED)):
             yield f"advice: {_way_out(summary)}"
         if overhang > limit:
@@ -275,11 +246,11 @@ def _way_out(summary: xr.Dataset) -> str:
 
 def _advice(summary: xr.Dataset, penetration: float) -> Iterator[str]:
     """Yield advice on penetration that remains after a linear step, or with the paper's set of active points."""
-    limit = NOTICED_SHARE * summary.attrs["smallest_range"]
+    limit = terms.NOTICED_SHARE * summary.attrs["smallest_range"]
     if penetration > limit and summary.attrs["active_set"] == "initial":
         yield 'advice: points outside the initial set penetrate; use Method(active_set="closed")'
     elif summary.attrs["resolution"] == "linearized" and penetration > limit:
-        yield f"advice: penetration exceeds {NOTICED_SHARE:.0%} of the smallest tolerance; use --resolution exact"
+        yield f"advice: penetration exceeds {terms.NOTICED_SHARE:.0%} of the smallest tolerance; use --resolution exact"
     elif summary.attrs["resolution"] == "linearized" and _by_status(summary)["not_converged"]:
         yield "advice: some realizations did not converge; use --resolution exact"
 
