@@ -199,17 +199,10 @@ class GeneralFeature(FeatureGeometry):
         return f"a general surface ({deviation})"
 
 
-@dataclass(frozen=True, eq=False)
-class TargetPoint(FeatureGeometry):
-    """A datum target: a point of a face, which moves along its normal."""
-
-    plural: ClassVar[str] = "datum targets"
-
-    @classmethod
-    def at(cls, point: np.ndarray, normal: np.ndarray) -> "TargetPoint":
-        """Return the target at a point (3,) [mm] with an outward unit normal (3,)."""
-        row = np.concatenate([normal, np.zeros(3)])[None]
-        return cls(point, ("height",), row.T, row, (point[None], normal[None, None]))
+def target_point(point: np.ndarray, normal: np.ndarray) -> FeatureGeometry:
+    """Return the geometry of a datum target: a point (3,) [mm] of a face, which moves along an outward unit normal (3,)."""
+    row = np.concatenate([normal, np.zeros(3)])[None]
+    return FeatureGeometry(point, ("height",), row.T, row, (point[None], normal[None, None]))
 
 
 def _cross_matrix(v: np.ndarray) -> np.ndarray:

@@ -13,9 +13,9 @@ import numpy as np
 
 from tolcontact.declaration.form import Form
 from tolcontact.errors import GeometryFault
-from tolcontact.features.associated_features import TERMS, AssociatedFeature, displacement_terms
+from tolcontact.features.associated_features import TERMS, AssociatedSurface, displacement_terms
 from tolcontact.features.covariances import Lengths, covariance
-from tolcontact.features.least_zone import ZoneMember
+from tolcontact.features.minimum_zone import ZoneMember
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder
 from tolcontact.geometry.surface import Surface
 
@@ -46,7 +46,7 @@ class FormField:
     """
 
     form: Form
-    associated: AssociatedFeature
+    associated: AssociatedSurface
     lengths: Lengths
     scales: Lengths
     places: np.ndarray
@@ -72,7 +72,7 @@ class FormField:
     def zone(self) -> tuple[ZoneMember, ...]:
         """The members of the zone of the form, at the places."""
         members = self.associated.members(self.places)
-        return tuple(ZoneMember(numbers, self.associated.rows(self.places[numbers])) for numbers in members)
+        return tuple(ZoneMember(indices, self.associated.rows(self.places[indices])) for indices in members)
 
     @cached_property
     def place_heights(self) -> np.ndarray:
@@ -120,7 +120,7 @@ class FormField:
         return replace(self, associated=self.associated.placed(R, t), places=places, stations=stations, removed=removed)
 
 
-def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> FormField:
+def form_field(form: Form, face: Surface, associated: AssociatedSurface) -> FormField:
     """Return the form field of a face on an analytic surface, in its part's own frame."""
     lengths = _lengths(form, face, associated)
     places, areas = associated.places(face, lengths)
@@ -155,7 +155,7 @@ def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> Form
 
 
 def beside_displacements(
-    functions: np.ndarray, associated: AssociatedFeature, places: np.ndarray, shares: np.ndarray
+    functions: np.ndarray, associated: AssociatedSurface, places: np.ndarray, shares: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return functions (place, function) beside displacements and growths of the face, and these (7, function).
 
@@ -168,7 +168,7 @@ def beside_displacements(
     return (functions - terms @ removed) * root, displaced_about_origin(removed, centre)
 
 
-def _lengths(form: Form, face: Surface, associated: AssociatedFeature) -> Lengths:
+def _lengths(form: Form, face: Surface, associated: AssociatedSurface) -> Lengths:
     """Return the correlation lengths of a form: usually a third of the extent of a face, with an axis across and along it."""
     vertices, surface = np.asarray(face.mesh.vertices), associated.surface
     if not isinstance(surface, Cylinder | Cone):
@@ -179,7 +179,7 @@ def _lengths(form: Form, face: Surface, associated: AssociatedFeature) -> Length
     return Lengths(across, form.length or LENGTH_SHARE * extent)
 
 
-def scales_within(lengths: Lengths, associated: AssociatedFeature, places: np.ndarray) -> Lengths:
+def scales_within(lengths: Lengths, associated: AssociatedSurface, places: np.ndarray) -> Lengths:
     """Return lengths over which heights change at places (place, 3) of a face, at most half of its extents.
 
     A length far beyond the face leaves heights that bend once over the face.
@@ -212,7 +212,7 @@ def displaced_about_origin(displacements: np.ndarray, centre: np.ndarray) -> np.
 
 
 def associated_covariance(
-    form: Form, lengths: Lengths, associated: AssociatedFeature, points: np.ndarray, stations: np.ndarray
+    form: Form, lengths: Lengths, associated: AssociatedSurface, points: np.ndarray, stations: np.ndarray
 ) -> np.ndarray:
     """Return the covariance (point, station), as functions of the points without what displaces sections or lines."""
     values = np.zeros((len(points), len(stations)))
@@ -222,7 +222,7 @@ def associated_covariance(
 
 
 def _cholesky(
-    places: np.ndarray, form: Form, lengths: Lengths, associated: AssociatedFeature
+    places: np.ndarray, form: Form, lengths: Lengths, associated: AssociatedSurface
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the pivoted Cholesky factor (station, place) of the covariance, the pivots (station,), and what it leaves out.
 

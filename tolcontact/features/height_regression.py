@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 
 from tolcontact.declaration.form import Form
-from tolcontact.features.associated_features import AssociatedFeature
+from tolcontact.features.associated_features import AssociatedSurface
 from tolcontact.features.covariances import Lengths, covariance
 from tolcontact.features.form_field import longest_extent
 from tolcontact.geometry.spreading import spread
@@ -65,12 +65,12 @@ class HeightRegression:
 
     form: Form
     lengths: Lengths
-    associated: AssociatedFeature
+    associated: AssociatedSurface
     stations: np.ndarray
     penalty: float
 
     @classmethod
-    def of(cls, form: Form, face: Surface, associated: AssociatedFeature, scans: Sequence[Scan]) -> Self:
+    def of(cls, form: Form, face: Surface, associated: AssociatedSurface, scans: Sequence[Scan]) -> Self:
         """Return the regression with the fewest stations that predict points of scans as well as more of them do."""
         scans = scans[:: -(-len(scans) // TRIAL_SCANS)]
         trials, fewest = [], min(len(scan.feet) for scan in scans)
@@ -86,7 +86,7 @@ class HeightRegression:
         return next(regression for regression, error in trials if error <= enough)
 
     @classmethod
-    def _with_stations(cls, count: int, form: Form, face: Surface, associated: AssociatedFeature) -> Self:
+    def _with_stations(cls, count: int, form: Form, face: Surface, associated: AssociatedSurface) -> Self:
         stations = associated.surface.project(spread(face.mesh, count, None))
         distance = float(np.sqrt(face.mesh.area / count))
         length = min(longest_extent(np.asarray(face.mesh.vertices)), MAX_LENGTH_FACTOR * distance)

@@ -12,11 +12,11 @@ import scipy
 
 from tolcontact.declaration.form import Form
 from tolcontact.errors import GeometryFault
-from tolcontact.features.associated_features import AssociatedFeature, displacement_terms
+from tolcontact.features.associated_features import AssociatedSurface, displacement_terms
 from tolcontact.features.covariances import Lengths
 from tolcontact.features.form_field import FormField, associated_covariance, beside_displacements, scales_within
 from tolcontact.features.height_regression import STATIONS, HeightRegression, Scan
-from tolcontact.features.least_zone import ZoneMember, least_widths
+from tolcontact.features.minimum_zone import ZoneMember, minimum_widths
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder
 from tolcontact.geometry.measured_points import measured_points
 from tolcontact.geometry.spreading import spread
@@ -34,7 +34,7 @@ SIGNIFICANT = 5.0  # standard deviations of a mean, by which deviations from the
 STEP_SHARE = 1e-4  # of the correlation length: steps of slopes
 
 
-def measured_field(form: Form, pattern: str, face: Surface, associated: AssociatedFeature) -> FormField:
+def measured_field(form: Form, pattern: str, face: Surface, associated: AssociatedSurface) -> FormField:
     """Return the form field of faces whose points are in files, in the frame of their part. Raises GeometryFault."""
     form = replace(form, covariance=COVARIANCE)
     everywhere = associated.surface.project(spread(face.mesh, STATIONS[0], None))
@@ -74,11 +74,11 @@ def measured_field(form: Form, pattern: str, face: Surface, associated: Associat
         scans={},
     )
     if not associated.is_whole:  # each section or line has a zone of its own, at places
-        widths = tuple(map(float, least_widths(field.zone, (remainder / np.sqrt(shares)[:, None]).T)))
+        widths = tuple(map(float, minimum_widths(field.zone, (remainder / np.sqrt(shares)[:, None]).T)))
     return replace(field, scans={scan.path: width for scan, width in zip(scans, widths, strict=True)})
 
 
-def _scan(cloud: np.ndarray, path: str, face: Surface, everywhere: np.ndarray, associated: AssociatedFeature) -> Scan:
+def _scan(cloud: np.ndarray, path: str, face: Surface, everywhere: np.ndarray, associated: AssociatedSurface) -> Scan:
     """Return the heights of a measured part over its nominal face, from its points (point, 3) [mm].
 
     Raises GeometryFault for points that are not of the face, or not near places (place, 3) everywhere on it.
@@ -134,7 +134,7 @@ def _fit(scan: Scan, weights: np.ndarray, regression: HeightRegression) -> tuple
             "between or beside them; measure more points, also along the rim, or filter short waves out of the points"
         )
     rows = regression.associated.rows(feet)
-    return float(least_widths([ZoneMember(np.arange(len(feet)), rows)], values[None])[0]), lost
+    return float(minimum_widths([ZoneMember(np.arange(len(feet)), rows)], values[None])[0]), lost
 
 
 def _lengths(regression: HeightRegression, weights: np.ndarray) -> Lengths:
