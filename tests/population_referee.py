@@ -140,7 +140,7 @@ def _measured_tolerance(
     pattern: NominalPattern, layer: Layer, system: Sequence[Sequence[NominalFeature]], deviations: np.ndarray
 ) -> MeasuredZone:
     """Measure one tolerance of a feature or pattern in the system of its datum features."""
-    tolerance, centre = layer.tolerance, pattern.geometry.centre
+    tolerance, centre = layer.tolerance, pattern.centre
     primary = system[0][0].geometry if system else None
     has_form = pattern.form is not None and includes_form(tolerance, pattern.members[0].geometry)
     probes = [
@@ -256,7 +256,7 @@ def _form_heights(feature: NominalFeature, deviations: np.ndarray) -> np.ndarray
 def _stated_share(pattern: NominalPattern, layer: Layer) -> float:
     """Return the share of features inside that the rules state; NaN if they state none."""
     tolerance, tolerances = layer.tolerance, pattern.declared.geometric
-    is_shared = any(pattern.geometry.owner(direction) is None for direction in layer.added.T)
+    is_shared = any(pattern.owner(direction) is None for direction in layer.added.T)
     has_bonus_beside = tolerance.material and (len(pattern.layers) > 1 or is_shared)
     if all(nested.rule == INSIDE and nested.cp == 1 and nested.cpk is None for nested in tolerances) and not has_bonus_beside:
         return STATED_SHARE
@@ -304,8 +304,8 @@ def _fitted_frame(
     free. A plane by itself is then moved out of the material until no probe of it stands outside of its datum. One with form is
     measured all over, and what is fitted to it first is the plane that touches it.
     """
-    centre = pattern.geometry.centre
-    free = np.diag([1.0] * 3 + [1 / pattern.geometry.reach] * 3)
+    centre = pattern.centre
+    free = np.diag([1.0] * 3 + [1 / pattern.reach] * 3)
     motion = np.zeros((len(deviations), 6))
     for compartment, is_turned in zip(system, orientation_only, strict=True):
         is_outside = len(compartment) == 1 and _touches_outside(compartment[0])

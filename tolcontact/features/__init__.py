@@ -9,8 +9,8 @@ from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.form_field import FormField
 from tolcontact.features.freedoms import Freedom
 from tolcontact.features.nominal_feature import FaceDeviation, NominalFeature, Placement
-from tolcontact.features.nominal_features import Features, NominalPattern
-from tolcontact.features.tolerance_layers import Layer
+from tolcontact.features.nominal_features import Features
+from tolcontact.features.nominal_pattern import Layer, NominalPattern
 
 __all__ = [
     "AxisFeature", "DatumShift", "FaceDeviation", "FeatureGeometry", "FeatureOfSize", "Features", "FormField", "Freedom",

@@ -16,7 +16,6 @@ from tolcontact.features.feature_geometry import PlaneFeature
 from tolcontact.features.form_field import FormField
 from tolcontact.features.minimum_zone import minimax
 from tolcontact.features.nominal_feature import NominalFeature
-from tolcontact.features.pattern_geometry import PatternGeometry
 from tolcontact.features.zone_kernel import sum_modes
 
 FIELDS_AT_ONCE = 512
@@ -191,18 +190,22 @@ class DatumFrame(NamedTuple):
 
 
 def datum_frame(
-    system: Sequence[Sequence[NominalFeature]], pattern: PatternGeometry, columns: int, orientation_only: Sequence[bool]
+    system: Sequence[Sequence[NominalFeature]],
+    centre: np.ndarray,
+    reach: float,
+    columns: int,
+    orientation_only: Sequence[bool],
 ) -> DatumFrame:
-    """Return the frame of datums in their precedence, for displacements about the centre of a pattern.
+    """Return the frame of datums in their precedence, for displacements about a `centre` (3,) [mm].
 
     The datums of one compartment count together, by least squares of their coordinates. A plane alone is then moved to where it
-    touches its feature outside the material (ISO 5459), unless its association is by least squares. Angles are weighed by the
-    reach of the pattern. Compartments that are `orientation_only` lock no translations.
+    touches its feature outside the material (ISO 5459), unless its association is by least squares. Angles are weighed by
+    `reach` [mm]. Compartments that are `orientation_only` lock no translations.
     """
-    to_twist = np.diag([1.0] * 3 + [1 / pattern.reach] * 3)
+    to_twist = np.diag([1.0] * 3 + [1 / reach] * 3)
     frame = DatumFrame(np.zeros((6, columns)), np.eye(6), ())
     for compartment, is_turned in zip(system, orientation_only, strict=True):
-        J = np.vstack([datum.geometry.about(pattern.centre) for datum in compartment]) @ to_twist
+        J = np.vstack([datum.geometry.about(centre) for datum in compartment]) @ to_twist
         frame = frame.locked(compartment, J, is_turned=is_turned)
     return DatumFrame(to_twist @ frame.motion, to_twist @ frame.free, frame.shifts)
 

@@ -6,46 +6,19 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tolcontact.declaration import DatumTargets, Face, Feature, GeometricTolerance, Pattern
+from tolcontact.declaration import DatumTargets, Face, Feature, Pattern
 from tolcontact.errors import GeometryFault
 from tolcontact.features.datum_frames import DatumShift, padded
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.freedoms import DATUM, FEATURE, FORM, Freedom
 from tolcontact.features.nominal_feature import FaceDeviation, NominalFeature, Placement, moving_faces
-from tolcontact.features.pattern_geometry import MIXED, RELATIVE, SIZE_TOLERANCE, PatternGeometry, check_alike
+from tolcontact.features.nominal_pattern import MIXED, RELATIVE, SIZE_TOLERANCE, NominalPattern, check_alike
 from tolcontact.features.tolerance_kinds import form_field_of, form_tolerance
-from tolcontact.features.tolerance_layers import Layer, tolerance_layers
+from tolcontact.features.tolerance_layers import tolerance_layers
 from tolcontact.geometry.faces import FaceArea, Meshes, face_area, patch
 
 MIN_SHARE = 1e-6  # of a face's area: a smaller common part of two faces does not count
-
-
-@dataclass(frozen=True, eq=False)
-class NominalPattern:
-    """The features that a declaration tolerances together: the members of a pattern, or one feature alone.
-
-    geometry      of all members together
-    freedoms      the directions that its layers add, shifts of datum planes, sizes of its members, and modes of their forms
-    shifts        of the datum planes of its tolerances
-    form          the tolerance by which the form of its members is drawn; None if they keep their shape
-    """
-
-    declared: Feature | Pattern
-    members: tuple[NominalFeature, ...]
-    geometry: PatternGeometry
-    layers: tuple[Layer, ...]
-    freedoms: tuple[Freedom, ...]
-    shifts: tuple[DatumShift, ...]
-    form: GeometricTolerance | None = None
-
-    @property
-    def part(self) -> int:
-        return self.members[0].part
-
-    @property
-    def label(self) -> str:
-        return f"{self.declared.part.name}.{self.declared.name}"
 
 
 @dataclass(eq=False)
@@ -82,13 +55,15 @@ class Features:
         recognized = dict[Feature, NominalFeature]()
         for member in new:
             recognized[member] = self._recognized(member, part, meshes, recognized.values())
-        members = [recognized.get(member) or self.features[member] for member in declared.members]
+        pattern = NominalPattern(
+            declared, tuple(recognized.get(member) or self.features[member] for member in declared.members)
+        )
         if declared.tolerances:
-            check_alike([member.geometry for member in members])
-        geometry, start = PatternGeometry(tuple(member.geometry for member in members)), self.first_column + len(self.freedoms)
-        layers = tolerance_layers(declared, geometry, self.datums(part), start)
-        freedoms = list(_displacements(declared, geometry, layers))
-        shifts, coordinates = _follow_datums(declared, geometry, layers, start, freedoms)
+            check_alike(pattern.geometries)
+        start = self.first_column + len(self.freedoms)
+        pattern = replace(pattern, layers=tolerance_layers(pattern, self.datums(part), start))
+        freedoms = list(_displacements(pattern))
+        shifts, coordinates = _follow_datums(pattern, start, freedoms)
         if declared.size is not None:
             for member in new:
                 _check_size(member, recognized[member].geometry)
@@ -104,11 +79,11 @@ class Features:
                 labels = [f"{nominal.label}.form {k:02d}" for k in range(1, shape.modes + 1)]
                 freedoms += [Freedom(label, FORM, geometric=form) for label in labels]
         coordinates = padded(coordinates, start + len(freedoms))
-        for place, member in zip(geometry.slices, declared.members, strict=True):
+        for place, member in zip(pattern.slices, declared.members, strict=True):
             if member in recognized:
                 self.features[member] = replace(recognized[member], coordinates=coordinates[place])
-        nominals = tuple(self.features[member] for member in declared.members)
-        self.patterns.append(NominalPattern(declared, nominals, geometry, layers, tuple(freedoms), tuple(shifts), form))
+        members = tuple(self.features[member] for member in declared.members)
+        self.patterns.append(replace(pattern, members=members, freedoms=tuple(freedoms), shifts=tuple(shifts), form=form))
 
     def add_targets(self, targets: DatumTargets, part: int) -> None:
         """Add a datum whose features have been added before. Raises GeometryFault for a target that is not on its feature."""
@@ -177,35 +152,33 @@ class Features:
         return self._used_faces[key]
 
 
-def _displacements(declared: Feature | Pattern, geometry: PatternGeometry, layers: Sequence[Layer]) -> Iterator[Freedom]:
+def _displacements(pattern: NominalPattern) -> Iterator[Freedom]:
     """Yield the freedoms of the directions that layers add, named after the feature or pattern that they move."""
-    counts = Counter[str]()
-    for layer in layers:
+    counts, declared = Counter[str](), pattern.declared
+    for layer in pattern.layers:
         for direction in layer.added.T:
-            member = geometry.owner(direction)
+            member = pattern.owner(direction)
             owner = declared if member is None else declared.members[member]
-            label = f"{declared.part.name}.{owner.name}.{geometry.freedom_name(direction)}"
+            label = f"{declared.part.name}.{owner.name}.{pattern.freedom_name(direction)}"
             counts[label] += 1
             label = f"{label} {counts[label]}" if label.endswith((MIXED, RELATIVE)) else label
             yield Freedom(label, FEATURE, geometric=layer.tolerance)
 
 
-def _follow_datums(
-    declared: Feature | Pattern, geometry: PatternGeometry, layers: Sequence[Layer], start: int, freedoms: list[Freedom]
-) -> tuple[list[DatumShift], np.ndarray]:
-    """Add the freedoms of the datum shifts that a pattern follows to its `freedoms`, of which the first has the column `start`.
+def _follow_datums(pattern: NominalPattern, start: int, freedoms: list[Freedom]) -> tuple[list[DatumShift], np.ndarray]:
+    """Return the datum shifts that a pattern follows, and its coordinates (coordinate, column) per unit deviation.
 
-    Return these shifts, and the coordinates (coordinate, column) per unit deviation.
+    The freedoms of these shifts are added to its `freedoms`, which begin at the column `start`.
     """
-    shifts, coordinates = list[DatumShift](), np.zeros((geometry.count, start + len(freedoms)))
-    for layer in layers:
-        effect = layer.added @ layer.added.T @ geometry.values
+    shifts, coordinates = list[DatumShift](), np.zeros((pattern.count, start + len(freedoms)))
+    for layer in pattern.layers:
+        effect = layer.added @ layer.added.T @ pattern.values
         kept, first = layer.frame.columns_affecting(effect), start + len(freedoms)
         places = np.array([*range(start), *range(first, first + len(kept) - start)], dtype=int)
         for shift in filter(None, (shift.moved(kept, places) for shift in layer.frame.shifts)):
             shifts.append(shift)
             names = shift.labels(layer.tolerance.datums)
-            freedoms += [Freedom(f"{declared.part.name}.{declared.name}.{name}", DATUM, rule=shift.rule) for name in names]
+            freedoms += [Freedom(f"{pattern.label}.{name}", DATUM, rule=shift.rule) for name in names]
         coordinates = padded(coordinates, start + len(freedoms))
         coordinates[:, layer.columns] = layer.added
         coordinates[:, places] += effect @ layer.frame.motion[:, kept]

@@ -1,57 +1,36 @@
 """Layers: the directions of a feature that each of its tolerances controls, from the innermost tolerance on."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
 from tolcontact.declaration import GeometricTolerance
 from tolcontact.declaration.feature_tolerance import TRANSLATION
-from tolcontact.declaration.toleranced import Toleranced
 from tolcontact.errors import GeometryFault
 from tolcontact.features.datum_frames import MIN_PART, RANK_TOLERANCE, DatumFrame, datum_frame
 from tolcontact.features.nominal_feature import NominalFeature
-from tolcontact.features.pattern_geometry import MIN_LENGTH, PatternGeometry
+from tolcontact.features.nominal_pattern import MIN_LENGTH, Layer, NominalPattern
 from tolcontact.features.tolerance_kinds import zone_rows
 
 
-@dataclass(frozen=True, eq=False)
-class Layer:
-    """The directions of a feature or pattern that one tolerance controls beyond the tolerances within it.
-
-    rows        for each member (point, component, coordinate of the member) of its zone (see tolerance_kinds)
-    controlled  (coordinate, n): orthonormal directions that its datums lock
-    added       (coordinate, k): directions that no narrower tolerance controls and that its rule draws; each is a freedom
-    columns     of these freedoms in the deviations
-    frame       of its datum system
-    """
-
-    tolerance: GeometricTolerance
-    rows: tuple[np.ndarray, ...]
-    controlled: np.ndarray
-    added: np.ndarray
-    columns: range
-    frame: DatumFrame
-
-
 def tolerance_layers(
-    declared: Toleranced, geometry: PatternGeometry, datums: Mapping[str | None, Sequence[NominalFeature]], first_column: int
+    pattern: NominalPattern, datums: Mapping[str | None, Sequence[NominalFeature]], first_column: int
 ) -> tuple[Layer, ...]:
     """Return a layer for each geometric tolerance of a feature or pattern, from the one that controls fewest directions on.
 
     `datums` are by their letters. Raises GeometryFault for tolerances that the feature cannot have, or that do not nest.
     """
-    zones = [(tolerance, *_zone(tolerance, geometry, datums, first_column)) for tolerance in declared.geometric]
+    zones = [(tolerance, *_zone(tolerance, pattern, datums, first_column)) for tolerance in pattern.declared.geometric]
     zones.sort(key=lambda zone: (zone[3].shape[1], zone[0].width))
     layers: list[Layer] = []
-    controlled_before, column = np.zeros((geometry.count, 0)), first_column
+    controlled_before, column = np.zeros((pattern.count, 0)), first_column
     for tolerance, rows, frame, controlled in zones:
         _check_nesting(tolerance, controlled, layers)
         is_outer = controlled_before.shape[1] > 0
-        added = _named_basis(_difference(controlled, controlled_before), geometry, is_outer=is_outer)
+        added = _named_basis(_difference(controlled, controlled_before), pattern, is_outer=is_outer)
         if tolerance.rule == TRANSLATION:
-            added = _translations(tolerance, geometry, added, is_outer=is_outer)
+            added = _translations(tolerance, pattern, added, is_outer=is_outer)
         if controlled.shape[1] and not added.shape[1]:
             raise GeometryFault(
                 f"{tolerance.kind} {tolerance.width:g} controls nothing that others do not; leave one of them out"
@@ -64,7 +43,7 @@ def tolerance_layers(
 
 def _zone(
     tolerance: GeometricTolerance,
-    geometry: PatternGeometry,
+    pattern: NominalPattern,
     datums: Mapping[str | None, Sequence[NominalFeature]],
     columns: int,
 ) -> tuple[tuple[np.ndarray, ...], DatumFrame, np.ndarray]:
@@ -74,10 +53,10 @@ def _zone(
         raise GeometryFault(f"{tolerance.kind} refers to datum {absent[0]}, which could not be made; mend its feature first")
     system = [[datum for letter in compartment for datum in datums[letter]] for compartment in tolerance.system]
     primary = system[0][0].geometry if system else None
-    rows = tuple(zone_rows(tolerance, member, primary) for member in geometry.members)
-    frame = datum_frame(system, geometry, columns, tolerance.orientation_only)
-    is_limited = system or len(geometry.members) > 1  # a common zone limits the members to each other
-    controlled = _controlled(rows, geometry, frame) if is_limited else np.zeros((geometry.count, 0))
+    rows = tuple(zone_rows(tolerance, member, primary) for member in pattern.geometries)
+    frame = datum_frame(system, pattern.centre, pattern.reach, columns, tolerance.orientation_only)
+    is_limited = system or len(pattern.members) > 1  # a common zone limits the members to each other
+    controlled = _controlled(rows, pattern, frame) if is_limited else np.zeros((pattern.count, 0))
     if any(map(len, rows)) and is_limited and not controlled.shape[1]:
         reason = f"the datum system {tolerance.datums} does not lock any" if system else "a common zone limits nothing"
         raise GeometryFault(f"{tolerance.kind}: {reason} of what is toleranced; add the datum that does")
@@ -96,20 +75,20 @@ def _check_nesting(tolerance: GeometricTolerance, controlled: np.ndarray, layers
             )
 
 
-def _translations(tolerance: GeometricTolerance, geometry: PatternGeometry, added: np.ndarray, *, is_outer: bool) -> np.ndarray:
+def _translations(tolerance: GeometricTolerance, pattern: NominalPattern, added: np.ndarray, *, is_outer: bool) -> np.ndarray:
     """Return the part of the added directions (coordinate, n) that does not rotate a feature."""
-    _, S, Vt = np.linalg.svd(geometry.turns @ added)
+    _, S, Vt = np.linalg.svd(pattern.turns @ added)
     translations = added @ Vt[int((S > RANK_TOLERANCE).sum()) :].T
     if not translations.shape[1]:
         raise GeometryFault(f'{tolerance.kind}: the rule "{tolerance.rule}" leaves nothing, as its datums lock tilts alone')
-    return _named_basis(translations, geometry, is_outer=is_outer)
+    return _named_basis(translations, pattern, is_outer=is_outer)
 
 
-def _controlled(rows: Sequence[np.ndarray], geometry: PatternGeometry, frame: DatumFrame) -> np.ndarray:
+def _controlled(rows: Sequence[np.ndarray], pattern: NominalPattern, frame: DatumFrame) -> np.ndarray:
     """Return the directions (coordinate, n) that the zone limits and that no free motion of the datum frame changes."""
     limited = _span(np.asarray(scipy.linalg.block_diag(*(member.reshape(-1, member.shape[-1]).T for member in rows))))
-    controlled = _difference(limited, _span(limited @ limited.T @ geometry.values @ frame.free))
-    return _named_basis(controlled, geometry, is_outer=False)
+    controlled = _difference(limited, _span(limited @ limited.T @ pattern.values @ frame.free))
+    return _named_basis(controlled, pattern, is_outer=False)
 
 
 def _span(vectors: np.ndarray) -> np.ndarray:
@@ -125,23 +104,23 @@ def _difference(basis: np.ndarray, subtracted: np.ndarray) -> np.ndarray:
     return _span(basis - subtracted @ (subtracted.T @ basis))
 
 
-def _named_basis(directions: np.ndarray, geometry: PatternGeometry, *, is_outer: bool) -> np.ndarray:
+def _named_basis(directions: np.ndarray, pattern: NominalPattern, *, is_outer: bool) -> np.ndarray:
     """Return unit vectors with the same span as `directions` (coordinate, n), along coordinates where the span has any.
 
     Directions of the outer tolerance of a pattern are along its common motions first. The remaining vectors are projections of
     the coordinates, in their order, made orthogonal (Gram-Schmidt), so that the basis depends on the span alone.
     """
     projector, count = directions @ directions.T, directions.shape[1]
-    coordinates = np.eye(geometry.count)
+    coordinates = np.eye(pattern.count)
     spanned = np.flatnonzero(np.diag(projector) > 1 - 1e-6)
     if len(spanned) == count:
         return coordinates[:, spanned]
-    motions = geometry.common_motions if is_outer and len(geometry.members) > 1 else np.zeros((geometry.count, 0))
+    motions = pattern.common_motions if is_outer and len(pattern.members) > 1 else np.zeros((pattern.count, 0))
     lengths = np.linalg.norm(motions, axis=0)
     motions = motions[:, lengths > MIN_LENGTH] / lengths[lengths > MIN_LENGTH]
     within = np.linalg.norm(projector @ motions - motions, axis=0) < RANK_TOLERANCE
     candidates = np.hstack([motions[:, within], coordinates[:, spanned], projector])
-    basis, rank = np.zeros((geometry.count, count)), 0
+    basis, rank = np.zeros((pattern.count, count)), 0
     for candidate in candidates.T:
         remainder = candidate
         for _ in range(2):  # twice is enough to be orthogonal to rounding

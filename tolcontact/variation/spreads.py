@@ -84,7 +84,7 @@ def _fill_layers(
 
     `spreads_of_forms` are the standard deviations (mode,) [mm] of the form of each member; empty without form.
     """
-    basis, spreads, columns = np.zeros((pattern.geometry.count, 0)), np.zeros(0), np.zeros(0, dtype=int)
+    basis, spreads, columns = np.zeros((pattern.count, 0)), np.zeros(0), np.zeros(0, dtype=int)
     for layer in pattern.layers:
         inner_count, count, tolerance = len(spreads), layer.added.shape[1], layer.tolerance
         if not count:
@@ -99,7 +99,7 @@ def _fill_layers(
         _check_inner_share(tolerance, [member.take(inner_count) for member in members], spreads, width)
         _check_rule(pattern, tolerance)
         spreads = np.concatenate([spreads, np.full(count, spread / tolerance.cp)])
-        offsets = pattern.geometry.offsets @ layer.controlled @ layer.controlled.T @ basis
+        offsets = pattern.offsets @ layer.controlled @ layer.controlled.T @ basis
         middles = np.asarray(tolerance.uneven_shift * offsets)  # of the zone, in each component
         means = middles[inner_count:].copy()
         for group, components in _groups(members):
@@ -121,8 +121,8 @@ def _member_zones(
     coordinates = layer.controlled @ layer.controlled.T @ basis
     if len(pattern.members) > 1:
         coordinates = np.where(np.abs(coordinates) < MIN_PART, 0.0, coordinates)
-    places, tolerance = pattern.geometry.slices, layer.tolerance
-    if not spreads_of_forms or not includes_form(tolerance, pattern.geometry.members[0]):
+    places, tolerance = pattern.slices, layer.tolerance
+    if not spreads_of_forms or not includes_form(tolerance, pattern.geometries[0]):
         return [MemberZone(rows, coordinates[place]) for rows, place in zip(layer.rows, places, strict=True)]
     members = []
     for member, rows, place, spreads in zip(pattern.members, layer.rows, places, spreads_of_forms, strict=True):
@@ -156,7 +156,7 @@ def _with_bonus(
     zone: ComponentZone, pattern: NominalPattern, members: Sequence[MemberZone], group: Sequence[int], material: str
 ) -> ComponentZone:
     """Return the zone of a group of members that grows as their sizes depart from the material limit, "M" or "L"."""
-    size, geometry = pattern.declared.size, pattern.geometry.members[group[0]]
+    size, geometry = pattern.declared.size, pattern.geometries[group[0]]
     columns = [pattern.members[k].size_column for k in group]
     if size is None or None in columns:
         return zone
@@ -168,7 +168,7 @@ def _with_bonus(
 
 def _check_rule(pattern: NominalPattern, tolerance: GeometricTolerance) -> None:
     form, rule = pattern.form, tolerance.rule
-    if form is not None and rule != INSIDE and includes_form(tolerance, pattern.geometry.members[0]):
+    if form is not None and rule != INSIDE and includes_form(tolerance, pattern.geometries[0]):
         raise GeometryFault(
             f'{tolerance.kind}: the rule "{rule}" is for features that keep their shape, and the form of this one is '
             f'drawn; choose "{INSIDE}", or give its {form.kind} form=None'
