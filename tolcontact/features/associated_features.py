@@ -22,7 +22,7 @@ MAX_EXCESS = 8  # times the intended number of places
 MIN_AZIMUTHS, MAX_AZIMUTHS = 48, 144  # of a circle
 MIN_HEIGHTS, MAX_HEIGHTS = 9, 25
 MAX_FACET_ANGLE = np.radians(46.0)  # between neighbouring vertices: a wider gap is a gap of the face
-PLACE_TOLERANCE = 1e-4  # of a face's size: the distance of a place on it, in addition to that of triangles from their surface
+PLACE_TOLERANCE = 1e-4  # of a face's size: the distance of a place on it, in addition to the error of triangles
 ROTATIONS = 32  # that determine the position and diameter of a section, exactly for fewer lobes
 NODES = 16  # of a line
 MIN_LENGTH = 1e-9  # of a displacement, relative to the largest
@@ -35,7 +35,7 @@ Places = tuple[np.ndarray, np.ndarray]  # places (place, 3) [mm] of a face, and 
 def displacement_terms(normals: np.ndarray, arms: np.ndarray) -> np.ndarray:
     """Return heights (place, 7) of a surface with `normals` (place, 3) for a unit growth, unit translations and rotations.
 
-    Rotations are about the point from which `arms` (place, 3) [mm] are counted.
+    Rotations are about the origin of `arms` (place, 3) [mm].
     """
     (x, y, z), (u, v, w) = arms.T, normals.T
     return np.column_stack([np.ones(len(arms)), normals, y * w - z * v, z * u - x * w, x * v - y * u])
@@ -43,7 +43,7 @@ def displacement_terms(normals: np.ndarray, arms: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class AssociatedSurface:
-    """The analytic surface from which the form of a face is measured as a whole.
+    """The analytic surface that the form of a face is measured from, as a whole.
 
     ends       places [mm] of the ends of the face along the axis of the surface
     is_whole   whether the face has one zone, and not several members with a zone each

@@ -1,4 +1,4 @@
-"""Form fields: heights of a face as few functions of place, without what displaces the face as a whole.
+"""Form fields: heights of a face as few functions of place, without displacements of the face as a whole.
 
 The functions are Karhunen-Loeve modes of a covariance, orthogonal to rigid displacements and growths by area. They follow from
 a pivoted Cholesky factor of the covariance, so that they are known at any place: height(p) = covariance(p, stations) @ weights
@@ -114,7 +114,7 @@ class FormField:
         return values, displacement_terms(normals, points)
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "FormField":
-        """Return the field of a face that stands at R (3, 3), t (3,) [mm]."""
+        """Return the field of a face in a part at R (3, 3), t (3,) [mm]."""
         removed = displaced_about_origin(np.vstack([self.removed[:1], R @ self.removed[1:4], R @ self.removed[4:]]), t)
         places, stations = self.places @ R.T + t, self.stations @ R.T + t
         return replace(self, associated=self.associated.placed(R, t), places=places, stations=stations, removed=removed)
@@ -128,7 +128,7 @@ def form_field(form: Form, face: Surface, associated: AssociatedSurface) -> Form
     stations, shares = places[pivots], areas / areas.sum()
     inverse = np.linalg.inv(factor[:, pivots])
     functions = associated_covariance(form, lengths, associated, places, stations) @ inverse
-    remainder, removed = beside_displacements(functions, associated, places, shares)
+    remainder, removed = without_displacements(functions, associated, places, shares)
     variances, directions = np.linalg.eigh(remainder.T @ remainder)
     if variances.sum() < REST:
         raise GeometryFault(
@@ -154,15 +154,15 @@ def form_field(form: Form, face: Surface, associated: AssociatedSurface) -> Form
     )
 
 
-def beside_displacements(
+def without_displacements(
     functions: np.ndarray, associated: AssociatedSurface, places: np.ndarray, shares: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return functions (place, function) beside displacements and growths of the face, and these (7, function).
+    """Return functions (place, function) without displacements and growths of the face, and these (7, function).
 
     shares   (place,) of the area. Values of a place are returned times the root of its share.
     """
     root, centre = np.sqrt(shares)[:, None], places.mean(axis=0)
-    # Sections and lines without what displaces them are not displaced as a whole either.
+    # Sections and lines without displacements are not displaced as a whole either.
     terms = associated.is_whole * displacement_terms(associated.surface.distance(places)[1], places - centre)
     removed, *_ = np.linalg.lstsq(terms * root, functions * root, rcond=1e-10)
     return (functions - terms @ removed) * root, displaced_about_origin(removed, centre)
@@ -206,7 +206,7 @@ def longest_extent(points: np.ndarray) -> float:
 
 
 def displaced_about_origin(displacements: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """Return displacements (7, n) with turns about the origin that equal some with turns about a centre (3,) [mm]."""
+    """Return displacements (7, n) with rotations about the origin that equal some with rotations about a centre (3,) [mm]."""
     growth, translation, rotation = np.split(displacements, [1, TERMS - 3])
     return np.vstack([growth, translation + np.cross(centre, rotation, axisb=0).T, rotation])
 
@@ -214,7 +214,7 @@ def displaced_about_origin(displacements: np.ndarray, centre: np.ndarray) -> np.
 def associated_covariance(
     form: Form, lengths: Lengths, associated: AssociatedSurface, points: np.ndarray, stations: np.ndarray
 ) -> np.ndarray:
-    """Return the covariance (point, station), as functions of the points without what displaces sections or lines."""
+    """Return the covariance (point, station), as functions of the points without displacements of sections or lines."""
     values = np.zeros((len(points), len(stations)))
     for factors, copies in associated.copies(points):
         values += factors[:, None] * covariance(form, lengths, associated.surface, copies, stations)
@@ -224,9 +224,9 @@ def associated_covariance(
 def _cholesky(
     places: np.ndarray, form: Form, lengths: Lengths, associated: AssociatedSurface
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the pivoted Cholesky factor (station, place) of the covariance, the pivots (station,), and what it leaves out.
+    """Return the pivoted Cholesky factor (station, place) of the covariance, the pivots (station,), and the remaining variance.
 
-    This is a variance (place,).
+    The variance (place,) is what the stations leave out.
     """
     variance, rows, pivots = np.ones(len(places)), np.zeros((0, len(places))), list[int]()
     while len(rows) < min(MAX_STATIONS, len(places)) and variance.max() > REST:

@@ -1,7 +1,7 @@
 """Freedoms: everything that varies, and its distribution. Column k of the deviations of a model belongs to its freedom k.
 
-The freedoms of a model are those of its locators, its features and its variables, in this order. A feature is given its
-freedoms as it is made (see nominal_features), and their spreads when its zones are filled (see variation/spreads).
+Locators come first, then features and variables. A feature receives its freedoms as it is made (see nominal_features),
+and these their spreads as zones are filled (see variation/spreads).
 """
 
 from collections.abc import Callable
@@ -26,7 +26,7 @@ QUANTILES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 
 @dataclass(frozen=True, eq=False)
 class Freedom:
-    """One way in which a locator, a feature or a variable deviates.
+    """A degree of freedom of a locator, a feature or a variable.
 
     label      "part.locator", "part.feature.freedom", "part.pattern.freedom" of several members, or the name of a variable
     source     "locator", "feature", "form", "variable", or "datum": a shift that follows from other deviations

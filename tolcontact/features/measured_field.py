@@ -1,4 +1,4 @@
-"""The form field of measured faces: their mean, and the principal components of what they deviate from it.
+"""The form field of measured faces: their mean, and the principal components of their deviations from it.
 
 Heights of the points of each part over the nominal surface are fitted with functions of place (see height_regression), so that
 the field is known at any place like any other. Coefficients vary as the measured faces do. The field is compared with the
@@ -14,7 +14,7 @@ from tolcontact.declaration.form import Form
 from tolcontact.errors import GeometryFault
 from tolcontact.features.associated_features import AssociatedSurface, displacement_terms
 from tolcontact.features.covariances import Lengths
-from tolcontact.features.form_field import FormField, associated_covariance, beside_displacements, scales_within
+from tolcontact.features.form_field import FormField, associated_covariance, scales_within, without_displacements
 from tolcontact.features.height_regression import STATIONS, HeightRegression, Scan
 from tolcontact.features.minimum_zone import ZoneMember, minimum_widths
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder
@@ -22,15 +22,15 @@ from tolcontact.geometry.measured_points import measured_points
 from tolcontact.geometry.spreading import spread
 from tolcontact.geometry.surface import Surface
 
-COVARIANCE = "matern 5/2"  # by which heights between stations follow from theirs
+COVARIANCE = "matern 5/2"  # for the heights between stations
 MIN_POINTS = 24
-MAX_HEIGHT_SHARE = 0.02  # of a face's size: a point farther from its surface was not measured on it
-DIGITS = 6  # of mm: points that are no farther apart are one, whose scatter is not independent
+MAX_HEIGHT_SHARE = 0.02  # of a face's size: a point further from its surface was not measured on it
+DIGITS = 6  # of mm: points that are no further apart are one, whose scatter is not independent
 MIN_VARIANCE = 1e-8  # of the largest: a component with less is rounding
 MAX_LOST_SHARE = 0.25  # of the form: what the field may leave out
 MAX_EXCESS = 3.0  # times the largest height at the points: what the field may reach between them
 NEIGHBOURS = 8  # of a point, whose deviations from the field are compared with its own
-SIGNIFICANT = 5.0  # standard deviations of a mean, by which deviations from the field are more than scatter
+SIGNIFICANT = 5.0  # standard deviations of a mean, above which deviations from the field are more than scatter
 STEP_SHARE = 1e-4  # of the correlation length: steps of slopes
 
 
@@ -49,7 +49,7 @@ def measured_field(form: Form, pattern: str, face: Surface, associated: Associat
     places, areas = associated.places(face, lengths)
     functions = associated_covariance(form, regression.lengths, associated, places, regression.stations) @ weights
     shares = areas / areas.sum()
-    remainder, removed = beside_displacements(functions, associated, places, shares)
+    remainder, removed = without_displacements(functions, associated, places, shares)
     mean, count = remainder.mean(axis=1), remainder.shape[1]
     _, spreads, directions = np.linalg.svd((remainder - mean[:, None]) / np.sqrt(count - 1), full_matrices=False)
     kept = min(form.modes, int((spreads**2 > MIN_VARIANCE * spreads[0] ** 2).sum()))
@@ -86,10 +86,10 @@ def _scan(cloud: np.ndarray, path: str, face: Surface, everywhere: np.ndarray, a
     outward = -1.0 if any(piece.is_hollow for piece in face.pieces) else 1.0
     distances, normals = associated.surface.distance(cloud)
     heights = outward * distances
-    farthest = int(np.abs(heights).argmax())
-    if abs(heights[farthest]) > MAX_HEIGHT_SHARE * face.mesh.scale:
+    outermost = int(np.abs(heights).argmax())
+    if abs(heights[outermost]) > MAX_HEIGHT_SHARE * face.mesh.scale:
         raise GeometryFault(
-            f'"{path}": point {farthest + 1} is {abs(heights[farthest]):.3g} mm away from the face; expected points of the '
+            f'"{path}": point {outermost + 1} is {abs(heights[outermost]):.3g} mm away from the face; expected points of the '
             "face, in mm in the frame of the part"
         )
     feet = associated.surface.project(cloud)

@@ -51,7 +51,7 @@ def minimax(rigid: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def _initial_points(rigid: np.ndarray) -> np.ndarray:
-    """Return the indices (freedom + 1,) of well-conditioned points from which exchanges start."""
+    """Return the indices (freedom + 1,) of well-conditioned starting points."""
     remainder, indices = rigid.copy(), list[int]()
     for _ in range(rigid.shape[1]):
         indices.append(int((remainder**2).sum(axis=1).argmax()))

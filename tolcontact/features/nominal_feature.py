@@ -138,7 +138,7 @@ class NominalFeature:
 
 
 def moving_faces(feature: Feature) -> Sequence[bool]:
-    """Return whether each face of a feature deviates with it: a face from which a size is only measured does not."""
+    """Return whether each face of a feature deviates with it: the fixed face of a size does not."""
     if feature.size is None or feature.size.moves == "both":
         return [True] * len(feature.faces)
     return [feature.size.moves == "first", feature.size.moves == "second"]

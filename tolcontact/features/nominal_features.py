@@ -44,7 +44,7 @@ class Features:
         return tuple(freedom for pattern in self.patterns for freedom in pattern.freedoms)
 
     def copy(self) -> "Features":
-        """Return the same features, to which others can be added without changing these."""
+        """Return a copy, so that further features do not change these."""
         return replace(self, patterns=list(self.patterns), features=dict(self.features), _targets=dict(self._targets))
 
     def add(self, declared: Feature | Pattern, part: int, meshes: Meshes) -> None:

@@ -47,7 +47,7 @@ class NominalPattern:
     layers    of its geometric tolerances, from the innermost on
     freedoms  the directions that its layers add, shifts of datum planes, sizes of its members, and modes of their forms
     shifts    of the datum planes of its tolerances
-    form      the tolerance by which the form of its members is drawn; None if they keep their shape
+    form      the tolerance that draws the form of its members; None if they keep their shape
     """
 
     declared: Feature | Pattern
@@ -127,7 +127,7 @@ class NominalPattern:
     def freedom_name(self, direction: np.ndarray) -> str:
         """Return the name of a direction (coordinate,): of its coordinate, of its motion of the pattern, "relative" or "mixed".
 
-        A relative direction moves members of a pattern to each other, and the pattern as a whole not at all.
+        A relative direction moves members relative to each other, and not the pattern as a whole.
         """
         coordinate = int(np.abs(direction).argmax())
         if abs(direction[coordinate]) > 1 - 1e-6:

@@ -197,7 +197,7 @@ def is_drawn(kind: ToleranceKind, per: object) -> bool:
 
 
 def form_tolerance(toleranced: Toleranced, feature: FeatureGeometry) -> GeometricTolerance | None:
-    """Return the tolerance by which the form of a feature is drawn, the narrowest one; None if it keeps its shape.
+    """Return the tolerance that draws the form of a feature, the narrowest one; None if it keeps its shape.
 
     Raises GeometryFault for a tolerance of form that cannot be drawn.
     """

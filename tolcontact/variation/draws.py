@@ -143,7 +143,7 @@ class Draws:
         sets = [[self._column[label] for label in labels] for labels, _ in self.correlated if correlated]
         sets += [list(map(int, columns)) for columns, _ in self.populations]
         together = [[*shift.columns, *map(int, shift.sources)] for shift in self.shifts]
-        together += [list(map(int, [*zone.sizes, *zone.added])) for zone in self.zones if zone.sizes is not None]
+        together += [sorted({*map(int, zone.sizes), *map(int, zone.added)}) for zone in self.zones if zone.sizes is not None]
         # What follows from others by more than a sum also follows from the causes that drive them.
         followed = {column for columns in together for column in columns}
         of_causes = [

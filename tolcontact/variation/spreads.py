@@ -45,7 +45,7 @@ class ComponentZone:
     growth: float = 0.0
 
     def scale(self, deviations: np.ndarray) -> np.ndarray:
-        """Return the factor (n,) by which the bonus of deviations (n, contributor) enlarges the added components."""
+        """Return the factor (n,) of the added components for the bonus of deviations (n, contributor)."""
         assert self.sizes is not None
         sizes = deviations[:, np.unique(self.sizes)]
         bonus = np.maximum(self.growth * (sizes - self.limit), 0.0)
@@ -55,7 +55,7 @@ class ComponentZone:
 def fill_zones(nominal: Nominal) -> tuple[list[Freedom], list[ComponentZone], dict[str, float]]:
     """Return the freedoms of a model with their spreads, the zones that components fill, and mean widths of forms.
 
-    The widths [mm] are those of the minimum zones, by feature. Raises ModelError if a rule cannot be applied to a feature.
+    The widths [mm] are widths of minimum zones, by feature. Raises ModelError if a rule cannot be applied to a feature.
     """
     freedoms, component_zones, mean_widths = list(nominal.freedoms), list[ComponentZone](), dict[str, float]()
     for pattern in nominal.patterns:

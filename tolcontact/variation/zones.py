@@ -3,7 +3,7 @@
 Components c are independent and normal. A feature lies inside if none of the rows of its zone, each a vector linear in c, is
 longer than half the width. In the direction u, a random unit vector scaled by the standard deviations, the zone ends at a
 distance. The share of features nearer than that is the chi distribution's, so the share inside is its mean over directions. A
-quasi-random sequence of directions gives it to some 1e-5, without draws of features, and alike for all kinds of zones.
+quasi-random sequence of directions gives it to some 1e-5, without draws of features, in the same way for all zones.
 """
 
 import functools
@@ -34,7 +34,7 @@ class MemberZone:
     """The zone of a feature, or of a member of a pattern, whose coordinates are linear in components.
 
     rows         (point, entry, coordinate)
-    coordinates  (coordinate, component) for components of 1
+    coordinates  (coordinate, component) for unit components
     """
 
     rows: np.ndarray
@@ -47,7 +47,7 @@ class MemberZone:
 
     @property
     def identity(self) -> bytes:
-        """The bytes on which shares depend, beside spreads."""
+        """The bytes that determine shares, together with spreads."""
         rows = self.component_rows
         return rows[..., (rows != 0).any(axis=(0, 1))].tobytes()
 
