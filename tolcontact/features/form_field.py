@@ -169,34 +169,30 @@ def without_displacements(
 
 
 def _lengths(form: Form, face: Surface, associated: AssociatedSurface) -> Lengths:
-    """Return the correlation lengths of a form: usually a third of the extent of a face, with an axis across and along it."""
-    vertices, surface = np.asarray(face.mesh.vertices), associated.surface
-    if not isinstance(surface, Cylinder | Cone):
-        length = form.length or LENGTH_SHARE * longest_extent(vertices)
-        return Lengths(length, length)
-    diameter, extent = axial_extents(surface.origin, surface.axis, vertices)
-    across = diameter / 2 / form.lobes if form.lobes else form.length or LENGTH_SHARE * diameter
-    return Lengths(across, form.length or LENGTH_SHARE * extent)
+    """Return the correlation lengths of a form: usually a third of the extents of a face."""
+    extents = face_extents(associated, np.asarray(face.mesh.vertices))
+    across = extents.across / 2 / form.lobes if form.lobes else form.length or LENGTH_SHARE * extents.across
+    return Lengths(across, form.length or LENGTH_SHARE * extents.along)
 
 
 def scales_within(lengths: Lengths, associated: AssociatedSurface, places: np.ndarray) -> Lengths:
-    """Return lengths over which heights change at places (place, 3) of a face, at most half of its extents.
+    """Return the lengths over which heights change at places (place, 3) of a face, at most half of its extents.
 
     A length far beyond the face leaves heights that bend once over the face.
     """
+    extents = face_extents(associated, places)
+    return Lengths(min(lengths.across, extents.across / 2), min(lengths.along, extents.along / 2))
+
+
+def face_extents(associated: AssociatedSurface, points: np.ndarray) -> Lengths:
+    """Return the diameter of points (point, 3) [mm] around an axis and their extent along it; without axis the longest one."""
     surface = associated.surface
     if not isinstance(surface, Cylinder | Cone):
-        return Lengths(*np.minimum(lengths, longest_extent(places) / 2))
-    across, along = axial_extents(surface.origin, surface.axis, places)
-    return Lengths(min(lengths.across, across / 2), min(lengths.along, along / 2))
-
-
-def axial_extents(origin: np.ndarray, axis: np.ndarray, points: np.ndarray) -> tuple[float, float]:
-    """Return the largest diameter [mm] of points (point, 3) around an axis, and their extent along it [mm]."""
-    arms = points - origin
-    along = arms @ axis
-    radius = float(np.linalg.norm(arms - along[:, None] * axis, axis=1).max())
-    return 2 * radius, float(np.ptp(along))
+        return Lengths(longest_extent(points), longest_extent(points))
+    arms = points - surface.origin
+    along = arms @ surface.axis
+    radius = float(np.linalg.norm(arms - along[:, None] * surface.axis, axis=1).max())
+    return Lengths(2 * radius, float(np.ptp(along)))
 
 
 def longest_extent(points: np.ndarray) -> float:

@@ -42,23 +42,14 @@ def measured_field(form: Form, pattern: str, face: Surface, associated: Associat
     regression = HeightRegression.of(form, face, associated, scans)
     scans = regression.samples(scans)
     weights = regression.weights(scans)
-    widths, losses = zip(
-        *(_fit(scan, of_part, regression) for scan, of_part in zip(scans, weights.T, strict=True)), strict=True
-    )
+    fits = [_fit(scan, of_part, regression) for scan, of_part in zip(scans, weights.T, strict=True)]
     lengths = _lengths(regression, weights)
     places, areas = associated.places(face, lengths)
     functions = associated_covariance(form, regression.lengths, associated, places, regression.stations) @ weights
     shares = areas / areas.sum()
-    remainder, removed = without_displacements(functions, associated, places, shares)
-    mean, count = remainder.mean(axis=1), remainder.shape[1]
-    _, spreads, directions = np.linalg.svd((remainder - mean[:, None]) / np.sqrt(count - 1), full_matrices=False)
-    kept = min(form.modes, int((spreads**2 > MIN_VARIANCE * spreads[0] ** 2).sum()))
-    # Of the parts: their mean, then components that have the length 1, as the spreads have the unit.
-    mixes = np.column_stack([np.full(count, 1 / count), (directions[:kept] / spreads[:kept, None]).T / np.sqrt(count - 1)])
-    mixes[:, 1:] -= mixes[:, 1:].mean(axis=0)
-    size = max(float(np.linalg.norm(mean)), 1e-300)
-    mixes[:, 0] /= size
-    lost = float(np.mean([loss**2 for loss in losses]))
+    heights, removed = without_displacements(functions, associated, places, shares)
+    mixes, size, spreads = _principal_components(heights, form.modes)
+    kept, lost = mixes.shape[1] - 1, float(np.mean([loss**2 for _, loss in fits]))
     field = FormField(
         form=form,
         associated=associated,
@@ -73,9 +64,26 @@ def measured_field(form: Form, pattern: str, face: Surface, associated: Associat
         means=np.array([size, *[0.0] * kept]),
         scans={},
     )
+    widths = [width for width, _ in fits]
     if not associated.is_whole:  # each section or line has a zone of its own, at places
-        widths = tuple(map(float, minimum_widths(field.zone, (remainder / np.sqrt(shares)[:, None]).T)))
+        widths = [float(width) for width in minimum_widths(field.zone, (heights / np.sqrt(shares)[:, None]).T)]
     return replace(field, scans={scan.path: width for scan, width in zip(scans, widths, strict=True)})
+
+
+def _principal_components(heights: np.ndarray, modes: int) -> tuple[np.ndarray, float, np.ndarray]:
+    """Return the mean and the principal components of heights (place, part) [mm], as mixes (part, 1 + component) of parts.
+
+    There are at most `modes` components. The heights of each mix have the length 1. Return also the length of the mean, and the
+    standard deviations of all components, in mm.
+    """
+    mean, count = heights.mean(axis=1), heights.shape[1]
+    _, spreads, directions = np.linalg.svd((heights - mean[:, None]) / np.sqrt(count - 1), full_matrices=False)
+    kept = min(modes, int((spreads**2 > MIN_VARIANCE * spreads[0] ** 2).sum()))
+    mixes = np.column_stack([np.full(count, 1 / count), (directions[:kept] / spreads[:kept, None]).T / np.sqrt(count - 1)])
+    mixes[:, 1:] -= mixes[:, 1:].mean(axis=0)
+    size = max(float(np.linalg.norm(mean)), 1e-300)
+    mixes[:, 0] /= size
+    return mixes, size, spreads
 
 
 def _scan(cloud: np.ndarray, path: str, face: Surface, everywhere: np.ndarray, associated: AssociatedSurface) -> Scan:

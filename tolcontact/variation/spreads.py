@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from tolcontact.declaration import GeometricTolerance
 from tolcontact.declaration.feature_tolerance import EXTREMES, INSIDE
@@ -134,7 +135,7 @@ def _member_zones(
     return members
 
 
-def _groups(members: Sequence[MemberZone]) -> Iterator[tuple[list[int], np.ndarray]]:
+def _groups(members: Sequence[MemberZone]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield the indices of members that have components in common, and these components, in the order of the first members.
 
     A group is one member if no component moves it and others.
@@ -143,17 +144,14 @@ def _groups(members: Sequence[MemberZone]) -> Iterator[tuple[list[int], np.ndarr
         moved = np.ones((1, members[0].coordinates.shape[1]), dtype=bool)
     else:
         moved = np.array([(member.component_rows != 0).any(axis=(0, 1)) for member in members])
-    remaining = list(range(len(members)))
-    while remaining:
-        group, components = [remaining[0]], moved[remaining[0]]
-        while joined := [k for k in remaining if k not in group and (moved[k] & components).any()]:
-            group, components = sorted([*group, *joined]), components | moved[joined].any(axis=0)
-        remaining = [k for k in remaining if k not in group]
-        yield group, np.flatnonzero(components)
+    _, labels = connected_components(moved.astype(int) @ moved.astype(int).T)
+    for label in range(labels.max() + 1):
+        group = np.flatnonzero(labels == label)
+        yield group, np.flatnonzero(moved[group].any(axis=0))
 
 
 def _with_bonus(
-    zone: ComponentZone, pattern: NominalPattern, members: Sequence[MemberZone], group: Sequence[int], material: str
+    zone: ComponentZone, pattern: NominalPattern, members: Sequence[MemberZone], group: np.ndarray, material: str
 ) -> ComponentZone:
     """Return the zone of a group of members that grows as their sizes depart from the material limit, "M" or "L"."""
     size, geometry = pattern.declared.size, pattern.geometries[group[0]]
