@@ -73,7 +73,7 @@ def test_the_plane_is_that_of_a_linear_programme_on_the_same_heights(program, la
     whole = replace(plane, coordinates=(0, 1, 2)).shifts(deviations, {})
     for deviation, coordinates in zip(deviations, whole, strict=True):
         leaning = plane.residuals @ deviation[: plane.residuals.shape[1]]
-        form = plane.form.heights(plane.form.places) @ deviation[plane.form_columns]
+        form = plane.form.heights(plane.form.places) @ deviation[plane.datum.form_columns]
         heights = plane.heights @ leaning + form
         scale = np.abs(heights).max()
         least = programme(heights / scale, rows)
@@ -116,9 +116,9 @@ def test_simple_forms_are_touched_where_closed_forms_say(shape, out, inverted):
     program = tc.build(plate(tc.Form(modes=1)))
     ((_, plane),) = tangents(program).values()
     fields_of_form = {field.name: getattr(plane.form, field.name) for field in fields(FormField)}
-    by_hand = replace(plane, form=OneMode(**fields_of_form, shape=shape))
+    by_hand = replace(plane, datum=replace(plane.datum, form=OneMode(**fields_of_form, shape=shape)))
     deviations = np.zeros((2, len(program.nominal.contributors)))
-    deviations[:, plane.form_columns.start] = 0.02, -0.03
+    deviations[:, plane.datum.form_columns.start] = 0.02, -0.03
     expected = [[0.02 * out, 0, 0], [0.03 * inverted, 0, 0]]
     np.testing.assert_allclose(by_hand.shifts(deviations, {}), expected, atol=1e-12)
 

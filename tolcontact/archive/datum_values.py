@@ -22,7 +22,7 @@ def datum_sizes(program: Program) -> dict[str, int]:
     planes = tangents(program)
     if not planes:
         return {}
-    places = {plane.form_columns.start: len(plane.heights) for plane in planes}
+    places = {plane.datum.form_columns.start: len(plane.heights) for plane in planes}
     return {
         terms.TANGENT: len(planes), terms.TANGENT_PLACE: sum(places.values()),
         terms.COORDINATE: COORDINATES, terms.TANGENT_FREEDOM: COORDINATES,
@@ -42,10 +42,10 @@ def datum_values(program: Program) -> dict[ArchiveVariable, Any]:
         columns[number, list(plane.coordinates)] = plane.columns
         leaning[number, :, : plane.residuals.shape[1]] = plane.residuals
         free[number, :, : plane.free.shape[1]] = plane.free
-    touched = {faces[plane.form_columns.start]: plane for plane in planes}
+    touched = {faces[plane.datum.form_columns.start]: plane for plane in planes}
     places = [program.nominal.faces[face].form for face in touched]
     return {
-        terms.TANGENT_FACE: [faces[plane.form_columns.start] for plane in planes],
+        terms.TANGENT_FACE: [faces[plane.datum.form_columns.start] for plane in planes],
         terms.TANGENT_CONTRIBUTOR: columns,
         terms.TANGENT_LEANING: leaning,
         terms.TANGENT_FREE: free,

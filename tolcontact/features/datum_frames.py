@@ -5,7 +5,8 @@ linearly: the coordinates of the shift are freedoms that are not drawn.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -37,26 +38,30 @@ class DatumShift:
     centre plane of the minimum zone of the face, moved out of the material by half the width, and it tilts as far as the datums
     before it permit. If the form of a face is 0, the plane touches it as a face that keeps its shape.
 
-    datum        its letter
+    datum        its feature
     extremes     (extreme, column) [mm]: heights of the extremes of the plane over the least-squares plane, per unit deviation
                  of the columns before its own
     residuals    (3, column): coordinates of the face relative to the least-squares plane, per unit deviation
-    coordinates  indices of the coordinates of the plane that shift; each has a column
-    form, form_columns   of the face, and the columns of its coefficients; None if it keeps its shape
-    heights      (place, 3): heights of unit coordinates of the plane at the places of the form
     free         (3, freedom): coordinates of the plane that the datums before leave free, the offset first
-    names        of the coordinates
+    coordinates  indices of the coordinates of the plane that shift; each has a column
     """
 
-    datum: str | None
+    datum: NominalFeature
     extremes: np.ndarray
     residuals: np.ndarray
-    coordinates: tuple[int, ...] = (0,)
-    form: FormField | None = None
-    form_columns: range = range(0)
-    heights: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-    free: np.ndarray = field(default_factory=lambda: np.zeros((3, 0)))
-    names: tuple[str, ...] = ()
+    free: np.ndarray
+    coordinates: tuple[int, ...]
+
+    @property
+    def form(self) -> FormField | None:
+        """The form of the datum feature; None if it keeps its shape."""
+        return self.datum.form
+
+    @cached_property
+    def heights(self) -> np.ndarray:
+        """The heights (place, 3) of unit coordinates of the plane at the places of the form."""
+        assert self.form is not None
+        return self.datum.geometry.rows((self.form.places, self.form.normals[:, None]))[:, 0]
 
     @property
     def rule(self) -> str:
@@ -75,12 +80,12 @@ class DatumShift:
     def sources(self) -> np.ndarray:
         """The columns of the deviations that the shift follows from."""
         columns = np.flatnonzero(self.extremes.any(axis=0))
-        return columns if self.form is None else np.union1d(columns, np.array(self.form_columns))
+        return columns if self.form is None else np.union1d(columns, np.array(self.datum.form_columns))
 
     def labels(self, system: str) -> list[str]:
         """Return the names of its freedoms, for a feature that refers to a datum system."""
-        name = f"datum {self.datum} of {system}"
-        return [name] if self.form is None else [f"{name}: {self.names[k]}" for k in self.coordinates]
+        name = f"datum {self.datum.feature.datum} of {system}"
+        return [name] if self.form is None else [f"{name}: {self.datum.geometry.names[k]}" for k in self.coordinates]
 
     def moved(self, kept: np.ndarray, places: np.ndarray) -> "DatumShift | None":
         """Return the shift with some columns kept, and these at other places; None if none of its own columns is kept."""
@@ -120,7 +125,7 @@ class DatumShift:
         """Return the coordinates (row, 3) [mm] of the planes that touch faces with `residuals` (row, 3) [mm]."""
         coordinates = np.zeros((len(deviations), 3))
         coordinates[:, :1] = self._largest_heights(deviations)
-        coefficients = deviations[:, self.form_columns.start : self.form_columns.stop]
+        coefficients = deviations[:, self.datum.form_columns.start : self.datum.form_columns.stop]
         with_form = np.flatnonzero(coefficients.any(axis=1))
         rows, planes = np.ascontiguousarray(self.heights.T), self.heights @ self.free
         for start in range(0, len(with_form), FIELDS_AT_ONCE):
@@ -219,21 +224,15 @@ def _datum_shift(
     tilts       (coordinate, n): coordinates for the motions that the datums before leave free
     """
     (datum, *others) = compartment
-    geometry, form = datum.geometry, datum.form
+    geometry = datum.geometry
     if others or not isinstance(geometry, PlaneFeature) or datum.feature.association != OUTSIDE:
         return None
-    if form is not None:
+    if datum.form is not None:
         residuals = np.where(np.abs(residuals) < MIN_PART, 0.0, residuals)
     extremes = geometry.rows(geometry.extremes)[:, 0] @ residuals
-    if form is not None:
-        heights = geometry.rows((form.places, form.normals[:, None]))[:, 0]
-        return DatumShift(
-            datum.feature.datum, extremes, residuals, (0, 1, 2),
-            form, datum.form_columns, heights, _free_coordinates(tilts[1:]), geometry.names,
-        )  # fmt: skip
-    if is_turned or np.abs(extremes).max(initial=0.0) <= MIN_SHIFT:
+    if datum.form is None and (is_turned or np.abs(extremes).max(initial=0.0) <= MIN_SHIFT):
         return None
-    return DatumShift(datum.feature.datum, extremes, residuals)
+    return DatumShift(datum, extremes, residuals, _free_coordinates(tilts[1:]), (0,) if datum.form is None else (0, 1, 2))
 
 
 def _free_coordinates(tilts: np.ndarray) -> np.ndarray:
