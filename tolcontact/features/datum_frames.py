@@ -89,13 +89,13 @@ class DatumShift:
 
     def moved(self, kept: np.ndarray, places: np.ndarray) -> "DatumShift | None":
         """Return the shift with some columns kept, and these at other places; None if none of its own columns is kept."""
-        before, own = kept < self.columns.start, np.isin(kept, self.columns)
-        if not own.any():
+        is_earlier, is_own = kept < self.columns.start, np.isin(kept, self.columns)
+        if not is_own.any():
             return None
-        coordinates = tuple(self.coordinates[k - self.columns.start] for k in kept[own])
-        extremes, residuals = (np.zeros((len(matrix), places[own][0])) for matrix in (self.extremes, self.residuals))
-        extremes[:, places[before]] = self.extremes[:, kept[before]]
-        residuals[:, places[before]] = self.residuals[:, kept[before]]
+        coordinates = tuple(self.coordinates[k - self.columns.start] for k in kept[is_own])
+        extremes, residuals = (np.zeros((len(matrix), places[is_own][0])) for matrix in (self.extremes, self.residuals))
+        extremes[:, places[is_earlier]] = self.extremes[:, kept[is_earlier]]
+        residuals[:, places[is_earlier]] = self.residuals[:, kept[is_earlier]]
         return replace(self, extremes=extremes, residuals=residuals, coordinates=coordinates)
 
     def shifts(self, deviations: np.ndarray, computed: Shifts) -> np.ndarray:
@@ -188,10 +188,10 @@ class DatumFrame(NamedTuple):
         if shift.form is None:
             plane = compartment[0].geometry
             assert isinstance(plane, PlaneFeature)
-            own = np.asarray(moves @ plane.values @ np.concatenate([plane.normal, np.zeros(3)]))[:, None]
+            shift_motion = np.asarray(moves @ plane.values @ np.concatenate([plane.normal, np.zeros(3)]))[:, None]
         else:
-            own = moves[:, shift.coordinates]
-        return DatumFrame(np.hstack([motion, own]), remaining, (*self.shifts, shift))
+            shift_motion = moves[:, shift.coordinates]
+        return DatumFrame(np.hstack([motion, shift_motion]), remaining, (*self.shifts, shift))
 
 
 def datum_frame(
@@ -223,9 +223,9 @@ def _datum_shift(
     residuals   (coordinate, column): coordinates of the features relative to their datum, per unit deviation
     tilts       (coordinate, n): coordinates for the motions that the datums before leave free
     """
-    (datum, *others) = compartment
+    (datum, *further) = compartment
     geometry = datum.geometry
-    if others or not isinstance(geometry, PlaneFeature) or datum.feature.association != OUTSIDE:
+    if further or not isinstance(geometry, PlaneFeature) or datum.feature.association != OUTSIDE:
         return None
     if datum.form is not None:
         residuals = np.where(np.abs(residuals) < MIN_PART, 0.0, residuals)

@@ -60,6 +60,7 @@ class Features:
         )
         if declared.tolerances:
             check_alike(pattern.geometries)
+        # The order of the freedoms is the order of their columns: displacements, datum shifts, sizes, modes of forms.
         start = self.first_column + len(self.freedoms)
         pattern = replace(pattern, layers=tolerance_layers(pattern, self.datums(part), start))
         freedoms = list(_displacements(pattern))
@@ -206,7 +207,7 @@ def _check_size(feature: Feature, geometry: FeatureGeometry) -> None:
             "shape, with the limits about it"
         )
     if size.is_for_holes not in (None, geometry.is_inner):
-        own, other = (
+        kind, letters = (
             ("a hole", size.tolerance_class.upper()) if geometry.is_inner else ("no hole", size.tolerance_class.lower())
         )
-        raise GeometryFault(f'its tolerance class is {size.tolerance_class}, and it is {own}; write "{other}"')
+        raise GeometryFault(f'its tolerance class is {size.tolerance_class}, and it is {kind}; write "{letters}"')
