@@ -267,8 +267,10 @@ def datum_order(part: Part) -> tuple[list[Declared], list[Declared]]:
     while ready := [declared for declared in remaining if _references(declared) <= present]:
         ordered += ready
         for declared in ready:
-            is_targets = isinstance(declared, DatumTargets)
-            present |= {declared.letter} if is_targets else {declared.datum, *declared.members}
+            if isinstance(declared, DatumTargets):
+                present.add(declared.letter)
+            else:
+                present.update([declared.datum, *declared.members])
         remaining = [declared for declared in remaining if declared not in ready]
     return ordered, remaining
 

@@ -60,14 +60,15 @@ def fill_zones(nominal: Nominal) -> tuple[list[Freedom], list[ComponentZone], di
     """
     freedoms, component_zones, mean_widths = list(nominal.freedoms), list[ComponentZone](), dict[str, float]()
     for pattern in nominal.patterns:
-        forms = [(member, member.form) for member in pattern.members if pattern.form is not None and member.form is not None]
         spreads_of_forms = []
-        for member, form in forms:
-            spreads = form_spreads(form, pattern.form)
-            means = np.zeros(len(spreads)) if form.means is None else form.means
+        for member in pattern.members:
+            if member.form is None or pattern.form is None:
+                continue
+            spreads = form_spreads(member.form, pattern.form)
+            means = np.zeros(len(spreads)) if member.form.means is None else member.form.means
             for column, spread, mean in zip(member.form_columns, spreads, means, strict=True):
                 freedoms[column] = replace(freedoms[column], spread=float(spread), mean=float(mean))
-            mean_widths[member.label] = mean_width(form, spreads)
+            mean_widths[member.label] = mean_width(member.form, spreads)
             spreads_of_forms.append(spreads)
         try:
             component_zones += _fill_layers(pattern, spreads_of_forms, freedoms)
@@ -125,7 +126,7 @@ def _member_zones(
     places, tolerance = pattern.slices, layer.tolerance
     if not spreads_of_forms or not includes_form(tolerance, pattern.geometries[0]):
         return [MemberZone(rows, coordinates[place]) for rows, place in zip(layer.rows, places, strict=True)]
-    members = []
+    members = list[MemberZone]()
     for member, rows, place, spreads in zip(pattern.members, layer.rows, places, spreads_of_forms, strict=True):
         form, geometry = member.form, member.geometry
         assert form is not None
