@@ -7,9 +7,7 @@ from scipy.stats import binom, norm
 import tolcontact as tc
 from tests.cases import Frame, toleranced
 from tests.population_referee import measured_back
-from tolcontact.declaration.feature_tolerance import ToleranceKind
 from tolcontact.discretization import discretize
-from tolcontact.features.tolerance_kinds import TOLERANCES
 from tolcontact.variation import Draws
 from tolcontact.variation.zones import MemberZone, equal_spread, share_inside
 
@@ -153,13 +151,3 @@ def test_a_tangent_plane_and_form_per_length_are_stated_and_draw_as_the_plane_do
     assert list(map(str, top.tolerances))[1:] == [
         "parallelism 0.1 Ⓣ A", "flatness 0.02/25×25", "straightness 0.01/10",
     ]  # fmt: skip
-
-
-def test_a_new_kind_of_tolerance_is_a_row_of_each_table(monkeypatch):
-    """A kind with the row of run-out has its spreads, also around a form: nothing else depends on the name of a kind."""
-    kind = ToleranceKind("wall run-out", "run-out of a wall to the axis of its datums")
-    monkeypatch.setitem(TOLERANCES, kind, TOLERANCES[tc.TotalRunout])
-    kinds = kind, tc.TotalRunout
-    models = [toleranced.ring_with("bore", row(0.3, "A|B"), tc.Cylindricity(0.05)) for row in kinds]
-    spreads, expected = ([freedom.spread for freedom in Draws(discretize(model)).contributors] for model in models)
-    assert spreads == expected and min(spreads) > 0
