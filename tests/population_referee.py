@@ -15,22 +15,23 @@ import tolcontact as tc
 from tolcontact.declaration import OUTSIDE, GeometricTolerance
 from tolcontact.declaration.feature_tolerance import INSIDE
 from tolcontact.discretization import Nominal, discretize
-from tolcontact.features import AxisFeature, Datum, FeatureGeometry, Layer, NominalFeature, NominalPattern, PlaneFeature
+from tolcontact.features import AxisFeature, FeatureGeometry, FeatureOfSize, Layer, NominalFeature, NominalPattern, PlaneFeature
 from tolcontact.features.feature_geometry import Probes
-from tolcontact.features.least_zone import least_widths, middles
+from tolcontact.features.minimum_zone import minimax, minimum_widths
 from tolcontact.features.tolerance_kinds import (
-    ZONES,
+    TOLERANCES,
     axis_zone,
     direction_zone,
     flat_axis_zone,
+    floats,
     form_zone,
+    includes_form,
     slope_zone,
     surface_zone,
     zone_rows,
 )
 from tolcontact.statistics.intervals import proportion_of
 from tolcontact.variation import Draws
-from tolcontact.variation.component_zones import bonus, floats, includes_form
 
 MIN_NOTICED = 1e-4  # smallest singular value, relative to the largest, of a motion that datums notice
 STATED_SHARE = 0.9973
@@ -136,10 +137,10 @@ def _measured_zone(
 
 
 def _measured_tolerance(
-    pattern: NominalPattern, layer: Layer, system: Sequence[Sequence[Datum]], deviations: np.ndarray
+    pattern: NominalPattern, layer: Layer, system: Sequence[Sequence[NominalFeature]], deviations: np.ndarray
 ) -> MeasuredZone:
     """Measure one tolerance of a feature or pattern in the system of its datum features."""
-    tolerance, centre = layer.tolerance, pattern.geometry.centre
+    tolerance, centre = layer.tolerance, pattern.centre
     primary = system[0][0].geometry if system else None
     has_form = pattern.form is not None and includes_form(tolerance, pattern.members[0].geometry)
     probes = [
@@ -169,15 +170,25 @@ def _measured_tolerance(
         needed.append(width)
         allowed.append(np.full(len(residuals), float(tolerance.width)))
         if member.size_column is not None:
-            allowed[-1] += bonus(member, tolerance, deviations[:, member.size_column])
+            allowed[-1] += _bonus(member, tolerance, deviations[:, member.size_column])
         start = end
     stated = _stated_share(pattern, layer)
     return _measured_zone(pattern, f"{tolerance}; {tolerance.rule}", stated, _in_turn(needed), _in_turn(allowed))
 
 
+def _bonus(feature: NominalFeature, tolerance: GeometricTolerance, size: np.ndarray) -> np.ndarray:
+    """Return the growth [mm] of a zone for size deviations of any shape: their departure from the material limit."""
+    limits = feature.feature.size
+    if limits is None or not tolerance.material:
+        return np.zeros_like(size)
+    is_inner = isinstance(feature.geometry, FeatureOfSize) and feature.geometry.is_inner
+    counts_from_lower = is_inner == (tolerance.material == "M")
+    return np.maximum(size - limits.lower if counts_from_lower else limits.upper - size, 0.0)
+
+
 def _zone_probes(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: FeatureGeometry | None) -> Probes:
     """Return the places and directions in which a feature is measured for a tolerance."""
-    if ZONES[tolerance.of][type(feature)] is surface_zone:
+    if TOLERANCES[tolerance.of].zones[type(feature)] is surface_zone:
         return feature.surface_probes
     places, directions = feature.extremes
     if tolerance.projected is None:
@@ -190,7 +201,7 @@ def _zone_probes(tolerance: GeometricTolerance, feature: FeatureGeometry, primar
 
 def _needed_width(tolerance: GeometricTolerance, feature: FeatureGeometry, residuals: np.ndarray) -> np.ndarray:
     """Return the width (n,) [mm] of the narrowest zone around what probes measured (n, point, entry) [mm]."""
-    return WIDTHS[ZONES[tolerance.of][type(feature)]](tolerance, feature, residuals)
+    return WIDTHS[TOLERANCES[tolerance.of].zones[type(feature)]](tolerance, feature, residuals)
 
 
 def _width_about_surface(tolerance: GeometricTolerance, feature: FeatureGeometry, residuals: np.ndarray) -> np.ndarray:
@@ -221,7 +232,7 @@ WIDTHS: dict[Callable, Callable[[GeometricTolerance, FeatureGeometry, np.ndarray
 def _measured_form(pattern: NominalPattern, layer: Layer, deviations: np.ndarray) -> MeasuredZone:
     """Measure the tolerance by which the form of a feature or pattern is drawn: the least zones of its faces."""
     widths = [
-        least_widths(member.form.zone, _form_heights(member, deviations))
+        minimum_widths(member.form.zone, _form_heights(member, deviations))
         for member in pattern.members
         if member.form is not None
     ]
@@ -230,13 +241,13 @@ def _measured_form(pattern: NominalPattern, layer: Layer, deviations: np.ndarray
     return _measured_zone(pattern, f"{tolerance}; {tolerance.rule}", stated, _in_turn(widths), tolerance.width)
 
 
-def _form_probes(feature: NominalFeature | Datum) -> Probes:
+def _form_probes(feature: NominalFeature) -> Probes:
     """Return places all over a face with form, and its normal at each."""
     assert feature.form is not None
     return feature.form.places, feature.form.normals[:, None]
 
 
-def _form_heights(feature: NominalFeature | Datum, deviations: np.ndarray) -> np.ndarray:
+def _form_heights(feature: NominalFeature, deviations: np.ndarray) -> np.ndarray:
     """Return the heights (n, place) [mm] of the form of drawn features at these places."""
     assert feature.form is not None
     return np.asarray(deviations[:, feature.form_columns] @ feature.form.place_heights)
@@ -245,7 +256,7 @@ def _form_heights(feature: NominalFeature | Datum, deviations: np.ndarray) -> np
 def _stated_share(pattern: NominalPattern, layer: Layer) -> float:
     """Return the share of features inside that the rules state; NaN if they state none."""
     tolerance, tolerances = layer.tolerance, pattern.declared.geometric
-    is_shared = any(pattern.geometry.owner(direction) is None for direction in layer.added.T)
+    is_shared = any(pattern.owner(direction) is None for direction in layer.added.T)
     has_bonus_beside = tolerance.material and (len(pattern.layers) > 1 or is_shared)
     if all(nested.rule == INSIDE and nested.cp == 1 and nested.cpk is None for nested in tolerances) and not has_bonus_beside:
         return STATED_SHARE
@@ -253,7 +264,7 @@ def _stated_share(pattern: NominalPattern, layer: Layer) -> float:
 
 
 def _measurement(
-    feature: NominalFeature | Datum, places: np.ndarray, directions: np.ndarray, deviations: np.ndarray, centre: np.ndarray
+    feature: NominalFeature, places: np.ndarray, directions: np.ndarray, deviations: np.ndarray, centre: np.ndarray
 ) -> _Measurement:
     """Measure drawn features at `places` (point, 3) along `directions` (point, entry, 3); motions turn about `centre` (3,)."""
     geometry = feature.geometry
@@ -264,7 +275,7 @@ def _measurement(
     return _Measurement(rows, np.einsum("npk,pek->npe", displacements, directions).reshape(len(deviations), -1))
 
 
-def _touches_outside(datum: Datum) -> bool:
+def _touches_outside(datum: NominalFeature) -> bool:
     return isinstance(datum.geometry, PlaneFeature) and datum.feature.association == OUTSIDE
 
 
@@ -276,14 +287,14 @@ def _tangents(motions: np.ndarray, heights: np.ndarray) -> np.ndarray:
     tilts, lengths, _ = np.linalg.svd(motions - motions.mean(axis=0), full_matrices=False)
     tilts = tilts[:, lengths > MIN_NOTICED * max(lengths.max(initial=0.0), 1.0)]
     rows = np.column_stack([np.ones(len(motions)), tilts / np.abs(tilts).max(axis=0, initial=MIN_NOTICED)])
-    middle, _ = middles(rows, heights)
+    middle, _ = minimax(rows, heights)
     planes = middle @ rows.T
     return np.asarray(planes + (heights - planes).max(axis=1)[:, None])
 
 
 def _fitted_frame(
     pattern: NominalPattern,
-    system: Sequence[Sequence[Datum]],
+    system: Sequence[Sequence[NominalFeature]],
     deviations: np.ndarray,
     orientation_only: Sequence[bool],
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -293,8 +304,8 @@ def _fitted_frame(
     free. A plane by itself is then moved out of the material until no probe of it stands outside of its datum. One with form is
     measured all over, and what is fitted to it first is the plane that touches it.
     """
-    centre = pattern.geometry.centre
-    free = np.diag([1.0] * 3 + [1 / pattern.geometry.reach] * 3)
+    centre = pattern.centre
+    free = np.diag([1.0] * 3 + [1 / pattern.reach] * 3)
     motion = np.zeros((len(deviations), 6))
     for compartment, is_turned in zip(system, orientation_only, strict=True):
         is_outside = len(compartment) == 1 and _touches_outside(compartment[0])

@@ -9,7 +9,7 @@ from tests.cases import toleranced
 from tests.cases.round_contact import BARREL
 from tests.test_guide import GUIDE
 from tolcontact.declaration.feature_tolerance import KINDS
-from tolcontact.features.tolerance_kinds import ZONES
+from tolcontact.features.tolerance_kinds import TOLERANCES
 
 BORE = tc.Cylinder(inner=True)
 
@@ -170,7 +170,7 @@ def test_a_datum_that_locks_nothing_is_named():
 
 
 def test_every_tolerance_kind_has_a_zone_a_public_name_and_a_place_in_the_guide():
-    assert set(ZONES) == set(KINDS.values())
+    assert set(TOLERANCES) == set(KINDS.values())
     chapter = (GUIDE / "features.md").read_text(encoding="utf-8")
     for kind in KINDS.values():
         assert getattr(tc, kind.name) is kind and f"`tc.{kind.name}" in chapter

@@ -10,8 +10,8 @@ from tests.cases import toleranced
 from tests.cases.seats import seat
 from tests.helpers import nightly
 from tests.population_referee import measured_back
-from tolcontact.features.least_zone import ZoneMember, least_widths
-from tolcontact.variation.form_spreads import FormSpread
+from tolcontact.features.minimum_zone import ZoneMember, minimum_widths
+from tolcontact.variation.form_spreads import equal_form_spread
 
 FORMS = [tc.Form(), tc.Form(length=10), tc.Form("matern 5/2"), tc.Form("matern 3/2")]
 SHARE = 0.9973002039367398
@@ -33,7 +33,7 @@ def width_by_programme(places, heights):
 def test_the_least_zone_is_that_of_a_linear_programme(faces):
     field = field_of(tc.Form())
     heights = np.random.default_rng(1).normal(size=(faces, field.modes)) @ field.heights(field.places).T
-    widths = least_widths(field.zone, heights)
+    widths = minimum_widths(field.zone, heights)
     expected = [width_by_programme(field.places[:, :2], of_one) for of_one in heights]
     np.testing.assert_allclose(widths, expected, rtol=1e-6)
 
@@ -43,16 +43,16 @@ def test_the_least_zone_by_closed_form():
     x, y = (grid.ravel() for grid in np.meshgrid(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21)))
     heights = np.array([x**2 + y**2, x * y, 3 * x - 2 * y + 1])
     zone = [ZoneMember(np.arange(len(x)), np.column_stack([x**0, x, y]))]
-    np.testing.assert_allclose(least_widths(zone, heights), [2, 2, 0], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(minimum_widths(zone, heights), [2, 2, 0], rtol=1e-6, atol=1e-6)
 
 
 @pytest.mark.parametrize(("form", "count"), [(FORMS[0], 60_000), *nightly(*((form, 200_000) for form in FORMS))], ids=str)
 def test_a_stated_share_of_faces_lies_inside(form, count):
     field, width = field_of(form), 0.05
-    spread = FormSpread(field).spread(width)
+    spread = equal_form_spread(field, width)
     rng, inside, modes = np.random.default_rng(7), 0, field.heights(field.places).T
     for _ in range(count // 2000):
-        inside += int((least_widths(field.zone, spread * rng.normal(size=(2000, field.modes)) @ modes) <= width).sum())
+        inside += int((minimum_widths(field.zone, spread * rng.normal(size=(2000, field.modes)) @ modes) <= width).sum())
     lower, upper = count_inside(inside, count)
     assert lower < SHARE < upper
 

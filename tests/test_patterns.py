@@ -28,7 +28,7 @@ def plate(*tolerances, count=2, **options):
 
 
 def spreads(model):
-    return {freedom.label: freedom.spread for freedom in Draws(discretize(model)).contributors if freedom.layer is not None}
+    return {freedom.label: freedom.spread for freedom in Draws(discretize(model)).contributors if freedom.geometric is not None}
 
 
 def axis_ends(model, samples):

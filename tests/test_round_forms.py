@@ -11,7 +11,7 @@ from tests.cases.fits import CLEARANCE, LENGTH, PULL, RADIUS, shaft_in_a_bore, s
 from tests.helpers import SEATED, nightly, simulate
 from tests.population_referee import measured_back
 from tests.test_form import coefficients
-from tolcontact.features.least_zone import least_widths
+from tolcontact.features.minimum_zone import minimum_widths
 from tolcontact.simulation.surfaces import check_surfaces
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
 from tolcontact.vocabulary import CORRECTED, Status
@@ -140,7 +140,7 @@ def test_zones_of_cylinders_are_those_of_a_linear_programme(tolerance):
         own = key == value
         widths = [width_by_programme(terms[own][:, columns], of_one[own]) for of_one in heights]
         expected = np.maximum(expected, widths)
-    np.testing.assert_allclose(least_widths(field.zone, heights), expected, rtol=1e-6)
+    np.testing.assert_allclose(minimum_widths(field.zone, heights), expected, rtol=1e-6)
     assert 0.01 < expected.mean() < 0.05
 
 

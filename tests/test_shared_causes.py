@@ -12,8 +12,8 @@ from tests.test_datums import plate
 from tests.test_ra1 import plane_weights
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.designs import MixedDraws, SteppedDraws
+from tolcontact.features.freedoms import LOCATOR, Freedom
 from tolcontact.report.analysis_tables import analysis_report
-from tolcontact.variation.contributors import LOCATOR, Contributor
 
 SUPPORTS = ("A1", "A2", "A3")
 
@@ -174,7 +174,7 @@ def test_groups_are_named_after_what_varies():
     ids=str,
 )
 def test_variances_are_those_of_the_quantiles(tolerance):
-    contributor = Contributor("block.A1", LOCATOR, "mm", tolerance)
+    contributor = Freedom("block.A1", LOCATOR, tolerance)
     deviations = contributor.deviations((np.arange(1_000_000) + 0.5) / 1_000_000)
     assert contributor.variance == pytest.approx(deviations.var(), rel=1e-4)
 

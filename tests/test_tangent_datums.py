@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 import tolcontact as tc
 from tests.population_referee import measured_back
 from tolcontact.declaration.script import load_model
-from tolcontact.features import FormField, TangentPlane
+from tolcontact.features import FormField
 from tolcontact.testing import assert_datums_recompute, assert_same_run
 
 TIGHT = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
@@ -47,7 +47,7 @@ def program():
 
 
 def tangents(program):
-    planes = {column: lean for pattern in program.nominal.patterns for column, lean in pattern.leans.items()}
+    planes = {plane.columns.start: plane for pattern in program.nominal.patterns for plane in pattern.shifts}
     return {program.nominal.contributors[column]: (column, plane) for column, plane in planes.items()}
 
 
@@ -72,8 +72,8 @@ def test_the_plane_is_that_of_a_linear_programme_on_the_same_heights(program, la
     np.testing.assert_array_equal(planes, deviations[:, column : column + planes.shape[1]])
     whole = replace(plane, coordinates=(0, 1, 2)).shifts(deviations, {})
     for deviation, coordinates in zip(deviations, whole, strict=True):
-        leaning = plane.leaning @ deviation[: plane.leaning.shape[1]]
-        form = plane.form.heights(plane.form.places) @ deviation[plane.form_columns]
+        leaning = plane.residuals @ deviation[: plane.residuals.shape[1]]
+        form = plane.form.heights(plane.form.places) @ deviation[plane.datum.form_columns]
         heights = plane.heights @ leaning + form
         scale = np.abs(heights).max()
         least = programme(heights / scale, rows)
@@ -116,9 +116,9 @@ def test_simple_forms_are_touched_where_closed_forms_say(shape, out, inverted):
     program = tc.build(plate(tc.Form(modes=1)))
     ((_, plane),) = tangents(program).values()
     fields_of_form = {field.name: getattr(plane.form, field.name) for field in fields(FormField)}
-    by_hand = replace(plane, form=OneMode(**fields_of_form, shape=shape))
+    by_hand = replace(plane, datum=replace(plane.datum, form=OneMode(**fields_of_form, shape=shape)))
     deviations = np.zeros((2, len(program.nominal.contributors)))
-    deviations[:, plane.form_columns.start] = 0.02, -0.03
+    deviations[:, plane.datum.form_columns.start] = 0.02, -0.03
     expected = [[0.02 * out, 0, 0], [0.03 * inverted, 0, 0]]
     np.testing.assert_allclose(by_hand.shifts(deviations, {}), expected, atol=1e-12)
 
@@ -157,9 +157,9 @@ def test_archives_state_the_planes_and_recompute_them(tmp_path):
     with tc.open_archive(path) as archive:
         sample = archive["sample"].to_dataset()
         rules = sample["distribution"].values[sample["source"].values == "datum"]
-        assert set(rules) == {TangentPlane.rule} and len(rules) == len(
-            sample["contributor"][["datum" in str(label) for label in sample["contributor"].values]]
-        )
+        assert set(rules) == {"follows from the form of the datum feature; minimax plane outside of the material"} and len(
+            rules
+        ) == len(sample["contributor"][["datum" in str(label) for label in sample["contributor"].values]])
         column = list(sample["contributor"].values).index("block.top 0.datum A of A|B|C: offset")
         archive["sample"]["deviation"].values[3, column] += 1e-6
         with pytest.raises(AssertionError, match="in realization 3 is"):

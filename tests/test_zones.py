@@ -49,7 +49,7 @@ def zone_with(rows):
 def test_spreads_are_those_of_the_table(name):
     model, factor = FACTORS[name]
     contributors = Draws(discretize(model())).contributors
-    spreads = [each.spread for each in contributors if each.layer is not None] or [contributors[-1].tolerance.width / 6]
+    spreads = [each.spread for each in contributors if each.geometric is not None] or [contributors[-1].tolerance.width / 6]
     assert spreads == pytest.approx([1 / factor] * len(spreads), rel=2e-3)
 
 
@@ -108,7 +108,7 @@ def test_capability_and_shifts():
 
 def test_a_capability_off_centre_shifts_the_place_of_a_face_and_not_its_tilts():
     block = toleranced.block_with("top", tc.Profile(0.3, "A", cp=1.5, cpk=1.2))
-    place, *tilts = [each for each in Draws(discretize(block)).contributors if each.layer is not None]
+    place, *tilts = [each for each in Draws(discretize(block)).contributors if each.geometric is not None]
     assert place.mean_shift == pytest.approx(3 * place.spread * 1.5 * (1 - 1.2 / 1.5), rel=1e-12) and len(tilts) == 2
     assert [tilt.mean_shift for tilt in tilts] == [0, 0]
 

@@ -9,9 +9,9 @@ import numpy as np
 import scipy
 
 from tolcontact.declaration import Tolerance
-from tolcontact.variation.component_zones import ComponentZone
-from tolcontact.variation.contributors import TAIL, Contributor
+from tolcontact.features.freedoms import TAIL, Freedom
 from tolcontact.variation.draws import Draws
+from tolcontact.variation.spreads import ComponentZone
 
 RANDOM_DIRECTIONS = 32  # for the extreme points of a zone, in addition to the directions of its components
 MAX_CUTS = 40  # successive tangents of a round zone
@@ -38,11 +38,11 @@ class AllowedRegion:
         measured = [column for columns, _ in self._populations for column in columns]
         for columns, values in self._populations:
             self.lower[columns], self.upper[columns] = values.min(axis=0), values.max(axis=0)
-        self.zones = [zone for zone in draws.contributors.zones if not np.isin(zone.columns, measured).any()]
+        self.zones = [zone for zone in draws.zones if not np.isin(zone.columns, measured).any()]
         for zone in self.zones:
             self._enclose(zone)
-        for column, lean in draws.leans.items():
-            self.lower[column], self.upper[column] = lean.bounds(*self._driven_bounds())
+        for shift in draws.shifts:
+            self.lower[shift.columns.start], self.upper[shift.columns.start] = shift.bounds(*self._driven_bounds())
         self._joined = [(np.array(columns), values) for columns, values in self._populations]
         rng = np.random.default_rng(seed)
         for columns in self._joint_columns():
@@ -263,7 +263,7 @@ class AllowedRegion:
         return np.asarray(middle[columns] + self.reach(middle[None], (point - middle)[None])[0] * (point - middle)[columns])
 
 
-def _bounds(contributor: Contributor) -> tuple[float, float]:
+def _bounds(contributor: Freedom) -> tuple[float, float]:
     """Return the bounds of a contributor without its zones."""
     if contributor.tolerance is None:
         return 0.0, 0.0  # its zone bounds it

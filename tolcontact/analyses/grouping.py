@@ -6,8 +6,8 @@ import numpy as np
 
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
+from tolcontact.features.freedoms import FORM
 from tolcontact.statistics.linear_shares import joined_columns
-from tolcontact.variation.contributors import FORM
 from tolcontact.variation.draws import Draws
 from tolcontact.vocabulary import GROUPED_BY
 
@@ -28,7 +28,8 @@ def owners(program: Program, by: str) -> list[str]:
     owner_of = {label: part.located for part in nominal.parts for label in part.locators.labels}
     for pattern in nominal.patterns:
         part = pattern.declared.part.name
-        owner_of |= {label: part if by == "part" else label.rpartition(".")[0] for label in pattern.labels}
+        labels_of_pattern = [freedom.label for freedom in pattern.freedoms]
+        owner_of |= {label: part if by == "part" else label.rpartition(".")[0] for label in labels_of_pattern}
     return [owner_of.get(label, label) for label in labels]
 
 

@@ -14,9 +14,9 @@ from tolcontact.analyses.farthest_pose import farthest_poses
 from tolcontact.analyses.linear_model import LinearModel, linear_model
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
+from tolcontact.features.freedoms import FORM
 from tolcontact.simulation import simulate_blocks
 from tolcontact.variation import GivenDraws
-from tolcontact.variation.contributors import FORM
 from tolcontact.workflow.models import Choice, Model
 
 PER_LEVEL, PER_CONTRIBUTOR = 20.0, 6.0  # combinations that a search needs at each step length

@@ -6,24 +6,23 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.compilation import Program
-from tolcontact.features import TangentPlane
+from tolcontact.features import DatumShift
 from tolcontact.vocabulary import ArchiveVariable
 
 COORDINATES = 3  # of a plane
 
 
-def tangents(program: Program) -> dict[int, TangentPlane]:
-    """Return the planes that touch datum features, by the first of their columns of deviations."""
-    leans = {column: lean for pattern in program.nominal.patterns for column, lean in pattern.leans.items()}
-    return {column: lean for column, lean in leans.items() if isinstance(lean, TangentPlane)}
+def tangents(program: Program) -> list[DatumShift]:
+    """Return the shifts of the planes that touch datum features with form."""
+    return [shift for pattern in program.nominal.patterns for shift in pattern.shifts if shift.form is not None]
 
 
 def datum_sizes(program: Program) -> dict[str, int]:
     """Return the dimensions of these planes; none if there are none."""
-    planes = list(tangents(program).values())
+    planes = tangents(program)
     if not planes:
         return {}
-    places = {plane.form_columns.start: len(plane.heights) for plane in planes}
+    places = {plane.datum.form_columns.start: len(plane.heights) for plane in planes}
     return {
         terms.TANGENT: len(planes), terms.TANGENT_PLACE: sum(places.values()),
         terms.COORDINATE: COORDINATES, terms.TANGENT_FREEDOM: COORDINATES,
@@ -39,14 +38,14 @@ def datum_values(program: Program) -> dict[ArchiveVariable, Any]:
     count = len(program.nominal.contributors)
     columns, leaning = np.full((len(planes), COORDINATES), -1), np.zeros((len(planes), COORDINATES, count))
     free = np.zeros((len(planes), COORDINATES, COORDINATES))
-    for number, (column, plane) in enumerate(planes.items()):
-        columns[number, list(plane.coordinates)] = column + np.arange(len(plane.coordinates))
-        leaning[number, :, : plane.leaning.shape[1]] = plane.leaning
+    for number, plane in enumerate(planes):
+        columns[number, list(plane.coordinates)] = plane.columns
+        leaning[number, :, : plane.residuals.shape[1]] = plane.residuals
         free[number, :, : plane.free.shape[1]] = plane.free
-    touched = {faces[plane.form_columns.start]: plane for plane in planes.values()}
+    touched = {faces[plane.datum.form_columns.start]: plane for plane in planes}
     places = [program.nominal.faces[face].form for face in touched]
     return {
-        terms.TANGENT_FACE: [faces[plane.form_columns.start] for plane in planes.values()],
+        terms.TANGENT_FACE: [faces[plane.datum.form_columns.start] for plane in planes],
         terms.TANGENT_CONTRIBUTOR: columns,
         terms.TANGENT_LEANING: leaning,
         terms.TANGENT_FREE: free,

@@ -36,7 +36,7 @@ def form_values(program: Program) -> dict[ArchiveVariable, Any]:
     with_form = [(number, face, face.form) for number, face in enumerate(faces) if face.form is not None]
     for number, face, form in with_form:
         spread = np.nan if form.spreads is not None else contributors[face.form_columns[0]].spread
-        width = program.draws.contributors.mean_zones[face.name]
+        width = program.draws.mean_widths[face.name]
         values = (*form.lengths, *form.associated.ends, spread, form.left_out, width)
         for variable, value in zip(NUMBERS, values, strict=True):
             numbers[variable][number] = value

@@ -27,6 +27,7 @@ from tolcontact.discretization.nominal import ContactPoints, Nominal
 from tolcontact.discretization.scenes import Scene, carried, scenes_of
 from tolcontact.errors import GeometryFault, ModelError, designation
 from tolcontact.features import Features, Placement, datum_order
+from tolcontact.features.freedoms import DATUM
 from tolcontact.geometry.faces import Meshes
 from tolcontact.geometry.files.reading import Shape, read_files
 from tolcontact.geometry.shapes import field_surface, placement_of, shape
@@ -91,10 +92,10 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
     if is_sound:
         faults.extend(fault for scene in scenes for fault in _immovable_pairs(scene))
         labels = [label for nominal in nominal_parts for label in nominal.locators.labels]
-        labels += [*features.labels, *(variable.name for variable in assembly.variables)]
+        labels += [*(freedom.label for freedom in features.freedoms), *(variable.name for variable in assembly.variables)]
         faults.extend(_repeated_labels(labels))
         if not faults:
-            shifts = {labels[column] for pattern in features.patterns for column in pattern.shift_columns}
+            shifts = {freedom.label for freedom in features.freedoms if freedom.source == DATUM}
             faults.extend(_contributor_faults(assembly, labels, shifts))
     faults.extend(fault for scene in scenes for fault in _reserved_names(scene))
     if faults:
@@ -173,7 +174,7 @@ def _on_features(
             )
         locators = replace(locators, faces=faces)
     if location is not None and isinstance(location.on, Feature):
-        ground = features.middle_of(location.on, placements[location.on.part])
+        ground = features.face_of(location.on, None, placements[location.on.part])
         locators = replace(locators, grounds=(ground,) * len(locators))
     return replace(part, locators=locators)
 

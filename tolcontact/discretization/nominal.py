@@ -16,7 +16,8 @@ from tolcontact.discretization.offsets import Offsets, PairForm
 from tolcontact.discretization.plane_minima import PlaneMinima
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
-from tolcontact.features import Datum, FaceDeviation, Features, NominalFeature, NominalPattern
+from tolcontact.features import FaceDeviation, Features, Freedom, NominalFeature, NominalPattern
+from tolcontact.features.freedoms import LOCATOR, VARIABLE
 from tolcontact.features.zone_kernel import sum_modes
 from tolcontact.geometry.face_pair import FacePair, body_face
 from tolcontact.geometry.faces import Meshes, triangles
@@ -231,14 +232,14 @@ class Nominal:
     @property
     def features(self) -> tuple[NominalFeature, ...]:
         """The features of all parts, among them the members of patterns."""
-        return tuple(self._features.features)
+        return tuple(self._features.features.values())
 
     @property
     def patterns(self) -> tuple[NominalPattern, ...]:
         """The features that are toleranced together, of all parts; a single feature is a pattern of one member."""
         return tuple(self._features.patterns)
 
-    def datums(self, part: int) -> dict[str | None, tuple[Datum, ...]]:
+    def datums(self, part: int) -> dict[str | None, tuple[NominalFeature, ...]]:
         """Return the datums of a part by their letters: several features or targets for a common datum."""
         return self._features.datums(part)
 
@@ -248,9 +249,19 @@ class Nominal:
         return self._features.faces
 
     @cached_property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """The freedoms of locators, features and variables, without spreads: column k of deviations belongs to freedom k."""
+        locators = zip(self.locators.labels, self.locators.tolerances, strict=True)
+        return (
+            *(Freedom(label, LOCATOR, tolerance) for label, tolerance in locators),
+            *self._features.freedoms,
+            *(Freedom(cause.name, VARIABLE, cause.tolerance, units=cause.units) for cause in self.assembly.variables),
+        )
+
+    @cached_property
     def contributors(self) -> tuple[str, ...]:
-        """The labels of the columns of deviations: locators, freedoms of features, and variables."""
-        return (*self.locators.labels, *self._features.labels, *(variable.name for variable in self.assembly.variables))
+        """The labels of the freedoms."""
+        return tuple(freedom.label for freedom in self.freedoms)
 
     def columns(self, part: int) -> np.ndarray:
         """Return the columns of a part's locators."""
@@ -306,7 +317,7 @@ class Nominal:
     def position(self, point: Point) -> np.ndarray:
         """Return the nominal assembly coordinates (3,) [mm] of a declared point."""
         if point.end is not None and point.on is not None:
-            position = self._features.nominal(point.on).geometry.end(point.end)
+            position = self._features.features[point.on].geometry.end(point.end)
         else:
             position = np.array(point.position)
         return self.parts[self.part_index(point.part)].placed(position)
@@ -315,7 +326,7 @@ class Nominal:
         """Return the face of a feature that a declared point moves with, or the median of two; None for other points."""
         if point.on is None:
             return None
-        feature = self._features.nominal(point.on)
+        feature = self._features.features[point.on]
         number = None if point.position is None else feature.face_with(np.array(point.position))
         return feature.deviation(number, self.parts[feature.part].placement)
 
@@ -324,6 +335,6 @@ class Nominal:
         part = self.parts[self.part_index(point.part)]
         if point.on is None or point.position is None:
             return np.zeros(3)
-        surface = self._features.nominal(point.on).surfaces[0]  # features that grow in height have one face
+        surface = self._features.features[point.on].surfaces[0]  # features that grow in height have one face
         triangle, foot = surface.nearest(np.array([point.position]))
         return part.placement[0] @ surface.normals(triangle, foot)[0]

@@ -3,15 +3,16 @@
 .. include:: ../guide/features.md
 """
 
-from tolcontact.features.datum_planes import TangentPlane
-from tolcontact.features.face_deviation import FaceDeviation
+from tolcontact.features.datum_frames import DatumShift, datum_order
 from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, PlaneFeature
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.form_field import FormField
-from tolcontact.features.nominal_features import Features, NominalFeature, NominalPattern, Placement
-from tolcontact.features.tolerance_layers import Datum, Layer, datum_order
+from tolcontact.features.freedoms import Freedom
+from tolcontact.features.nominal_feature import FaceDeviation, NominalFeature, Placement
+from tolcontact.features.nominal_features import Features
+from tolcontact.features.nominal_pattern import Layer, NominalPattern
 
 __all__ = [
-    "AxisFeature", "Datum", "FaceDeviation", "FeatureGeometry", "FeatureOfSize", "Features", "FormField", "Layer",
-    "NominalFeature", "NominalPattern", "Placement", "PlaneFeature", "TangentPlane", "datum_order", "feature_geometry",
+    "AxisFeature", "DatumShift", "FaceDeviation", "FeatureGeometry", "FeatureOfSize", "Features", "FormField", "Freedom",
+    "Layer", "NominalFeature", "NominalPattern", "Placement", "PlaneFeature", "datum_order", "feature_geometry",
 ]  # fmt: skip

@@ -1,53 +1,56 @@
 """What form deviations are measured from: an associated surface, or the circles or the lines of a surface (ISO 17450).
 
-A flatness or a cylindricity limits a face as a whole, beside displacements and sizes of its surface. A roundness limits each
-section, beside its place and diameter, and a straightness each line, beside its place and slope.
+A flatness or a cylindricity limits a face as a whole, free of displacements and sizes of its surface. A roundness limits each
+section, free of its position and diameter, and a straightness each line, free of its position and slope.
 """
 
-from abc import ABC
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
 
 from tolcontact.errors import GeometryFault
-from tolcontact.features.axial_grid import PLACE_SPACING, AxialGrid
 from tolcontact.features.covariances import Lengths
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.triangle_mesh import quadrature
 
+PLACE_SPACING = 1 / 4  # of the correlation length
 MIN_PLACES, MAX_PLACES = 600, 20_000  # of a face, over which areas are summed
 MAX_EXCESS = 8  # times the intended number of places
-ROTATIONS = 32  # by which a section's place and diameter are known, exactly for fewer lobes
+MIN_AZIMUTHS, MAX_AZIMUTHS = 48, 144  # of a circle
+MIN_HEIGHTS, MAX_HEIGHTS = 9, 25
+MAX_FACET_ANGLE = np.radians(46.0)  # between neighbouring vertices: a wider gap is a gap of the face
+PLACE_TOLERANCE = 1e-4  # of a face's size: the distance of a place on it, in addition to the error of triangles
+ROTATIONS = 32  # that determine the position and diameter of a section, exactly for fewer lobes
 NODES = 16  # of a line
 MIN_LENGTH = 1e-9  # of a displacement, relative to the largest
 START = 0.01  # rad before the first line, where no other line is: azimuths are counted from here
 TERMS = 7  # of the displacement of a surface: its growth, then a translation and a rotation
 
-Places = tuple[np.ndarray, np.ndarray]  # places (place, 3) [mm] of a face, and the areas (place,) that they stand for
+Places = tuple[np.ndarray, np.ndarray]  # places (place, 3) [mm] of a face, and their areas (place,) as weights
 
 
 def displacement_terms(normals: np.ndarray, arms: np.ndarray) -> np.ndarray:
-    """Return heights (place, 7) of a surface with `normals` (place, 3) for a growth, translations and turns of 1.
+    """Return heights (place, 7) of a surface with `normals` (place, 3) for a unit growth, unit translations and rotations.
 
-    Turns are about the point from which `arms` (place, 3) [mm] are counted.
+    Rotations are about the origin of `arms` (place, 3) [mm].
     """
     (x, y, z), (u, v, w) = arms.T, normals.T
     return np.column_stack([np.ones(len(arms)), normals, y * w - z * v, z * u - x * w, x * v - y * u])
 
 
 @dataclass(frozen=True, eq=False)
-class AssociatedFeature(ABC):
-    """What the form of a face on an analytic surface is measured from.
+class AssociatedSurface:
+    """The analytic surface that the form of a face is measured from, as a whole.
 
     ends       places [mm] of the ends of the face along the axis of the surface
-    is_whole   whether it is the whole surface, and not several members of it
+    is_whole   whether the face has one zone, and not several members with a zone each
     """
 
-    name: ClassVar[str]
-    is_whole: ClassVar[bool] = False
+    name: ClassVar[str] = "surface"
+    is_whole: ClassVar[bool] = True
 
     surface: AnalyticSurface
     ends: tuple[float, float]
@@ -59,14 +62,16 @@ class AssociatedFeature(ABC):
         return cls(surface, (float(along.min()), float(along.max())))
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> Self:
-        """Return the feature of a face that stands at R (3, 3), t (3,) [mm]."""
+        """Return the feature of a face in a part at R (3, 3), t (3,) [mm]."""
         return replace(self, surface=self.surface.placed(R, t))
 
     def places(self, face: Surface, lengths: Lengths) -> Places:
-        """Return places all over a face, for a form with correlation lengths, and their areas."""
+        """Return places all over a face, for a form with correlation lengths, and their areas.
+
+        Raises GeometryFault for circles or lines of a face that does not go all the way around.
+        """
         if isinstance(self.surface, Cylinder | Cone):
-            grid = AxialGrid.of(self.surface, self.ends, face, lengths)
-            return grid.places[grid.is_on], grid.areas[grid.is_on]
+            return self._axial_grid(face, lengths)
         count = min(max(MIN_PLACES, face.mesh.area / (PLACE_SPACING * min(lengths)) ** 2), MAX_PLACES)
         step = float(np.sqrt(face.mesh.area / count))
         places, areas = quadrature(face.mesh, step)
@@ -76,18 +81,18 @@ class AssociatedFeature(ABC):
         return (self.surface.project(places) if face.curvature else places), areas
 
     def copies(self, points: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yield points (point, 3), and the factors (point,) with which a function of place is summed over them.
+        """Yield factors (point,) and points (point, 3), where a function of place is summed with these factors.
 
-        The sum is the function without what displaces each section or line.
+        The sum is the function without the displacement of each section or line.
         """
         yield np.ones(len(points)), points
 
     def members(self, places: np.ndarray) -> list[np.ndarray]:
-        """Return the numbers of the places (place, 3) of each member that has a zone of its own."""
+        """Return the indices of the places (place, 3) of each member that has a zone of its own."""
         return [np.arange(len(places))]
 
     def rows(self, places: np.ndarray) -> np.ndarray:
-        """Return heights (place, freedom) at the places of a member of displacements and growths, each at most 1."""
+        """Return heights (place, freedom) at the places of a member for displacements and growths, each at most 1."""
         _, normals = self.surface.distance(places)
         arms = places - places.mean(axis=0)
         terms = displacement_terms(normals, arms / np.linalg.norm(arms, axis=1).max())[:, 1:]
@@ -96,53 +101,54 @@ class AssociatedFeature(ABC):
         directions = directions[:, lengths > MIN_LENGTH * max(lengths.max(initial=0.0), 1.0)]
         return np.column_stack([np.ones(len(places)), directions / np.abs(directions).max(axis=0)])
 
-
-class AssociatedSurface(AssociatedFeature):
-    """The surface as a whole."""
-
-    name, is_whole = "surface", True
-
-
-class AxialFeature(AssociatedFeature):
-    """Circles around an axis, or lines along it, of a face that goes all the way around. Places are a grid on the face."""
-
-    def places(self, face: Surface, lengths: Lengths) -> Places:
-        grid = AxialGrid.of(self.surface, self.ends, face, lengths)
-        if not grid.is_whole:
+    def _axial_grid(self, face: Surface, lengths: Lengths) -> Places:
+        """Return places on a face of a cylinder or cone, a grid of heights and azimuths, and their relative areas."""
+        surface, (start, end) = self.surface, self.ends
+        count = int(np.clip((end - start) / (PLACE_SPACING * lengths.along), MIN_HEIGHTS, MAX_HEIGHTS))
+        heights = np.linspace(start, end, count)
+        radii = heights * np.tan(surface.angle) if surface.angle else np.full(len(heights), surface.radius)
+        azimuths, shares, u = _azimuths(surface, face, PLACE_SPACING * lengths.across / radii.max())
+        outward = np.cos(azimuths)[:, None] * u + np.sin(azimuths)[:, None] * np.cross(surface.axis, u)
+        places = surface.origin + heights[:, None, None] * surface.axis + radii[:, None, None] * outward
+        nearest = face.nearest(places.reshape(-1, 3))[1].reshape(places.shape)
+        is_on = np.linalg.norm(nearest - places, axis=2) <= PLACE_TOLERANCE * face.mesh.scale + face.bulge
+        goes_around = np.ptp(azimuths) > 2 * np.pi - MAX_FACET_ANGLE and is_on.all(axis=1).any()
+        if not (self.is_whole or goes_around):
             raise GeometryFault(
                 "its face does not go all the way around its axis, so that the form of its sections and lines cannot be drawn; "
                 "give the tolerance form=None, and the feature keeps its shape"
             )
-        return grid.places[grid.is_on], grid.areas[grid.is_on]
+        areas = radii[:, None] * np.outer(_trapezoid(heights), shares)
+        return places[is_on], areas[is_on]
 
     def _along(self, points: np.ndarray) -> np.ndarray:
         """Return the places (point,) [mm] of points (point, 3) along the axis."""
         return (points - self.surface.origin) @ self.surface.axis
 
 
-class AssociatedCircles(AxialFeature):
-    """The circle of each section across the axis."""
+class AssociatedCircles(AssociatedSurface):
+    """The circle of each section across the axis, of a face that goes all the way around."""
 
-    name = "circles"
+    name, is_whole = "circles", False
 
     def copies(self, points: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yield points turned about the axis: their means, and means with a cosine, are a section's diameter and place."""
+        """Yield points rotated about the axis: their means, and means with a cosine, are a section's diameter and position."""
         yield np.ones(len(points)), points
         axis, arms = self.surface.axis, points - self.surface.origin
         along = (arms @ axis)[:, None] * axis
         across, sideways = arms - along, np.cross(axis, arms)
-        for turn in np.arange(ROTATIONS) * 2 * np.pi / ROTATIONS:
-            turned = self.surface.origin + along + np.cos(turn) * across + np.sin(turn) * sideways
-            yield np.full(len(points), -(1 + 2 * np.cos(turn)) / ROTATIONS), turned
+        for angle in np.arange(ROTATIONS) * 2 * np.pi / ROTATIONS:
+            rotated = self.surface.origin + along + np.cos(angle) * across + np.sin(angle) * sideways
+            yield np.full(len(points), -(1 + 2 * np.cos(angle)) / ROTATIONS), rotated
 
     def members(self, places: np.ndarray) -> list[np.ndarray]:
-        return _alike(self._along(places))
+        return _groups_of_equal(self._along(places))
 
 
-class AssociatedLines(AxialFeature):
-    """Each line of the surface in a plane through the axis."""
+class AssociatedLines(AssociatedSurface):
+    """Each line of the surface in a plane through the axis, of a face that goes all the way around."""
 
-    name = "lines"
+    name, is_whole = "lines", False
 
     def copies(self, points: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yield points along the line of each point: integrals of a function, and of it times the place, are its line."""
@@ -162,16 +168,35 @@ class AssociatedLines(AxialFeature):
         axis, arms = self.surface.axis, places - self.surface.origin
         u = arms[0] - (arms[0] @ axis) * axis
         azimuths = np.arctan2(arms @ np.cross(axis, u), arms @ u)
-        return _alike((azimuths + START) % (2 * np.pi))
+        return _groups_of_equal((azimuths + START) % (2 * np.pi))
 
 
-def _alike(values: np.ndarray) -> list[np.ndarray]:
-    """Return the numbers of values that are equal but for rounding, for each such value in turn."""
+def _azimuths(surface: AnalyticSurface, face: Surface, spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return azimuths (azimuth,) [rad] of a face, about `spacing` apart, their shares, and the unit vector (3,) at 0."""
+    axis, arms = surface.axis, np.asarray(face.mesh.vertices) - surface.origin
+    arms = arms - (arms @ axis)[:, None] * axis
+    arms = arms[np.linalg.norm(arms, axis=1) > PLACE_TOLERANCE * face.mesh.scale]
+    u = arms[0] / np.linalg.norm(arms[0])
+    angles = np.sort(np.arctan2(arms @ np.cross(axis, u), arms @ u))
+    gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
+    widest = int(gaps.argmax())
+    extent = 2 * np.pi - (gaps[widest] if gaps[widest] > MAX_FACET_ANGLE else 0.0)
+    count = int(np.ceil(extent / (2 * np.pi) * np.clip(2 * np.pi / spacing, MIN_AZIMUTHS, MAX_AZIMUTHS)))
+    if extent == 2 * np.pi:
+        return np.arange(count) * extent / count, np.ones(count), u
+    azimuths = angles[widest] + gaps[widest] + np.linspace(0.0, extent, max(count, MIN_HEIGHTS))
+    return azimuths, _trapezoid(azimuths), u
+
+
+def _trapezoid(values: np.ndarray) -> np.ndarray:
+    """Return the weights of evenly spaced values in a sum by the trapezoidal rule."""
+    weights = np.full(len(values), values[1] - values[0])
+    weights[[0, -1]] /= 2
+    return weights
+
+
+def _groups_of_equal(values: np.ndarray) -> list[np.ndarray]:
+    """Return the indices of values that are equal up to rounding, for each distinct value in turn."""
     order = np.argsort(values, kind="stable")
     starts = np.flatnonzero(np.diff(values[order]) > 1e-6 * np.ptp(values)) + 1
-    return [np.sort(numbers) for numbers in np.split(order, starts)]
-
-
-ASSOCIATED: Mapping[str, type[AssociatedFeature]] = {
-    kind.name: kind for kind in (AssociatedSurface, AssociatedCircles, AssociatedLines)
-}
+    return [np.sort(indices) for indices in np.split(order, starts)]

@@ -1,7 +1,7 @@
 """Features as kinds of geometry: their coordinates, measured as displacements at their extremes. Part's own frame.
 
-A plane has an offset in its middle and tilts at its edges, an axis has shifts in its middle and tilts at its ends, a centre has
-shifts. All coordinates are in mm and do not depend on where the origin is.
+A plane has an offset at its centre and tilts at its edges, an axis has shifts at its centre and tilts at its ends, a centre has
+shifts. All coordinates are in mm and do not depend on the origin.
 """
 
 from collections.abc import Sequence
@@ -21,12 +21,12 @@ Coordinates = tuple[np.ndarray, tuple[str, ...], np.ndarray, np.ndarray, Probes]
 class FeatureGeometry:
     """The coordinates of a feature.
 
-    centre   (3,) [mm] about which twists turn
+    centre   (3,) [mm] of the rotations of twists
     names    of the coordinates
     twists   (6, coordinate): the displacement (tau, rho) of the feature for a coordinate of 1 mm
     values   (coordinate, 6): the coordinates of a displacement (tau, rho)
     extremes places (point, 3) [mm] and unit vectors (point, entry, 3): corners of a plane, ends of an axis, a centre, vertices
-             of a general surface, and the directions in which the feature is measured there
+             of a general surface, and the directions of measurement there
     """
 
     plural: ClassVar[str]
@@ -49,17 +49,17 @@ class FeatureGeometry:
 
     @property
     def surface_probes(self) -> Probes:
-        """Places and directions by which the profile of the feature's surface is measured."""
+        """Places and directions for measuring the profile of the feature's surface."""
         return self.extremes
 
     def rows(self, probes: Probes) -> np.ndarray:
-        """Return what probes measure for coordinates of 1 mm: (point, entry, coordinate)."""
+        """Return the measurements of probes for coordinates of 1 mm: (point, entry, coordinate)."""
         places, directions = probes
         moved = self.twists[:3].T + np.cross(self.twists[3:].T, (places - self.centre)[:, None])
         return np.einsum("pqk,pek->peq", moved, directions)
 
     def about(self, centre: np.ndarray) -> np.ndarray:
-        """Return `values` (coordinate, 6) for displacements that turn about another centre (3,)."""
+        """Return `values` (coordinate, 6) for displacements with rotations about another centre (3,)."""
         # x -> tau + rho x (x - centre) is x -> tau' + rho x (x - c), c = self.centre, with tau' = tau + rho x (c - centre).
         shift = np.eye(6)
         shift[:3, 3:] = -_cross_matrix(self.centre - centre)
@@ -75,7 +75,7 @@ class FeatureOfSize(FeatureGeometry):
     """A feature with a diameter or a distance.
 
     size      [mm] nominal
-    is_inner  whether the size is that of a gap in the material: a hole, a slot
+    is_inner  whether it is a gap in the material: a hole, a slot
     """
 
     size: float
@@ -124,7 +124,7 @@ class SlabFeature(PlaneFeature, FeatureOfSize):
         return "a pair of planes"
 
     def growth(self, face: int, moving: Sequence[bool]) -> tuple[np.ndarray, float]:
-        """Return how a face moves (3,) along its normal as the size grows by 1; it does not grow by itself."""
+        """Return how a face moves (3,) along its normal as the size grows by 1; it has no height of its own."""
         return (-1.0 if self.is_inner else 1.0) * moving[face] / sum(moving) * self.normals[face], 0.0
 
 
@@ -199,17 +199,10 @@ class GeneralFeature(FeatureGeometry):
         return f"a general surface ({deviation})"
 
 
-@dataclass(frozen=True, eq=False)
-class TargetPoint(FeatureGeometry):
-    """A datum target: a point of a face, which moves along its normal."""
-
-    plural: ClassVar[str] = "datum targets"
-
-    @classmethod
-    def at(cls, point: np.ndarray, normal: np.ndarray) -> "TargetPoint":
-        """Return the target at a point (3,) [mm] with an outward unit normal (3,)."""
-        row = np.concatenate([normal, np.zeros(3)])[None]
-        return cls(point, ("height",), row.T, row, (point[None], normal[None, None]))
+def target_point(point: np.ndarray, normal: np.ndarray) -> FeatureGeometry:
+    """Return the geometry of a datum target: a point (3,) [mm] of a face, which moves along an outward unit normal (3,)."""
+    row = np.concatenate([normal, np.zeros(3)])[None]
+    return FeatureGeometry(point, ("height",), row.T, row, (point[None], normal[None, None]))
 
 
 def _cross_matrix(v: np.ndarray) -> np.ndarray:

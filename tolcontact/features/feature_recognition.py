@@ -21,10 +21,10 @@ from tolcontact.geometry.fitting import nearest_surface
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.triangle_mesh import smooth_pieces
 
-AREA_TOLERANCE = 1e-3  # relative: a turned rectangle must be smaller by this to be preferred to one along the part's axes
+AREA_TOLERANCE = 1e-3  # relative: a rotated rectangle must be smaller by this to be preferred to one along the part's axes
 AXIS_TOLERANCE = 1e-6  # largest difference of a direction from the axis of the part after which it is named
-MIN_NOTICED = 1e-3  # of a displacement: the part of it along the normals of a general surface that makes it a freedom
-EXTREME_TRIALS = 4096  # random displacements by which the extremes of a general surface are found
+MIN_NORMAL_PART = 1e-3  # of a displacement: its part along the normals of a general surface, above which it is a freedom
+EXTREME_TRIALS = 4096  # random displacements that determine the extremes of a general surface
 CONE_PROBES = 32  # places around each end of a cone
 MAX_OPPOSED_ERROR = 1e-3  # rad between two planes that count as parallel
 AXES = np.eye(3)
@@ -101,7 +101,7 @@ def _slab(faces: Sequence[Surface], surfaces: Sequence[AnalyticSurface | None]) 
 
 
 def _plane_coordinates(place: np.ndarray, n: np.ndarray, points: np.ndarray) -> Coordinates:
-    """Return the coordinates of a plane with normal n through `place`, which reaches as far as `points` (point, 3) on it.
+    """Return the coordinates of a plane with normal n through `place`, bounded by `points` (point, 3) on it.
 
     Tilts are measured at the edges of the smallest rectangle around the points.
     """
@@ -131,7 +131,7 @@ def _rectangle_angle(corners: np.ndarray) -> float:
 
 
 def _turned(corners: np.ndarray, angle: float) -> np.ndarray:
-    """Return coordinates (corner, 2) along axes that are turned by an angle [rad]."""
+    """Return coordinates (corner, 2) along axes that are rotated by an angle [rad]."""
     cos, sin = np.cos(angle), np.sin(angle)
     return corners @ np.array([[cos, -sin], [sin, cos]])
 
@@ -160,7 +160,7 @@ def _cone(face: Surface, cone: Cone) -> ConeFeature:
 def _axis_coordinates(face: Surface, surface: Cylinder | Cone) -> tuple[Coordinates, np.ndarray, float]:
     """Return the coordinates of a cylinder or cone, its axis (3,), and half the length [mm] of its face.
 
-    The coordinates are two shifts in the middle of the axis and two tilts at its ends.
+    The coordinates are two shifts at the centre of the axis and two tilts at its ends.
     """
     axis = surface.axis * np.sign(surface.axis[np.abs(surface.axis).argmax()])  # the same, whichever way the file has it
     u, v, names = _directions_across(axis)
@@ -183,7 +183,7 @@ def _general(face: Surface) -> GeneralFeature:
     centre = np.asarray(mesh.area_faces @ mesh.triangles_center / mesh.area_faces.sum())
     reach = float(np.linalg.norm(points - centre, axis=1).max())
     moved = np.hstack([normals, np.cross(points - centre, normals) / reach])  # along normals, for (tau, rho reach) of 1
-    freedoms = _noticed_displacements(moved, _simple_displacements(face))
+    freedoms = _normal_displacements(moved, _simple_displacements(face))
     to_twist = np.diag([1.0] * 3 + [1 / reach] * 3)
     metric = moved.T @ moved
     values = np.linalg.solve(freedoms.T @ metric @ freedoms, freedoms.T @ metric) @ np.linalg.inv(to_twist)
@@ -196,7 +196,7 @@ def _general(face: Surface) -> GeneralFeature:
 
 
 def _simple_displacements(face: Surface) -> list[np.ndarray]:
-    """Return six displacements (tau, rho): along and across the mean normal, then turns about the directions across and it."""
+    """Return six displacements (tau, rho): along and across the mean normal, then rotations about these."""
     mesh = face.mesh
     mean_normal = mesh.area_faces @ mesh.face_normals
     length = np.linalg.norm(mean_normal)
@@ -206,11 +206,11 @@ def _simple_displacements(face: Surface) -> list[np.ndarray]:
     return [np.concatenate([e, zero]) for e in (n, u, v)] + [np.concatenate([zero, e]) for e in (u, v, n)]
 
 
-def _noticed_displacements(moved: np.ndarray, displacements: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the displacements (6, freedom) that the surface notices, each independent of those before it.
+def _normal_displacements(moved: np.ndarray, displacements: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the rigid displacements (6, freedom) that move the surface along its normals, each independent of others.
 
-    moved   (vertex, 6): how far vertices move along their normals for displacements of 1. Two displacements are independent if
-            these distances are orthogonal. Each freedom is scaled so that the largest distance is 1.
+    moved   (vertex, 6): motions of vertices along their normals for unit displacements. Two displacements are independent if
+            these motions are orthogonal. Each freedom is scaled so that the largest motion is 1.
     """
     freedoms: list[np.ndarray] = []
     for displacement in displacements:
@@ -218,13 +218,13 @@ def _noticed_displacements(moved: np.ndarray, displacements: Sequence[np.ndarray
         for freedom in freedoms:
             distances = moved @ freedom
             direction = direction - (moved @ direction @ distances) / (distances @ distances) * freedom
-        if (largest := np.abs(moved @ direction).max()) > MIN_NOTICED:
+        if (largest := np.abs(moved @ direction).max()) > MIN_NORMAL_PART:
             freedoms.append(direction / largest)
     return np.column_stack(freedoms)
 
 
 def _directions_across(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[str, str]]:
-    """Return two unit vectors across `a` (3,) and each other, with their names: axes of the part where they are along those."""
+    """Return two unit vectors normal to `a` (3,) and each other, with their names: axes of the part where they are parallel."""
     smallest = int(np.abs(a).argmin())
     largest = int(np.abs(a).argmax())
     if abs(a[largest]) > 1 - AXIS_TOLERANCE:

@@ -1,4 +1,4 @@
-"""Form fields: heights of a face as few functions of place, without what displaces the face as a whole.
+"""Form fields: heights of a face as few functions of place, without displacements of the face as a whole.
 
 The functions are Karhunen-Loeve modes of a covariance, orthogonal to rigid displacements and growths by area. They follow from
 a pivoted Cholesky factor of the covariance, so that they are known at any place: height(p) = covariance(p, stations) @ weights
@@ -13,9 +13,9 @@ import numpy as np
 
 from tolcontact.declaration.form import Form
 from tolcontact.errors import GeometryFault
-from tolcontact.features.associated_features import TERMS, AssociatedFeature, displacement_terms
+from tolcontact.features.associated_features import TERMS, AssociatedSurface, displacement_terms
 from tolcontact.features.covariances import Lengths, covariance
-from tolcontact.features.least_zone import ZoneMember
+from tolcontact.features.minimum_zone import ZoneMember
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder
 from tolcontact.geometry.surface import Surface
 
@@ -46,7 +46,7 @@ class FormField:
     """
 
     form: Form
-    associated: AssociatedFeature
+    associated: AssociatedSurface
     lengths: Lengths
     scales: Lengths
     places: np.ndarray
@@ -72,7 +72,7 @@ class FormField:
     def zone(self) -> tuple[ZoneMember, ...]:
         """The members of the zone of the form, at the places."""
         members = self.associated.members(self.places)
-        return tuple(ZoneMember(numbers, self.associated.rows(self.places[numbers])) for numbers in members)
+        return tuple(ZoneMember(indices, self.associated.rows(self.places[indices])) for indices in members)
 
     @cached_property
     def place_heights(self) -> np.ndarray:
@@ -114,13 +114,13 @@ class FormField:
         return values, displacement_terms(normals, points)
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "FormField":
-        """Return the field of a face that stands at R (3, 3), t (3,) [mm]."""
+        """Return the field of a face in a part at R (3, 3), t (3,) [mm]."""
         removed = displaced_about_origin(np.vstack([self.removed[:1], R @ self.removed[1:4], R @ self.removed[4:]]), t)
         places, stations = self.places @ R.T + t, self.stations @ R.T + t
         return replace(self, associated=self.associated.placed(R, t), places=places, stations=stations, removed=removed)
 
 
-def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> FormField:
+def form_field(form: Form, face: Surface, associated: AssociatedSurface) -> FormField:
     """Return the form field of a face on an analytic surface, in its part's own frame."""
     lengths = _lengths(form, face, associated)
     places, areas = associated.places(face, lengths)
@@ -128,7 +128,7 @@ def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> Form
     stations, shares = places[pivots], areas / areas.sum()
     inverse = np.linalg.inv(factor[:, pivots])
     functions = associated_covariance(form, lengths, associated, places, stations) @ inverse
-    remainder, removed = beside_displacements(functions, associated, places, shares)
+    remainder, removed = without_displacements(functions, associated, places, shares)
     variances, directions = np.linalg.eigh(remainder.T @ remainder)
     if variances.sum() < REST:
         raise GeometryFault(
@@ -154,49 +154,45 @@ def form_field(form: Form, face: Surface, associated: AssociatedFeature) -> Form
     )
 
 
-def beside_displacements(
-    functions: np.ndarray, associated: AssociatedFeature, places: np.ndarray, shares: np.ndarray
+def without_displacements(
+    functions: np.ndarray, associated: AssociatedSurface, places: np.ndarray, shares: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return functions (place, function) beside displacements and growths of the face, and these (7, function).
+    """Return functions (place, function) without displacements and growths of the face, and these (7, function).
 
     shares   (place,) of the area. Values of a place are returned times the root of its share.
     """
     root, centre = np.sqrt(shares)[:, None], places.mean(axis=0)
-    # Sections and lines without what displaces them are not displaced as a whole either.
+    # Sections and lines without displacements are not displaced as a whole either.
     terms = associated.is_whole * displacement_terms(associated.surface.distance(places)[1], places - centre)
     removed, *_ = np.linalg.lstsq(terms * root, functions * root, rcond=1e-10)
     return (functions - terms @ removed) * root, displaced_about_origin(removed, centre)
 
 
-def _lengths(form: Form, face: Surface, associated: AssociatedFeature) -> Lengths:
-    """Return the correlation lengths of a form: usually a third of the extent of a face, with an axis across and along it."""
-    vertices, surface = np.asarray(face.mesh.vertices), associated.surface
-    if not isinstance(surface, Cylinder | Cone):
-        length = form.length or LENGTH_SHARE * longest_extent(vertices)
-        return Lengths(length, length)
-    diameter, extent = axial_extents(surface.origin, surface.axis, vertices)
-    across = diameter / 2 / form.lobes if form.lobes else form.length or LENGTH_SHARE * diameter
-    return Lengths(across, form.length or LENGTH_SHARE * extent)
+def _lengths(form: Form, face: Surface, associated: AssociatedSurface) -> Lengths:
+    """Return the correlation lengths of a form: usually a third of the extents of a face."""
+    extents = face_extents(associated, np.asarray(face.mesh.vertices))
+    across = extents.across / 2 / form.lobes if form.lobes else form.length or LENGTH_SHARE * extents.across
+    return Lengths(across, form.length or LENGTH_SHARE * extents.along)
 
 
-def scales_within(lengths: Lengths, associated: AssociatedFeature, places: np.ndarray) -> Lengths:
-    """Return lengths over which heights change at places (place, 3) of a face, at most half of its extents.
+def scales_within(lengths: Lengths, associated: AssociatedSurface, places: np.ndarray) -> Lengths:
+    """Return the lengths over which heights change at places (place, 3) of a face, at most half of its extents.
 
     A length far beyond the face leaves heights that bend once over the face.
     """
+    extents = face_extents(associated, places)
+    return Lengths(min(lengths.across, extents.across / 2), min(lengths.along, extents.along / 2))
+
+
+def face_extents(associated: AssociatedSurface, points: np.ndarray) -> Lengths:
+    """Return the diameter of points (point, 3) [mm] around an axis and their extent along it; without axis the longest one."""
     surface = associated.surface
     if not isinstance(surface, Cylinder | Cone):
-        return Lengths(*np.minimum(lengths, longest_extent(places) / 2))
-    across, along = axial_extents(surface.origin, surface.axis, places)
-    return Lengths(min(lengths.across, across / 2), min(lengths.along, along / 2))
-
-
-def axial_extents(origin: np.ndarray, axis: np.ndarray, points: np.ndarray) -> tuple[float, float]:
-    """Return the largest diameter [mm] of points (point, 3) around an axis, and their extent along it [mm]."""
-    arms = points - origin
-    along = arms @ axis
-    radius = float(np.linalg.norm(arms - along[:, None] * axis, axis=1).max())
-    return 2 * radius, float(np.ptp(along))
+        return Lengths(longest_extent(points), longest_extent(points))
+    arms = points - surface.origin
+    along = arms @ surface.axis
+    radius = float(np.linalg.norm(arms - along[:, None] * surface.axis, axis=1).max())
+    return Lengths(2 * radius, float(np.ptp(along)))
 
 
 def longest_extent(points: np.ndarray) -> float:
@@ -206,15 +202,15 @@ def longest_extent(points: np.ndarray) -> float:
 
 
 def displaced_about_origin(displacements: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """Return displacements (7, n) with turns about the origin that equal some with turns about a centre (3,) [mm]."""
+    """Return displacements (7, n) with rotations about the origin that equal some with rotations about a centre (3,) [mm]."""
     growth, translation, rotation = np.split(displacements, [1, TERMS - 3])
     return np.vstack([growth, translation + np.cross(centre, rotation, axisb=0).T, rotation])
 
 
 def associated_covariance(
-    form: Form, lengths: Lengths, associated: AssociatedFeature, points: np.ndarray, stations: np.ndarray
+    form: Form, lengths: Lengths, associated: AssociatedSurface, points: np.ndarray, stations: np.ndarray
 ) -> np.ndarray:
-    """Return the covariance (point, station), as functions of the points without what displaces sections or lines."""
+    """Return the covariance (point, station), as functions of the points without displacements of sections or lines."""
     values = np.zeros((len(points), len(stations)))
     for factors, copies in associated.copies(points):
         values += factors[:, None] * covariance(form, lengths, associated.surface, copies, stations)
@@ -222,11 +218,11 @@ def associated_covariance(
 
 
 def _cholesky(
-    places: np.ndarray, form: Form, lengths: Lengths, associated: AssociatedFeature
+    places: np.ndarray, form: Form, lengths: Lengths, associated: AssociatedSurface
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the pivoted Cholesky factor (station, place) of the covariance, the pivots (station,), and what it leaves out.
+    """Return the pivoted Cholesky factor (station, place) of the covariance, the pivots (station,), and the remaining variance.
 
-    This is a variance (place,).
+    The variance (place,) is what the stations leave out.
     """
     variance, rows, pivots = np.ones(len(places)), np.zeros((0, len(places))), list[int]()
     while len(rows) < min(MAX_STATIONS, len(places)) and variance.max() > REST:

@@ -1,7 +1,7 @@
 """Regression of measured heights on the covariances with stations: smooth where points scatter, exact where they agree.
 
-The sum of squared deviations from the points is least, with a penalty for rough fields, as in kriging with a nugget. The number
-of stations and the penalty are those that predict points left out best (generalized cross-validation), over several scans.
+The sum of squared deviations from the points is minimized, with a penalty for rough fields, as in kriging with a nugget. The
+number of stations and the penalty predict points that are left out best (generalized cross-validation), over several scans.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 
 from tolcontact.declaration.form import Form
-from tolcontact.features.associated_features import AssociatedFeature
+from tolcontact.features.associated_features import AssociatedSurface
 from tolcontact.features.covariances import Lengths, covariance
 from tolcontact.features.form_field import longest_extent
 from tolcontact.geometry.spreading import spread
@@ -24,7 +24,7 @@ MAX_LENGTH_FACTOR = 40.0  # times the distance of stations, beyond which their c
 ROUNDING = 1e-11  # that is added to the variance of stations, since their covariances are all but dependent
 PENALTIES = tuple(10.0 ** np.arange(-8, 2))  # of a field of variance 1, relative to a squared deviation
 MAX_VALUES = 5_000_000  # of the covariances of a scan with stations: of more points, some are taken at random
-TRIAL_SCANS = 2  # by which the number of stations and the penalty are chosen
+TRIAL_SCANS = 2  # that determine the number of stations and the penalty
 MAX_STATIONS_PER_POINT = 2
 MAX_FREEDOM_SHARE = 0.98  # of the number of points: with more, points left out cannot be predicted
 MIN_POWER = 1e-300
@@ -65,12 +65,12 @@ class HeightRegression:
 
     form: Form
     lengths: Lengths
-    associated: AssociatedFeature
+    associated: AssociatedSurface
     stations: np.ndarray
     penalty: float
 
     @classmethod
-    def of(cls, form: Form, face: Surface, associated: AssociatedFeature, scans: Sequence[Scan]) -> Self:
+    def of(cls, form: Form, face: Surface, associated: AssociatedSurface, scans: Sequence[Scan]) -> Self:
         """Return the regression with the fewest stations that predict points of scans as well as more of them do."""
         scans = scans[:: -(-len(scans) // TRIAL_SCANS)]
         trials, fewest = [], min(len(scan.feet) for scan in scans)
@@ -86,7 +86,7 @@ class HeightRegression:
         return next(regression for regression, error in trials if error <= enough)
 
     @classmethod
-    def _with_stations(cls, count: int, form: Form, face: Surface, associated: AssociatedFeature) -> Self:
+    def _with_stations(cls, count: int, form: Form, face: Surface, associated: AssociatedSurface) -> Self:
         stations = associated.surface.project(spread(face.mesh, count, None))
         distance = float(np.sqrt(face.mesh.area / count))
         length = min(longest_extent(np.asarray(face.mesh.vertices)), MAX_LENGTH_FACTOR * distance)

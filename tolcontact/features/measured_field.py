@@ -1,4 +1,4 @@
-"""The form field of measured faces: their mean, and the principal components of what they deviate from it.
+"""The form field of measured faces: their mean, and the principal components of their deviations from it.
 
 Heights of the points of each part over the nominal surface are fitted with functions of place (see height_regression), so that
 the field is known at any place like any other. Coefficients vary as the measured faces do. The field is compared with the
@@ -12,29 +12,29 @@ import scipy
 
 from tolcontact.declaration.form import Form
 from tolcontact.errors import GeometryFault
-from tolcontact.features.associated_features import AssociatedFeature, displacement_terms
+from tolcontact.features.associated_features import AssociatedSurface, displacement_terms
 from tolcontact.features.covariances import Lengths
-from tolcontact.features.form_field import FormField, associated_covariance, beside_displacements, scales_within
+from tolcontact.features.form_field import FormField, associated_covariance, scales_within, without_displacements
 from tolcontact.features.height_regression import STATIONS, HeightRegression, Scan
-from tolcontact.features.least_zone import ZoneMember, least_widths
+from tolcontact.features.minimum_zone import ZoneMember, minimum_widths
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder
 from tolcontact.geometry.measured_points import measured_points
 from tolcontact.geometry.spreading import spread
 from tolcontact.geometry.surface import Surface
 
-COVARIANCE = "matern 5/2"  # by which heights between stations follow from theirs
+COVARIANCE = "matern 5/2"  # for the heights between stations
 MIN_POINTS = 24
-MAX_HEIGHT_SHARE = 0.02  # of a face's size: a point farther from its surface was not measured on it
-DIGITS = 6  # of mm: points that are no farther apart are one, whose scatter is not independent
+MAX_HEIGHT_SHARE = 0.02  # of a face's size: a point further from its surface was not measured on it
+DIGITS = 6  # of mm: points that are no further apart are one, whose scatter is not independent
 MIN_VARIANCE = 1e-8  # of the largest: a component with less is rounding
 MAX_LOST_SHARE = 0.25  # of the form: what the field may leave out
 MAX_EXCESS = 3.0  # times the largest height at the points: what the field may reach between them
 NEIGHBOURS = 8  # of a point, whose deviations from the field are compared with its own
-SIGNIFICANT = 5.0  # standard deviations of a mean, by which deviations from the field are more than scatter
+SIGNIFICANT = 5.0  # standard deviations of a mean, above which deviations from the field are more than scatter
 STEP_SHARE = 1e-4  # of the correlation length: steps of slopes
 
 
-def measured_field(form: Form, pattern: str, face: Surface, associated: AssociatedFeature) -> FormField:
+def measured_field(form: Form, pattern: str, face: Surface, associated: AssociatedSurface) -> FormField:
     """Return the form field of faces whose points are in files, in the frame of their part. Raises GeometryFault."""
     form = replace(form, covariance=COVARIANCE)
     everywhere = associated.surface.project(spread(face.mesh, STATIONS[0], None))
@@ -42,23 +42,14 @@ def measured_field(form: Form, pattern: str, face: Surface, associated: Associat
     regression = HeightRegression.of(form, face, associated, scans)
     scans = regression.samples(scans)
     weights = regression.weights(scans)
-    widths, losses = zip(
-        *(_fit(scan, of_part, regression) for scan, of_part in zip(scans, weights.T, strict=True)), strict=True
-    )
+    fits = [_fit(scan, of_part, regression) for scan, of_part in zip(scans, weights.T, strict=True)]
     lengths = _lengths(regression, weights)
     places, areas = associated.places(face, lengths)
     functions = associated_covariance(form, regression.lengths, associated, places, regression.stations) @ weights
     shares = areas / areas.sum()
-    remainder, removed = beside_displacements(functions, associated, places, shares)
-    mean, count = remainder.mean(axis=1), remainder.shape[1]
-    _, spreads, directions = np.linalg.svd((remainder - mean[:, None]) / np.sqrt(count - 1), full_matrices=False)
-    kept = min(form.modes, int((spreads**2 > MIN_VARIANCE * spreads[0] ** 2).sum()))
-    # Of the parts: their mean, then components that have the length 1, as the spreads have the unit.
-    mixes = np.column_stack([np.full(count, 1 / count), (directions[:kept] / spreads[:kept, None]).T / np.sqrt(count - 1)])
-    mixes[:, 1:] -= mixes[:, 1:].mean(axis=0)
-    size = max(float(np.linalg.norm(mean)), 1e-300)
-    mixes[:, 0] /= size
-    lost = float(np.mean([loss**2 for loss in losses]))
+    heights, removed = without_displacements(functions, associated, places, shares)
+    mixes, size, spreads = _principal_components(heights, form.modes)
+    kept, lost = mixes.shape[1] - 1, float(np.mean([loss**2 for _, loss in fits]))
     field = FormField(
         form=form,
         associated=associated,
@@ -73,12 +64,29 @@ def measured_field(form: Form, pattern: str, face: Surface, associated: Associat
         means=np.array([size, *[0.0] * kept]),
         scans={},
     )
+    widths = [width for width, _ in fits]
     if not associated.is_whole:  # each section or line has a zone of its own, at places
-        widths = tuple(map(float, least_widths(field.zone, (remainder / np.sqrt(shares)[:, None]).T)))
+        widths = [float(width) for width in minimum_widths(field.zone, (heights / np.sqrt(shares)[:, None]).T)]
     return replace(field, scans={scan.path: width for scan, width in zip(scans, widths, strict=True)})
 
 
-def _scan(cloud: np.ndarray, path: str, face: Surface, everywhere: np.ndarray, associated: AssociatedFeature) -> Scan:
+def _principal_components(heights: np.ndarray, modes: int) -> tuple[np.ndarray, float, np.ndarray]:
+    """Return the mean and the principal components of heights (place, part) [mm], as mixes (part, 1 + component) of parts.
+
+    There are at most `modes` components. The heights of each mix have the length 1. Return also the length of the mean, and the
+    standard deviations of all components, in mm.
+    """
+    mean, count = heights.mean(axis=1), heights.shape[1]
+    _, spreads, directions = np.linalg.svd((heights - mean[:, None]) / np.sqrt(count - 1), full_matrices=False)
+    kept = min(modes, int((spreads**2 > MIN_VARIANCE * spreads[0] ** 2).sum()))
+    mixes = np.column_stack([np.full(count, 1 / count), (directions[:kept] / spreads[:kept, None]).T / np.sqrt(count - 1)])
+    mixes[:, 1:] -= mixes[:, 1:].mean(axis=0)
+    size = max(float(np.linalg.norm(mean)), 1e-300)
+    mixes[:, 0] /= size
+    return mixes, size, spreads
+
+
+def _scan(cloud: np.ndarray, path: str, face: Surface, everywhere: np.ndarray, associated: AssociatedSurface) -> Scan:
     """Return the heights of a measured part over its nominal face, from its points (point, 3) [mm].
 
     Raises GeometryFault for points that are not of the face, or not near places (place, 3) everywhere on it.
@@ -86,10 +94,10 @@ def _scan(cloud: np.ndarray, path: str, face: Surface, everywhere: np.ndarray, a
     outward = -1.0 if any(piece.is_hollow for piece in face.pieces) else 1.0
     distances, normals = associated.surface.distance(cloud)
     heights = outward * distances
-    farthest = int(np.abs(heights).argmax())
-    if abs(heights[farthest]) > MAX_HEIGHT_SHARE * face.mesh.scale:
+    outermost = int(np.abs(heights).argmax())
+    if abs(heights[outermost]) > MAX_HEIGHT_SHARE * face.mesh.scale:
         raise GeometryFault(
-            f'"{path}": point {farthest + 1} is {abs(heights[farthest]):.3g} mm away from the face; expected points of the '
+            f'"{path}": point {outermost + 1} is {abs(heights[outermost]):.3g} mm away from the face; expected points of the '
             "face, in mm in the frame of the part"
         )
     feet = associated.surface.project(cloud)
@@ -134,7 +142,7 @@ def _fit(scan: Scan, weights: np.ndarray, regression: HeightRegression) -> tuple
             "between or beside them; measure more points, also along the rim, or filter short waves out of the points"
         )
     rows = regression.associated.rows(feet)
-    return float(least_widths([ZoneMember(np.arange(len(feet)), rows)], values[None])[0]), lost
+    return float(minimum_widths([ZoneMember(np.arange(len(feet)), rows)], values[None])[0]), lost
 
 
 def _lengths(regression: HeightRegression, weights: np.ndarray) -> Lengths:

@@ -1,7 +1,7 @@
-"""Tolerance kinds: the features that each kind of tolerance is for, and its zone.
+"""Tolerance kinds: the features that each kind of tolerance is for, its zone, and the form that it draws.
 
-A new kind is a row in `declaration/feature_tolerance.py` and a row of ZONES. A zone limits displacements of a feature; what
-the datums of a tolerance leave free in it is found in `tolerance_layers`.
+A new kind is a row in `declaration/feature_tolerance.py` and a row of TOLERANCES. A zone limits displacements of a feature; the
+datums of a tolerance leave some of these free (see tolerance_layers).
 
 A zone is a function of the tolerance, the feature, and the geometry of the first datum feature (None without datums). It
 returns rows (point, component, coordinate): inside the zone, no vector `rows[point] @ coordinates` exceeds half the width. It
@@ -9,12 +9,15 @@ raises GeometryFault if the feature cannot have a tolerance with these options.
 """
 
 from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.declaration import feature_tolerance as tolerances
+from tolcontact.declaration import Feature, feature_tolerance as declared
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, ToleranceKind
+from tolcontact.declaration.toleranced import Toleranced
 from tolcontact.errors import GeometryFault
+from tolcontact.features.associated_features import AssociatedCircles, AssociatedLines, AssociatedSurface
 from tolcontact.features.feature_geometry import (
     AxisFeature,
     ConeFeature,
@@ -25,9 +28,16 @@ from tolcontact.features.feature_geometry import (
     SlabFeature,
     SphereFeature,
 )
+from tolcontact.features.feature_recognition import analytic_surface
+from tolcontact.features.form_field import FormField, form_field
+from tolcontact.features.measured_field import measured_field
+from tolcontact.geometry.surface import Surface
 
 MIN_ACROSS = 0.999  # of a direction: the part of it that must lie across an axis
 Zone = Callable[[GeometricTolerance, FeatureGeometry, FeatureGeometry | None], np.ndarray]
+Zones = Mapping[type[FeatureGeometry], Zone]
+Forms = Mapping[type[FeatureGeometry], type[AssociatedSurface]]
+NO_FORMS: Forms = {}
 
 
 def surface_zone(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: FeatureGeometry | None) -> np.ndarray:
@@ -107,35 +117,55 @@ def _zone_ends(tolerance: GeometricTolerance, feature: AxisFeature, primary: Fea
     return np.array([end, end * (1 + tolerance.projected / feature.half)])
 
 
-Zones = Mapping[type[FeatureGeometry], Zone]
+class ToleranceRow(NamedTuple):
+    """What a kind of tolerance limits.
+
+    zones        for each kind of feature that may have it
+    forms        what form deviations are measured from, for each kind of feature whose form it draws
+    limits_wall  whether the zone of a round feature contains its wall with its form, and not its axis alone
+    has_any_radius  whether that zone may have any radius
+    """
+
+    zones: Zones
+    forms: Forms = NO_FORMS
+    limits_wall: bool = False
+    has_any_radius: bool = False
+
+
 ROUND = (CylinderFeature, ConeFeature)
 FLAT = (PlaneFeature, SlabFeature)
-LOCATION: Zones = dict.fromkeys((*FLAT, SphereFeature), surface_zone) | dict.fromkeys(ROUND, axis_zone)
-ORIENTATION: Zones = dict.fromkeys(FLAT, slope_zone) | dict.fromkeys(ROUND, direction_zone)
-RUNOUT: Zones = dict.fromkeys(FLAT, slope_zone) | dict.fromkeys(ROUND, axis_zone)
-PROFILE: Zones = dict.fromkeys((*FLAT, *ROUND, SphereFeature, GeneralFeature), surface_zone)
+LOCATION = ToleranceRow(dict.fromkeys((*FLAT, SphereFeature), surface_zone) | dict.fromkeys(ROUND, axis_zone))
+ORIENTATION = ToleranceRow(dict.fromkeys(FLAT, slope_zone) | dict.fromkeys(ROUND, direction_zone))
+RUNOUT = ToleranceRow(dict.fromkeys(FLAT, slope_zone) | dict.fromkeys(ROUND, axis_zone), limits_wall=True, has_any_radius=True)
+PROFILE = ToleranceRow(
+    dict.fromkeys((*FLAT, *ROUND, SphereFeature, GeneralFeature), surface_zone),
+    dict.fromkeys((PlaneFeature, *ROUND, SphereFeature), AssociatedSurface),
+    limits_wall=True,
+)
 
-ZONES: dict[ToleranceKind, Zones] = {
-    tolerances.Position: LOCATION,
-    tolerances.Coaxiality: dict.fromkeys(ROUND, axis_zone) | {SphereFeature: surface_zone},
-    tolerances.Symmetry: {SlabFeature: surface_zone} | dict.fromkeys(ROUND, flat_axis_zone),
-    tolerances.Profile: PROFILE,
-    tolerances.LineProfile: PROFILE,
-    tolerances.Parallelism: ORIENTATION,
-    tolerances.Perpendicularity: ORIENTATION,
-    tolerances.Angularity: ORIENTATION,
-    tolerances.CircularRunout: RUNOUT,
-    tolerances.TotalRunout: RUNOUT,
-    tolerances.Straightness: dict.fromkeys((*FLAT, *ROUND), form_zone),
-    tolerances.Flatness: dict.fromkeys(FLAT, form_zone),
-    tolerances.Roundness: dict.fromkeys((*ROUND, SphereFeature), form_zone),
-    tolerances.Cylindricity: {CylinderFeature: form_zone},
+TOLERANCES: dict[ToleranceKind, ToleranceRow] = {
+    declared.Position: LOCATION,
+    declared.Coaxiality: ToleranceRow(dict.fromkeys(ROUND, axis_zone) | {SphereFeature: surface_zone}),
+    declared.Symmetry: ToleranceRow({SlabFeature: surface_zone} | dict.fromkeys(ROUND, flat_axis_zone)),
+    declared.Profile: PROFILE,
+    declared.LineProfile: PROFILE,
+    declared.Parallelism: ORIENTATION,
+    declared.Perpendicularity: ORIENTATION,
+    declared.Angularity: ORIENTATION,
+    declared.CircularRunout: RUNOUT,
+    declared.TotalRunout: RUNOUT,
+    declared.Straightness: ToleranceRow(dict.fromkeys((*FLAT, *ROUND), form_zone), dict.fromkeys(ROUND, AssociatedLines)),
+    declared.Flatness: ToleranceRow(dict.fromkeys(FLAT, form_zone), {PlaneFeature: AssociatedSurface}),
+    declared.Roundness: ToleranceRow(
+        dict.fromkeys((*ROUND, SphereFeature), form_zone), dict.fromkeys(ROUND, AssociatedCircles)
+    ),
+    declared.Cylindricity: ToleranceRow({CylinderFeature: form_zone}, {CylinderFeature: AssociatedSurface}),
 }
 
 
 def zone_rows(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: FeatureGeometry | None) -> np.ndarray:
     """Return the rows of the zone of a tolerance. Raises GeometryFault if the feature cannot have the tolerance."""
-    zones = ZONES[tolerance.of]
+    zones = TOLERANCES[tolerance.of].zones
     if type(feature) not in zones:
         *plurals, last = (kind.plural for kind in zones)
         kinds = f"{', '.join(plurals)} and {last}" if plurals else last
@@ -144,3 +174,59 @@ def zone_rows(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: 
     if tolerance.tangent and type(feature) is not PlaneFeature:
         raise GeometryFault(f"{tolerance.kind}: tangent is for planes, and it is {feature.in_words}; leave it out")
     return zones[type(feature)](tolerance, feature, primary)
+
+
+def includes_form(tolerance: GeometricTolerance, feature: FeatureGeometry) -> bool:
+    """Return whether a zone contains the surface with its form: not the axis or the tangent plane alone."""
+    return not tolerance.tangent and (isinstance(feature, PlaneFeature) or TOLERANCES[tolerance.of].limits_wall)
+
+
+def floats(tolerance: GeometricTolerance, feature: FeatureGeometry, rows: np.ndarray) -> bool:
+    """Return whether a zone with these rows may lie anywhere along the normals of the surface, a round one with any radius."""
+    if isinstance(feature, PlaneFeature):
+        return not rows[..., 0].any()  # it limits tilts alone, and not the offset, the first coordinate of a plane
+    return TOLERANCES[tolerance.of].has_any_radius
+
+
+def is_drawn(kind: ToleranceKind, per: object) -> bool:
+    """Return whether the form that a kind of tolerance limits, of any surface or `per` a length, can surely be drawn.
+
+    A roundness may limit part of a circle, a straightness an axis: what is drawn of these are circles and lines.
+    """
+    return per is None and all(associated.is_whole for associated in TOLERANCES[kind].forms.values())
+
+
+def form_tolerance(toleranced: Toleranced, feature: FeatureGeometry) -> GeometricTolerance | None:
+    """Return the tolerance that draws the form of a feature, the narrowest one; None if it keeps its shape.
+
+    Raises GeometryFault for a tolerance of form that cannot be drawn.
+    """
+    tolerances = [
+        tolerance for tolerance in toleranced.geometric
+        if tolerance.form is not None
+        # Without datums, a profile of a pattern limits its members to each other.
+        and (tolerance.is_form or (tolerance.limits_form_alone and isinstance(toleranced, Feature)))
+    ]  # fmt: skip
+    for tolerance in tolerances:
+        if tolerance.per is not None or type(feature) not in TOLERANCES[tolerance.of].forms:
+            unit = " per unit" if tolerance.per is not None else ""
+            raise GeometryFault(
+                f"the form of {tolerance.kind}{unit} of {feature.in_words} cannot be drawn; give the {tolerance.kind} "
+                "form=None, and the feature keeps its shape"
+            )
+        if tolerance.form is not None and tolerance.form.lobes is not None and type(feature) not in ROUND:
+            raise GeometryFault(
+                f"{tolerance.kind}: lobes are for cylinders and cones, and it is {feature.in_words}; leave them out"
+            )
+    return min(tolerances, key=lambda tolerance: tolerance.width, default=None)
+
+
+def form_field_of(tolerance: GeometricTolerance, feature: FeatureGeometry, face: Surface) -> FormField | None:
+    """Return the form field of a face by a tolerance; None for a tolerance without form. Raises GeometryFault."""
+    surface = analytic_surface(face)
+    if tolerance.form is None or surface is None:
+        return None
+    associated = TOLERANCES[tolerance.of].forms[type(feature)].of(surface, face)
+    if tolerance.form.measured is not None:
+        return measured_field(tolerance.form, tolerance.form.measured, face, associated)
+    return form_field(tolerance.form, face, associated)

@@ -1,4 +1,8 @@
-"""Compiled search of least zones, one field of heights after another: places that the zone touches are exchanged."""
+"""Compiled search of minimum zones, one field of heights after another, by exchange of the places that the zone touches.
+
+The touched places are a reference of freedom + 1 places with a side of the zone each. Two linear systems belong to a reference:
+its `equidistant` system gives the centre with equal distances from its places, its `dual` system the weights of these.
+"""
 
 import numpy as np
 
@@ -21,63 +25,73 @@ def sum_modes(coefficients, modes, heights):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def exchange(heights, exact, rows, first, first_signs, limit, closeness, solutions, widths):  # type: ignore[no-untyped-def]
-    """Write the least zone of each field of heights (n, place); NaN as its width where exchanges do not end.
+def exchange(heights, exact, rows, initial, initial_signs, limit, closeness, centres, widths):  # type: ignore[no-untyped-def]
+    """Write the minimum zone of each field of heights (n, place); NaN as its width where exchanges do not end.
 
-    Of several zones of that width it is the one with the least sum of squared heights from its middle.
+    If several zones have that width, the centre is the one with the smallest sum of squared residuals.
 
-    exact        (freedom, place): heights of displacements of 1
-    rows         (freedom, place): the same for the search, which might cycle among places in line
-    first        (freedom + 1,) numbers of places from which searches start
-    first_signs  (freedom + 1,) 1 or -1: the sides of the zone that they are on
-    limit        number of exchanges
-    closeness    share of the width: places that are no farther out are in the zone
-    solutions    (n, freedom) displacements of the middle of the zone, written
-    widths       (n,), written
+    exact          (freedom, place): heights of unit displacements
+    rows           (freedom, place): the same for the search, which might cycle among collinear places
+    initial        (freedom + 1,) indices of the places of the first reference
+    initial_signs  (freedom + 1,) 1 or -1: the sides of the zone that they are on
+    limit          number of exchanges
+    closeness      share of the width: places that are no further out are in the zone
+    centres        (n, freedom) displacements of the centre of the zone, written
+    widths         (n,), written
     """
-    freedom = rows.shape[0]
-    size = freedom + 1
-    matrix, right = np.empty((size, size)), np.empty((size, 2))
-    chosen, signs, residuals = np.empty(size, dtype=np.int64), np.empty(size), np.empty(heights.shape[1])
+    size = rows.shape[0] + 1
+    matrix, solution, direction = np.empty((size, size)), np.empty(size), np.empty(size)
+    places, signs, residuals = np.empty(size, dtype=np.int64), np.empty(size), np.empty(heights.shape[1])
     for k in range(heights.shape[0]):
-        chosen[:], signs[:], widths[k] = first, first_signs, np.nan
+        places[:], signs[:], widths[k] = initial, initial_signs, np.nan
         for _ in range(limit):
-            if not find_middle(heights[k], rows, chosen, signs, matrix, right):
+            for c in range(size):
+                solution[c] = signs[c] * heights[k, places[c]]
+            fill_equidistant(rows, places, signs, matrix)
+            if not solve(matrix, solution):
                 break
-            entering, largest = farthest(heights[k], rows, right, residuals)
-            if abs(largest) <= right[freedom, 0] * (1 + closeness) + 1e-300:
-                widths[k] = refine(heights[k], exact, rows, chosen, signs, matrix, right, residuals, solutions[k])
-                settle(heights[k], exact, chosen, signs, matrix, right, residuals, widths[k] / 2, solutions[k])
+            entering, largest = outermost(heights[k], rows, solution, residuals)
+            if abs(largest) <= solution[size - 1] * (1 + closeness) + 1e-300:
+                widths[k] = refine(heights[k], exact, rows, places, signs, matrix, solution, residuals, centres[k])
+                settle(heights[k], exact, places, signs, matrix, direction, residuals, widths[k] / 2, centres[k])
                 break
             sign = 1.0 if largest > 0 else -1.0
-            leaving = find_leaving(rows, chosen, signs, entering, sign, matrix, right)
+            leaving = find_leaving(rows, places, signs, entering, sign, matrix, solution, direction)
             if leaving < 0:
                 break
-            chosen[leaving], signs[leaving] = entering, sign
+            places[leaving], signs[leaving] = entering, sign
 
 
 @inner
-def find_middle(field, rows, chosen, signs, matrix, right):  # type: ignore[no-untyped-def]
-    """Write the middle from which all chosen places are equally far, and their distance, to the first column of `right`."""
+def fill_equidistant(rows, places, signs, matrix):  # type: ignore[no-untyped-def]
+    """Write the system whose solution is a displacement of the centre and the distance of all places from it."""
     freedom = rows.shape[0]
     for c in range(freedom + 1):
         for i in range(freedom):
-            matrix[c, i] = signs[c] * rows[i, chosen[c]]
+            matrix[c, i] = signs[c] * rows[i, places[c]]
         matrix[c, freedom] = 1.0
-        right[c, 0] = signs[c] * field[chosen[c]]
-    return solve(matrix, right, 1)
 
 
 @inner
-def farthest(field, rows, middle, residuals):  # type: ignore[no-untyped-def]
-    """Return the place that is farthest from the middle in the first column of an array, and its height from there.
+def fill_dual(rows, places, signs, matrix):  # type: ignore[no-untyped-def]
+    """Write the system whose solution is the weights of the places."""
+    freedom = rows.shape[0]
+    for c in range(freedom + 1):
+        for i in range(freedom):
+            matrix[i, c] = signs[c] * rows[i, places[c]]
+        matrix[freedom, c] = 1.0
 
-    `residuals` (place,) are written: all heights from there.
+
+@inner
+def outermost(field, rows, centre, residuals):  # type: ignore[no-untyped-def]
+    """Return the place with the largest distance from a centre, and its residual there.
+
+    `residuals` (place,) are written: the heights of all places over the centre.
     """
     for j in range(field.size):
         residuals[j] = field[j]
     for i in range(rows.shape[0]):
-        factor, row = middle[i, 0], rows[i]
+        factor, row = centre[i], rows[i]
         for j in range(field.size):
             residuals[j] -= factor * row[j]
     place, largest = 0, 0.0
@@ -88,93 +102,87 @@ def farthest(field, rows, middle, residuals):  # type: ignore[no-untyped-def]
 
 
 @inner
-def find_leaving(rows, chosen, signs, entering, sign, matrix, right):  # type: ignore[no-untyped-def]
-    """Return which of the chosen places another one replaces, so that the zone stays the least one of these; -1: none."""
+def find_leaving(rows, places, signs, entering, sign, matrix, weights, changes):  # type: ignore[no-untyped-def]
+    """Return which place of the reference another one replaces, so that the zone of the reference grows; -1: none.
+
+    The weights of the reference, and their changes by a unit weight of the entering place, are written.
+    """
     freedom = rows.shape[0]
     for i in range(freedom):
-        for c in range(freedom + 1):
-            matrix[i, c] = signs[c] * rows[i, chosen[c]]
-        right[i, 0], right[i, 1] = 0.0, sign * rows[i, entering]
+        weights[i], changes[i] = 0.0, sign * rows[i, entering]
+    weights[freedom], changes[freedom] = 1.0, 1.0
+    fill_dual(rows, places, signs, matrix)
+    if not solve(matrix, weights):
+        return -1
+    fill_dual(rows, places, signs, matrix)
+    solve(matrix, changes)
+    leaving, smallest = -1, np.inf
     for c in range(freedom + 1):
-        matrix[freedom, c] = 1.0
-    right[freedom, 0], right[freedom, 1] = 1.0, 1.0
-    leaving, least = -1, np.inf
-    if solve(matrix, right, 2):
-        for c in range(freedom + 1):
-            if right[c, 1] > MIN_STEP and max(right[c, 0], 0.0) / right[c, 1] < least:
-                leaving, least = c, max(right[c, 0], 0.0) / right[c, 1]
+        if changes[c] > MIN_STEP and max(weights[c], 0.0) / changes[c] < smallest:
+            leaving, smallest = c, max(weights[c], 0.0) / changes[c]
     return leaving
 
 
 @inner
-def refine(field, exact, rows, chosen, signs, matrix, right, residuals, solution):  # type: ignore[no-untyped-def]
-    """Write the middle of a zone by exact heights, from that by `rows` in `right`; return the width of the zone."""
-    freedom, distance = rows.shape[0], right[rows.shape[0], 0]
+def refine(field, exact, rows, places, signs, matrix, solution, residuals, centre):  # type: ignore[no-untyped-def]
+    """Write the centre of a zone by exact heights, from the `solution` by `rows`; return the width of the zone."""
+    freedom, distance = rows.shape[0], solution[rows.shape[0]]
     for i in range(freedom):
-        solution[i] = right[i, 0]
-    _, before = farthest(field, exact, right, residuals)
+        centre[i] = solution[i]
+    _, before = outermost(field, exact, centre, residuals)
     for c in range(freedom + 1):
-        residual = field[chosen[c]]
+        residual = field[places[c]]
         for i in range(freedom):
-            matrix[c, i] = signs[c] * rows[i, chosen[c]]
-            residual -= exact[i, chosen[c]] * solution[i]
-        matrix[c, freedom] = 1.0
-        right[c, 0] = signs[c] * residual - distance
-    if solve(matrix, right, 1):
+            residual -= exact[i, places[c]] * centre[i]
+        solution[c] = signs[c] * residual - distance
+    fill_equidistant(rows, places, signs, matrix)
+    if solve(matrix, solution):
         for i in range(freedom):
-            right[i, 0] += solution[i]
-        _, after = farthest(field, exact, right, residuals)
+            solution[i] += centre[i]
+        _, after = outermost(field, exact, solution, residuals)
         if abs(after) <= abs(before):
             for i in range(freedom):
-                solution[i] = right[i, 0]
+                centre[i] = solution[i]
             return 2 * abs(after)
     return 2 * abs(before)
 
 
 @inner
-def settle(field, exact, chosen, signs, matrix, right, residuals, half, solution):  # type: ignore[no-untyped-def]
-    """Move the middle of a zone of this half width, if it can turn about places in line, to the least sum of squares."""
+def settle(field, exact, places, signs, matrix, direction, residuals, half, centre):  # type: ignore[no-untyped-def]
+    """Move the centre of a zone of this half width to the least squares, if it is not unique (collinear places)."""
     freedom = exact.shape[0]
-    for i in range(freedom):
-        for c in range(freedom + 1):
-            matrix[i, c] = signs[c] * exact[i, chosen[c]]
-        right[i, 0] = 0.0
     for c in range(freedom + 1):
-        matrix[freedom, c] = 1.0
-    right[freedom, 0] = 1.0
-    if not solve(matrix, right, 1):
+        direction[c] = 1.0 if c == freedom else 0.0
+    fill_dual(exact, places, signs, matrix)
+    if not solve(matrix, direction):
         return
     idle = 0
     for c in range(freedom + 1):
-        idle = c if right[c, 0] < right[idle, 0] else idle
-    if right[idle, 0] > IDLE:
+        idle = c if direction[c] < direction[idle] else idle
+    if direction[idle] > IDLE:
         return
     for c in range(freedom + 1):
+        direction[c] = 1.0 if c == idle else 0.0
+    fill_equidistant(exact, places, signs, matrix)
+    if solve(matrix, direction):
+        outermost(field, exact, centre, residuals)
+        step = best_step(exact, direction, residuals, half)
         for i in range(freedom):
-            matrix[c, i] = signs[c] * exact[i, chosen[c]]
-        matrix[c, freedom], right[c, 0] = 1.0, 1.0 if c == idle else 0.0
-    if not solve(matrix, right, 1):
-        return
-    for i in range(freedom):
-        right[i, 1], right[i, 0] = right[i, 0], solution[i]
-    farthest(field, exact, right, residuals)
-    turn = best_turn(exact, right, residuals, half)
-    for i in range(freedom):
-        solution[i] += turn * right[i, 1]
+            centre[i] += step * direction[i]
 
 
 @inner
-def best_turn(exact, turns, residuals, half):  # type: ignore[no-untyped-def]
-    """Return how far a middle moves by the displacement in the second column of `turns`, within the zone, to the least squares.
+def best_step(exact, direction, residuals, half):  # type: ignore[no-untyped-def]
+    """Return the step of a centre in a direction (freedom,) to the least squares, within the zone of this half width.
 
-    residuals   (place,) heights from the middle before
+    residuals   (place,) heights over the centre before
     """
     reach = 0.0
     for j in range(residuals.size):
-        reach = max(reach, abs(height_of(exact, turns, j)))
+        reach = max(reach, abs(height_of(exact, direction, j)))
     low, high, moment, inertia = -np.inf, np.inf, 0.0, 0.0
     for j in range(residuals.size):
-        height = height_of(exact, turns, j)
+        height = height_of(exact, direction, j)
         moment += residuals[j] * height
         inertia += height * height
         if abs(height) > PARALLEL * reach:
@@ -184,46 +192,36 @@ def best_turn(exact, turns, residuals, half):  # type: ignore[no-untyped-def]
 
 
 @inner
-def height_of(exact, turns, j):  # type: ignore[no-untyped-def]
-    """Return the height of a place by the displacement in the second column of `turns`."""
+def height_of(exact, displacement, j):  # type: ignore[no-untyped-def]
+    """Return the height of place j for a displacement (freedom,)."""
     height = 0.0
     for i in range(exact.shape[0]):
-        height += exact[i, j] * turns[i, 1]
+        height += exact[i, j] * displacement[i]
     return height
 
 
 @inner
-def solve(matrix, right, columns):  # type: ignore[no-untyped-def]
-    """Solve matrix x = right for some columns, in place, by elimination with pivots; return whether that was possible."""
+def solve(matrix, vector):  # type: ignore[no-untyped-def]
+    """Solve matrix x = vector, in place, by elimination with pivots; return whether that was possible."""
     size = matrix.shape[0]
     for p in range(size):
-        if not bring_pivot(matrix, right, p, columns):
+        pivot = p
+        for i in range(p + 1, size):
+            if abs(matrix[i, p]) > abs(matrix[pivot, p]):
+                pivot = i
+        if matrix[pivot, p] == 0.0:
             return False
+        for j in range(p, size):
+            matrix[p, j], matrix[pivot, j] = matrix[pivot, j], matrix[p, j]
+        vector[p], vector[pivot] = vector[pivot], vector[p]
         for i in range(p + 1, size):
             factor = matrix[i, p] / matrix[p, p]
             for j in range(p + 1, size):
                 matrix[i, j] -= factor * matrix[p, j]
-            for j in range(columns):
-                right[i, j] -= factor * right[p, j]
-    for j in range(columns):
-        for p in range(size - 1, -1, -1):
-            value = right[p, j]
-            for i in range(p + 1, size):
-                value -= matrix[p, i] * right[i, j]
-            right[p, j] = value / matrix[p, p]
+            vector[i] -= factor * vector[p]
+    for p in range(size - 1, -1, -1):
+        value = vector[p]
+        for i in range(p + 1, size):
+            value -= matrix[p, i] * vector[i]
+        vector[p] = value / matrix[p, p]
     return True
-
-
-@inner
-def bring_pivot(matrix, right, p, columns):  # type: ignore[no-untyped-def]
-    """Exchange row p for the one below with the largest entry in column p; return whether that is not 0."""
-    pivot = p
-    for i in range(p + 1, matrix.shape[0]):
-        if abs(matrix[i, p]) > abs(matrix[pivot, p]):
-            pivot = i
-    if pivot != p:
-        for j in range(p, matrix.shape[0]):
-            matrix[p, j], matrix[pivot, j] = matrix[pivot, j], matrix[p, j]
-        for j in range(columns):
-            right[p, j], right[pivot, j] = right[pivot, j], right[p, j]
-    return matrix[p, p] != 0.0

@@ -7,7 +7,7 @@ from tolcontact.declaration import feature_tolerance as declared
 from tolcontact.declaration.feature_tolerance import KINDS as DECLARED_KINDS, GeometricTolerance
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.tolerance_class import UndefinedClass, tolerance_class
-from tolcontact.features.forms import is_drawn
+from tolcontact.features.tolerance_kinds import is_drawn
 from tolcontact.pmi.annotations import DatumReference, Dimension, Tolerance
 
 _KINDS = {

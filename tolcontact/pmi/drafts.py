@@ -17,7 +17,7 @@ from tolcontact.errors import GeometryFault
 from tolcontact.features import Features, datum_order
 from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, SlabFeature
 from tolcontact.features.feature_recognition import feature_geometry
-from tolcontact.features.pattern_geometry import check_alike
+from tolcontact.features.nominal_pattern import check_alike
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.files import Shape
 from tolcontact.pmi import declarable

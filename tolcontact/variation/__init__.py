@@ -3,7 +3,6 @@
 .. include:: ../guide/variation.md
 """
 
-from tolcontact.variation.contributors import Contributor
 from tolcontact.variation.draws import Draws, GivenDraws, draw
 
-__all__ = ["Contributor", "Draws", "GivenDraws", "draw"]
+__all__ = ["Draws", "GivenDraws", "draw"]

@@ -12,9 +12,9 @@ from scipy.special import ndtr, ndtri
 
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
-from tolcontact.features.datum_planes import Shifts
-from tolcontact.variation.contributors import Contributors
+from tolcontact.features.datum_frames import Shifts
 from tolcontact.variation.plans import STREAM, Numbers, Plan
+from tolcontact.variation.spreads import fill_zones
 from tolcontact.vocabulary import MONTE_CARLO
 
 MIN_UNIFORM = 1e-16  # smallest distance of a number from 0 and 1
@@ -22,19 +22,34 @@ ROUNDING = 1e-12  # of a column: independent deviations that are no larger are w
 
 
 class Draws:
-    """The draws of a model. Raises ModelError if rules cannot be applied to a feature."""
+    """The draws of a model. Raises ModelError if rules cannot be applied to a feature.
+
+    contributors  the freedoms of the model with their spreads, in the order of the columns of deviations
+    zones         that components of features fill
+    mean_widths   [mm] of the minimum zones of forms, by feature
+    shifts        of datum planes, which follow from other deviations
+    correlated    for each correlation its labels, and the lower factor of its matrix (Cholesky)
+    populations   columns of measured parts, and their values (row, column)
+    """
 
     def __init__(self, nominal: Nominal) -> None:
-        self.contributors = Contributors(nominal)
-        self._assembly = nominal.assembly
-        self.leans = {column: lean for pattern in nominal.patterns for column, lean in pattern.leans.items()}
+        self.contributors, self.zones, self.mean_widths = fill_zones(nominal)
+        self.shifts = [shift for pattern in nominal.patterns for shift in pattern.shifts]
+        self._assembly = assembly = nominal.assembly
         self._column = {contributor.label: k for k, contributor in enumerate(self.contributors)}
         self._plan = Plan(MONTE_CARLO, [])
         self._scale = np.ones(len(self.contributors))
         self._middle = np.array([
             contributor.tolerance.shift if contributor.tolerance else contributor.middle for contributor in self.contributors
         ])  # fmt: skip
-        self._factors = [np.linalg.cholesky(np.array(correlation.matrix)) for correlation in self._assembly.correlations]
+        self.correlated = [
+            (list(correlation.labels), np.linalg.cholesky(np.array(correlation.matrix)))
+            for correlation in assembly.correlations
+        ]
+        self.populations = [
+            (np.array([self._column[label] for label in population.columns]), population.values)
+            for population in assembly.populations
+        ]
 
     def planned(self, name: str) -> "Draws":
         """Return draws of the same contributors by a sampling plan (see plans)."""
@@ -52,12 +67,6 @@ class Draws:
     def labels(self) -> list[str]:
         """Labels of the columns of deviations."""
         return list(self._column)
-
-    @property
-    def correlated(self) -> list[tuple[list[str], np.ndarray]]:
-        """For each correlation its labels, and the lower factor of its matrix (Cholesky)."""
-        correlations = zip(self._assembly.correlations, self._factors, strict=True)
-        return [(list(correlation.labels), factor) for correlation, factor in correlations]
 
     @property
     def plan(self) -> str:
@@ -97,12 +106,12 @@ class Draws:
 
     def add_shifts(self, deviations: np.ndarray) -> None:
         """Put into deviations (n, contributor) the shifts of datums, which follow from the other ones."""
-        known: Shifts = {}
-        for column, lean in self.leans.items():
-            deviations[:, column : column + len(lean.coordinates)] = lean.shifts(deviations, known)
+        computed: Shifts = {}
+        for shift in self.shifts:
+            deviations[:, shift.columns] = shift.shifts(deviations, computed)
 
     def _single_draws(self, numbers: Numbers, count: int) -> np.ndarray:
-        """Return deviations (count, contributor) of each contributor by itself, or in its correlation."""
+        """Return deviations (count, contributor) of each contributor alone, or in its correlation."""
         deviations = np.empty((count, len(self.contributors)))
         correlated = self._correlated_numbers(numbers)
         for column, contributor in enumerate(self.contributors):
@@ -113,11 +122,11 @@ class Draws:
     def _add_causes_and_bonuses(self, deviations: np.ndarray) -> None:
         """Add shared causes to sizes, scale components by the bonus of their sizes, and add shared causes to the rest."""
         measured = [column for columns, _ in self.populations for column in columns]
-        sizes = {int(size) for bonus in self.contributors.bonuses for size in bonus.sizes}
+        sizes = {int(size) for zone in self.zones if zone.sizes is not None for size in zone.sizes}
         self._add_causes(deviations, lambda column: column in sizes)
-        for bonus in self.contributors.bonuses:
-            columns = np.setdiff1d(bonus.columns, measured)  # measured parts have used their bonus
-            deviations[:, columns] *= bonus.factor(deviations[:, bonus.sizes])[:, None]
+        for zone in (zone for zone in self.zones if zone.sizes is not None):
+            columns = np.setdiff1d(zone.added, measured)  # measured parts have used their bonus
+            deviations[:, columns] *= zone.scale(deviations)[:, None]
         self._add_causes(deviations, lambda column: column not in sizes)
 
     @property
@@ -127,18 +136,18 @@ class Draws:
         return [f"population {k}: {', '.join(population.columns)}" for k, population in populations]
 
     def dependent(self, *, correlated: bool = True) -> list[list[int]]:
-        """Return sets of columns that depend on each other: drawn together, or `correlated`; not those of mere sums."""
-        assembly = self._assembly
+        """Return sets of columns that depend on each other: drawn together, or `correlated`.
+
+        Columns that are coupled by sums alone are excluded.
+        """
         sets = [[self._column[label] for label in labels] for labels, _ in self.correlated if correlated]
-        sets += [[self._column[label] for label in population.columns] for population in assembly.populations]
-        together = [
-            [*range(column, column + len(lean.coordinates)), *map(int, lean.sources)] for column, lean in self.leans.items()
-        ]
-        together += [list(map(int, [*bonus.sizes, *bonus.columns])) for bonus in self.contributors.bonuses]
+        sets += [list(map(int, columns)) for columns, _ in self.populations]
+        together = [[*shift.columns, *map(int, shift.sources)] for shift in self.shifts]
+        together += [sorted({*map(int, zone.sizes), *map(int, zone.added)}) for zone in self.zones if zone.sizes is not None]
         # What follows from others by more than a sum also follows from the causes that drive them.
         followed = {column for columns in together for column in columns}
         of_causes = [
-            [self._column[cause.name], *(self._column[label] for label in cause.drives)] for cause in assembly.variables
+            [self._column[cause.name], *(self._column[label] for label in cause.drives)] for cause in self._assembly.variables
         ]
         return sets + together + [columns for columns in of_causes if followed & set(columns[1:])]
 
@@ -162,20 +171,12 @@ class Draws:
 
     @property
     def drive_matrix(self) -> np.ndarray:
-        """The amounts (column, column) that a deviation of 1 of each column adds to others through shared causes."""
+        """The amounts (column, column) that a unit deviation of each column adds to others through shared causes."""
         matrix = np.zeros((len(self._column), len(self._column)))
         for cause in self._assembly.variables:
             for label, factor in cause.drives.items():
                 matrix[self._column[cause.name], self._column[label]] += factor
         return matrix
-
-    @property
-    def populations(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Columns of measured parts, and their values (row, column)."""
-        return [
-            (np.array([self._column[label] for label in population.columns]), population.values)
-            for population in self._assembly.populations
-        ]
 
     def rows(self, numbers: np.ndarray, *, seed: int) -> np.ndarray:
         """Return deviations (row, contributor) of realizations by their numbers (row,)."""

@@ -1,4 +1,4 @@
-"""Sampling plans: the numbers between 0 and 1 of which deviations are quantiles.
+"""Sampling plans: the numbers between 0 and 1 whose quantiles are the deviations.
 
     monte-carlo       independent of each other
     latin hypercube   256 realizations together fill 256 classes of every contributor, once each (McKay, Beckman, Conover, 1979)
@@ -6,7 +6,7 @@
                       scramble), with a random digital shift
 
 With the last two, realizations k 256 to (k + 1) 256 are a replicate: independent of all others, each of its realizations
-distributed as one drawn by itself. So intervals follow from the means of replicates (Owen, 1997). In any plan the numbers of
+distributed as one drawn alone. So intervals follow from the means of replicates (Owen, 1997). In any plan the numbers of
 realization k depend on the seed, the labels and k alone.
 """
 

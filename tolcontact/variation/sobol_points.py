@@ -1,6 +1,6 @@
 """Scrambled Sobol' points in few dimensions, as `scipy.stats.qmc.Sobol` gives them, whose import takes longer than a summary.
 
-Sobol', USSR Computational Mathematics and Mathematical Physics 7 (1967); the direction numbers are those of Joe and Kuo (2008),
+Sobol', USSR Computational Mathematics and Mathematical Physics 7 (1967); direction numbers by Joe and Kuo (2008);
 the scrambling is Matoušek's (1998): a random lower triangular matrix of bits, and a random shift.
 """
 

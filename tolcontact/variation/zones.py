@@ -3,7 +3,7 @@
 Components c are independent and normal. A feature lies inside if none of the rows of its zone, each a vector linear in c, is
 longer than half the width. In the direction u, a random unit vector scaled by the standard deviations, the zone ends at a
 distance. The share of features nearer than that is the chi distribution's, so the share inside is its mean over directions. A
-quasi-random sequence of directions gives it to some 1e-5, without draws of features, and alike for all kinds of zones.
+quasi-random sequence of directions gives it to some 1e-5, without draws of features, in the same way for all zones.
 """
 
 import functools
@@ -11,7 +11,7 @@ import hashlib
 import pickle
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,6 +24,7 @@ SHARE = 0.9973002039367398  # of a normal distribution within three standard dev
 LOG2_DIRECTIONS = 14
 MEMBER_DIRECTIONS = 1 << 17  # for all members of a pattern that differ; the mean share then has an error of some 3e-5
 MIN_DIRECTIONS = 1 << 11  # for each of these members
+FORM_DIRECTIONS = 1 << 13  # displacements have larger spreads than modes, so that fewer directions are enough
 CHUNK = 1024  # components that are evaluated at once
 MIN_SPREAD = 1e-9  # of the width: a smaller spread counts as 0
 
@@ -33,7 +34,7 @@ class MemberZone:
     """The zone of a feature, or of a member of a pattern, whose coordinates are linear in components.
 
     rows         (point, entry, coordinate)
-    coordinates  (coordinate, component) for components of 1
+    coordinates  (coordinate, component) for unit components
     """
 
     rows: np.ndarray
@@ -46,13 +47,13 @@ class MemberZone:
 
     @property
     def identity(self) -> bytes:
-        """The bytes on which shares depend, beside spreads."""
+        """The bytes that determine shares, together with spreads."""
         rows = self.component_rows
         return rows[..., (rows != 0).any(axis=(0, 1))].tobytes()
 
     def take(self, count: int) -> "MemberZone":
         """Return the same zone of the first components alone."""
-        return MemberZone(self.rows, self.coordinates[:, :count])
+        return replace(self, coordinates=self.coordinates[:, :count])
 
     def share_inside(self, spreads: np.ndarray, width: float, count: int = 1 << LOG2_DIRECTIONS) -> float:
         """Return the share of members, with standard deviations (component,), inside a zone of a width."""
@@ -72,6 +73,33 @@ class MemberZone:
         else:
             longest = _longest(rows, directions(len(varied))[:count] * varied)
         return float(chi_share(width / 2 / np.maximum(longest, 1e-300), len(varied)).mean())
+
+
+@dataclass(frozen=True, eq=False)
+class FormedZone(MemberZone):
+    """The zone of a surface that has form and displacements.
+
+    heights  (place, mode) [mm] of the form for coefficients of one standard deviation
+    offsets  (place, coordinate): heights of the surface for unit coordinates
+    floats   whether the zone may lie anywhere along the normal of the surface
+    """
+
+    heights: np.ndarray
+    offsets: np.ndarray
+    floats: bool
+
+    @property
+    def identity(self) -> bytes:
+        return super().identity + self.heights.tobytes()
+
+    def share_inside(self, spreads: np.ndarray, width: float, count: int = FORM_DIRECTIONS) -> float:
+        varying = np.flatnonzero((spreads > 0) & self.coordinates.any(axis=0))
+        modes = self.heights.shape[1]
+        unit = directions(modes + len(varying))[: min(count, FORM_DIRECTIONS)]
+        displacements = self.offsets @ (self.coordinates[:, varying] * spreads[varying])
+        heights = unit[:, :modes] @ self.heights.T + unit[:, modes:] @ displacements.T
+        needed = np.ptp(heights, axis=1) if self.floats else 2 * np.abs(heights).max(axis=1)
+        return float(chi_share(width / np.maximum(needed, 1e-300), unit.shape[1]).mean())
 
 
 def share_inside(members: Sequence[MemberZone], spreads: np.ndarray, width: float) -> float:

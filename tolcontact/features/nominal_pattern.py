@@ -1,4 +1,4 @@
-"""The coordinates of all members of a pattern together, and motions of the pattern as a whole. Part's own frame."""
+"""The features that a declaration tolerances together: their coordinates, and what varies of them. Part's own frame."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,28 +8,72 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import block_diag
 
+from tolcontact.declaration import Feature, GeometricTolerance, Pattern
 from tolcontact.errors import GeometryFault
+from tolcontact.features.datum_frames import DatumFrame, DatumShift
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize, PlaneFeature
+from tolcontact.features.freedoms import Freedom
+from tolcontact.features.nominal_feature import NominalFeature
 
 SIZE_TOLERANCE = 1e-6  # relative: largest difference between sizes that count as equal
-MIN_LENGTH = 1e-4  # of the coordinates of a motion of 1 mm that a pattern notices
+MIN_LENGTH = 1e-4  # of the coordinates of a motion of 1 mm that affects a pattern
 MIXED, RELATIVE = "mixed", "relative"
 MOTIONS = ("common shift x", "common shift y", "common shift z", "common turn x", "common turn y", "common turn z")
 
 
 @dataclass(frozen=True, eq=False)
-class PatternGeometry:
-    """The members of a pattern. Its coordinates are those of the members, one member after the other.
+class Layer:
+    """The directions of a pattern that one tolerance controls beyond the tolerances within it.
 
-    A feature by itself is a pattern of one member.
+    rows        for each member (point, component, coordinate of the member) of its zone (see tolerance_kinds)
+    controlled  (coordinate, n): orthonormal directions that its datums lock
+    added       (coordinate, k): directions that no narrower tolerance controls and that its rule draws; each is a freedom
+    columns     of these freedoms in the deviations
+    frame       of its datum system
     """
 
-    members: tuple[FeatureGeometry, ...]
+    tolerance: GeometricTolerance
+    rows: tuple[np.ndarray, ...]
+    controlled: np.ndarray
+    added: np.ndarray
+    columns: range
+    frame: DatumFrame
+
+
+@dataclass(frozen=True, eq=False)
+class NominalPattern:
+    """The members of a pattern, or one feature alone. Its coordinates are the coordinates of one member after the other.
+
+    layers    of its geometric tolerances, from the innermost on
+    freedoms  the directions that its layers add, shifts of datum planes, sizes of its members, and modes of their forms
+    shifts    of the datum planes of its tolerances
+    form      the tolerance that draws the form of its members; None if they keep their shape
+    """
+
+    declared: Feature | Pattern
+    members: tuple[NominalFeature, ...]
+    layers: tuple[Layer, ...] = ()
+    freedoms: tuple[Freedom, ...] = ()
+    shifts: tuple[DatumShift, ...] = ()
+    form: GeometricTolerance | None = None
+
+    @property
+    def part(self) -> int:
+        return self.members[0].part
+
+    @property
+    def label(self) -> str:
+        return f"{self.declared.part.name}.{self.declared.name}"
+
+    @property
+    def geometries(self) -> tuple[FeatureGeometry, ...]:
+        """The geometry of each member."""
+        return tuple(member.geometry for member in self.members)
 
     @cached_property
     def slices(self) -> tuple[slice, ...]:
         """The coordinates of each member."""
-        ends = np.cumsum([0, *(len(member.names) for member in self.members)])
+        ends = np.cumsum([0, *(len(geometry.names) for geometry in self.geometries)])
         return tuple(slice(int(start), int(end)) for start, end in pairwise(ends))
 
     @property
@@ -39,35 +83,35 @@ class PatternGeometry:
 
     @cached_property
     def centre(self) -> np.ndarray:
-        """The middle (3,) [mm] of the centres of the members."""
-        centres = [member.centre for member in self.members]
+        """The mean (3,) [mm] of the centres of the members."""
+        centres = [geometry.centre for geometry in self.geometries]
         return centres[0] if len(centres) == 1 else np.mean(centres, axis=0)
 
     @cached_property
     def reach(self) -> float:
         """The largest distance [mm] of an extreme of a member from the centre."""
         if len(self.members) == 1:
-            return self.members[0].reach
-        return max(float(np.linalg.norm(member.extremes[0] - self.centre, axis=1).max()) for member in self.members)
+            return self.geometries[0].reach
+        return max(float(np.linalg.norm(geometry.extremes[0] - self.centre, axis=1).max()) for geometry in self.geometries)
 
     @cached_property
     def values(self) -> np.ndarray:
         """The coordinates (coordinate, 6) of a displacement (tau, rho) of all members about the centre."""
         if len(self.members) == 1:
-            return self.members[0].values
-        return np.vstack([member.about(self.centre) for member in self.members])
+            return self.geometries[0].values
+        return np.vstack([geometry.about(self.centre) for geometry in self.geometries])
 
     @property
     def turns(self) -> np.ndarray:
-        """The turn of each member (3 * member, coordinate) for coordinates of 1 mm, times its reach."""
-        return np.asarray(block_diag(*(member.twists[3:] * member.reach for member in self.members)))
+        """The rotation of each member (3 * member, coordinate) for coordinates of 1 mm, times its reach."""
+        return np.asarray(block_diag(*(geometry.twists[3:] * geometry.reach for geometry in self.geometries)))
 
     @property
     def offsets(self) -> np.ndarray:
         """The coordinates (coordinate,) if all members that are planes are 1 mm out of the material; 0 for other features."""
         offsets = np.zeros(self.count)
-        for member, place in zip(self.members, self.slices, strict=True):
-            offsets[place.start] = isinstance(member, PlaneFeature)
+        for geometry, place in zip(self.geometries, self.slices, strict=True):
+            offsets[place.start] = isinstance(geometry, PlaneFeature)
         return offsets
 
     @property
@@ -76,18 +120,18 @@ class PatternGeometry:
         return self.values @ np.diag([1.0] * 3 + [1 / self.reach] * 3)
 
     def owner(self, direction: np.ndarray) -> int | None:
-        """Return the number of the one member that a direction (coordinate,) moves; None if it moves several."""
+        """Return the index of the one member that a direction (coordinate,) moves; None if it moves several."""
         moved = [number for number, place in enumerate(self.slices) if direction[place].any()]
         return moved[0] if len(moved) == 1 else None
 
     def freedom_name(self, direction: np.ndarray) -> str:
         """Return the name of a direction (coordinate,): of its coordinate, of its motion of the pattern, "relative" or "mixed".
 
-        A relative direction moves members of a pattern to each other, and the pattern as a whole not at all.
+        A relative direction moves members relative to each other, and not the pattern as a whole.
         """
         coordinate = int(np.abs(direction).argmax())
         if abs(direction[coordinate]) > 1 - 1e-6:
-            return [name for member in self.members for name in member.names][coordinate]
+            return [name for geometry in self.geometries for name in geometry.names][coordinate]
         if self.owner(direction) is not None:
             return MIXED
         lengths = np.linalg.norm(self.common_motions, axis=0)

@@ -1,0 +1,144 @@
+"""A feature with numbers: how it deviates with the freedoms of a model, and its faces with it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tolcontact.declaration import Feature
+from tolcontact.errors import GeometryFault
+from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize, target_point
+from tolcontact.features.form_field import FormField
+from tolcontact.geometry.faces import FaceArea
+from tolcontact.geometry.surface import Surface
+
+Placement = tuple[np.ndarray, np.ndarray]  # R (3, 3) and t (3,) [mm] of a part in the nominal assembly
+FACE_TOLERANCE = 1e-4  # of a face's size: the largest distance of a point on it
+
+
+@dataclass(frozen=True, eq=False)
+class FaceDeviation:
+    """The deviation of a face: a small rigid displacement and a height, both linear in what varies. Nominal assembly frame.
+
+    name      "part.feature"
+    columns   (k,) of the deviations that displace the face
+    centre    (3,) [mm]: a point p of the face goes to p + tau + rho x (p - centre)
+    twist     (6, k): tau [mm] and rho [rad] per unit deviation
+    height    (k,) [mm]: uniform outward offset of the displaced face per unit deviation
+    form      form deviation of the face in its nominal place; None if it keeps its shape
+    modes     (mode,) indices of the coefficients of the form in `columns`
+    """
+
+    name: str
+    columns: np.ndarray
+    centre: np.ndarray
+    twist: np.ndarray
+    height: np.ndarray
+    form: FormField | None = None
+    modes: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+
+    @property
+    def form_columns(self) -> np.ndarray:
+        """The columns (mode,) of the deviations that are coefficients of the form."""
+        return self.columns[self.modes]
+
+    def form_heights(self, points: np.ndarray) -> np.ndarray:
+        """Return the heights (..., mode) of the modes of the form at points (..., 3) [mm]."""
+        return np.zeros((*points.shape[:-1], 0)) if self.form is None else self.form.heights(points)
+
+    @property
+    def grows(self) -> bool:
+        """Whether the height varies."""
+        return bool(self.height.any())
+
+    def heights(self, deviations: np.ndarray) -> np.ndarray:
+        """Return the heights (row,) [mm] for deviations (row, column), summed up in a fixed order."""
+        heights = np.zeros(len(deviations))
+        for column, factor in zip(self.columns, self.height, strict=True):
+            heights += factor * deviations[:, column]
+        return heights
+
+    def outward(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Return the motion (point, k) of `points` (point, 3) of the face along `normals` (point, 3) per unit deviation."""
+        turned = np.cross(points - self.centre, normals)
+        outward = np.hstack([normals, turned]) @ self.twist + self.height
+        if self.form is not None:
+            outward[:, self.modes] += self.form.heights(points)
+        return outward
+
+
+@dataclass(frozen=True, eq=False)
+class NominalFeature:
+    """A feature in its part, alone or as a member of a pattern. A datum target is a feature at one point of another.
+
+    surfaces     its faces, in the part's own frame
+    areas        its faces on the part's mesh
+    coordinates  (coordinate, column) per unit deviation of the freedoms of its pattern and of all freedoms before
+    size_column  the column of its size; None if its size is not toleranced
+    form         of its face; None if the feature keeps its shape
+    form_columns the columns of the coefficients of the form
+    """
+
+    feature: Feature
+    part: int
+    geometry: FeatureGeometry
+    surfaces: tuple[Surface, ...]
+    areas: tuple[FaceArea, ...]
+    coordinates: np.ndarray
+    size_column: int | None = None
+    form: FormField | None = None
+    form_columns: range = range(0)
+
+    @property
+    def label(self) -> str:
+        return f"{self.feature.part.name}.{self.feature.name}"
+
+    @property
+    def varies(self) -> bool:
+        """Whether the feature deviates at all."""
+        return self.size_column is not None or self.form is not None or bool(self.coordinates.any())
+
+    def face_with(self, position: np.ndarray) -> int | None:
+        """Return the index of the face that a point (3,) [mm] is on; None, for the centre, if it is on neither of two."""
+        if len(self.surfaces) == 1:
+            return 0
+        tolerance = FACE_TOLERANCE * max(surface.mesh.scale for surface in self.surfaces)
+        distances = [float(np.linalg.norm(surface.nearest(position[None])[1][0] - position)) for surface in self.surfaces]
+        nearest = int(np.argmin(distances))
+        return nearest if distances[nearest] <= tolerance else None
+
+    def target(self, position: np.ndarray) -> "NominalFeature":
+        """Return the datum that touches the feature at a point (3,) [mm]. Raises GeometryFault for a point elsewhere."""
+        index = self.face_with(position)
+        surface = self.surfaces[index or 0]
+        triangle, projection = surface.nearest(position[None])
+        if index is None or np.linalg.norm(projection[0] - position) > FACE_TOLERANCE * surface.mesh.scale:
+            place = ", ".join(f"{coordinate:g}" for coordinate in position)
+            raise GeometryFault(f'its target at ({place}) is not on feature "{self.feature.name}"; move it there')
+        normal = surface.normals(triangle, projection)[0]
+        deviation = self.deviation(index, (np.eye(3), np.zeros(3)))
+        coordinates = np.zeros((1, self.coordinates.shape[1]))
+        coordinates[:, deviation.columns] = deviation.outward(position[None], normal[None])
+        return replace(self, geometry=target_point(position, normal), coordinates=coordinates, form=None, form_columns=range(0))
+
+    def deviation(self, index: int | None, placement: Placement) -> FaceDeviation:
+        """Return how a face deviates in a part at `placement`; with `index` None the centre, which no size moves."""
+        geometry, size_column = self.geometry, self.size_column
+        twist, height = geometry.twists @ self.coordinates, np.zeros(self.coordinates.shape[1])
+        if size_column is not None and index is not None and isinstance(geometry, FeatureOfSize):
+            motion, height[size_column] = geometry.growth(index, moving_faces(self.feature))
+            twist[:3, size_column] += motion
+        columns, form = np.flatnonzero(twist.any(axis=0) | (height != 0)), self.form if index is not None else None
+        modes = np.arange(len(columns), len(columns) + (len(self.form_columns) if form else 0))
+        columns = np.concatenate([columns, np.array(self.form_columns if form else (), dtype=int)])
+        R, t = placement
+        turned = np.vstack([R @ twist[:3, columns], R @ twist[3:, columns]])
+        placed = None if form is None else form.placed(R, t)
+        return FaceDeviation(self.label, columns, R @ geometry.centre + t, turned, height[columns], placed, modes)
+
+
+def moving_faces(feature: Feature) -> Sequence[bool]:
+    """Return whether each face of a feature deviates with it: the fixed face of a size does not."""
+    if feature.size is None or feature.size.moves == "both":
+        return [True] * len(feature.faces)
+    return [feature.size.moves == "first", feature.size.moves == "second"]

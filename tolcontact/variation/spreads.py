@@ -1,0 +1,184 @@
+"""Spreads: how the freedoms of features fill the zones of their tolerances, from the innermost tolerance on."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+from tolcontact.declaration import GeometricTolerance
+from tolcontact.declaration.feature_tolerance import EXTREMES, INSIDE
+from tolcontact.discretization import Nominal
+from tolcontact.errors import GeometryFault, ModelError, designation
+from tolcontact.features import FeatureOfSize, Freedom, Layer, NominalPattern
+from tolcontact.features.tolerance_kinds import floats, includes_form
+from tolcontact.variation import zones
+from tolcontact.variation.form_spreads import form_spreads, mean_width
+from tolcontact.variation.zones import FormedZone, MemberZone
+
+INNER_SHARE_TOLERANCE = 1e-3  # share of features that narrower tolerances may leave outside of a wider one, beyond 0.27 %
+MIN_PART = 1e-12  # of a unit component: smaller parts of it in a coordinate are rounding
+
+
+@dataclass(frozen=True, eq=False)
+class ComponentZone:
+    """The zone of the components of a feature, or of members of a pattern that have components in common.
+
+    No row of `rows` @ (components - middle) is longer than half of the width, enlarged by the bonus.
+
+    columns     of the deviations: the components
+    rows        (point, entry, component)
+    middle      (component,): nonzero for an unequally disposed zone (UZ)
+    width       [mm] without the bonus
+    added       columns of the components that the tolerance adds to narrower ones: they fill the zone with its bonus
+    drawn_width [mm] for which the spreads of these components are computed
+    sizes       (point,) columns of sizes, if the zone grows as these depart from `limit` in the direction `growth` (1, -1)
+    """
+
+    columns: np.ndarray
+    rows: np.ndarray
+    middle: np.ndarray
+    width: float
+    added: np.ndarray
+    drawn_width: float
+    sizes: np.ndarray | None = None
+    limit: float = 0.0
+    growth: float = 0.0
+
+    def scale(self, deviations: np.ndarray) -> np.ndarray:
+        """Return the factor (n,) of the added components for the bonus of deviations (n, contributor)."""
+        assert self.sizes is not None
+        sizes = deviations[:, np.unique(self.sizes)]
+        bonus = np.maximum(self.growth * (sizes - self.limit), 0.0)
+        return np.asarray((self.width + bonus.min(axis=1)) / self.drawn_width)
+
+
+def fill_zones(nominal: Nominal) -> tuple[list[Freedom], list[ComponentZone], dict[str, float]]:
+    """Return the freedoms of a model with their spreads, the zones that components fill, and mean widths of forms.
+
+    The widths [mm] are widths of minimum zones, by feature. Raises ModelError if a rule cannot be applied to a feature.
+    """
+    freedoms, component_zones, mean_widths = list(nominal.freedoms), list[ComponentZone](), dict[str, float]()
+    for pattern in nominal.patterns:
+        spreads_of_forms = []
+        for member in pattern.members:
+            if member.form is None or pattern.form is None:
+                continue
+            spreads = form_spreads(member.form, pattern.form)
+            means = np.zeros(len(spreads)) if member.form.means is None else member.form.means
+            for column, spread, mean in zip(member.form_columns, spreads, means, strict=True):
+                freedoms[column] = replace(freedoms[column], spread=float(spread), mean=float(mean))
+            mean_widths[member.label] = mean_width(member.form, spreads)
+            spreads_of_forms.append(spreads)
+        try:
+            component_zones += _fill_layers(pattern, spreads_of_forms, freedoms)
+        except GeometryFault as fault:
+            declared = pattern.declared
+            place = f'part "{declared.part.name}": {designation(declared.noun, declared)}'
+            raise ModelError(nominal.assembly.name, [f"{place}: {fault}"]) from fault
+    return freedoms, component_zones, mean_widths
+
+
+def _fill_layers(
+    pattern: NominalPattern, spreads_of_forms: Sequence[np.ndarray], freedoms: list[Freedom]
+) -> Iterator[ComponentZone]:
+    """Give the freedoms of a pattern's layers their spreads, and yield the zones that they fill.
+
+    `spreads_of_forms` are the standard deviations (mode,) [mm] of the form of each member; empty without form.
+    """
+    basis, spreads, columns = np.zeros((pattern.count, 0)), np.zeros(0), np.zeros(0, dtype=int)
+    for layer in pattern.layers:
+        inner_count, count, tolerance = len(spreads), layer.added.shape[1], layer.tolerance
+        if not count:
+            continue
+        basis, columns = np.hstack([basis, layer.added]), np.concatenate([columns, layer.columns])
+        members = _member_zones(pattern, layer, basis, spreads_of_forms)
+        if not tolerance.width and inner_count:
+            raise GeometryFault(f"{tolerance.kind}: a zone of width 0 is its bonus alone; leave out the tolerances within it")
+        width = float(tolerance.width) or 1.0  # for which spreads are computed: the bonus scales them
+        spread_rule = zones.extreme_spread if tolerance.rule == EXTREMES else zones.equal_spread
+        spread = spread_rule(members, spreads, count, width)
+        _check_inner_share(tolerance, [member.take(inner_count) for member in members], spreads, width)
+        _check_rule(pattern, tolerance)
+        spreads = np.concatenate([spreads, np.full(count, spread / tolerance.cp)])
+        offsets = pattern.offsets @ layer.controlled @ layer.controlled.T @ basis
+        middles = np.asarray(tolerance.uneven_shift * offsets)  # of the zone, in each component
+        means = middles[inner_count:].copy()
+        for group, components in _groups(members):
+            added, rows = components[components >= inner_count], [members[k].component_rows[..., components] for k in group]
+            zone = ComponentZone(
+                columns[components], np.concatenate(rows), middles[components], tolerance.width, columns[added], width
+            )
+            yield zone if not tolerance.material else _with_bonus(zone, pattern, members, group, tolerance.material)
+            if tolerance.cpk is not None:
+                means[added[:1] - inner_count] += 3 * spread * (1 - tolerance.cpk / tolerance.cp)
+        for column, mean, middle in zip(layer.columns, means, middles[inner_count:], strict=True):
+            freedoms[column] = replace(freedoms[column], spread=spread / tolerance.cp, mean=float(mean), middle=float(middle))
+
+
+def _member_zones(
+    pattern: NominalPattern, layer: Layer, basis: np.ndarray, spreads_of_forms: Sequence[np.ndarray]
+) -> list[MemberZone]:
+    """Return the zones of a layer for the members, as their components (coordinate, component) move what it controls."""
+    coordinates = layer.controlled @ layer.controlled.T @ basis
+    if len(pattern.members) > 1:
+        coordinates = np.where(np.abs(coordinates) < MIN_PART, 0.0, coordinates)
+    places, tolerance = pattern.slices, layer.tolerance
+    if not spreads_of_forms or not includes_form(tolerance, pattern.geometries[0]):
+        return [MemberZone(rows, coordinates[place]) for rows, place in zip(layer.rows, places, strict=True)]
+    members = list[MemberZone]()
+    for member, rows, place, spreads in zip(pattern.members, layer.rows, places, spreads_of_forms, strict=True):
+        form, geometry = member.form, member.geometry
+        assert form is not None
+        offsets = geometry.rows((form.places, form.normals[:, None]))[:, 0]
+        heights = spreads * form.place_heights.T
+        members.append(FormedZone(rows, coordinates[place], heights, offsets, floats(tolerance, geometry, rows)))
+    return members
+
+
+def _groups(members: Sequence[MemberZone]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield the indices of members that have components in common, and these components, in the order of the first members.
+
+    A group is one member if no component moves it and others.
+    """
+    if len(members) == 1:
+        moved = np.ones((1, members[0].coordinates.shape[1]), dtype=bool)
+    else:
+        moved = np.array([(member.component_rows != 0).any(axis=(0, 1)) for member in members])
+    _, labels = connected_components(moved.astype(int) @ moved.astype(int).T)
+    for label in range(labels.max() + 1):
+        group = np.flatnonzero(labels == label)
+        yield group, np.flatnonzero(moved[group].any(axis=0))
+
+
+def _with_bonus(
+    zone: ComponentZone, pattern: NominalPattern, members: Sequence[MemberZone], group: np.ndarray, material: str
+) -> ComponentZone:
+    """Return the zone of a group of members that grows as their sizes depart from the material limit, "M" or "L"."""
+    size, geometry = pattern.declared.size, pattern.geometries[group[0]]
+    columns = [pattern.members[k].size_column for k in group]
+    if size is None or None in columns:
+        return zone
+    is_inner = isinstance(geometry, FeatureOfSize) and geometry.is_inner
+    limit, growth = (size.lower, 1.0) if is_inner == (material == "M") else (size.upper, -1.0)
+    sizes = np.repeat(np.array(columns, dtype=int), [len(members[k].rows) for k in group])
+    return replace(zone, sizes=sizes, limit=limit, growth=growth)
+
+
+def _check_rule(pattern: NominalPattern, tolerance: GeometricTolerance) -> None:
+    form, rule = pattern.form, tolerance.rule
+    if form is not None and rule != INSIDE and includes_form(tolerance, pattern.geometries[0]):
+        raise GeometryFault(
+            f'{tolerance.kind}: the rule "{rule}" is for features that keep their shape, and the form of this one is '
+            f'drawn; choose "{INSIDE}", or give its {form.kind} form=None'
+        )
+
+
+def _check_inner_share(tolerance: GeometricTolerance, members: Sequence[MemberZone], spreads: np.ndarray, width: float) -> None:
+    """Raise GeometryFault if narrower tolerances, with spreads (component,), leave too many features outside of the zone."""
+    share = zones.share_inside(members, spreads, width)
+    if share < zones.SHARE - INNER_SHARE_TOLERANCE:
+        raise GeometryFault(
+            f"{tolerance.kind} {tolerance.width:g}: the narrower tolerances within it leave "
+            f"{100 * (1 - share):.2g} % of the features outside already; make these narrower, or it wider"
+        )
