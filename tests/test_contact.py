@@ -104,7 +104,7 @@ def test_contact_of_one_moving_part_leaves_no_penetration():
 
 def test_the_papers_set_alone_may_leave_penetration_and_the_closed_set_does_not():
     """Contact at the upper joint presses the middle plate onto the bottom, where nothing was active before."""
-    _, initial = simulate(cases.stack(), samples=200, method=replace(PAPER, active_set="initial"))
+    _, initial = simulate(cases.stack(), samples=200, method=tc.Method.paper())
     _, closed = simulate(cases.stack(), samples=200, method=PAPER)
     only_upper = (closed["active"][:, 0] == 0) & (closed["active"][:, 1] > 0)
     assert only_upper.sum() > 10

@@ -110,6 +110,11 @@ class Method:
         if self.search != "fixed" and self.resolution != "exact":
             raise OptionError(f'search is "{self.search}" with a linearized resolution; it needs resolution "exact"')
 
+    @classmethod
+    def paper(cls) -> "Method":
+        """Return the paper's choices: one step (12) by the points that are active in the raw state, regularized by eta I (11)."""
+        return cls(resolution="linearized", objective="active points", regularization="identity", active_set="initial")
+
     def with_choices(self, **choices: Any) -> "Method":
         """Return this method with other choices; another resolution comes with its usual search, unless one is given.
 

@@ -17,8 +17,7 @@ import tolcontact as tc
 HERE = Path(__file__).resolve().parent
 METHODS = {
     "linearized": {"resolution": "linearized"},
-    # (11) with eta I, points active at first
-    "to the letter": {"resolution": "linearized", "regularization": "identity", "active_set": "initial"},
+    "to the letter": vars(tc.Method.paper()),
     "exact": {"search": "fixed", "objective": "active points"},
 }
 
