@@ -112,7 +112,7 @@ class Method:
 
     @classmethod
     def paper(cls) -> "Method":
-        """Return the paper's choices: one step (12) by the points that are active in the raw state, regularized by eta I (11)."""
+        """Return the choices of the paper: one step (12) by the points active in the raw state, regularized by eta I (11)."""
         return cls(resolution="linearized", objective="active points", regularization="identity", active_set="initial")
 
     def with_choices(self, **choices: Any) -> "Method":
