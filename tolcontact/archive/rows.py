@@ -1,4 +1,4 @@
-"""Which variables of each realization an archive holds, in which groups, and their values."""
+"""The variables of each realization in an archive, their groups, and their values."""
 
 from collections.abc import Collection, Iterable
 from typing import NamedTuple

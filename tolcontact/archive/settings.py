@@ -92,7 +92,7 @@ def _weighting(program: Program) -> str:
 
 
 def _method_origin(program: Program) -> str:
-    """Return whether the method is that of the model, the defaults, or set by options of the run."""
+    """Return whether the method comes from the model, the defaults, or options of the run."""
     declared = program.nominal.assembly.method
     if program.method == (declared or Method()):
         return "defaults" if declared is None else "model"

@@ -1,4 +1,4 @@
-"""Rows of realizations as they are stored: which variables, in which chunks and blocks, with which checksums."""
+"""Rows of realizations as they are stored: their variables, chunks, blocks and checksums."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -29,7 +29,7 @@ class StoredBlock(NamedTuple):
 
 
 def stored(block: Block, labels: Sequence[str], nominal: Nominal) -> StoredBlock:
-    """Return a block, converted once for the file and for its checksums; `labels` are those of its variables."""
+    """Return a block, converted once for the file and for its checksums; `labels` select its variables."""
     values = row_values(block, labels, nominal)
     checksums = [crc32(row.variable, values[row.label]) for row in kept_rows(nominal, "all") if row.label in values]
     return StoredBlock(block.start, block.start + len(block), values, checksums)
@@ -134,7 +134,7 @@ class _Largest:
 def archived_poses(file: netCDF4.Dataset, rows: np.ndarray, stations: Sequence[str]) -> np.ndarray | None:
     """Return corrected poses (row, part, 12) of some rows; None if the archive does not keep poses.
 
-    With `stations` the parts are those of all stations, one after the other.
+    With `stations`, the parts of all stations follow one another.
     """
     if terms.ROTATION.name not in file.variables:
         return None

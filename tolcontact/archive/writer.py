@@ -151,7 +151,7 @@ class ArchiveWriter:
         return self.is_between_blocks and (is_old or is_last)
 
     def write_checkpoint(self, sums: Sequence[np.ndarray]) -> None:
-        """Write the sums of the fields (state, number) for each part so far, from which a killed run continues."""
+        """Write the sums of the fields (state, number) for each part so far, so that a killed run can continue."""
         with _as_archive_error(self._path):
             place = 1 - self._place
             write_checkpoint(self._values, Checkpoint(self.rows, place, list(sums)), self._parts)

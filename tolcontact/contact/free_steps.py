@@ -1,4 +1,4 @@
-"""Steps of bodies that are free of each other: they end before bodies enter each other, so that none contradict each other."""
+"""Steps of free bodies: each step ends before bodies penetrate, so that no constraints contradict each other."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -17,11 +17,11 @@ from tolcontact.discretization import ContactPoints
 from tolcontact.mechanics import Group
 
 MAX_HALVINGS = 20
-SINK_SHARE = 0.02  # of a step, by which places may sink in: they follow planes, and rotations are curved
-TOUCHING = 1e-9  # mm: bodies no deeper in each other touch
-GAIN_SHARE = 1e-9  # of the objective, by which rounding may raise it
+SINK_SHARE = 0.02  # of a step: accepted penetration of places, since they follow planes and rotations are curved
+TOUCHING = 1e-9  # mm: bodies with at most this penetration touch
+GAIN_SHARE = 1e-9  # of the objective: increase due to rounding
 MAX_LIFTS = 30
-LIFT_FACTOR = 1.1  # times the width of what bodies share, by which they are moved apart
+LIFT_FACTOR = 1.1  # times the width of the common region of bodies: how far they are moved apart
 
 
 class FreeSteps:
@@ -46,7 +46,7 @@ class FreeSteps:
     def shorten(self, step: LinearStep, task: Task, before: State, state: State, size: Float[Array, " n"]) -> Bool[Array, " n"]:
         """Shorten steps from `before` to `state`, of a size (n,) [mm], so that bodies stay free; return which are short (n,).
 
-        What a short step left in each other since rotations are curved comes free by another one, the smallest that does.
+        If a short step leaves penetration because rotations are curved, the smallest step that removes it follows.
         """
         is_short = self._hold_back(task, before, state, size)
         rows = np.flatnonzero(is_short)

@@ -1,4 +1,4 @@
-"""Guards of pairs whose bodies end: they see that bodies lie in each other where the list of places shows nothing."""
+"""Guards of bounded pairs: they detect bodies that interfere where the list of places shows nothing."""
 
 from dataclasses import dataclass
 
@@ -10,13 +10,13 @@ from tolcontact.compilation import Program
 from tolcontact.geometry.meeting import Places
 from tolcontact.interference import Neighbours, WayOut, ordered
 
-GUARD = 1 << 41  # first label of places that a guard adds: a label says in which direction the place parts the bodies
+GUARD = 1 << 41  # first label of places that a guard adds: a label encodes the direction that separates the bodies
 LEVELS = 1 << 12  # of a component of that direction
-APART = 2.0 * 8.0 ** np.arange(3)  # insets of both bodies, by which they may be apart where a place holds them
+APART = 2.0 * 8.0 ** np.arange(3)  # insets of both bodies: the distances at which a place that holds them apart is searched
 
 
 def is_guard(labels: Int[Array, "..."]) -> Bool[Array, "..."]:
-    """Return which labels are those of places that a guard added."""
+    """Return which labels belong to places that a guard added."""
     return (labels >= GUARD) & (labels < 2 * GUARD)
 
 
@@ -87,9 +87,9 @@ class Guard:
             values[rows, 0] = of_rows
 
     def ways_out(self, X_RM: Float[Array, "n 12"], directions: Float[Array, "n 3"] | None = None) -> WayOut:
-        """Return how the bodies part: P_m, P_r and n_r of the paper, and how deep the place P_m lies (n,) [mm].
+        """Return how the bodies separate: P_m, P_r and n_r of the paper, and how deep the place P_m lies (n,) [mm].
 
-        directions   (n, 3) in which they part, if known (see Neighbours)
+        directions   (n, 3) of separation, if known (see Neighbours)
         """
         if not self.is_swapped:
             return self.neighbours.ways_out(X_RM, directions)

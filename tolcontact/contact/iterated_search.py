@@ -19,7 +19,7 @@ from tolcontact.contact.state import State, Task, Unsettled
 
 MAX_STEPS = 100
 GOOD_RATIO = 0.7  # a good step is at most this part of the step before, or gains at least this part of the foreseen gain
-CAUTION_FACTOR = 10.0  # by which caution grows after a step that stalls, and falls after one that gains
+CAUTION_FACTOR = 10.0  # growth of caution after a step that stalls, and its reduction after one that gains
 MIN_SCALED_STEP = 1e-6  # mm, in the norm of the objective: its square is what a step gains
 STEP_TOLERANCE = 1e-8  # mm: a smaller step is the last one
 
@@ -62,7 +62,7 @@ def search(
 
 
 def _empty_slots(state: State) -> None:
-    """Empty all slots: the points that carried before may now be beyond the rim."""
+    """Empty all slots: the points that were active before may now be beyond the rim."""
     for slots in state.slots:
         slots.put(np.arange(len(state)), Slots.empty(*slots.points.shape))
 

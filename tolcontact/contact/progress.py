@@ -7,7 +7,7 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.contact.state import State
 
-ASTRAY_WEIGHT = 1e3  # of a locator that does not hold, beside penetration
+ASTRAY_WEIGHT = 1e3  # of a locator that does not hold, relative to penetration
 PATIENCE_IN_CONFLICT, MIN_GAIN = 10, 1e-3  # steps without less penetration, and the share of it that counts as less
 PATIENCE, MIN_CALMING = 20, 0.1  # steps that are not smaller than all before, and the share that counts as smaller
 

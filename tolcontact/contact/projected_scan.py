@@ -13,7 +13,7 @@ from tolcontact.discretization import ContactPoints
 
 @dataclass(frozen=True, eq=False)
 class ProjectedScan(PairScan):
-    """A scan in which every realization has feet of its own.
+    """A scan with separate projections of the points for every realization.
 
     feet, normals    (realization, point, 3): P^r and n^r, nominal
     over             (realization, point): points that do not overhang the rim of the reference face; the others cannot touch

@@ -24,7 +24,7 @@ class GapMinima(NamedTuple):
 
     labels             (realization, place), -1 for none
     P_m, feet, n_r     (realization, place, 3): P^m, P^r, n^r of nominal faces
-    heights            (realization, place) [mm] by which both faces have grown there, with their forms
+    heights            (realization, place) [mm]: growth of both faces there, including form deviations
     """
 
     labels: Int[Array, "realization place"]

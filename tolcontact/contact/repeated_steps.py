@@ -21,8 +21,8 @@ from tolcontact.contact.starts import Start
 from tolcontact.contact.state import State, Task, Unsettled
 
 STEP_TOLERANCE = 1e-9  # mm: a smaller step is the last one
-ROUNDING = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that next to nothing holds
-NEARLY_AT_REST = 1e-3  # mm: after a smaller step, places do not stay beside sharp edges
+ROUNDING = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that are almost unconstrained
+NEARLY_AT_REST = 1e-3  # mm: after a smaller step, places do not stay beyond sharp edges
 CLOSED = 1e-6  # mm, and of rotation matrices: steps that come back so near to where they were will do so again
 
 
@@ -45,10 +45,10 @@ FIRM_STEPS = (*[StepKind(1e4, newton=True)] * 6, *[StepKind(1e2, newton=True)] *
 STEPS = (*[StepKind(1.0, newton=False)] * 8, *FIRM_STEPS, *[StepKind(1.0, newton=True)] * 80)
 # Places between the points of planes with form are added step by step: a few realizations need some more steps for that.
 STEPS_WITH_FORM = (*[StepKind(1.0, newton=False)] * 8, *STEPS)
-# Where faces end, places come and go. Newton's curvature is that of places that stay, so steps like the paper's come first and,
-# held back, again later, with places that stay longer: they do not jump to and fro between places. Beside its edge
-# a place holds bodies apart that would touch nearby, at a lower objective. So places only stay while steps are large, unless
-# that takes too long.
+# Where faces end, places appear and vanish. Newton's curvature belongs to places that stay, so steps like the paper's come
+# first. Damped, they come again later, with places that stay longer, and do not alternate between places. Beyond its edge, a
+# place separates bodies that would touch nearby at a lower objective. So places only stay while steps are large, unless
+# convergence takes too long.
 WIDE = 32.0
 STEPS_WHERE_FACES_END = (
     *[StepKind(1.0, newton=False, sharp=True)] * 12,

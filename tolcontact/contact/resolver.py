@@ -1,4 +1,4 @@
-"""Resolve contact: from the raw poses of a group of parts to those in which nothing penetrates, and how sure that is.
+"""Resolve contact: move a group of parts from raw poses to poses without penetration, and rate the certainty of the answer.
 
 The linearized resolution takes one linear step. The exact one repeats them (see repeated_steps), with an iterated search
 about contact points that are projected again (see iterated_search). Realizations that end in a conflict, without an answer, or
@@ -36,7 +36,7 @@ from tolcontact.contact.starts import (
 from tolcontact.contact.state import NO_ANSWER, Resolved, State, Task
 from tolcontact.interference import ordered
 
-SAME_CONFLICT = 1e-3  # share by which the penetration of two conflicts differs that are taken for the same
+SAME_CONFLICT = 1e-3  # conflicts whose penetration differs by less than this share count as the same
 UNMOVED = 1e-9  # mm: contact moves bodies by more
 MIN_GAIN = 1e-6  # of the objective, or mm of penetration: what another start must gain to be preferred
 
@@ -102,7 +102,7 @@ class ContactResolver:
     ) -> Resolved:
         """Correct the realizations of a block that contact in this group changes.
 
-        Forces move every realization; without forces, contact moves the realizations in which a point is inside.
+        Forces move every realization; without forces, contact moves only realizations with a point inside.
 
         poses        (realization, part, 12), raw
         relative     (realization, pair, 12): X_RM of the pairs, raw
@@ -180,13 +180,13 @@ class ContactResolver:
             self._doubt_rolled(task, state)
 
     def _leave_adrift(self, task: Task, state: State) -> None:
-        """Put realizations in which nothing holds a part against its forces back to their raw poses."""
+        """Reset realizations to their raw poses if nothing holds a part against its forces."""
         adrift = self._limits.is_adrift(task, state)
         state.kkt_residual[adrift], state.slack[adrift], state.multipliers[adrift] = np.inf, 0, 0
         state.poses[adrift], state.relative[adrift] = task.raw[adrift], task.relative[adrift]
 
     def _doubt_rolled(self, task: Task, state: State) -> None:
-        """Mark answers as doubtful in which contact points slid into a curved face, along planes that leave it there."""
+        """Mark answers as doubtful if contact points slid along tangent planes into a curved face."""
         for k in self._candidates.curved:
             rolled = np.flatnonzero(self._limits.rolled(k, state))
             if rolled.size:
@@ -197,7 +197,7 @@ class ContactResolver:
     def _try_other_starts(self, task: Task, state: State) -> None:
         """Try again, from other starts, realizations that are not certified, or far from their raw pose; keep the better.
 
-        The same conflict from two starts is not looked for from a third one.
+        If two starts lead to the same conflict, no third start is tried.
         """
         if self._candidates.curved:
             self._try_again(task, state, np.flatnonzero(state.rank == NO_ANSWER), BALANCE)
@@ -215,7 +215,7 @@ class ContactResolver:
             self._try_again(task, state, np.flatnonzero(state.rank > 0), start)
 
     def _without_answer(self, state: State) -> Int[Array, " k"]:
-        """Return the realizations (k,) without an answer in which bodies are apart; one that is far away counts as one."""
+        """Return the realizations (k,) without an answer that separates the bodies; a distant answer counts as one."""
         rows = np.flatnonzero(state.rank == NO_ANSWER)
         is_apart = state.solved[rows] & ~self._candidates.interfere(state.relative[rows])
         return rows[~is_apart]

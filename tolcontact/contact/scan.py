@@ -82,7 +82,7 @@ class Scan:
 class SlotScan(Scan):
     """A scan whose points take turns in the slots of the QP.
 
-    fills   whether points outside take the slots that are left: worth it where most points may carry
+    fills   whether points outside take the remaining slots: worthwhile if most points may be active
     """
 
     fills: ClassVar[bool] = False
@@ -251,7 +251,7 @@ def pair_scan(
 
     Each support has a cluster of its own.
 
-    points   numbers of the points (point,) that the scan has; all if it is None
+    points   indices (point,) of the points of the scan; all if it is None
     """
     points = np.arange(len(pair.P_m)) if points is None else points
     label = cluster_labels(pair.P_m[points], len(points) if pair.is_supports else clusters)
@@ -315,7 +315,7 @@ def undone(
     may_carry: Sequence[Bool[Array, "realization _"] | None],
     slack: Float[Array, "realization pair"],
 ) -> Float[Array, "realization pair"]:
-    """Return by how much points that may carry are deeper inside than the slack (realization, pair) [mm].
+    """Return the penetration beyond the slack of points that may be active (realization, pair) [mm].
 
     min_gap     (realization, pair) [mm]: the least gaps of all points
     may_carry   for each pair (realization, point), or None if all points may

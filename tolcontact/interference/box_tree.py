@@ -7,7 +7,7 @@ import numpy as np
 from tolcontact.arrays import Array, Float, Int
 
 LEAF = 4  # triangles in a leaf
-LEVELS = 1 << 10  # cells along each side of the mesh, by which triangles are sorted
+LEVELS = 1 << 10  # cells along each side of the mesh, for sorting triangles
 
 
 class BoxTree(NamedTuple):

@@ -22,7 +22,7 @@ class DeviatingSolid:
     columns    (k,) of the deviations that move its faces
     outward    (t, 3, k) [mm]: how far the plane of each triangle moves outwards at each of its corners for unit deviations
     bulges     (t,) [mm]: how far triangles of hollow round faces stand in the hollow
-    cylinders  those on which its triangles are known to lie, in its frame
+    cylinders  that are known to contain some of its triangles, in its frame
     """
 
     solid: Solid

@@ -32,7 +32,7 @@ class Side(NamedTuple):
     members, first_members   the triangles of each facet, as in a CSR matrix
     vertices_of_facets   (f, 3): three vertices of facets that deviations move, -1 for others
     starts, listed, reaches   the facets near each edge, as in a CSR matrix, the nearest first, with their nominal distances
-    reach       [mm] up to which facets are near
+    reach       [mm]: the largest distance of near facets
     triangles, boxes, next   its BoxTree
     bounds      (8, 3) [mm]: corners of a box that holds the body
     witnesses   (c,): a vertex of each connected component, nominally far from the surface of the other body
@@ -126,7 +126,7 @@ def crossing(side, triangle, p, q):  # type: ignore[no-untyped-def]
 
 @inlined_uncounted
 def passes(side, p, q, shares, senses):  # type: ignore[no-untyped-def]
-    """Write at which shares, in order, and in which senses the segment from p to q passes the surface; return how often."""
+    """Write shares, in order, and senses of the passes of the segment from p to q through the surface; return their number."""
     low, high = (min(p[0], q[0]), min(p[1], q[1]), min(p[2], q[2])), (max(p[0], q[0]), max(p[1], q[1]), max(p[2], q[2]))
     return passes_in(side, low, high, p, q, shares, senses)
 
@@ -225,7 +225,7 @@ def motion_of(X, bounds):  # type: ignore[no-untyped-def]
 
 @inlined_uncounted
 def _misses(boxes, p, q):  # type: ignore[no-untyped-def]
-    """Return whether the box around p and q misses that of a whole body."""
+    """Return whether the box around p and q misses the box of a whole body."""
     return (
         boxes[0, 0] > max(p[0], q[0]) or boxes[0, 3] < min(p[0], q[0]) or boxes[0, 1] > max(p[1], q[1])
         or boxes[0, 4] < min(p[1], q[1]) or boxes[0, 2] > max(p[2], q[2]) or boxes[0, 5] < min(p[2], q[2])

@@ -77,7 +77,7 @@ def _bulges(body: Solid, surface_of_body: Surface, round_faces: Sequence[tuple[A
 def _round_faces(
     nominal: Nominal, part: NominalPart, body: Solid, surface_of_body: Surface
 ) -> Iterator[tuple[AnalyticSurface, np.ndarray]]:
-    """Yield the round surfaces of a part in the nominal assembly, and the triangles (m,) of its solid that stand for them."""
+    """Yield the round surfaces of a part in the nominal assembly, and the triangles (m,) of its solid that represent them."""
     faces_of_file = known_surfaces(part.mesh)
     if faces_of_file is not None:
         numbers, surfaces, _ = faces_of_file
@@ -93,12 +93,12 @@ def _round_faces(
 
 
 def curved_triangles(body: Solid, face: Surface) -> np.ndarray:
-    """Return the triangles (m,) of a body on which the round surfaces of a face lie."""
+    """Return the triangles (m,) of a body that form the round surfaces of a face."""
     surface_of_body = Surface(trimesh.Trimesh(body.vertices, body.faces, process=False))
     pieces = [piece for piece in face.pieces if not isinstance(piece.surface, Plane)]
     return np.concatenate([np.zeros(0, dtype=int), *(_triangles(surface_of_body, piece.face) for piece in pieces)])
 
 
 def _triangles(surface_of_body: Surface, face: Surface) -> np.ndarray:
-    """Return the triangles (m,) of a body on which a face of it lies."""
+    """Return the triangles (m,) of a body that form one of its faces."""
     return np.unique(surface_of_body.nearest(np.asarray(face.mesh.triangles_center))[0])

@@ -1,4 +1,4 @@
-"""Compiled directions in which bodies that interfere part with the least motion."""
+"""Compiled search for the direction of the least motion that separates bodies that interfere."""
 
 import math
 from typing import NamedTuple
@@ -22,8 +22,8 @@ class Region(NamedTuple):
 
     points     (p, 3) [mm]
     normals    (p, 3): of the facet that an edge passes, from B to A; 0 at vertices
-    facets     (p, 4): two facets of A and two of B, twice the same in the middle of one; -1 at vertices
-    vertices   (p,): that of A, or -2 minus that of B; NO_VERTEX where an edge passes a facet
+    facets     (p, 4): two facets of A and two of B, twice the same inside a facet; -1 at vertices
+    vertices   (p,): the vertex of A, or -2 minus the vertex of B; NO_VERTEX where an edge passes a facet
     edges      (p,): the edge that passes the facet, with the sign of `vertices`
     shares     (p,) of that edge
     senses     (p,): -1 inwards, 1 outwards, 0 at vertices
@@ -55,7 +55,7 @@ def _add(region, count, point, normal, number, share, sense):  # type: ignore[no
 
 @uncounted
 def _root(parents, j):  # type: ignore[no-untyped-def]
-    """Return the corner that stands for all of the same connected part."""
+    """Return the corner that represents all of the same connected part."""
     while parents[j] != j:
         parents[j] = parents[parents[j]]
         j = parents[j]
@@ -160,8 +160,8 @@ def _join_parts(region, count):  # type: ignore[no-untyped-def]
 def _normals_of_part(A, B, X, region, count, part, edges_A, edges_B, normals):  # type: ignore[no-untyped-def]
     """Write the normals along which a connected part of the region may be narrowest; return how many there are.
 
-    They are those of facets that edges pass, and the common ones of edges of A and of B, where both bodies are convex; some of
-    the edges that do are written.
+    They are the normals of facets that edges pass, and the common normals of edges of A and of B where both bodies are convex;
+    some of the passing edges are written.
     """
     found = 0
     count_A, count_B = 0, 0
@@ -210,13 +210,13 @@ def _narrowest(region, count, part, normals):  # type: ignore[no-untyped-def]
 
 @compiled
 def ways_out(A, B, poses, inset, directions, places, feet, normals, widths):  # type: ignore[no-untyped-def]
-    """Write how bodies that interfere at poses X_BA (n, 12) part: along n, by the width of what they share.
+    """Write how bodies that interfere at poses X_BA (n, 12) separate: along n, by the width of their common region.
 
     The corners of the region that both bodies share lie on their edges. Of the normals of facets that edges pass, and of
     crossing edges, the one counts along which this region is narrowest. Its lowest point is held above its highest one. Of
-    several connected parts of the region the widest counts, or that which parts most nearly in a given direction.
+    several connected parts of the region the widest counts, or the part whose normal is closest to a given direction.
 
-    inset         [mm] by which both surfaces together lie inside the bodies
+    inset         [mm]: sum of the depths of both surfaces inside the bodies
     directions    (n, 3): the given ones, 0 for none
     places, feet  (n, 3) [mm]: the lowest point, on A, and the highest one, on B, in the frames of these bodies
     normals       (n, 3), from B to A, in the frame of B

@@ -14,7 +14,7 @@ from tolcontact.geometry.vertex_displacements import capped, displacements
 
 SAME_PLANE = 1e-5  # rad: facets whose normals differ by less are one plane
 MIN_SINGULAR = 0.05  # of the planes around a vertex: a direction that they determine worse is left alone
-MAX_SHIFT = 8.0  # insets: a vertex of a needle moves no farther
+MAX_SHIFT = 8.0  # insets: the largest motion of a vertex, for needles
 
 
 @dataclass(frozen=True, eq=False)

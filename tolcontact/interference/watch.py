@@ -1,4 +1,4 @@
-"""The watch over all bodies of an assembly: which of them lie in each other, in every realization."""
+"""The watch over all bodies of an assembly: which of them interfere, in every realization."""
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -16,19 +16,19 @@ from tolcontact.interference.free_region import CORNERS
 from tolcontact.interference.neighbours import Interference, Neighbours
 from tolcontact.interference.part_solid import curved_triangles, part_solid
 
-# Of the smallest tolerance range, twice the radius of a ball in both bodies: the depth from which on these lie in each other.
+# Share of the smallest tolerance range: bodies interfere from this depth on, the diameter of a ball that lies in both of them.
 ALLOWED_SHARE = 1 / 1000
 RANGE = 1.0  # mm: in its place if nothing is toleranced
 MIN_DEPTH = 1e-7  # mm, and MIN_SHARE of the sizes of both bodies: below, poses and vertices are rounded
 MIN_SHARE = 1e-8
 MOTION_FACTOR = 2.0  # times the motion of raw poses: how far bodies usually move
-SHARES = (0.4, 0.6)  # of that depth, by which the surfaces of both bodies are moved inwards
+SHARES = (0.4, 0.6)  # of that depth: inward offsets of the surfaces of both bodies
 
 
 class Clash(NamedTuple):
-    """Realizations in which two bodies lie in each other.
+    """Realizations with interference between two bodies.
 
-    pair    the numbers of the bodies among the parts of the nominal assembly, the smaller one first
+    pair    the indices of the bodies among the parts of the nominal assembly, the smaller one first
     rows    (k,) realizations
     """
 
@@ -53,8 +53,8 @@ class Watch:
     """The bodies of an assembly that may come near each other.
 
     nominal   the assembly
-    allowed   [mm] by pair of bodies: a depth at which they do not count as in each other yet, if that is larger than usual;
-              infinite where they may lie in each other
+    allowed   [mm] by pair of bodies: a depth that does not count as interference yet, if it is larger than usual; infinite if
+              any depth is allowed
     poses, deviations   (n, part, 12), (n, contributor): some raw poses; tests are quickest where bodies move about as far
     """
 
@@ -149,7 +149,7 @@ class Watch:
         return MOTION_FACTOR * float(self._usual_motions[list(pair)].sum())
 
     def depth(self, pair: tuple[int, int]) -> float:
-        """Return the depth [mm] from which on two bodies count as in each other; infinite if they may be."""
+        """Return the interference threshold of two bodies, a depth [mm]; infinite if any depth is allowed."""
         size = float(np.ptp(self._bounds[list(pair)], axis=1).max())
         return max(self._usual_depth, self.allowed.get(pair, 0.0), MIN_DEPTH, MIN_SHARE * size)
 
@@ -159,7 +159,7 @@ class Watch:
 
     @property
     def largest_depth(self) -> float:
-        """The largest depth [mm] from which on bodies count as in each other, of tested pairs."""
+        """The largest interference threshold [mm] of tested pairs."""
         depths = [self.depth(pair) for pair in self.declared]
         return max([self._usual_depth, MIN_DEPTH, *(depth for depth in depths if np.isfinite(depth))])
 
@@ -171,7 +171,7 @@ class Watch:
 
     @property
     def untested_pairs(self) -> tuple[str, ...]:
-        """The names of contact pairs whose bodies may lie in each other, since they give way or have form."""
+        """The names of contact pairs whose bodies may interfere, since they are compliant or have form deviations."""
         pairs = [pair for pair in self.nominal.pairs if pair.reference is not None and (pair.is_springy or pair.has_form)]
         return tuple(dict.fromkeys(pair.name for pair in pairs))
 
