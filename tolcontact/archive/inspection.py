@@ -78,7 +78,7 @@ class DamagedError(Exception):
 
 
 def check_archive(path: Path) -> None:
-    """Raise ArchiveError if there is no file at a path, or it does not stand the inspection."""
+    """Raise ArchiveError if there is no file at a path, or it fails the inspection."""
     if not path.is_file():
         raise ArchiveError(f'archive "{path}" does not exist; write one with: tolcontact run MODEL.py --out {path}')
     inspect(path)

@@ -25,7 +25,7 @@ class BytePlace(NamedTuple):
 
 
 class RawFile:
-    """The values of an archive on its disk. A row is what stands at one index of a variable's first dimension."""
+    """The values of an archive on its disk. A row is the values at one index of a variable's first dimension."""
 
     def __init__(self, path: Path) -> None:
         """Open the file. Raises OSError if it cannot be read and written."""

@@ -35,7 +35,7 @@ def define(group: netCDF4.Dataset, variable: ArchiveVariable) -> None:
 
 
 def rows_together(width: int) -> int:
-    """Return the rows in a chunk of the file, for rows of `width` bytes: all rows of a block, or fewer if they are too large."""
+    """Return the rows in a chunk of the file, for rows of `width` bytes: a whole block, or fewer if they are too large."""
     rows = terms.BLOCK_ROWS
     while rows > MIN_CHUNK_ROWS and rows * width > MAX_CHUNK_BYTES:
         rows //= 2

@@ -1,7 +1,7 @@
 """Writing an archive block by block.
 
 A file that is being extended breaks when its writer is killed at the wrong moment. So room is laid out first, under another
-name: header, and rows with the status "unfinished". Once the file stands under its own name, bytes are only overwritten in
+name: header, and rows with the status "unfinished". Once the file has its own name, bytes are only overwritten in
 place, the status of a row after its data. If the process is killed, the file still opens, finished rows stay, and `resume`
 continues after the last checkpoint. (Writes are not flushed to the disk: a power failure may lose more.) To have its name
 soon, a long run begins with room for few rows; when these are full, a copy gets room for all, and replaces the file.

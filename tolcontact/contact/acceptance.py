@@ -94,7 +94,7 @@ class AcceptanceLimits:
         return doubtful
 
     def lie_in_form(self, task: Task, state: State) -> Bool[Array, " n"]:
-        """Return whether faces with form lie in each other in a certified answer (n,), where no search finds the deepest place.
+        """Return whether faces with form interfere in a certified answer (n,), where no search finds the deepest place.
 
         These are polyhedra on a plane with form. The faces are compared at many points.
         """
@@ -116,11 +116,11 @@ class AcceptanceLimits:
         return self.displacement(task.raw, state.poses) > self._max_travel
 
     def allowed(self, k: int) -> float:
-        """Return how deep [mm] the faces of pair k of the group may lie in each other in an answer that is not doubtful."""
+        """Return the penetration [mm] of the faces of pair k of the group that an answer may have and not be doubtful."""
         return self._max_depth + self._group_pairs[k].facets
 
     def rolled(self, k: int, state: State) -> Bool[Array, " n"]:
-        """Return whether points may have slid so far around the reference face of pair k that their planes leave it (n,).
+        """Return whether points may have slid so far around the reference face of pair k that tangent planes leave it (n,).
 
         A tangent plane departs from a curved face by curvature times half the square of the distance from its contact point.
         """

@@ -1,4 +1,4 @@
-"""Compiled passes over places that are found at every pose, of every realization its own."""
+"""Compiled passes over places that are searched at every pose, separately for each realization."""
 
 import numpy as np
 
@@ -51,7 +51,7 @@ def deepest(labels, feet, values, distance, numbers, depths):  # type: ignore[no
 
 @uncounted
 def _is_near(feet, columns, depths, k, j, distance):  # type: ignore[no-untyped-def]
-    """Return whether the foot in column j is within a distance of one in a column before it that counts."""
+    """Return whether the projection in column j is within a distance of one in an earlier column that counts."""
     is_near = False
     for other in range(j):
         away = 0.0

@@ -27,7 +27,7 @@ MAX_CLUSTERS = 6
 FORM_CLUSTERS = 8  # of faces with form, which touch at more places
 APART = 2.0  # times the error of planes beyond their edges: bodies under load are no further apart
 EDGE_SHARE = 1 / 4000  # of the smallest tolerance range: error of planes beyond their edges, in steps
-BULGE_SHARE = 1 / 2500  # of the same: depth to which planes with form may lie in each other between contact points
+BULGE_SHARE = 1 / 2500  # of the same: accepted penetration of planes with form between contact points
 MIN_BULGE = 1e-7  # mm
 OVERHANG_SHARE = 0.01  # of their radius: overhang beyond a wall at which balls and shafts that travelled far may be active
 
@@ -43,7 +43,7 @@ class RawSurvey(NamedTuple):
     """Gaps and active points of realizations in their raw state.
 
     scans       for each pair the points that may be active
-    min_gap     (realization, pair) [mm]: the least gaps
+    min_gap     (realization, pair) [mm]: the smallest gaps
     active      (realization, pair): number of active points
     moments     (realization, side, moment) of the points that count in the objective
     is_inside   (realization,): whether faces with form penetrate each other between the points
@@ -94,7 +94,7 @@ class Candidates:
                 self._all_scans.append(round_scan)
                 self._carrying_scans.append(round_scan)
                 continue
-            # Places of bounded pairs are found at every pose, so that no cluster offers a point of its own.
+            # Places of bounded pairs are found at every pose, so that clusters offer no separate points.
             clusters = 1 if index in program.meetings else FORM_CLUSTERS if pair.has_form else MAX_CLUSTERS
             self._all_scans.append(pair_scan(pair, gaps, tables, clusters))
             # If the paper's set of points may be active, points between the corners count, too.
@@ -185,18 +185,18 @@ class Candidates:
 
     @property
     def change(self) -> bool:
-        """Whether places of contact are found again at every pose."""
+        """Whether contact places are searched at every pose."""
         return bool(self.bounded or self._with_minima)
 
     def bulge(self, scans: Sequence[Scan], relative: Float[Array, "realization pair 12"]) -> Bool[Array, " realization"]:
-        """Return whether planes with form lie in each other between contact points, by more than bodies may (realization,)."""
+        """Return whether planes with form penetrate between contact points, deeper than bodies may (realization,)."""
         found = np.zeros(len(relative), dtype=bool)
         for k in self._with_minima:
             found |= scans[k].depth_between(relative[:, k]) > self._allowed_bulge
         return found
 
     def interfere(self, relative: Float[Array, "realization pair 12"]) -> Bool[Array, " realization"]:
-        """Return whether bodies of a pair lie in each other (realization,), by a test that does not know the list of places."""
+        """Return whether bodies of a pair interfere (realization,), by a test that is independent of the list of places."""
         found = np.zeros(len(relative), dtype=bool)
         for k, guard in self.guards.items():
             found |= guard.interferes(relative[:, k])

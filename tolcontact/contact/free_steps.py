@@ -25,7 +25,7 @@ LIFT_FACTOR = 1.1  # times the width of the common region of bodies: how far the
 
 
 class FreeSteps:
-    """What keeps the bodies of a group free of each other, or frees them.
+    """The steps that keep the bodies of a group free of interference, or free them.
 
     relate, energy   return X_RM of all pairs at some poses, and the objective of a task's state
     """
@@ -90,7 +90,7 @@ class FreeSteps:
     def lift(
         self, poses: Float[Array, "n part 12"], relative: Float[Array, "n pair 12"], deviations: Float[Array, "n contributor"]
     ) -> tuple[Float[Array, "n part 12"], Float[Array, "n pair 12"]]:
-        """Return poses, and X_RM, at which bodies that lie in each other are moved apart, where they are narrowest."""
+        """Return poses, and X_RM, after moving interfering bodies apart, along the narrowest extent of their common region."""
         poses, relative = poses.copy(), relative.copy()
         for _ in range(MAX_LIFTS):
             is_free = True
@@ -118,7 +118,7 @@ class FreeSteps:
         return self._relate(poses=poses, deviations=deviations).reshape(len(poses), len(self._pairs), -1)
 
     def _depths(self, task: Task, relative: np.ndarray, deepest: np.ndarray) -> np.ndarray:
-        """Return the largest penetration (n,) [mm] that places show, of those not deeper than `deepest` (n,) [mm]."""
+        """Return the largest penetration (n,) [mm] of the places that are not deeper than `deepest` (n,) [mm]."""
         scans = self._candidates.scans(relative, task.deviations, start=FREE_WHERE_RAW, deepest=deepest)
         return np.maximum(-min_gaps(scans, relative, task.deviations).min(axis=1), 0)
 

@@ -33,7 +33,7 @@ def _direction(labels: Int[Array, " n"]) -> Float[Array, "n 3"]:
 
 
 def no_places(count: int) -> Places:
-    """Return places (n, 1) that are none."""
+    """Return empty places (n, 1)."""
     return Places(np.full((count, 1), -1), np.full((count, 1), np.inf), *np.zeros((3, count, 1, 3)))
 
 
@@ -49,7 +49,7 @@ class Guard:
 
     @classmethod
     def of(cls, program: Program, index: int) -> "Guard | None":
-        """Return the guard of a pair; None if its bodies may lie in each other, have no inside, or grow where they touch."""
+        """Return the guard of a pair; None if its bodies may interfere, have no inside, or grow where they touch."""
         pair = program.nominal.pairs[index]
         assert pair.reference is not None
         if any(face is not None and face.grows for face in pair.deviating):
@@ -59,11 +59,11 @@ class Guard:
         return None if neighbours is None else cls(neighbours, pair.moving != bodies[0])
 
     def interferes(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
-        """Return whether the bodies lie in each other at X_RM (n,)."""
+        """Return whether the bodies interfere at X_RM (n,)."""
         return self.neighbours.interfere(pose.inverse(X_RM) if self.is_swapped else X_RM)
 
     def places(self, X_RM: Float[Array, "n 12"], labels: Int[Array, " n"]) -> Places:
-        """Return a place (n, 1) that parts the bodies at X_RM where they lie in each other, or touch; an infinite gap for none.
+        """Return a place (n, 1) that separates the bodies at X_RM where they interfere, or touch; an infinite gap for none.
 
         labels   (n,) of the places that held the bodies apart before, -1 for none: these bodies touch, or are a little apart
         """
@@ -75,7 +75,7 @@ class Guard:
         return found
 
     def _part(self, found: Places, rows: Int[Array, " k"], X_RM: Float[Array, "n 12"], shift: Float[Array, "k 3"]) -> None:
-        """Write the place that parts bodies in some rows, which overlap once the moving one is shifted."""
+        """Write the place that separates bodies in some rows, which overlap once the moving one is shifted."""
         shifted = X_RM[rows]
         shifted[:, 9:] += shift
         way = self.ways_out(shifted, -shift)

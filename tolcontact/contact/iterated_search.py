@@ -1,7 +1,7 @@
-"""Iterated search: linear steps, each about contact points that were projected again, until the poses stay.
+"""Iterated search: linear steps, each about contact points that were projected again, until the poses converge.
 
 More than one step about the same points would let a round part roll on the planes that represent its counterpart. Linear
-rows do not know how the surfaces curve: steps that neither shrink nor gain are repeated with more caution, a weight on the
+rows neglect the curvature of the surfaces: steps that neither shrink nor gain are repeated with more caution, a weight on the
 step itself.
 """
 
@@ -68,7 +68,7 @@ def _empty_slots(state: State) -> None:
 
 
 def _depth_left(scans: list, unsettled: Unsettled) -> np.ndarray:
-    """Return by how much points are deeper inside than the slack (n,) [mm], among points projected at the poses reached."""
+    """Return the penetration beyond the slack (n,) [mm], among points projected at the poses reached."""
     task, state = unsettled.task, unsettled.state
     gaps = min_gaps(scans, state.relative, task.deviations)
     return undone(scans, gaps, state.relative, task.deviations, task.may_carry, state.slack).max(axis=1)

@@ -1,4 +1,4 @@
-"""The progress of repeated steps: the least true penetration and the smallest step so far, and when they fell last."""
+"""The progress of repeated steps: the smallest true penetration and the smallest step so far, and when they last fell."""
 
 from dataclasses import dataclass
 
@@ -14,9 +14,9 @@ PATIENCE, MIN_CALMING = 20, 0.1  # steps that are not smaller than all before, a
 
 @dataclass(eq=False)
 class Progress:
-    """What was reached, and for how many steps, not held back, nothing better was.
+    """The best state reached, and the number of full steps without improvement.
 
-    best       State (n) of least true penetration; its `slack` is the penetration of each pair
+    best       State (n) of smallest true penetration; its `slack` is the penetration of each pair
     violation  (n,) [mm] of these poses
     stale      (n,) number of steps since the violation fell
     unrest     (n,) [mm]: the smallest step

@@ -1,6 +1,6 @@
-"""The exact resolution: linear steps about the poses reached, with their true gaps, until these stay.
+"""The exact resolution: linear steps about the poses reached, with their true gaps, until the poses converge.
 
-The first steps are like the paper's. Realizations that still move then have freedoms that next to nothing holds, while the
+The first steps are like the paper's. Realizations that still move then have freedoms that are almost unconstrained, while the
 curvature of gaps and objective counts: they continue with Newton steps, which hold those freedoms firmly at first.
 """
 
@@ -29,10 +29,10 @@ CLOSED = 1e-6  # mm, and of rotation matrices: steps that come back so near to w
 class StepKind(NamedTuple):
     """How a step is taken.
 
-    firmness   how firmly it holds what the objective leaves open
+    firmness   weight of the regularization of freedoms that the objective leaves open
     newton     whether it counts curvature
     width      how wide edges are taken (see Candidates.scans)
-    sharp      whether edges are sharp after it, where realizations are nearly at rest
+    sharp      whether edges are sharp after it, for realizations that have nearly converged
     """
 
     firmness: float
@@ -77,7 +77,7 @@ def repeat(
     state: State,
     start: Start,
 ) -> None:
-    """Take the steps of `state` to their end, as the `start` says. Without rest there is only an answer to a contradiction."""
+    """Take steps from `state` until they converge, as `start` specifies; without convergence only a conflict is an answer."""
     unsettled, trail = Unsettled(task, state), list[np.ndarray]()
     progress: Progress | None = None
     if not len(task):
@@ -130,14 +130,14 @@ def repeat(
 
 
 def _find_places(candidates: Candidates, unsettled: Unsettled, width: float, at_rest: np.ndarray, start: Start) -> None:
-    """Find the places of contact at the poses of unsettled realizations."""
+    """Find the contact places at the poses of unsettled realizations."""
     poses, task, slots = unsettled.state.relative, unsettled.task, unsettled.state.slots
     scans = candidates.scans(poses, task.deviations, slots=slots, width=width, at_rest=at_rest, earlier=task.scans, start=start)
     unsettled.task = replace(task, scans=scans)
 
 
 def _end(unsettled: Unsettled, progress: Progress | None, unrest: Float[Array, " n"], ends: Bool[Array, " n"]) -> None:
-    """End realizations without rest (n,): parts that contradict each other where their penetration was least."""
+    """End realizations that do not converge (n,): conflicting parts at the poses of their smallest penetration."""
     state = unsettled.state
     if progress is not None:
         stuck = np.flatnonzero(ends & _is_stuck(state))
@@ -159,7 +159,7 @@ def _take(step: LinearStep, unsettled: Unsettled, rows: np.ndarray, kind: StepKi
 
 
 def _goes_round(trail: Sequence[np.ndarray], state: State) -> Bool[Array, " n"]:
-    """Return whether parts that do not contradict each other are back where they were two steps ago, not one step (n,)."""
+    """Return whether parts without conflict are back at their poses of two steps ago, and not of one step ago (n,)."""
     if len(trail) < 2:
         return np.zeros(len(state), dtype=bool)
     two, one = (np.abs(state.poses - poses).reshape(len(state), -1).max(axis=1) for poses in trail)

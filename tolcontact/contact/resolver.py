@@ -77,7 +77,7 @@ class ContactResolver:
 
     @property
     def watched(self) -> list[tuple[int, int]]:
-        """Pairs of bodies that lie in each other in no certified answer, whatever deviates: these are tested here."""
+        """Pairs of bodies that interfere in no certified answer, whatever deviates: they are tested here."""
         return [
             ordered(pair.moving, pair.reference)
             for k, pair in enumerate(self.contact_points)
@@ -90,7 +90,7 @@ class ContactResolver:
     def raw_contact(
         self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
     ) -> tuple[Float[Array, "realization pair_of_group"], Int[Array, "realization pair_of_group"]]:
-        """Return the least gap [mm] and the number of active points of each pair of the group at raw X_RM."""
+        """Return the smallest gap [mm] and the number of active points of each pair of the group at raw X_RM."""
         survey = self._candidates.survey(relative[:, self.pairs], deviations)
         return survey.min_gap, survey.active
 
@@ -135,7 +135,7 @@ class ContactResolver:
         return Resolved(touched[~stays], state.take(np.flatnonzero(~stays)), gap_min, survey.active)
 
     def _apart(self, task: Task, min_gap: Float[Array, "n pair"]) -> Int[Array, " k"]:
-        """Return the realizations (k,) whose raw bodies are apart, though places with a least gap (n, pair) [mm] deny it."""
+        """Return the realizations (k,) whose raw bodies are apart, although the smallest gaps (n, pair) [mm] deny it."""
         if not self._candidates.are_guarded or self._method.minimizes.presses:
             return np.zeros(0, dtype=int)
         rows = np.flatnonzero((min_gap < -FREE_DEPTH).any(axis=1))
@@ -259,7 +259,7 @@ class ContactResolver:
 def is_better(state: State, energy: Float[Array, " n"], best: State, best_energy: Float[Array, " n"]) -> Bool[Array, " n"]:
     """Return whether answers are better than the best ones so far (n,).
 
-    A lower rank is better. Of two certified answers the one with less energy (n,) is better, of two conflicts the less deep.
+    A lower rank is better. Of two certified answers, the one with less energy (n,) is better; of two conflicts, the shallower.
     """
     depth, best_depth = state.slack.max(axis=1), best.slack.max(axis=1)
     is_lower = energy < best_energy - MIN_GAIN * np.abs(best_energy)
@@ -268,16 +268,16 @@ def is_better(state: State, energy: Float[Array, " n"], best: State, best_energy
 
 
 def is_same_conflict(state: State, best: State) -> Bool[Array, " n"]:
-    """Return whether answers, and the best ones so far, are conflicts that go equally deep (n,)."""
+    """Return whether answers, and the best ones so far, are conflicts of equal depth (n,)."""
     depth, best_depth = state.slack.max(axis=1), best.slack.max(axis=1)
     goes_as_deep = np.abs(depth - best_depth) <= SAME_CONFLICT * np.maximum(depth, best_depth)
     return (state.rank == 1) & (best.rank == 1) & goes_as_deep
 
 
 def checked_residual(state: State, depth: Float[Array, " n"]) -> Float[Array, " n"]:
-    """Return the residual (n,) [mm] together with what the solver does not report.
+    """Return the residual (n,) [mm], including the errors that the solver does not report.
 
-    depth   (n,) [mm]: by how much points lie deeper inside than the slack at the poses reached
+    depth   (n,) [mm]: penetration beyond the slack at the poses reached
     """
     residual = np.maximum(state.kkt_residual, depth)
     # Penetration does not excuse locators that do not hold.

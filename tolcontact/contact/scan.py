@@ -71,7 +71,7 @@ class Scan:
     def min_gap(
         self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
     ) -> Float[Array, " realization"]:
-        """Return the least gap of all points (realization,) [mm]."""
+        """Return the smallest gap of all points (realization,) [mm]."""
         return self.gaps(relative, deviations).min(axis=1)
 
     def depth_between(self, relative: Float[Array, "realization 12"]) -> Float[Array, " realization"]:
@@ -317,7 +317,7 @@ def undone(
 ) -> Float[Array, "realization pair"]:
     """Return the penetration beyond the slack of points that may be active (realization, pair) [mm].
 
-    min_gap     (realization, pair) [mm]: the least gaps of all points
+    min_gap     (realization, pair) [mm]: the smallest gaps of all points
     may_carry   for each pair (realization, point), or None if all points may
     """
     depths = [
@@ -330,5 +330,5 @@ def undone(
 def min_gaps(
     scans: Sequence[Scan], relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
 ) -> Float[Array, "realization pair"]:
-    """Return the least gap (realization, pair) [mm] of each pair at X_RM (realization, pair, 12)."""
+    """Return the smallest gap (realization, pair) [mm] of each pair at X_RM (realization, pair, 12)."""
     return np.stack([scan.min_gap(relative[:, k], deviations) for k, scan in enumerate(scans)], axis=1)

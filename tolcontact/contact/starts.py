@@ -1,4 +1,4 @@
-"""Where steps start, and what they hold bodies apart with."""
+"""Where steps start, and how they keep bodies apart."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ STRIDE, SMALL_STRIDE = 0.5, 0.05  # rad: the largest rotation of a part in one s
 class Start(NamedTuple):
     """Where steps start, and how large they may be.
 
-    at_nominal   whether they start from the nominal instead of the raw place
+    at_nominal   whether they start from the nominal instead of the raw poses
     at_answer    whether they start from the best answer so far
     projected    whether contact points are projected again, before every step, onto curved faces
     stride       the largest rotation of a part in one step [rad]
@@ -31,7 +31,7 @@ class Start(NamedTuple):
 FIRST = Start()
 OTHER_STARTS = (Start(at_nominal=True), Start(stride=SMALL_STRIDE))  # if no face is curved
 OTHER_STARTS_CURVED = (Start(projected=True), Start(projected=True, at_nominal=True))
-# Planes at fixed points of a shaft leave it as it spins. If its spin is free, rounding grows until it falls through them.
+# Planes at fixed points of a shaft leave it as it spins. If its spin is free, rounding grows until it slips through them.
 BALANCE = Start(balances=True)
 GUARDED = (Start(guarded=True, at_answer=True), Start(guarded=True), Start(guarded=True, stride=SMALL_STRIDE))
 PARTED = (Start(parted=True), Start(parted=True, stride=SMALL_STRIDE))

@@ -23,7 +23,7 @@ ANSWER = ("poses", "relative", "multipliers", "slack", "astray")
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What stays the same while realizations are resolved.
+    """The constants of realizations while they are resolved.
 
     raw            (n, part of the group, 12)
     relative       (n, pair of the group, 12): X_RM in the raw state
@@ -57,14 +57,14 @@ class Task:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class State(Record):
-    """How far the steps of a task have come, with the numbers of its record. Steps write into the arrays.
+    """The progress of the steps of a task, with the numbers of its record. Steps write into the arrays.
 
     poses       (n, part of the group, 12)
     relative    (n, pair of the group, 12): X_RM
     slack       (n, pair of the group) [mm]: penetration that no increment could remove
-    astray      (n,) [mm]: how far two-sided locators are from where they should hold
+    astray      (n,) [mm]: distance of two-sided locators from the positions where they should hold
     multipliers (n, row of the QP): reactions
-    gap_min     (n, pair of the group) [mm]: least true gap at `poses`, once they are an answer
+    gap_min     (n, pair of the group) [mm]: smallest true gap at `poses`, once they are an answer
     doubtful    (n,): whether the answer is further from the raw pose than the method accepts
     slots       of the pairs with changing points: the points that were active last
     """
@@ -170,7 +170,7 @@ class Resolved:
 
     and of all realizations of the block:
 
-    gap_min   (realization, state, pair of the group) [mm]: least true gap
+    gap_min   (realization, state, pair of the group) [mm]: smallest true gap
     active    (realization, pair of the group): number of active contact points in the raw state
     """
 

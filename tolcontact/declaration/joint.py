@@ -1,4 +1,4 @@
-"""Bodies that belong together: parts that a station joined to one rigid body, and parts that may lie in each other."""
+"""Bodies that belong together: parts that a station joined to one rigid body, and parts that may overlap."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ def parts_of(bodies: Sequence[Part | Joint]) -> tuple[Part, ...]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Overlap(Declaration):
-    """Parts that may lie in each other, any two of them: press fits, welds, parts that are modelled overlapping.
+    """Parts that may overlap, any two of them: press fits, welds, parts that are modelled overlapping.
 
     Neither checks nor runs watch these bodies. A contact pair between two of them still holds for its chosen faces.
     """

@@ -148,15 +148,15 @@ class _OfTwoFaces(Measurement):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Clearance(_OfTwoFaces):
-    """The least distance of two faces of different parts, negative where they overlap.
+    """The shortest distance of two faces of different parts, negative where they overlap.
 
-    Of planes it is the least height, perpendicular to the second face, in their overlap region at the present pose; in their
-    nominal overlap region if they do not overlap there, or if their rims have more than 2500 pairs of edges. Of a ball or a
-    shaft and walls it is the least gap of contact (see tolcontact.discretization), of two outer cylinders the
-    distance of their axes, each as long as its face, less both radii. Of all other faces, and of whole parts
-    (`part.face()`), it is the least distance of their triangles, negative by the depth of a corner or an edge inside the other
-    one. It looks at the corners and edges that are nearest nominally, and where parts move beyond these it is too small, never
-    too large, with a warning (see tolcontact.plausibility).
+    For planes it is the smallest height, perpendicular to the second face, in their overlap region at the current pose; in
+    their nominal overlap region if they do not overlap there, or if their rims have more than 2500 pairs of edges. For a ball
+    or a shaft and walls it is the smallest contact gap (see tolcontact.discretization); for two outer cylinders, the distance
+    of their axes, each as long as its face, less both radii. For all other faces, and for whole parts (`part.face()`), it is
+    the shortest distance of their triangles, negative by the depth of a corner or an edge inside the other one. It evaluates
+    the corners and edges that are nominally nearest; where parts move beyond these it is too small, never too large, with a
+    warning (see tolcontact.plausibility).
     """
 
     kind = "clearance"
@@ -192,9 +192,9 @@ class AxisDistance(_OfTwoFaces):
 
     By default it is the shortest distance of the two axes, each as long as its face.
 
-    across   a direction: the distance of the points where both axes, however long, pierce the plane across it through the
-             middle of the first axis
-    along    a direction: the component of the perpendicular from the middle of the first axis to the second axis, however long
+    across   a direction: the distance of the points where both axes, extended if needed, pierce the plane across it through the
+             midpoint of the first axis
+    along    a direction: the component of the perpendicular from the midpoint of the first axis to the infinite second axis
 
     Directions are fixed in the assembly frame.
     """

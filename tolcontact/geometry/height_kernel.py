@@ -22,7 +22,7 @@ class HeightTable(NamedTuple):
 
 
 class Plane(NamedTuple):
-    """A flat face in coordinates of its own.
+    """A flat face in its own coordinates.
 
     origin   (3,) [mm]
     axes     (2, 3) unit vectors in the plane, and

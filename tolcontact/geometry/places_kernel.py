@@ -225,7 +225,7 @@ def _find_at(A, B, candidates, reach, margins, nearness, overhang, retained, X, 
 
 @uncounted
 def _choose(touching, gaps, projections, retained, directions, is_chosen, labels):  # type: ignore[no-untyped-def]
-    """Write the labels (p,) of relevant points: retained ones, those with the least gaps, and the outermost; -1 for none."""
+    """Write the labels (p,) of relevant points: retained ones, those with the smallest gaps, and the outermost; -1 for none."""
     number = 0
     for s in touching:
         is_chosen[s] = gaps[s] == np.inf
@@ -308,7 +308,7 @@ def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, direc
 def find(A, B, candidates, reach, margin, error, poses, retained, directions, labels, gaps, points, projections, normals):  # type: ignore
     """Write the relevant points at which bodies can touch, at poses X_RM (n, 12).
 
-    First come the candidates in `retained` (n, k), then the candidates with the least gaps, then the outermost in each of the
+    First come the candidates in `retained` (n, k), then those with the smallest gaps, then the outermost in each of the
     `directions` (direction, 3). All are written if there is room for them.
 
     A, B          Body, the moving and the reference one

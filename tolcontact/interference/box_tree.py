@@ -37,7 +37,7 @@ def box_tree(corners: Float[Array, "t 3 3"]) -> BoxTree:
 
 
 def boxes_of_nodes(triangles: Int[Array, "l 4"], lower: Float[Array, "t 3"], upper: Float[Array, "t 3"]) -> Float[Array, "n 6"]:
-    """Return the boxes of the nodes of a tree with `triangles` in its leaves, whose own boxes are `lower` to `upper`."""
+    """Return the boxes of the nodes of a tree with `triangles` in its leaves, whose boxes are `lower` to `upper`."""
     places = triangles.ravel()
     boxes = np.concatenate([np.full((places.size, 3), np.inf), np.full((places.size, 3), -np.inf)], axis=1)
     boxes[places >= 0] = np.concatenate([lower, upper], axis=1)[places[places >= 0]]

@@ -25,7 +25,7 @@ RAY = (1.0, 0.01307, 0.00713)  # a direction that few edges have, and along whic
 
 @inlined_uncounted
 def _nearest_on_triangle(p, a, b, c):  # type: ignore[no-untyped-def]  # noqa: PLR0911
-    """Return the place on a triangle that is nearest to p (Ericson, Real-Time Collision Detection, 5.1.5)."""
+    """Return the point on a triangle that is nearest to p (Ericson, Real-Time Collision Detection, 5.1.5)."""
     ab, ac, ap, bp, cp = minus(b, a), minus(c, a), minus(p, a), minus(p, b), minus(p, c)
     d1, d2, d3, d4, d5, d6 = dot(ab, ap), dot(ac, ap), dot(ab, bp), dot(ac, bp), dot(ab, cp), dot(ac, cp)
     va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
@@ -64,7 +64,7 @@ def _seems_within(side, p, shares, senses):  # type: ignore[no-untyped-def]
 
 @uncounted
 def _near_leaf(side, p):  # type: ignore[no-untyped-def]
-    """Return a bound from above of the squared distance of p from the surface: that from a leaf with a near box."""
+    """Return an upper bound of the squared distance of p from the surface: its distance from a leaf with a near box."""
     node, inner, square = 0, side.next.size // 2, np.inf
     while node < inner:
         left, right = 2 * node + 1, 2 * node + 2

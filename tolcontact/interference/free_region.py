@@ -2,17 +2,17 @@
 
 A region C is the common part of half-spaces and at most one hollow: points whose distance from a segment, taken across an axis,
 is below a radius. Each triangle of the outer body is assigned to one of these constraints, and the level of a constraint is
-its least value at the corners of its triangles. So no triangle reaches into C, however the outer body deviates:
+its smallest value at the corners of its triangles. So no triangle reaches into C, however the outer body deviates:
 
-- n . x of a half-space is linear, so its least value in a triangle occurs at a corner;
+- n . x of a half-space is linear, so its smallest value in a triangle occurs at a corner;
 - the distance from the segment is at least e . x - max e . s over its ends s, for any unit vector e across the axis. Each
   triangle has the e along which it is nominally furthest from the segment.
 
 Both are linear in the deviations, as the corners are. If all vertices of the inner body lie in C, which is convex, all of its
 triangles do. Then both surfaces have no point in common. No component of the outer body lies in the inner one, since its
 surface would lie in C. Nor does one of the inner body lie in the outer one: C contains no point of the outer surface, so it is
-inside or outside as a whole. It is outside nominally, and remains so while deviations grow from 0 to what they are: levels
-are least values of linear functions, so C never becomes empty on the way, as it is not empty at its ends.
+inside or outside as a whole. It is outside nominally, and remains so while deviations grow from 0 to their values: levels
+are minima of linear functions, so C never becomes empty on the way, as it is not empty at its ends.
 
 Hence such bodies do not interfere, and the complete test need not run.
 """
@@ -60,8 +60,8 @@ class Constraint(NamedTuple):
     """A half-space, or the hollow around a core.
 
     directions  (t, 3): for each triangle of the outer body the unit vector along which its corners are compared
-    offsets     (t,) [mm]: what is subtracted from these
-    values      (v,) [mm]: what the constraint compares, at the vertices of the inner body
+    offsets     (t,) [mm]: subtracted from these
+    values      (v,) [mm]: values that the constraint compares, at the vertices of the inner body
     core        of a hollow (see Region), None for a half-space
     """
 
@@ -184,8 +184,8 @@ def _hollows(outer: InsetBody, inner: InsetBody) -> Iterator[Constraint]:
 def _cores(cylinders: Sequence[Cylinder], bulge: float) -> Iterator[tuple[np.ndarray, float]]:
     """Yield cores (see Region) and radii: of single cylinders, and of two with parallel axes and equal radii.
 
-    Where a flat wall of a slot goes over into a round one, triangles stand in the hollow by up to `bulge` [mm]. A core that
-    ends a little before has its full radius, since places there are no nearer to it.
+    Where a flat wall of a slot meets a round one, triangles protrude into the hollow by up to `bulge` [mm]. A core that
+    ends a little before has its full radius, since points there are no nearer to it.
     """
     for k, cylinder in enumerate(cylinders):
         u = cylinder.axis / np.linalg.norm(cylinder.axis)
@@ -201,7 +201,7 @@ def _cores(cylinders: Sequence[Cylinder], bulge: float) -> Iterator[tuple[np.nda
 
 
 def _arms(points: np.ndarray, core: np.ndarray) -> np.ndarray:
-    """Return the vectors (..., 3) [mm] across the axis from the nearest place on a core to points (..., 3)."""
+    """Return the vectors (..., 3) [mm] across the axis from the nearest point on a core to points (..., 3)."""
     u, start, span = core
     arms = points - start
     arms = arms - (arms @ u)[..., None] * u
@@ -216,7 +216,7 @@ def _distances(points: np.ndarray, core: np.ndarray) -> np.ndarray:
 def _hollow(corners: np.ndarray, vertices: np.ndarray, core: np.ndarray) -> Constraint:
     """Return the hollow around a core, for triangles with `corners` (t, 3, 3) and vertices of the inner body (v, 3).
 
-    A segment and a triangle are nearest to each other at an end of the one or a corner of the other.
+    A segment and a triangle are nearest to each other at an end of the segment or a corner of the triangle.
     """
     u, start, span = core
     flat = corners - (corners @ u)[..., None] * u

@@ -1,4 +1,4 @@
-"""Compiled test whether closed bodies interfere: edges of one that pass triangles of the other, and how deep they do."""
+"""Compiled test whether closed bodies interfere: edges of one that pass triangles of the other, and how deep they reach."""
 
 import math
 from typing import NamedTuple
@@ -19,14 +19,14 @@ class Side(NamedTuple):
     vertices    (v, 3) [mm], without deviations
     moved       (v,): index of each vertex among those that deviations move, -1 for others
     motions     (m, j, 3) [mm]: how far a unit of each deviation moves these
-    deviations  (n, j) that do
+    deviations  (n, j) that move them
     shifts      (m, 3) [mm]: how far they move in one realization; see `deviate`
     faces       (t, 3)
     planes      (t, 4): outward normal n and level n . x of each triangle; NaN for triangles that deviations move
     edges       (e, 2), those nominally nearest to the other body first
     sides       (e, 2): the facets at each edge
     outward     (e, 3): sums of the outward normals of the facets that meet at each edge
-    distances   (e,) [mm]: bounds from below of their nominal distances from it
+    distances   (e,) [mm]: lower bounds of their nominal distances from it
     facets      (f, 10): of each facet, triangles in one plane, its box (6), normal n and level n . x; NaN if it is not flat
     facet_of    (t,): the facet of each triangle
     members, first_members   the triangles of each facet, as in a CSR matrix
@@ -36,7 +36,7 @@ class Side(NamedTuple):
     triangles, boxes, next   its BoxTree
     bounds      (8, 3) [mm]: corners of a box that holds the body
     witnesses   (c,): a vertex of each connected component, nominally far from the surface of the other body
-    clearances  (c,) [mm]: bounds from below of that distance
+    clearances  (c,) [mm]: lower bounds of that distance
     is_in       (c,): whether that vertex lies nominally in the other body
     """
 
@@ -102,7 +102,7 @@ def corners_of(side, triangle):  # type: ignore[no-untyped-def]
 def crossing(side, triangle, p, q):  # type: ignore[no-untyped-def]
     """Return the share of the segment from p to q at which it passes a triangle, and its sense: -1 inwards, 1 outwards, 0 none.
 
-    Places on the edges of the triangle count, so that none gets through between two triangles.
+    Points on the edges of the triangle count, so that no segment slips between two triangles.
     """
     planes, is_known = side.planes, side.planes[triangle, 3] == side.planes[triangle, 3]
     if is_known:
@@ -175,7 +175,7 @@ def near_count(distances, motion):  # type: ignore[no-untyped-def]
 
 @uncounted
 def _holds(owner, target, X, is_forward, motion):  # type: ignore[no-untyped-def]
-    """Return whether a component of a body lies in the other one, if its surface passes that one's nowhere."""
+    """Return whether a component of a body lies in the other one, given that their surfaces do not cross."""
     for c in range(owner.witnesses.size):
         if owner.clearances[c] > motion:
             if owner.is_in[c]:
@@ -236,7 +236,7 @@ def _misses(boxes, p, q):  # type: ignore[no-untyped-def]
 def _heights(side, f, p, q):  # type: ignore[no-untyped-def]
     """Return heights of p and q over the plane of a facet: both 1 if their segment misses its box.
 
-    Of facets that are not flat nothing is known: then they are 1 and -1.
+    For facets that are not flat they are 1 and -1, since nothing is known of them.
     """
     facets = side.facets
     if (

@@ -49,7 +49,7 @@ FLAT = 1e-12  # of coordinates: how far corners of a facet may be from its plane
 
 @dataclass(frozen=True, eq=False)
 class Neighbours:
-    """Two bodies, which count as a little smaller than they are.
+    """Two bodies, which count as slightly smaller than they are.
 
     insets   [mm]: depths of the surfaces of A and of B inside the bodies. Touching bodies are apart by the sum of the insets;
              flush faces do not stay flush, since the insets differ
@@ -117,9 +117,9 @@ class Neighbours:
     def interfere(
         self, X_BA: Float[Array, "n 12"], deviations: Float[Array, "n contributor"] | None = None
     ) -> Bool[Array, " n"]:
-        """Return whether (n,) the bodies lie in each other by more than both insets at X_BA, the pose of A in the frame of B.
+        """Return whether (n,) the bodies interfere by more than both insets at X_BA, the pose of A in the frame of B.
 
-        Without `deviations`, faces are as they are nominally.
+        Without `deviations`, faces are nominal.
         """
         X_BA, interferes = np.ascontiguousarray(X_BA), np.zeros(len(X_BA), dtype=bool)
         rows = np.flatnonzero(~self.are_apart(X_BA, deviations))
@@ -130,10 +130,10 @@ class Neighbours:
         return interferes
 
     def ways_out(self, X_BA: Float[Array, "n 12"], directions: Float[Array, "n 3"] | None = None) -> WayOut:
-        """Return how bodies without deviations part at poses X_BA (n, 12) at which they interfere.
+        """Return how bodies without deviations separate at poses X_BA (n, 12) at which they interfere.
 
-        directions   (n, 3), in the frame of B: where bodies lie in each other at several places, that one counts at which they
-                     part most nearly along these, or else the deepest one
+        directions   (n, 3), in the frame of B: where bodies interfere at several places, the place counts whose separation is
+                     closest to these, or else the deepest one
         """
         places, feet, normals = np.zeros((3, len(X_BA), 3))
         way = WayOut(places, feet, normals, np.zeros(len(X_BA)))
@@ -142,7 +142,7 @@ class Neighbours:
         return way
 
     def measured(self, X_BA: Float[Array, "n 12"], deviations: Float[Array, "n contributor"] | None = None) -> Interference:
-        """Return how deep bodies lie in each other at poses X_BA at which they interfere."""
+        """Return the penetration of bodies at poses X_BA where they interfere."""
         result = Interference(np.empty(len(X_BA)), np.empty((len(X_BA), 2), dtype=np.int64), np.empty((len(X_BA), 2, 3)))
         depth_kernel.sound(*self._sides(deviations), np.ascontiguousarray(X_BA), *result)
         for solid, side, triangles in zip((self.A.solid, self.B.solid), self._nominal, result.triangles.T, strict=True):
@@ -166,7 +166,7 @@ def _side(
     round_faces_of_target: np.ndarray,
     reach: float,
 ) -> kernel.Side:
-    """Return a body with inset vertices (v, 3) as compiled passes take it, with what its other body decides."""
+    """Return a body with inset vertices (v, 3) for compiled passes, with the arrays that depend on the other body."""
     solid, tree, tree_of_target = (
         body.solid,
         box_tree(vertices[body.solid.faces]),

@@ -17,8 +17,8 @@ from tolcontact.vocabulary import ROUNDED
 def part_solid(nominal: Nominal, index: int) -> DeviatingSolid | None:
     """Return the solid of a part of the nominal assembly; None if it is not closed.
 
-    Faces of features deviate, without their forms. Triangles of hollow round faces stand in the hollow, and the solid
-    does not.
+    Faces of features deviate, without their form deviations. Triangles of hollow round faces protrude into the hollow, and the
+    solid does not.
     """
     body = solid(nominal.parts[index].body)
     if body is None:
@@ -58,7 +58,7 @@ def _deviating_faces(
 
 
 def _bulges(body: Solid, surface_of_body: Surface, round_faces: Sequence[tuple[AnalyticSurface, np.ndarray]]) -> np.ndarray:
-    """Return how far (t,) [mm] triangles stand out of the round faces for which they stand, mostly into hollow ones."""
+    """Return how far (t,) [mm] triangles protrude from the round faces that they represent, mostly into hollow ones."""
     bulges = np.zeros(len(body.faces))
     corners = np.asarray(surface_of_body.mesh.triangles)
     points = np.concatenate(

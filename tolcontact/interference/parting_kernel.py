@@ -140,7 +140,7 @@ def _collect(owner, target, X, is_forward, region, count):  # type: ignore[no-un
 def _join_parts(region, count):  # type: ignore[no-untyped-def]
     """Join corners at the same vertex, or on the same facet of A and of B: an edge of the region may lie between them.
 
-    So regions that lie apart between the same two facets count as one.
+    So separate regions between the same two facets count as one.
     """
     facets = region.facets
     for i in range(count):
@@ -194,7 +194,7 @@ def _normals_of_part(A, B, X, region, count, part, edges_A, edges_B, normals):  
 
 @uncounted
 def _narrowest(region, count, part, normals):  # type: ignore[no-untyped-def]
-    """Return of some normals the one along which a part of the region is narrowest, its width, and its ends along it."""
+    """Return the normal along which a part of the region is narrowest, its width, and its ends along the normal."""
     best, least, lowest, highest = 0, np.inf, 0, 0
     for m in range(normals.shape[0]):
         low, high, bottom, top = np.inf, -np.inf, 0, 0

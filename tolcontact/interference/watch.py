@@ -37,7 +37,7 @@ class Clash(NamedTuple):
 
 
 def ordered(first: int, second: int) -> tuple[int, int]:
-    """Return the numbers of two bodies, the smaller one first."""
+    """Return the indices of two bodies, the smaller one first."""
     return (first, second) if first < second else (second, first)
 
 
@@ -55,7 +55,7 @@ class Watch:
     nominal   the assembly
     allowed   [mm] by pair of bodies: a depth that does not count as interference yet, if it is larger than usual; infinite if
               any depth is allowed
-    poses, deviations   (n, part, 12), (n, contributor): some raw poses; tests are quickest where bodies move about as far
+    poses, deviations   (n, part, 12), (n, contributor): some raw poses; tests are fastest if bodies move about as far
     """
 
     nominal: Nominal
@@ -66,13 +66,13 @@ class Watch:
     _solids: dict[int, DeviatingSolid | None] = field(default_factory=dict, init=False)
 
     def allowing(self, allowed: Mapping[tuple[int, int], float]) -> "Watch":
-        """Return the same bodies with other depths that are allowed."""
+        """Return the same bodies with other allowed depths."""
         watch = Watch(self.nominal, allowed, self.poses, self.deviations)
         watch._solids.update(self._solids)
         return watch
 
     def overlap(self, first: int, second: int) -> bool:
-        """Return whether two bodies lie in each other in the nominal assembly, or may, since one of them is not closed."""
+        """Return whether two bodies interfere in the nominal assembly, or may, since one of them is not closed."""
         return self.neighbours(ordered(first, second)) is None or self._overlaps(ordered(first, second))
 
     @cached_property
@@ -112,7 +112,7 @@ class Watch:
         return np.array([0.0 if body is None else body.growth(deviations) for body in solids])
 
     def neighbours(self, pair: tuple[int, int]) -> Neighbours | None:
-        """Return two bodies that are tested; None if one of them is not closed, or they may lie in each other."""
+        """Return two bodies that are tested; None if one of them is not closed, or they may interfere."""
         if pair not in self._neighbours:
             A, B, depth, neighbours = self.solid(pair[0]), self.solid(pair[1]), self.depth(pair), None
             if A is not None and B is not None and np.isfinite(depth):
@@ -122,7 +122,7 @@ class Watch:
         return self._neighbours[pair]
 
     def _round_faces(self, pair: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-        """Return the numbers (t,) of the pairs of round faces for which the triangles of both bodies stand, -1 for none."""
+        """Return the numbers (t,) of the pairs of round faces that the triangles of both bodies represent, -1 for none."""
         numbers = [np.full(len(body.solid.faces), -1) for body in map(self.solid, pair) if body is not None]
         for k, points in enumerate(self.nominal.pairs):
             if points.round is None or points.reference is None or ordered(points.moving, points.reference) != pair:
@@ -165,7 +165,7 @@ class Watch:
 
     @property
     def open_parts(self) -> tuple[str, ...]:
-        """The names of parts that are not closed, so that nothing can lie in them."""
+        """The names of parts that are not closed and so have no inside."""
         numbers = {part.name: number for number, part in enumerate(self.nominal.parts)}
         return tuple(name for name, number in numbers.items() if self.solid(number) is None)
 
@@ -183,12 +183,12 @@ class Watch:
 
     @cached_property
     def overlapping(self) -> frozenset[tuple[int, int]]:
-        """Pairs of bodies that lie in each other in the nominal assembly."""
+        """Pairs of bodies that interfere in the nominal assembly."""
         return frozenset(pair for pair in self._near(np.zeros(len(self.nominal.parts))) if self._overlaps(pair))
 
     @property
     def overlapping_parts(self) -> tuple[str, ...]:
-        """The names of parts that lie in each other in the nominal assembly, as "(part, part)"."""
+        """The names of parts that interfere in the nominal assembly, as "(part, part)"."""
         parts = self.nominal.parts
         return tuple(dict.fromkeys(f"({parts[i].name}, {parts[j].name})" for i, j in sorted(self.overlapping)))
 
@@ -216,9 +216,9 @@ class Watch:
         left_out: Collection[tuple[int, int]] = (),
         among: Collection[tuple[int, int]] | None = None,
     ) -> Iterator[Clash]:
-        """Yield the pairs of bodies that lie in each other at poses (n, part, 12), for deviations (n, contributor).
+        """Yield the pairs of bodies that interfere at poses (n, part, 12), for deviations (n, contributor).
 
-        Pairs of numbers in `left_out` are not tested, nor pairs that are not `among` others, if these are given.
+        Pairs of indices in `left_out` are not tested, nor are pairs that are not in `among`, if it is given.
         """
         is_finite = np.isfinite(poses).all(axis=(1, 2))
         reach = self._motions(poses[is_finite]).max(axis=0, initial=0) + self._growth(deviations[is_finite])
@@ -234,7 +234,7 @@ class Watch:
     def measured(
         self, clash: Clash, poses: Float[Array, "n part 12"], deviations: Float[Array, "n contributor"]
     ) -> Interference:
-        """Return how deep two bodies lie in each other, in the realizations of a clash."""
+        """Return the penetration of two bodies in the realizations of a clash."""
         neighbours = self.neighbours(clash.pair)
         assert neighbours is not None
         i, j = clash.pair

@@ -115,7 +115,7 @@ def _announced_triangles(path: Path, head: bytes, size: int) -> int:
         return 0
     with path.open("rb") as file:
         count = sum(chunk.count(mark) for chunk in iter(lambda: file.read(1 << 24), b""))
-    return count // 2 if mark == b"facet" else count  # "facet" also stands in "endfacet"
+    return count // 2 if mark == b"facet" else count  # "facet" also occurs in "endfacet"
 
 
 def _check_stl(path: Path, head: bytes, size: int) -> None:

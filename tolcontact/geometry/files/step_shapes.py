@@ -118,7 +118,7 @@ def _proper_triangles(triangles: np.ndarray, omissions: Counter[str]) -> tuple[n
     """Return indices of triangles (triangle, 3), without repeated ones and without those that have two corners in one place.
 
     The second array (repeated, 2) has the indices of each repeated triangle and of the triangle that it repeats: they come
-    from a face that stands twice in its shell. Corners fall together at the ends of an edge that is shorter than coordinates
+    from a face that occurs twice in its shell. Corners fall together at the ends of an edge that is shorter than coordinates
     resolve.
     """
     proper = np.flatnonzero((triangles != np.roll(triangles, 1, axis=1)).all(axis=1))

@@ -57,7 +57,7 @@ class StepText:
     order         numbers of all records in the order of the file
     bodies        entity and parameters of each record by its number, without most shapes
     entities      the entity of a record by its number; none of a complex instance, which has several
-    numbers       numbers of the records of each entity, by its name
+    numbers       record numbers of each entity, by its name
     documents     names of other files that the file refers to, each once
     """
 
