@@ -1,4 +1,4 @@
-"""The header of an archive: everything but what is written block by block."""
+"""The header of an archive: everything except the values that are written block by block."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -230,7 +230,7 @@ def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
 
 
 def _bounded_values(program: Program) -> dict[ArchiveVariable, Any]:
-    """Return which pairs touch where their faces end, and how wrong fixed contact points would be; none unless they may."""
+    """Return which pairs touch where their faces end, and the error of fixed contact points there; none unless some may."""
     if not program.method.is_bounded:
         return {}
     numbers = range(len(program.nominal.pairs))

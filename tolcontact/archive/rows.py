@@ -27,7 +27,7 @@ class Row(NamedTuple):
 
 
 def kept_rows(nominal: Nominal, keep: str) -> tuple[Row, ...]:
-    """Return what an archive holds of each realization with the option `keep`."""
+    """Return the variables that an archive holds for each realization with the option `keep`."""
     stations = [terms.station_group(scene.station) for scene in nominal.scenes]
     rows = [Row(group_of_rows(variable), variable) for variable in terms.BY_REALIZATION]
     rows += [Row(group, variable) for group in stations for variable in terms.STATION_ROWS]

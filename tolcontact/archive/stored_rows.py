@@ -86,7 +86,7 @@ def _checksums(variable: ArchiveVariable, values: xr.DataArray, rows: int) -> np
 def choose(file: netCDF4.Dataset, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the numbers (row,) of at most `count` certified realizations, in order, and whether each is a random choice.
 
-    One third penetrate most at contact points, one third have most carrying points, and the rest are random: a fair
+    One third penetrate most at contact points, one third have the most points under load, and the rest are random: a fair
     sample of all certified realizations.
     """
     rows = len(file.dimensions[terms.REALIZATION]) if count else 0
@@ -116,7 +116,7 @@ def _pieces(file: netCDF4.Dataset, rows: int) -> Iterator[tuple[int, np.ndarray,
 
 
 class _Largest:
-    """The numbers of the largest values above 0, the first of equals."""
+    """The indices of the largest values above 0, the first of equals."""
 
     def __init__(self, count: int) -> None:
         self._count = count

@@ -3,7 +3,7 @@
 A file that is being extended breaks when its writer is killed at the wrong moment. So room is laid out first, under another
 name: header, and rows with the status "unfinished". Once the file has its own name, bytes are only overwritten in
 place, the status of a row after its data. If the process is killed, the file still opens, finished rows stay, and `resume`
-continues after the last checkpoint. (Writes are not flushed to the disk: a power failure may lose more.) To have its name
+continues after the last checkpoint. (Writes are not flushed to the disk: a power failure may lose more.) To get its name
 soon, a long run begins with room for few rows; when these are full, a copy gets room for all, and replaces the file.
 """
 
@@ -38,8 +38,8 @@ from tolcontact.replacing import replacing
 class ArchiveWriter:
     """An archive being written, whose file is locked (see `locked_archive`). Use it as a context manager.
 
-    rows      realizations that are in it; the next block starts there
-    samples   realizations that it was begun for
+    rows      number of realizations in it; the next block starts there
+    samples   number of realizations that it was started for
     kept      what it keeps of each realization
     """
 

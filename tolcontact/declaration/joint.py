@@ -13,7 +13,7 @@ MIN_MEMBERS = 2
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Joint(Declaration):
-    """Parts that keep, after the station that joins them, the poses relative to each other that they had there.
+    """Parts that keep, after the station that joins them, their relative poses in that station.
 
     `members` are the joined parts. The pose of the joint is the pose of the first one. A joint that is joined
     again is stated by its parts.

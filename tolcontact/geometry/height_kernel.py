@@ -28,7 +28,7 @@ class Plane(NamedTuple):
     axes     (2, 3) unit vectors in the plane, and
     normal   (3,) out of the material
     edges    (edge, 7) [mm] of its rim: start (2,), unit direction (2,), length, and unit vector into the face (2,)
-    corners  (2, 2) [mm]: least and largest coordinates
+    corners  (2, 2) [mm]: smallest and largest coordinates
     table    of its form deviation
     """
 

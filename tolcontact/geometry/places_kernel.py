@@ -40,7 +40,7 @@ class Candidates(NamedTuple):
 
     The candidates of a corner or edge and one facing plane, or no plane, are a run; runs begin at `runs` (run + 1,). From
     `middles` (run,) on they are sorted by the first value of their boxes, which are no wider than `widths` (run,) [mm].
-    `boxes` (candidate, 4) [mm] are the least and largest coordinates of the facets or the edge that a corner or an edge may
+    `boxes` (candidate, 4) [mm] are the smallest and largest coordinates of the facets or the edge that a corner or an edge may
     touch in a facing plane, along the vectors in `frames` (facing planes, body, 2, 3). `segments` (segment, 5) are the outlines
     of facing planes in these coordinates (see is_within). The outlines of a plane of the moving and of the reference body begin
     at `outlines` (2 planes + 1,). Their sorted segments begin at `outline_middles`, and are no taller than `tallest` (2
@@ -153,7 +153,7 @@ def _is_near(candidates, s, projection, projections, touching, gaps, distance): 
 
 @inlined_uncounted
 def _range(A, candidates, s, moved, slack):  # type: ignore[no-untyped-def]
-    """Return the least and largest coordinates of the corner or edge of candidate s in the plane that faces it."""
+    """Return the smallest and largest coordinates of the corner or edge of candidate s in the plane that faces it."""
     corners, lines, back = moved
     kind, index_A, index_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
     body = 0 if kind == FACET_ON_CORNER else 1

@@ -104,7 +104,7 @@ def _article(suffix: str) -> str:
 
 
 def _announced_triangles(path: Path, head: bytes, size: int) -> int:
-    """Return the number of triangles that a file announces; 0 if only reading all of it would tell."""
+    """Return the number of triangles that a file announces; 0 if that requires reading the entire file."""
     suffix = path.suffix.lower()
     if suffix == ".stl" and size == _stl_size(head):
         return int.from_bytes(head[80:84], "little")
