@@ -15,9 +15,9 @@ from tolcontact.interference.watch import ALLOWED_SHARE
 from tolcontact.mechanics import Group, curved_pairs
 from tolcontact.method import Method
 
-ADRIFT_SIZES = 10  # a part that travelled by more sizes has nothing to rest on
+ADRIFT_SIZES = 10  # a part that travelled further, in sizes, has nothing to rest on
 TURN_FACTOR = 2  # times the rotation that lifts the end of a face by the distance that contact may push
-LOST_SIZES = 1e5  # no step will bring a part back from there
+LOST_SIZES = 1e5  # no step brings a part back from further away
 # Accepted penetration of faces, in addition to the facet error of their triangles: the smaller of these two.
 DEPTH_SIZES = 1e-4  # sizes of the parts
 DEPTH_SHARE = 0.01  # of the smallest tolerance range

@@ -18,7 +18,7 @@ from tolcontact.geometry.parting import Parting
 PENETRATION = 1e-10  # mm: less than this is no penetration
 MAX_DEEPEST = SLOTS  # places of a pair that get a row in one round
 ALIGNED = 0.87  # cosine of the largest angle between the axis of separation and the normal of a penetrating place that counts
-SHOWN_SHARE = 0.05  # of the gap along this axis: it needs no place of its own if another place shows the rest of this gap
+SHOWN_SHARE = 0.05  # of the gap along this axis: no place is added if another place shows the gap to within this share
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,7 +31,7 @@ BULGE_SHARE = 1 / 2500  # of the same: accepted penetration of planes with form 
 MIN_BULGE = 1e-7  # mm
 OVERHANG_SHARE = 0.01  # of their radius: overhang beyond a wall at which balls and shafts that travelled far may be active
 
-FREE_DEPTH = 1e-3  # mm: penetration of free bodies is no deeper
+FREE_DEPTH = 1e-3  # mm: the largest penetration of free bodies
 
 
 def _lies_between(labels: Int[Array, "n k"]) -> Bool[Array, "n k"]:
@@ -293,7 +293,7 @@ class Candidates:
         loaded, standing, pair = state.loaded[:, self._spans[k]], self._standing[k], self._pairs[k]
         if pair.round:
             points = pair.round.points
-            realization, column = np.nonzero(loaded & ~points["cut"].any(axis=1))  # where a wall ends a shaft may go on
+            realization, column = np.nonzero(loaded & ~points["cut"].any(axis=1))  # a shaft may continue beyond a wall
             spacing = OVERHANG_SHARE * float(points["radius"].max())
             return Carriers(realization, points["centre"][column], points["on_moving"][column], spacing)
         if isinstance(standing, int):

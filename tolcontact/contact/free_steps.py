@@ -61,7 +61,7 @@ class FreeSteps:
         return is_short
 
     def _hold_back(self, task: Task, before: State, state: State, size: Float[Array, " n"]) -> Bool[Array, " n"]:
-        """Halve steps until no body enters another one and the objective is lower; return which are short (n,)."""
+        """Halve steps until no body penetrates another one and the objective is lower; return which are short (n,)."""
         shares = np.ones(len(task))
         rows = np.flatnonzero(np.isfinite(before.poses).all(axis=(1, 2)) & np.isfinite(state.poses).all(axis=(1, 2)))
         depths = self._depths(task, before.relative, np.full(len(task), FREE_DEPTH))
@@ -71,7 +71,7 @@ class FreeSteps:
         motions = self._limits.displacement(before.poses, state.poses)
         for _ in range(MAX_HALVINGS):
             part, share = task.take(rows), shares[rows]
-            # Places that show more than bodies have moved are on the far side of a body.
+            # Places deeper than the motion of the bodies are on the far side of a body.
             depth = self._depths(part, state.relative[rows], depths[rows] + share * motions[rows] + TOUCHING)
             fails = depth > TOUCHING + depths[rows] * (1 - share) + SINK_SHARE * share * size[rows]
             fails |= enters[rows] & self._candidates.interfere(state.relative[rows])
@@ -82,7 +82,7 @@ class FreeSteps:
             shares[rows] /= 2
             state.poses[rows] = _halfway(before.poses[rows], state.poses[rows], self._centres)
             state.relative[rows] = self._related(state.poses[rows], part.deviations)
-        # Places show themselves once bodies have moved a little, unless only the complete test sees what is in the way.
+        # Places show penetration after small motions of the bodies, unless only the complete test detects it.
         rows = rows[enters[rows] & self._candidates.interfere(state.relative[rows])]
         state.poses[rows], state.relative[rows] = before.poses[rows], before.relative[rows]
         return shares < 1

@@ -111,7 +111,7 @@ def survey(points, table, leaf_sums, branch_sums, relative, deviations, activity
                     continue
                 gaps_of(points.coordinates, start, count, factors, gaps)
                 active_here = 0
-                for j in range(count):  # without a branch, which could not be predicted
+                for j in range(count):  # without a branch, since it would be unpredictable
                     found[active_here] = start + j
                     active_here += gaps[j] < activity
                 number += active_here

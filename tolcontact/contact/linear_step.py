@@ -149,7 +149,7 @@ class LinearStep:
         guessed_slack = np.where(np.isfinite(state.slack), state.slack, 0.0)  # infinite before the first answer
         answer = self._solve(**inputs, P_m=P_m, P_r=P_r, n_r=n_r, filled=filled, guess=guess, guessed_slack=guessed_slack)
         slack, residual = np.maximum(answer["slack"], 0), answer["residual"][:, 0]
-        solved = residual <= self._max_residual  # what no solver could solve moves nothing
+        solved = residual <= self._max_residual  # a problem that no solver could solve moves nothing
         deepest = self._deepest(task, answer["linearized"].reshape(state.relative.shape))
         # With conflicting rows, active points stay inside by the slack; only the excess is left undone.
         deepest = [Deepest(points, depth - slack[:, [k]]) for k, (points, depth) in zip(self.varying, deepest, strict=True)]

@@ -16,7 +16,7 @@ from tolcontact.discretization import ContactPoints
 from tolcontact.discretization.plane_minima import with_former
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
 
-MIN_HEIGHTS = 4  # that vary independently: fewer are as quick in every pass
+MIN_HEIGHTS = 4  # that vary independently: fewer are as fast in every pass
 
 
 class GapMinima(NamedTuple):

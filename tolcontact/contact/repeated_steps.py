@@ -23,7 +23,7 @@ from tolcontact.contact.state import State, Task, Unsettled
 STEP_TOLERANCE = 1e-9  # mm: a smaller step is the last one
 ROUNDING = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that are almost unconstrained
 NEARLY_AT_REST = 1e-3  # mm: after a smaller step, places do not stay beyond sharp edges
-CLOSED = 1e-6  # mm, and of rotation matrices: steps that come back so near to where they were will do so again
+CLOSED = 1e-6  # mm, and of rotation matrices: steps that return this close to an earlier pose repeat themselves
 
 
 class StepKind(NamedTuple):
@@ -43,7 +43,7 @@ class StepKind(NamedTuple):
 
 FIRM_STEPS = (*[StepKind(1e4, newton=True)] * 6, *[StepKind(1e2, newton=True)] * 6)
 STEPS = (*[StepKind(1.0, newton=False)] * 8, *FIRM_STEPS, *[StepKind(1.0, newton=True)] * 80)
-# Places between the points of planes with form are added step by step: a few realizations need some more steps for that.
+# Places between the points of planes with form are added step by step: a few realizations need more steps for that.
 STEPS_WITH_FORM = (*[StepKind(1.0, newton=False)] * 8, *STEPS)
 # Where faces end, places appear and vanish. Newton's curvature belongs to places that stay, so steps like the paper's come
 # first. Damped, they come again later, with places that stay longer, and do not alternate between places. Beyond its edge, a
@@ -97,7 +97,7 @@ def repeat(
         moves = is_short | (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
         if kind.width > 1:
             moves |= ~candidates.hold(unsettled.task, unsettled.state, start)
-        # The smaller one tells: steps are large in freedoms that nothing holds, and in the norm of the objective if
+        # The smaller size counts: steps are large in unconstrained freedoms, and in the norm of the objective if
         # Newton's curvature is stiff.
         unrest = np.minimum(size, scaled)
         residual = unsettled.state.kkt_residual
@@ -109,7 +109,7 @@ def repeat(
         residual[lost] = np.inf
         moves &= ~lost
         unsettled.settle(~moves)
-        # What rests while it is held back need not be held back longer.
+        # Realizations that converge while steps are damped need no further damping.
         asleep = (size[moves] <= STEP_TOLERANCE) & (kind.width > 1)
         unrest, trail = unrest[moves], [poses[moves] for poses in trail]
         progress = None if progress is None else progress.take(moves)

@@ -38,7 +38,7 @@ from tolcontact.interference import ordered
 
 SAME_CONFLICT = 1e-3  # conflicts whose penetration differs by less than this share count as the same
 UNMOVED = 1e-9  # mm: contact moves bodies by more
-MIN_GAIN = 1e-6  # of the objective, or mm of penetration: what another start must gain to be preferred
+MIN_GAIN = 1e-6  # of the objective, or mm of penetration: the gain for which another start is preferred
 
 
 class ContactResolver:
@@ -150,7 +150,7 @@ class ContactResolver:
         """Take steps from the poses of `state` to an answer, and judge it."""
         projected = start.projected or self._method.is_iterated
         if projected:
-            caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull far if nothing holds
+            caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull parts far if nothing holds them
             search(self._step, self._limits, self._candidates, self._energy_of, task, state, start.stride, caution)
         elif self._method.is_exact:
             repeat(self._step, self._limits, self._candidates, self._free_steps, task, state, start)

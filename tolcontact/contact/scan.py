@@ -1,4 +1,4 @@
-"""Scans: gaps of the contact points of a pair, the active points, and the points that deserve a row of the QP.
+"""Scans: gaps of the contact points of a pair, the active points, and the candidates for rows of the QP.
 
 Sums run over points in a fixed order, one realization independent of the others, so that results do not depend on
 how realizations are grouped into blocks. (A BLAS product would be faster and would not keep that.)
@@ -249,7 +249,7 @@ def pair_scan(
 ) -> PairScan:
     """Sort the points of a pair into at most `clusters` clusters of neighbours, and each cluster into branches and leaves.
 
-    Each support has a cluster of its own.
+    Each support has its own cluster.
 
     points   indices (point,) of the points of the scan; all if it is None
     """

@@ -36,7 +36,7 @@ def extend(points, filled, reactions, candidates, depth, tolerance, fills, exten
             point, is_inside = candidates[k, c], depth[k, c] > tolerance
             if not (is_inside or (fills and depth[k, c] > -np.inf)) or _has(new_points, k, used, point):
                 continue
-            # What had a row just now is inside by the solver's residual; another round would not change that.
+            # A point that already has a row is inside by the solver's residual; another round would not change that.
             grows[k] = grows[k] or (is_inside and not (fills and _has(points, k, room, point)))
             if count < room:
                 count += 1

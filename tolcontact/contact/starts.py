@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-STRIDE, SMALL_STRIDE = 0.5, 0.05  # rad: the largest rotation of a part in one step; linear rows are wrong long before
+STRIDE, SMALL_STRIDE = 0.5, 0.05  # rad: the largest rotation of a part in one step; linear rows lose accuracy long before
 
 
 class Start(NamedTuple):

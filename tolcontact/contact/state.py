@@ -142,7 +142,7 @@ _ARRAYS = tuple(entry.name for entry in fields(State) if entry.name != "slots")
 
 
 class Unsettled:
-    """Realizations that still move, with a task and a state of their own; settled ones are put back where they came from."""
+    """Realizations that still move, with their own task and state; settled ones are written back to the original state."""
 
     def __init__(self, task: Task, state: State) -> None:
         self._whole, self._rows = state, np.arange(len(task))

@@ -29,7 +29,7 @@ def box_tree(corners: Float[Array, "t 3 3"]) -> BoxTree:
     leaves = 1 << max(int(np.ceil(np.log2(max(len(corners), 1) / LEAF))), 0)
     order = np.argsort(_morton(corners.mean(axis=1)), kind="stable")
     places = np.full(leaves * LEAF, -1)
-    # Triangles are spread over all leaves, so that none is much fuller than another.
+    # Triangles are spread over all leaves, so that all are about equally full.
     leaf = np.arange(len(corners)) * leaves // max(len(corners), 1)
     places[leaf * LEAF + np.arange(len(corners)) - np.searchsorted(leaf, leaf)] = order
     triangles = places.reshape(leaves, LEAF)

@@ -9,8 +9,8 @@ from tolcontact.compiled import compiled, inlined_uncounted, uncounted
 from tolcontact.geometry.vector_kernel import along, cross, dot, minus, move, move_back, row, row_of, turn_back
 
 LEAF = 4
-MANY = 8  # triangles of a facet: of more, only those are looked at that lie where an edge passes their plane
-ROUNDED = 1e-9  # of coordinates: how far a place may be off
+MANY = 8  # triangles of a facet: with more, only triangles near the point where an edge passes their plane are tested
+ROUNDED = 1e-9  # of coordinates: the largest error of a point
 
 
 class Side(NamedTuple):
@@ -261,7 +261,7 @@ def _passes_facet(side, f, p, q, start, end, shares, senses):  # type: ignore[no
     n = (side.facets[f, 6], side.facets[f, 7], side.facets[f, 8])
     size = 1.0 + max(abs(p[0]), abs(p[1]), abs(p[2]), abs(q[0]), abs(q[1]), abs(q[2]))
     margin, share = ROUNDED * size, start / (start - end)
-    spare = margin * math.sqrt(dot(n, n)) / abs(start - end)  # the flatter, the less it is known where
+    spare = margin * math.sqrt(dot(n, n)) / abs(start - end)  # the flatter the angle, the less certain the point
     x, y = along(p, max(share - spare, 0.0), minus(q, p)), along(p, min(share + spare, 1.0), minus(q, p))
     low = (min(x[0], y[0]) - margin, min(x[1], y[1]) - margin, min(x[2], y[2]) - margin)
     high = (max(x[0], y[0]) + margin, max(x[1], y[1]) + margin, max(x[2], y[2]) + margin)

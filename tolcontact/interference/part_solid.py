@@ -52,7 +52,7 @@ def _deviating_faces(
                     _, slope = piece.surface.distance(corners[rows])
                     normals[rows] = slope * np.sign((slope * facets[rows]).sum(axis=1, keepdims=True))
             motion = np.hstack([normals, np.cross(corners - face.centre, normals)]) @ face.twist + face.height
-            # Corners of a shaft stay on it; the facets of a bore stay behind it, in their middle, too.
+            # Corners of a shaft stay on it; the facets of a bore stay behind it, also at their centres.
             motion *= (normals * facets).sum(axis=1, keepdims=True)
             yield triangles, face.columns[columns], motion[:, columns].reshape(len(triangles), 3, -1)
 

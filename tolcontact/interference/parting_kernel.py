@@ -13,7 +13,7 @@ MIN_SINE = 1e-3  # of the angle between edges that have a common normal
 MAX_POINTS = 512  # of the common region of two bodies
 MAX_NORMALS = 256
 MAX_CROSSING = 12  # edges of each body whose common normals are compared
-SAME_SHARE = 1e-9  # of an edge: triangles that it passes nearer to each other share the edge at which it does
+SAME_SHARE = 1e-9  # of an edge: two triangles that it passes within this distance share the edge where it passes
 NO_VERTEX = -1
 
 

@@ -13,7 +13,7 @@ from tolcontact.geometry.triangle_mesh import coordinate_error, edges
 from tolcontact.geometry.vertex_displacements import capped, displacements
 
 SAME_PLANE = 1e-5  # rad: facets whose normals differ by less are one plane
-MIN_SINGULAR = 0.05  # of the planes around a vertex: a direction that they determine worse is left alone
+MIN_SINGULAR = 0.05  # of the planes around a vertex: directions with a smaller singular value are left alone
 MAX_SHIFT = 8.0  # insets: the largest motion of a vertex, for needles
 
 
