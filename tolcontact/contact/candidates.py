@@ -137,7 +137,7 @@ class Candidates:
         """Return scans of the points that may be active, projected again if the method requires it.
 
         Places of bounded pairs are searched again. In steps, given the `slots` of the pairs with changing points, active places
-        persist slightly beyond their edges, `width` times as far as in an answer, unless the realization is `at_rest`.
+        persist slightly beyond their edges, up to `width` times the limit for an answer, unless the realization is `at_rest`.
         If the `start` is guarded, bodies that interfere where no place shows it get one more place (see Guard), which persists
         if it is in the `answered` slots. If it is parted, places separate convex bodies only in the best direction (see
         Parting). If it is free, places deeper than `deepest` (realization,) [mm], FREE_DEPTH by default, are on the far side of
