@@ -14,7 +14,7 @@ from tolcontact.replacing import remove_abandoned
 
 @contextlib.contextmanager
 def locked_archive(path: str | Path, *, overwrite: bool = False, resume: bool = False) -> Iterator[Path]:
-    """Lock the file that `path` stands for (the target of a link) against other runs, and yield its path.
+    """Lock the file that `path` refers to (the target of a link) against other runs, and yield its path.
 
     The system releases the lock of a run that was killed.
     Raises ArchiveError, and changes nothing, if the file cannot become an archive, or another run writes to it.
@@ -39,7 +39,7 @@ def locked_archive(path: str | Path, *, overwrite: bool = False, resume: bool = 
         # A run that is stopped between making and locking the file removes it too, unless it is another run's.
         with contextlib.suppress(OSError):
             holding.acquire()
-            lock.unlink(missing_ok=True)  # a run that opened it meanwhile notices, and tries again
+            lock.unlink(missing_ok=True)  # a run that opened it meanwhile detects this, and tries again
             holding.release(force=True)
 
 

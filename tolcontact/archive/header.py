@@ -1,4 +1,4 @@
-"""The header of an archive: everything but what is written block by block."""
+"""The header of an archive: everything except the values that are written block by block."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -230,7 +230,7 @@ def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
 
 
 def _bounded_values(program: Program) -> dict[ArchiveVariable, Any]:
-    """Return which pairs touch where their faces end, and how wrong fixed contact points would be; none unless they may."""
+    """Return which pairs touch where their faces end, and the error of fixed contact points there; none unless some may."""
     if not program.method.is_bounded:
         return {}
     numbers = range(len(program.nominal.pairs))
@@ -241,7 +241,7 @@ def _bounded_values(program: Program) -> dict[ArchiveVariable, Any]:
 
 
 def _coordinate_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
-    """Return the errors of coordinates in files, by which gaps count larger; none unless a file rounds coordinates."""
+    """Return the coordinate errors of files, which are added to gaps; none unless a file rounds coordinates."""
     errors = [pair.coordinate_error for pair in nominal.pairs]
     return {terms.COORDINATE_ERROR: errors} if any(errors) else {}
 
@@ -307,5 +307,5 @@ def _write_sample(contents: Contents, group: netCDF4.Group, program: Program, *,
 
 
 def _numbers(nominal: Nominal, faces: Sequence[FaceDeviation | None]) -> list[int]:
-    """Return the numbers of faces of features from 0, -1 for None."""
+    """Return the zero-based indices of the faces of features, -1 for None."""
     return [-1 if face is None else nominal.faces.index(face) for face in faces]

@@ -23,7 +23,7 @@ from tolcontact.errors import ArchiveError, shown
 from tolcontact.vocabulary import ArchiveVariable, archive, variation
 
 MAX_SECONDS, SECONDS_PER_GB = 20.0, 20.0  # of processor time
-MEMORY = 1 << 30  # beside four times the file's own size
+MEMORY = 1 << 30  # in addition to four times the size of the file
 MAX_DEFLATION = 1032  # zlib compresses data no further
 MAX_DECLARATION = 1 << 26  # bytes of a declared model
 MAX_TEXT = 1 << 20  # letters of an attribute
@@ -78,7 +78,7 @@ class DamagedError(Exception):
 
 
 def check_archive(path: Path) -> None:
-    """Raise ArchiveError if there is no file at a path, or it does not stand the inspection."""
+    """Raise ArchiveError if there is no file at a path, or it fails the inspection."""
     if not path.is_file():
         raise ArchiveError(f'archive "{path}" does not exist; write one with: tolcontact run MODEL.py --out {path}')
     inspect(path)

@@ -1,7 +1,7 @@
 """An archive that has room for all its values: they are overwritten in place, past the netCDF library.
 
 The library takes as long to write a block as contact takes to resolve it, must not be called by two threads at once, and
-locks the file against readers. All that it knows and a writer needs is where the bytes of a variable lie.
+locks the file against readers. A writer needs only the location of each variable's bytes from it.
 """
 
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ class BytePlace(NamedTuple):
 
 
 class RawFile:
-    """The values of an archive on its disk. A row is what stands at one index of a variable's first dimension."""
+    """The values of an archive on its disk. A row is the values at one index of a variable's first dimension."""
 
     def __init__(self, path: Path) -> None:
         """Open the file. Raises OSError if it cannot be read and written."""
@@ -79,7 +79,7 @@ class RawFile:
 def _place(item: h5py.h5d.DatasetID) -> BytePlace:
     """Return where the values of a variable lie.
 
-    It is given by its handle: the objects that h5py makes of handles take several times as long.
+    The variable is given by its handle: the h5py objects of handles take several times as long.
     """
     if item.get_create_plist().get_layout() != h5py.h5d.CHUNKED:
         offset = item.get_offset()

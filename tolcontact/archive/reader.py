@@ -23,7 +23,7 @@ def open_archive(path: str | Path) -> xr.DataTree:
     """Return an archive as a tree of labelled datasets that are read on demand.
 
     Raises ArchiveError if the file is missing, is not an archive of tolcontact, or is damaged: all but the realizations is
-    read and compared with its checksums; `summarize` checks those of the realizations.
+    read and compared with its checksums; `summarize` checks the realizations.
     """
     path = Path(path)
     check_archive(path)

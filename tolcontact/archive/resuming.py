@@ -42,7 +42,7 @@ def check_same_model(file: netCDF4.Dataset, path: Path, program: Program) -> Non
         if not _is_equal(file[f"field/{terms.group_of(part.name)}"][terms.FIELD_VERTICES.name], part.vertices):
             raise ArchiveError(f'"{path}": part "{part.name}" had another shape (was its mesh replaced?); write to a new file')
     for variable, values in contact_values(program).items():
-        if variable in (terms.BOUNDED, terms.PLANE_ERROR):  # they follow from the method, which is compared by itself
+        if variable in (terms.BOUNDED, terms.PLANE_ERROR):  # they follow from the method, which is compared separately
             continue
         stored = file["contact"].variables.get(variable.name)
         if stored is None or not (variable.kind is str or _is_equal(stored, values)):  # texts are in the declaration

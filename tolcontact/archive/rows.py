@@ -1,4 +1,4 @@
-"""Which variables of each realization an archive holds, in which groups, and their values."""
+"""The variables of each realization in an archive, their groups, and their values."""
 
 from collections.abc import Collection, Iterable
 from typing import NamedTuple
@@ -27,7 +27,7 @@ class Row(NamedTuple):
 
 
 def kept_rows(nominal: Nominal, keep: str) -> tuple[Row, ...]:
-    """Return what an archive holds of each realization with the option `keep`."""
+    """Return the variables that an archive holds for each realization with the option `keep`."""
     stations = [terms.station_group(scene.station) for scene in nominal.scenes]
     rows = [Row(group_of_rows(variable), variable) for variable in terms.BY_REALIZATION]
     rows += [Row(group, variable) for group in stations for variable in terms.STATION_ROWS]

@@ -66,7 +66,7 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
 
 
 def watch_settings(program: Program) -> dict[str, Any]:
-    """Return the attributes on the test of interference: its depth [mm], and what is not tested; none if nothing is."""
+    """Return the attributes of the interference test: its depth [mm], and the bodies left out; none without a test."""
     if not program.method.is_bounded:
         return {}
     watch, assembly = program.watch, program.nominal.assembly
@@ -92,7 +92,7 @@ def _weighting(program: Program) -> str:
 
 
 def _method_origin(program: Program) -> str:
-    """Return whether the method is that of the model, the defaults, or set by options of the run."""
+    """Return whether the method comes from the model, the defaults, or options of the run."""
     declared = program.nominal.assembly.method
     if program.method == (declared or Method()):
         return "defaults" if declared is None else "model"
@@ -110,5 +110,5 @@ def versions() -> str:
 
 
 def now() -> str:
-    """Return the present time in the format of the history."""
+    """Return the current time in the format of the history."""
     return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

@@ -11,7 +11,7 @@ from tolcontact.discretization import Nominal
 
 
 def write_stations(contents: Contents, file: netCDF4.Dataset, nominal: Nominal, rows: Sequence[Row]) -> None:
-    """Write which measures, pairs and parts belong to which station, and define what is archived of each; else nothing."""
+    """Write the station of each measure, pair and part, and define the variables of each station; nothing without stations."""
     if not nominal.scenes:
         return
     contents.add(file, terms.MEASURE_STATION, [measure.station for measure in nominal.measures])

@@ -1,4 +1,4 @@
-"""Rows of realizations as they are stored: which variables, in which chunks and blocks, with which checksums."""
+"""Rows of realizations as they are stored: their variables, chunks, blocks and checksums."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -29,7 +29,7 @@ class StoredBlock(NamedTuple):
 
 
 def stored(block: Block, labels: Sequence[str], nominal: Nominal) -> StoredBlock:
-    """Return a block, converted once for the file and for its checksums; `labels` are those of its variables."""
+    """Return a block, converted once for the file and for its checksums; `labels` select its variables."""
     values = row_values(block, labels, nominal)
     checksums = [crc32(row.variable, values[row.label]) for row in kept_rows(nominal, "all") if row.label in values]
     return StoredBlock(block.start, block.start + len(block), values, checksums)
@@ -86,7 +86,7 @@ def _checksums(variable: ArchiveVariable, values: xr.DataArray, rows: int) -> np
 def choose(file: netCDF4.Dataset, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the numbers (row,) of at most `count` certified realizations, in order, and whether each is a random choice.
 
-    One third penetrate most at contact points, one third have most carrying points, and the rest are random: a fair
+    One third penetrate most at contact points, one third have the most points under load, and the rest are random: a fair
     sample of all certified realizations.
     """
     rows = len(file.dimensions[terms.REALIZATION]) if count else 0
@@ -116,7 +116,7 @@ def _pieces(file: netCDF4.Dataset, rows: int) -> Iterator[tuple[int, np.ndarray,
 
 
 class _Largest:
-    """The numbers of the largest values above 0, the first of equals."""
+    """The indices of the largest values above 0, the first of equals."""
 
     def __init__(self, count: int) -> None:
         self._count = count
@@ -134,7 +134,7 @@ class _Largest:
 def archived_poses(file: netCDF4.Dataset, rows: np.ndarray, stations: Sequence[str]) -> np.ndarray | None:
     """Return corrected poses (row, part, 12) of some rows; None if the archive does not keep poses.
 
-    With `stations` the parts are those of all stations, one after the other.
+    With `stations`, the parts of all stations follow one another.
     """
     if terms.ROTATION.name not in file.variables:
         return None

@@ -35,7 +35,7 @@ def define(group: netCDF4.Dataset, variable: ArchiveVariable) -> None:
 
 
 def rows_together(width: int) -> int:
-    """Return the rows in a chunk of the file, for rows of `width` bytes: those of a block, or fewer if they are too large."""
+    """Return the rows in a chunk of the file, for rows of `width` bytes: a whole block, or fewer if they are too large."""
     rows = terms.BLOCK_ROWS
     while rows > MIN_CHUNK_ROWS and rows * width > MAX_CHUNK_BYTES:
         rows //= 2
@@ -108,7 +108,7 @@ def sizes_of_rows(nominal: Nominal) -> dict[str, int]:
 
 
 def units_of_rows(program: Program) -> dict[ArchiveVariable, str]:
-    """Return the units that depend on the model; those of measures are "1" if they differ."""
+    """Return the units that depend on the model; the units of measures are "1" if they differ."""
     units = {measure.units for measure in program.nominal.measures} or {"mm"}
     return {
         terms.REACTION: program.method.minimizes.reaction_units,

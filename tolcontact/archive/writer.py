@@ -1,9 +1,9 @@
 """Writing an archive block by block.
 
 A file that is being extended breaks when its writer is killed at the wrong moment. So room is laid out first, under another
-name: header, and rows with the status "unfinished". Once the file stands under its own name, bytes are only overwritten in
+name: header, and rows with the status "unfinished". Once the file has its own name, bytes are only overwritten in
 place, the status of a row after its data. If the process is killed, the file still opens, finished rows stay, and `resume`
-continues after the last checkpoint. (Writes are not flushed to the disk: a power failure may lose more.) To have its name
+continues after the last checkpoint. (Writes are not flushed to the disk: a power failure may lose more.) To get its name
 soon, a long run begins with room for few rows; when these are full, a copy gets room for all, and replaces the file.
 """
 
@@ -38,8 +38,8 @@ from tolcontact.replacing import replacing
 class ArchiveWriter:
     """An archive being written, whose file is locked (see `locked_archive`). Use it as a context manager.
 
-    rows      realizations that are in it; the next block starts there
-    samples   realizations that it was begun for
+    rows      number of realizations in it; the next block starts there
+    samples   number of realizations that it was started for
     kept      what it keeps of each realization
     """
 
@@ -151,7 +151,7 @@ class ArchiveWriter:
         return self.is_between_blocks and (is_old or is_last)
 
     def write_checkpoint(self, sums: Sequence[np.ndarray]) -> None:
-        """Write the sums of the fields (state, number) for each part so far, from which a killed run continues."""
+        """Write the sums of the fields (state, number) for each part so far, so that a killed run can continue."""
         with _as_archive_error(self._path):
             place = 1 - self._place
             write_checkpoint(self._values, Checkpoint(self.rows, place, list(sums)), self._parts)

@@ -81,7 +81,7 @@ def _declared(file: Path, information: Pmi) -> DeclaredFile:
 
 
 def _entries(declared: DeclaredFile) -> dict[str, Any]:
-    """Return everything for JSON: what the file states, its faces, and what became of it."""
+    """Return everything for JSON: the statements of the file, its faces, and the outcome."""
     faces = {record: asdict(face) for record, face in declared.faces.items()}
     declarations = {
         entry.annotation.record: {"features": entry.features, "reason": entry.reason} for entry in declared.annotations

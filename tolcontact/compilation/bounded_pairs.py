@@ -37,7 +37,7 @@ class Trial(NamedTuple):
 
 
 def push(pair: ContactPoints, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"], *, presses: bool) -> float:
-    """Return the distance [mm] by which contact of a pair may push its parts, from raw trial poses X_RM (n, 12).
+    """Return how far [mm] contact of a pair may push its parts, from raw trial poses X_RM (n, 12).
 
     deviations   (n, contributor)
     presses      whether forces also close the gaps
@@ -58,8 +58,8 @@ def bounded_pair(
     """Return where the bounded faces of a pair can touch, or None if fixed planes represent its reference face well.
 
     X_RM      (n, 12): raw trial poses, for `deviations` (n, contributor)
-    pushed    [mm]: distance by which all contact of the group may push its parts
-    room      [mm]: distance by which other contact, or forces, may; gaps below it are compared, and below the range of all gaps
+    pushed    [mm]: how far all contact of the group may push its parts
+    room      [mm]: how far other contact, or forces, may push; gaps below it are compared, and below the range of all gaps
     """
     nominal, pair = watch.nominal, watch.nominal.pairs[index]
     smallest = nominal.assembly.smallest_zone()

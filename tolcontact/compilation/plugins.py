@@ -8,7 +8,7 @@ import numpy as np
 
 from tolcontact.errors import OptionError
 
-ACCURACY = 1e-8  # mm: KKT residual up to which a QP counts as solved, for every plugin
+ACCURACY = 1e-8  # mm: the largest KKT residual of a solved QP, for every plugin
 
 
 @dataclass(frozen=True)

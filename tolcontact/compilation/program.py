@@ -68,7 +68,7 @@ class Program(Pictured):
     nominal_measures  values of the measures in the nominal assembly
     accuracies   accuracies of the measures, in their units (see measure_accuracies)
     stations     stations of an assembly that is built in steps, in their order; `place` then places the parts of all stations
-    watch        detects bodies that lie in each other
+    watch        detects bodies that interfere
     tapes        user-defined expressions by measure name
     """
 

@@ -1,7 +1,7 @@
-"""Limits of what is accepted: an answer far from the raw pose may obey half-spaces that no face fills there.
+"""Acceptance limits: far from the raw pose, an answer may satisfy half-space constraints where there is no face.
 
-Contact points are kept on one side of planes, which represent the reference face as long as the parts stay near. At a distance
-a plane may hold a point beside the face, or a part may have turned over into another pose that locators allow.
+Contact constraints keep points on one side of planes, which represent the reference face while the parts stay near. Further
+away, a plane may support a point beyond the rim of the face, or a part may have flipped into another pose that locators allow.
 """
 
 import numpy as np
@@ -15,16 +15,16 @@ from tolcontact.interference.watch import ALLOWED_SHARE
 from tolcontact.mechanics import Group, curved_pairs
 from tolcontact.method import Method
 
-ADRIFT_SIZES = 10  # a part that travelled by more sizes has nothing to rest on
-TURN_FACTOR = 2  # times the turn that lifts the end of a face as far as contact may push
-LOST_SIZES = 1e5  # no step will bring a part back from there
-# Faces may lie in each other, beside what their triangles leave open, by the smaller of these two:
+ADRIFT_SIZES = 10  # a part that travelled further, in sizes, has nothing to rest on
+TURN_FACTOR = 2  # times the rotation that lifts the end of a face by the distance that contact may push
+LOST_SIZES = 1e5  # no step brings a part back from further away
+# Accepted penetration of faces, in addition to the facet error of their triangles: the smaller of these two.
 DEPTH_SIZES = 1e-4  # sizes of the parts
 DEPTH_SHARE = 0.01  # of the smallest tolerance range
 
 
 class AcceptanceLimits:
-    """The limits of a method for one group of parts, the largest of which has a certain `size` [mm]."""
+    """The limits of a method for one group of parts; `size` [mm] is the size of the largest part."""
 
     def __init__(self, nominal: Nominal, group: Group, method: Method, size: float) -> None:
         self._nominal, self._pairs = nominal, group.pairs
@@ -43,7 +43,7 @@ class AcceptanceLimits:
         self._balls = [(side.part, *_ball(side.points)) for side in group.sides]
 
     def is_near(self, task: Task, state: State) -> Bool[Array, " n"]:
-        """Return whether no part has turned, and no contact point travelled, beyond the method's limits (n,)."""
+        """Return whether no part has rotated, and no contact point travelled, beyond the method's limits (n,)."""
         return ~self._is_turned(task, state) & ~self._is_far(task, state)
 
     def is_lost(self, task: Task, state: State) -> Bool[Array, " n"]:
@@ -62,9 +62,9 @@ class AcceptanceLimits:
     def is_doubtful(self, task: Task, state: State, candidates: Candidates) -> Bool[Array, " n"]:
         """Return whether an answer remains doubtful once the faces themselves are checked (n,).
 
-        It does if a part turned too far, also beside what its tolerances allow: unless forces do so, contact has no reason to
-        turn a part farther than gaps are deep, over the size of its face. If parts only travelled, or so far that places of
-        contact may have been missed, the faces must be free of penetration, and hold the points that carry.
+        It does if a part rotated too far, also compared with its tolerances: without forces, contact has no reason to rotate a
+        part by more than the depth of its gaps over the size of its face. If parts only travelled, perhaps so far that contact
+        points were missed, the faces must not penetrate each other, and the active points must lie on them.
         """
         doubtful = self._is_turned(task, state)
         if not self._presses:
@@ -87,14 +87,14 @@ class AcceptanceLimits:
                     overhang = side.face.overhang(pose.apply(motion[realization], carriers.places[points, None])[:, 0])
                     doubtful[rows[realization[overhang > carriers.spacing]]] = True
                 pair, deviations = self._group_pairs[k], task.deviations[rows]
-                if pair.is_springy:  # faces that give way lie in each other
+                if pair.is_springy:  # compliant faces penetrate each other
                     continue
                 form = pair.form(deviations) if pair.has_form else None
                 doubtful[rows] |= faces.depth(X_RM, pair.heights(deviations), form) > self.allowed(k)
         return doubtful
 
     def lie_in_form(self, task: Task, state: State) -> Bool[Array, " n"]:
-        """Return whether faces with form lie in each other in a certified answer (n,), where no search finds the deepest place.
+        """Return whether faces with form interfere in a certified answer (n,), where no search finds the deepest place.
 
         These are polyhedra on a plane with form. The faces are compared at many points.
         """
@@ -107,7 +107,7 @@ class AcceptanceLimits:
         return found
 
     def _is_turned(self, task: Task, state: State) -> Bool[Array, " n"]:
-        """Return whether a part turned too far from its raw pose (n,)."""
+        """Return whether a part rotated too far from its raw pose (n,)."""
         difference = state.poses[:, self._movers, :9] - task.raw[:, self._movers, :9]
         return ((difference**2).sum(axis=2) > self._max_turn).any(axis=1)
 
@@ -116,13 +116,13 @@ class AcceptanceLimits:
         return self.displacement(task.raw, state.poses) > self._max_travel
 
     def allowed(self, k: int) -> float:
-        """Return how deep [mm] the faces of pair k of the group may lie in each other in an answer that is not doubtful."""
+        """Return the penetration [mm] of the faces of pair k of the group that an answer may have and not be doubtful."""
         return self._max_depth + self._group_pairs[k].facets
 
     def rolled(self, k: int, state: State) -> Bool[Array, " n"]:
-        """Return whether points may have slid so far around the reference face of pair k that their planes leave it (n,).
+        """Return whether points may have slid so far around the reference face of pair k that tangent planes leave it (n,).
 
-        At a distance from its foot a plane leaves a curved face by the curvature times half the square of the distance.
+        A tangent plane departs from a curved face by curvature times half the square of the distance from its contact point.
         """
         curvature, centre, radius = self._round[k]
         slid = _displacement(state.relative[:, k] - pose.AT_REST, centre, radius)
@@ -131,7 +131,7 @@ class AcceptanceLimits:
     def displacement(self, start: Float[Array, "n part 12"], end: Float[Array, "n part 12"]) -> Float[Array, " n"]:
         """Return a bound of how far contact points move (n,) [mm] between two poses (n, part of the group, 12).
 
-        It is the displacement of the centre of a ball around the points, and the ball's radius times the turn.
+        It is the displacement of the centre of a ball around the points, and the ball's radius times the rotation.
         """
         bound = np.zeros(len(start))
         for part, centre, radius in self._balls:

@@ -1,4 +1,4 @@
-"""Compiled passes over places that are found at every pose, of every realization its own."""
+"""Compiled passes over places that are searched at every pose, separately for each realization."""
 
 import numpy as np
 
@@ -26,8 +26,8 @@ def gaps(relative, places, feet, normals, heights, values):  # type: ignore[no-u
 def deepest(labels, feet, values, distance, numbers, depths):  # type: ignore[no-untyped-def]
     """Write labels and depths of the deepest places (n, m), deepest first; where there are fewer, some label, and -inf.
 
-    Places outside are left out within a `distance` [mm] of a deeper one: of two that nearly coincide either could carry, and
-    which one does should not be left to the solver.
+    Places outside within a `distance` [mm] of a deeper one are left out: of two that nearly coincide, either could be active,
+    and the choice should not be left to the solver.
     """
     for k in range(values.shape[0]):
         count = 0
@@ -51,7 +51,7 @@ def deepest(labels, feet, values, distance, numbers, depths):  # type: ignore[no
 
 @uncounted
 def _is_near(feet, columns, depths, k, j, distance):  # type: ignore[no-untyped-def]
-    """Return whether the foot in column j is within a distance of one in a column before it that counts."""
+    """Return whether the projection in column j is within a distance of one in an earlier column that counts."""
     is_near = False
     for other in range(j):
         away = 0.0

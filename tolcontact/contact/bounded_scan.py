@@ -1,4 +1,4 @@
-"""Scans of bodies as they end: the places at which they can touch are found anew at every pose."""
+"""Scans of bounded bodies: the places where they can touch are searched at every pose."""
 
 from dataclasses import dataclass
 
@@ -17,17 +17,17 @@ from tolcontact.geometry.parting import Parting
 
 PENETRATION = 1e-10  # mm: less than this is no penetration
 MAX_DEEPEST = SLOTS  # places of a pair that get a row in one round
-ALIGNED = 0.87  # cosine of the angle to the axis along which bodies part, up to which places in each other count
-SHOWN_SHARE = 0.05  # of the gap along this axis: where other places show it up to that, it needs no place of its own
+ALIGNED = 0.87  # cosine of the largest angle between the axis of separation and the normal of a penetrating place that counts
+SHOWN_SHARE = 0.05  # of the gap along this axis: no place is added if another place shows the gap to within this share
 
 
 @dataclass(frozen=True, eq=False)
 class BoundedScan(SlotScan):
-    """Places at which a pair can touch, found at some poses: those of the least gaps, of every realization its own.
+    """Places where a pair can touch at given poses: for each realization, the places with the smallest gaps.
 
-    labels              (realization, place): numbers of the places among those of the pair's meeting
+    labels              (realization, place): indices of the places in the pair's meeting
     places, feet, normals   (realization, place, 3): P^m, P^r, n^r
-    heights             (realization, place) [mm] by which both faces have grown there, with their forms
+    heights             (realization, place) [mm]: growth of both faces there, including form deviations
     """
 
     fills = True
@@ -107,10 +107,10 @@ def bounded_scan(
 ) -> BoundedScan:
     """Return the places at which a pair can touch at X_RM (n, 12); see raised_places for the other arguments.
 
-    Where no place shows penetration, a `guard` adds one if bodies lie in each other, and finds it again while it carries. A
-    `parting` leaves out places that hold bodies apart in other directions than the one in which they part best, and adds the
-    place that does; `carried` (n, slot) are the labels of places that carried before, -1 for none. Places deeper than `deepest`
-    (n,) [mm] do not count.
+    If bodies interfere and no place shows penetration, a `guard` adds one, and finds it again while it is active. A `parting`
+    leaves out places that separate the bodies in other directions than the best one, and adds the place for the best direction;
+    `carried` (n, slot) are the labels of places that were active before, -1 for none. Places deeper than `deepest` (n,) [mm] do
+    not count.
     """
     found, heights = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness, depth)
     if deepest is not None:
@@ -126,9 +126,9 @@ def bounded_scan(
 def _with_guard(
     found: Places, heights: np.ndarray, guard: Guard, X_RM: np.ndarray, carried: np.ndarray | None
 ) -> tuple[Places, np.ndarray]:
-    """Return places, and their heights (n, place), with one more where bodies lie in each other and no place shows it.
+    """Return places, and their heights (n, place), with one more where bodies interfere and no place shows it.
 
-    Where such a place was among those that `carried` (n, k) it is found again, or bodies would go in as soon as they are out.
+    If such a place was active before (`carried` (n, k)), it is found again: otherwise bodies would interfere again at once.
     """
     labels = np.full(len(X_RM), -1)
     if carried is not None:
@@ -144,10 +144,11 @@ def _with_guard(
 def _with_parting(
     found: Places, heights: np.ndarray, parting: Parting, X_RM: np.ndarray, carried: np.ndarray | None
 ) -> tuple[Places, np.ndarray]:
-    """Return places, and their heights (n, place), that hold convex bodies apart where they part best, and the best one.
+    """Return places, and their heights (n, place), that separate convex bodies in the best direction, and the best place.
 
-    Bodies are free once they part in one direction. Places in each other along others would push them as well. The place that
-    parts them is added where no other shows as much. Nearly parallel edges that `carried` (n, k) before are added, too.
+    Bodies are free once they are separate in one direction; penetrating places with other normals would push them as well. The
+    separating place is added where no other place shows as much. Nearly parallel edges that were active before (`carried`
+    (n, k)) are added, too.
     """
     axis = parting.at(X_RM)
     is_aligned = (found.n_r * axis.n_r[:, None]).sum(axis=2) > ALIGNED

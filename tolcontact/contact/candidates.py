@@ -1,4 +1,4 @@
-"""The contact points of a group's pairs: all of them, those that may carry, and where they are at other poses."""
+"""The contact points of a group's pairs: all points, the points that may be active, and their positions at other poses."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -25,28 +25,28 @@ from tolcontact.mechanics import curved_pairs
 
 MAX_CLUSTERS = 6
 FORM_CLUSTERS = 8  # of faces with form, which touch at more places
-APART = 2.0  # times the error of planes beyond their edges: bodies that carry load are no farther apart
+APART = 2.0  # times the error of planes beyond their edges: bodies under load are no further apart
 EDGE_SHARE = 1 / 4000  # of the smallest tolerance range: error of planes beyond their edges, in steps
-BULGE_SHARE = 1 / 2500  # of the same: depth to which planes with form may lie in each other between contact points
+BULGE_SHARE = 1 / 2500  # of the same: accepted penetration of planes with form between contact points
 MIN_BULGE = 1e-7  # mm
-OVERHANG_SHARE = 0.01  # of their radius, by which balls and shafts that travelled far may carry beside a wall
+OVERHANG_SHARE = 0.01  # of their radius: overhang beyond a wall at which balls and shafts that travelled far may be active
 
-FREE_DEPTH = 1e-3  # mm: free bodies are not deeper in each other
+FREE_DEPTH = 1e-3  # mm: the largest penetration of free bodies
 
 
 def _lies_between(labels: Int[Array, "n k"]) -> Bool[Array, "n k"]:
-    """Return which labels of places are those of contact points, or of minima of the gap, between the ends of faces."""
+    """Return which labels belong to contact points, or to minima of the gap, between the ends of faces."""
     return ((labels >= FIRST_POINT) & (labels < GUARD)) | (labels >= FIRST_PLACE)
 
 
 class RawSurvey(NamedTuple):
     """Gaps and active points of realizations in their raw state.
 
-    scans       for each pair the points that may carry
-    min_gap     (realization, pair) [mm]: the least gaps
+    scans       for each pair the points that may be active
+    min_gap     (realization, pair) [mm]: the smallest gaps
     active      (realization, pair): number of active points
     moments     (realization, side, moment) of the points that count in the objective
-    is_inside   (realization,): whether faces with form lie in each other between the points
+    is_inside   (realization,): whether faces with form penetrate each other between the points
     """
 
     scans: list[Scan]
@@ -57,12 +57,12 @@ class RawSurvey(NamedTuple):
 
 
 class Carriers(NamedTuple):
-    """Points of a pair that carry.
+    """Points of a pair that are under load.
 
     realization   the realization of each point
-    places        (point, 3), nominal, of the part that does not have the surface which they touch
+    places        (point, 3), nominal, on the part opposite the surface that they touch
     on_moving     whether that is the moving part
-    spacing       the usual distance of the points [mm]; for round faces how far they may stand beside a wall
+    spacing       the usual spacing of the points [mm]; for round faces, the permitted overhang beyond a wall
     """
 
     realization: Int[Array, " point"]
@@ -74,8 +74,8 @@ class Carriers(NamedTuple):
 class Candidates:
     """The contact points of a group, with X_RM of its pairs as (realization, pair, 12).
 
-    bounded   the meetings of pairs whose places are found at every pose, by their number in the group
-    guards    guards of these, one for each two bodies: that of their first pair
+    bounded   the meetings of pairs whose places are found at every pose, by their index in the group
+    guards    guards of these pairs, one for each two bodies: the guard of their first pair
     """
 
     def __init__(self, program: Program, group: ContactGroup) -> None:
@@ -94,10 +94,10 @@ class Candidates:
                 self._all_scans.append(round_scan)
                 self._carrying_scans.append(round_scan)
                 continue
-            # Places of bounded pairs are found at every pose, so that no cluster offers a point of its own.
+            # Places of bounded pairs are found at every pose, so that clusters offer no separate points.
             clusters = 1 if index in program.meetings else FORM_CLUSTERS if pair.has_form else MAX_CLUSTERS
             self._all_scans.append(pair_scan(pair, gaps, tables, clusters))
-            # If the paper's set of points may carry, those between the corners count, too.
+            # If the paper's set of points may be active, points between the corners count, too.
             corners = self._method.corners_suffice and index not in program.meetings
             self._carrying_scans.append(pair_scan(pair, gaps, (), clusters, gaps.corners) if corners else self._all_scans[-1])
         smallest = program.nominal.assembly.smallest_zone()
@@ -134,15 +134,15 @@ class Candidates:
         deepest: Float[Array, " realization"] | None = None,
         answered: Sequence[Slots] = (),
     ) -> list[Scan]:
-        """Return scans of the points that may carry, projected again if the method requires it.
+        """Return scans of the points that may be active, projected again if the method requires it.
 
-        Places of bounded pairs are found anew; in steps, with the `slots` of the pairs with changing points, places that carry
-        remain a little beyond their edges, `width` times as far as they may in an answer, unless the realization is `at_rest`.
-        If the `start` is guarded, bodies that lie in each other where no place shows it get one more place (see Guard), which
-        remains where it is among those of the `answered` slots. If it
-        is parted, places hold convex bodies apart only in the direction in which they part best (see Parting). If it is free,
-        places deeper than `deepest` (realization,) [mm], FREE_DEPTH by default, are on the far side of a body and do not count.
-        Its steps know places a little beside their edges: a corner in a valley then meets both sides of it.
+        Places of bounded pairs are searched again. In steps, given the `slots` of the pairs with changing points, active places
+        persist slightly beyond their edges, up to `width` times the limit for an answer, unless the realization is `at_rest`.
+        If the `start` is guarded, bodies that interfere where no place shows it get one more place (see Guard), which persists
+        if it is in the `answered` slots. If it is parted, places separate convex bodies only in the best direction (see
+        Parting). If it is free, places deeper than `deepest` (realization,) [mm], FREE_DEPTH by default, are on the far side of
+        a body and do not count; its steps include places slightly beyond their edges, so that a corner in a valley meets both
+        sides of the valley.
         With `projected`, points against curved faces are projected, too. `earlier` are scans with the sums of heights.
         """
         scans = list(self._carrying_scans)
@@ -158,7 +158,7 @@ class Candidates:
             carrying = slots or (answered if start.guarded else ())
             carried = carrying[self._varying.index(k)].labels if carrying else None
             if kept is not None and at_rest is not None:
-                # Places between the ends of faces with form come and go with no edge.
+                # Places between the ends of faces with form appear and vanish without an edge.
                 kept[at_rest[:, None] & ~_lies_between(kept)] = -1
             former = earlier[k] if earlier else None
             if kept is not None and isinstance(former, BoundedScan):
@@ -185,18 +185,18 @@ class Candidates:
 
     @property
     def change(self) -> bool:
-        """Whether places of contact are found again at every pose."""
+        """Whether contact places are searched at every pose."""
         return bool(self.bounded or self._with_minima)
 
     def bulge(self, scans: Sequence[Scan], relative: Float[Array, "realization pair 12"]) -> Bool[Array, " realization"]:
-        """Return whether planes with form lie in each other between contact points, by more than bodies may (realization,)."""
+        """Return whether planes with form penetrate between contact points, deeper than bodies may (realization,)."""
         found = np.zeros(len(relative), dtype=bool)
         for k in self._with_minima:
             found |= scans[k].depth_between(relative[:, k]) > self._allowed_bulge
         return found
 
     def interfere(self, relative: Float[Array, "realization pair 12"]) -> Bool[Array, " realization"]:
-        """Return whether bodies of a pair lie in each other (realization,), by a test that does not know the list of places."""
+        """Return whether bodies of a pair interfere (realization,), by a test that is independent of the list of places."""
         found = np.zeros(len(relative), dtype=bool)
         for k, guard in self.guards.items():
             found |= guard.interferes(relative[:, k])
@@ -204,17 +204,17 @@ class Candidates:
 
     @cached_property
     def _widened(self) -> dict[int, Meeting]:
-        """The bounded pairs with places that count a little beside their edges."""
+        """The meetings of bounded pairs, with places that count slightly beyond their edges."""
         return {k: places.widened(self._edge_error) for k, places in self.bounded.items()}
 
     @property
     def are_guarded(self) -> bool:
-        """Whether there are bounded pairs, and of each it is known whether its bodies lie in each other."""
+        """Whether there are bounded pairs and every one of them has a guard against interference of its bodies."""
         return len(self.bounded) > 0 and len(self._guards) == len(self.bounded)
 
     @cached_property
     def partings(self) -> dict[int, Parting]:
-        """Of bounded pairs those of convex bodies without deviations, by their number in the group."""
+        """The partings of bounded pairs of convex bodies without deviations, by the index of the pair in the group."""
         partings = {}
         for k, guard in self._guards.items():
             pair = self._pairs[k]
@@ -224,7 +224,7 @@ class Candidates:
         return {k: found for k, found in partings.items() if found is not None}
 
     def are_apart(self, state: State) -> Bool[Array, " n"]:
-        """Return whether bodies of a bounded pair that carry load touch nowhere (n,)."""
+        """Return whether the bodies of a bounded pair under load touch nowhere (n,)."""
         found = np.zeros(len(state), dtype=bool)
         for k in self.bounded:
             if not self._pairs[k].has_form:  # whose minima are not among the gaps
@@ -232,7 +232,7 @@ class Candidates:
         return found
 
     def hold(self, task: Task, state: State, start: Start) -> Bool[Array, " n"]:
-        """Return whether the places that carry are as near to their faces as they may be in an answer (n,)."""
+        """Return whether the active places are as close to their faces as an answer requires (n,)."""
         scans = self.scans(state.relative, task.deviations, slots=state.slots, earlier=task.scans, start=start)
         held = np.ones(len(state), dtype=bool)
         for k in self.bounded:
@@ -262,7 +262,7 @@ class Candidates:
         )
 
     def _counted(self, k: int, active: np.ndarray) -> np.ndarray:
-        """Return moments (realization, side, moment) of points that count in the objective, given those of active points."""
+        """Return moments (realization, side, moment) of points that count in the objective, given those that are `active`."""
         if self._pairs[k].is_supports:  # they are not among the paper's contact points
             return np.zeros_like(active)
         if not self._method.minimizes.counts_all:
@@ -276,7 +276,7 @@ class Candidates:
         relative: Float[Array, "realization pair 12"],
         deviations: Float[Array, "realization contributor"],
     ) -> list[Bool[Array, "realization _"] | None]:
-        """Return which points (realization, point) may carry; in the paper's set those that are active in the raw state."""
+        """Return which points (realization, point) may be active; in the paper's set, the points active in the raw state."""
         if self._method.is_closed:
             return [None for _ in scans]
         return [
@@ -287,13 +287,13 @@ class Candidates:
         ]
 
     def carriers(self, k: int, state: State) -> Carriers:
-        """Return the points of pair k that carry; none of a bounded pair, whose places lie on both bodies."""
+        """Return the points of pair k under load; none for a bounded pair, whose places lie on both bodies."""
         if k in self.bounded:
             return Carriers(np.zeros(0, dtype=int), np.zeros((0, 3)), np.zeros(0, dtype=bool), 0.0)
         loaded, standing, pair = state.loaded[:, self._spans[k]], self._standing[k], self._pairs[k]
         if pair.round:
             points = pair.round.points
-            realization, column = np.nonzero(loaded & ~points["cut"].any(axis=1))  # where a wall ends a shaft may go on
+            realization, column = np.nonzero(loaded & ~points["cut"].any(axis=1))  # a shaft may continue beyond a wall
             spacing = OVERHANG_SHARE * float(points["radius"].max())
             return Carriers(realization, points["centre"][column], points["on_moving"][column], spacing)
         if isinstance(standing, int):

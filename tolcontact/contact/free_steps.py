@@ -1,4 +1,4 @@
-"""Steps of bodies that are free of each other: they end before bodies enter each other, so that none contradict each other."""
+"""Steps of free bodies: each step ends before bodies penetrate, so that no constraints contradict each other."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -17,15 +17,15 @@ from tolcontact.discretization import ContactPoints
 from tolcontact.mechanics import Group
 
 MAX_HALVINGS = 20
-SINK_SHARE = 0.02  # of a step, by which places may sink in: they follow planes, and rotations are curved
-TOUCHING = 1e-9  # mm: bodies no deeper in each other touch
-GAIN_SHARE = 1e-9  # of the objective, by which rounding may raise it
+SINK_SHARE = 0.02  # of a step: accepted penetration of places, since they follow planes and rotations are curved
+TOUCHING = 1e-9  # mm: bodies with at most this penetration touch
+GAIN_SHARE = 1e-9  # of the objective: increase due to rounding
 MAX_LIFTS = 30
-LIFT_FACTOR = 1.1  # times the width of what bodies share, by which they are moved apart
+LIFT_FACTOR = 1.1  # times the width of the common region of bodies: how far they are moved apart
 
 
 class FreeSteps:
-    """What keeps the bodies of a group free of each other, or frees them.
+    """The steps that keep the bodies of a group free of interference, or free them.
 
     relate, energy   return X_RM of all pairs at some poses, and the objective of a task's state
     """
@@ -46,7 +46,7 @@ class FreeSteps:
     def shorten(self, step: LinearStep, task: Task, before: State, state: State, size: Float[Array, " n"]) -> Bool[Array, " n"]:
         """Shorten steps from `before` to `state`, of a size (n,) [mm], so that bodies stay free; return which are short (n,).
 
-        What a short step left in each other since rotations are curved comes free by another one, the smallest that does.
+        If a short step leaves penetration because rotations are curved, the smallest step that removes it follows.
         """
         is_short = self._hold_back(task, before, state, size)
         rows = np.flatnonzero(is_short)
@@ -61,7 +61,7 @@ class FreeSteps:
         return is_short
 
     def _hold_back(self, task: Task, before: State, state: State, size: Float[Array, " n"]) -> Bool[Array, " n"]:
-        """Halve steps until no body enters another one and the objective is lower; return which are short (n,)."""
+        """Halve steps until no body penetrates another one and the objective is lower; return which are short (n,)."""
         shares = np.ones(len(task))
         rows = np.flatnonzero(np.isfinite(before.poses).all(axis=(1, 2)) & np.isfinite(state.poses).all(axis=(1, 2)))
         depths = self._depths(task, before.relative, np.full(len(task), FREE_DEPTH))
@@ -71,7 +71,7 @@ class FreeSteps:
         motions = self._limits.displacement(before.poses, state.poses)
         for _ in range(MAX_HALVINGS):
             part, share = task.take(rows), shares[rows]
-            # Places that show more than bodies have moved are on the far side of a body.
+            # Places deeper than the motion of the bodies are on the far side of a body.
             depth = self._depths(part, state.relative[rows], depths[rows] + share * motions[rows] + TOUCHING)
             fails = depth > TOUCHING + depths[rows] * (1 - share) + SINK_SHARE * share * size[rows]
             fails |= enters[rows] & self._candidates.interfere(state.relative[rows])
@@ -82,7 +82,7 @@ class FreeSteps:
             shares[rows] /= 2
             state.poses[rows] = _halfway(before.poses[rows], state.poses[rows], self._centres)
             state.relative[rows] = self._related(state.poses[rows], part.deviations)
-        # Places show themselves once bodies have moved a little, unless only the complete test sees what is in the way.
+        # Places show penetration after small motions of the bodies, unless only the complete test detects it.
         rows = rows[enters[rows] & self._candidates.interfere(state.relative[rows])]
         state.poses[rows], state.relative[rows] = before.poses[rows], before.relative[rows]
         return shares < 1
@@ -90,7 +90,7 @@ class FreeSteps:
     def lift(
         self, poses: Float[Array, "n part 12"], relative: Float[Array, "n pair 12"], deviations: Float[Array, "n contributor"]
     ) -> tuple[Float[Array, "n part 12"], Float[Array, "n pair 12"]]:
-        """Return poses, and X_RM, at which bodies that lie in each other are moved apart, where they are narrowest."""
+        """Return poses, and X_RM, after moving interfering bodies apart, along the narrowest extent of their common region."""
         poses, relative = poses.copy(), relative.copy()
         for _ in range(MAX_LIFTS):
             is_free = True
@@ -118,7 +118,7 @@ class FreeSteps:
         return self._relate(poses=poses, deviations=deviations).reshape(len(poses), len(self._pairs), -1)
 
     def _depths(self, task: Task, relative: np.ndarray, deepest: np.ndarray) -> np.ndarray:
-        """Return the largest penetration (n,) [mm] that places show, of those not deeper than `deepest` (n,) [mm]."""
+        """Return the largest penetration (n,) [mm] of the places that are not deeper than `deepest` (n,) [mm]."""
         scans = self._candidates.scans(relative, task.deviations, start=FREE_WHERE_RAW, deepest=deepest)
         return np.maximum(-min_gaps(scans, relative, task.deviations).min(axis=1), 0)
 

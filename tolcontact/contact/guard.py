@@ -1,4 +1,4 @@
-"""Guards of pairs whose bodies end: they see that bodies lie in each other where the list of places shows nothing."""
+"""Guards of bounded pairs: they detect bodies that interfere where the list of places shows nothing."""
 
 from dataclasses import dataclass
 
@@ -10,13 +10,13 @@ from tolcontact.compilation import Program
 from tolcontact.geometry.meeting import Places
 from tolcontact.interference import Neighbours, WayOut, ordered
 
-GUARD = 1 << 41  # first label of places that a guard adds: a label says in which direction the place parts the bodies
+GUARD = 1 << 41  # first label of places that a guard adds: a label encodes the direction that separates the bodies
 LEVELS = 1 << 12  # of a component of that direction
-APART = 2.0 * 8.0 ** np.arange(3)  # insets of both bodies, by which they may be apart where a place holds them
+APART = 2.0 * 8.0 ** np.arange(3)  # insets of both bodies: the distances at which a place that holds them apart is searched
 
 
 def is_guard(labels: Int[Array, "..."]) -> Bool[Array, "..."]:
-    """Return which labels are those of places that a guard added."""
+    """Return which labels belong to places that a guard added."""
     return (labels >= GUARD) & (labels < 2 * GUARD)
 
 
@@ -33,7 +33,7 @@ def _direction(labels: Int[Array, " n"]) -> Float[Array, "n 3"]:
 
 
 def no_places(count: int) -> Places:
-    """Return places (n, 1) that are none."""
+    """Return empty places (n, 1)."""
     return Places(np.full((count, 1), -1), np.full((count, 1), np.inf), *np.zeros((3, count, 1, 3)))
 
 
@@ -49,7 +49,7 @@ class Guard:
 
     @classmethod
     def of(cls, program: Program, index: int) -> "Guard | None":
-        """Return the guard of a pair; None if its bodies may lie in each other, have no inside, or grow where they touch."""
+        """Return the guard of a pair; None if its bodies may interfere, have no inside, or grow where they touch."""
         pair = program.nominal.pairs[index]
         assert pair.reference is not None
         if any(face is not None and face.grows for face in pair.deviating):
@@ -59,11 +59,11 @@ class Guard:
         return None if neighbours is None else cls(neighbours, pair.moving != bodies[0])
 
     def interferes(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
-        """Return whether the bodies lie in each other at X_RM (n,)."""
+        """Return whether the bodies interfere at X_RM (n,)."""
         return self.neighbours.interfere(pose.inverse(X_RM) if self.is_swapped else X_RM)
 
     def places(self, X_RM: Float[Array, "n 12"], labels: Int[Array, " n"]) -> Places:
-        """Return a place (n, 1) that parts the bodies at X_RM where they lie in each other, or touch; an infinite gap for none.
+        """Return a place (n, 1) that separates the bodies at X_RM where they interfere, or touch; an infinite gap for none.
 
         labels   (n,) of the places that held the bodies apart before, -1 for none: these bodies touch, or are a little apart
         """
@@ -75,7 +75,7 @@ class Guard:
         return found
 
     def _part(self, found: Places, rows: Int[Array, " k"], X_RM: Float[Array, "n 12"], shift: Float[Array, "k 3"]) -> None:
-        """Write the place that parts bodies in some rows, which overlap once the moving one is shifted."""
+        """Write the place that separates bodies in some rows, which overlap once the moving one is shifted."""
         shifted = X_RM[rows]
         shifted[:, 9:] += shift
         way = self.ways_out(shifted, -shift)
@@ -87,9 +87,9 @@ class Guard:
             values[rows, 0] = of_rows
 
     def ways_out(self, X_RM: Float[Array, "n 12"], directions: Float[Array, "n 3"] | None = None) -> WayOut:
-        """Return how the bodies part: P_m, P_r and n_r of the paper, and how deep the place P_m lies (n,) [mm].
+        """Return how the bodies separate: P_m, P_r and n_r of the paper, and how deep the place P_m lies (n,) [mm].
 
-        directions   (n, 3) in which they part, if known (see Neighbours)
+        directions   (n, 3) of separation, if known (see Neighbours)
         """
         if not self.is_swapped:
             return self.neighbours.ways_out(X_RM, directions)

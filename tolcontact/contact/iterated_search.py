@@ -1,7 +1,7 @@
-"""Iterated search: linear steps, each about contact points that were projected again, until the poses stay.
+"""Iterated search: linear steps, each about contact points that were projected again, until the poses converge.
 
 More than one step about the same points would let a round part roll on the planes that represent its counterpart. Linear
-rows do not know how the surfaces curve: steps that neither shrink nor gain are repeated with more caution, a weight on the
+rows neglect the curvature of the surfaces: steps that neither shrink nor gain are repeated with more caution, a weight on the
 step itself.
 """
 
@@ -18,8 +18,8 @@ from tolcontact.contact.slots import Slots
 from tolcontact.contact.state import State, Task, Unsettled
 
 MAX_STEPS = 100
-GOOD_RATIO = 0.7  # a good step is at most this part of the step before, or gains at least this part of the foreseen gain
-CAUTION_FACTOR = 10.0  # by which caution grows after a step that stalls, and falls after one that gains
+GOOD_RATIO = 0.7  # a good step is at most this part of the step before, or gains at least this part of the predicted gain
+CAUTION_FACTOR = 10.0  # growth of caution after a step that stalls, and its reduction after one that gains
 MIN_SCALED_STEP = 1e-6  # mm, in the norm of the objective: its square is what a step gains
 STEP_TOLERANCE = 1e-8  # mm: a smaller step is the last one
 
@@ -41,9 +41,9 @@ def search(
         _empty_slots(unsettled.state)
         size, scaled = step.take(unsettled.task, unsettled.state, stride=stride, caution=cautions)
         energy = energy_of(unsettled.task, unsettled.state)
-        gain_ratio = (last_energy - energy) / np.maximum(scaled**2 / 2, 1e-300)  # to the gain that the QP foresaw
+        gain_ratio = (last_energy - energy) / np.maximum(scaled**2 / 2, 1e-300)  # relative to the gain that the QP predicts
         scans = candidates.scans(unsettled.state.relative, unsettled.task.deviations, projected=True)
-        # A step whose points lie deeper inside afterwards gains only what it loses again.
+        # A step whose points are deeper inside afterwards only gains what is lost again later.
         sinks = _depth_left(scans, unsettled) > np.maximum((1 - GOOD_RATIO) * np.minimum(size, scaled), STEP_TOLERANCE)
         stalls = (size > GOOD_RATIO * last_size) & (gain_ratio < 1 - GOOD_RATIO) | sinks
         cautions = _adapted(cautions, stalls, gain_ratio)
@@ -62,19 +62,19 @@ def search(
 
 
 def _empty_slots(state: State) -> None:
-    """Empty all slots: the points that carried before may now be beyond the rim."""
+    """Empty all slots: the points that were active before may now be beyond the rim."""
     for slots in state.slots:
         slots.put(np.arange(len(state)), Slots.empty(*slots.points.shape))
 
 
 def _depth_left(scans: list, unsettled: Unsettled) -> np.ndarray:
-    """Return by how much points are deeper inside than the slack (n,) [mm], among points projected at the poses reached."""
+    """Return the penetration beyond the slack (n,) [mm], among points projected at the poses reached."""
     task, state = unsettled.task, unsettled.state
     gaps = min_gaps(scans, state.relative, task.deviations)
     return undone(scans, gaps, state.relative, task.deviations, task.may_carry, state.slack).max(axis=1)
 
 
 def _adapted(cautions: np.ndarray, stalls: np.ndarray, gain_ratio: np.ndarray) -> np.ndarray:
-    """Return the cautions (n,) of the next step: more where a step stalled, less where it gained what was foreseen."""
+    """Return the cautions (n,) of the next step: more where a step stalled, less where it gained as predicted."""
     relaxed = np.where(gain_ratio > GOOD_RATIO, cautions / CAUTION_FACTOR, cautions)
     return np.where(stalls, np.maximum(CAUTION_FACTOR * cautions, 1), relaxed)

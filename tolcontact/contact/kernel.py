@@ -1,8 +1,8 @@
 """Compiled passes over contact points: no array of size realizations x points is made.
 
-Contact points come in leaves of neighbours, and those in branches, with bounds of their coordinates, which bound their gaps.
-A leaf or branch that is wholly clear is passed over, one that is wholly active adds its summed moments, and one that cannot
-hold the deepest point is left out.
+Contact points form leaves of neighbours, and leaves form branches. Bounds of their coordinates bound their gaps.
+A leaf or branch that is entirely clear is skipped, one that is entirely active adds its summed moments, and one that cannot
+contain the deepest point is left out.
 Gaps are summed up in the order of `PairScan.gaps`, so that both give the same to the last bit; moments are summed up in
 another order than NumPy's, and agree to rounding.
 """
@@ -47,7 +47,7 @@ def write_factors(basis, columns, X, deviations, factors):  # type: ignore[no-un
 
 @inlined
 def bounds(boxes, start, count, factors, middle, spread):  # type: ignore[no-untyped-def]
-    """Write the gap in the middle of some boxes, and how far other gaps can be from it: middle and spread (count,)."""
+    """Write the gap at the centre of some boxes, and the largest difference from it in each box: middle and spread (count,)."""
     rounding = ROUNDING * abs(factors[0])
     for box in range(count):
         middle[box] = factors[0]
@@ -111,7 +111,7 @@ def survey(points, table, leaf_sums, branch_sums, relative, deviations, activity
                     continue
                 gaps_of(points.coordinates, start, count, factors, gaps)
                 active_here = 0
-                for j in range(count):  # without a branch, which could not be predicted
+                for j in range(count):  # without a branch, since it would be unpredictable
                     found[active_here] = start + j
                     active_here += gaps[j] < activity
                 number += active_here
@@ -124,7 +124,7 @@ def survey(points, table, leaf_sums, branch_sums, relative, deviations, activity
 
 @inlined
 def _deepest_of_leaves(points, first_leaf, end_leaf, factors, may_carry, lowest, where, scratch):  # type: ignore[no-untyped-def]
-    """Return gap and number of the deepest point of some leaves, if it is below `lowest`, or as low and before `where`."""
+    """Return gap and index of the deepest point of some leaves, if it is below `lowest`, or as low and before `where`."""
     leaves = points.leaves
     gaps, middle, spread = scratch
     bounds(points.leaf_boxes, first_leaf, end_leaf - first_leaf, factors, middle, spread)
@@ -148,7 +148,7 @@ def _deepest_of_leaves(points, first_leaf, end_leaf, factors, may_carry, lowest,
 
 @compiled
 def deepest(points, clusters, relative, deviations, may_carry, limit, numbers, gaps_there):  # type: ignore[no-untyped-def]
-    """Write number and gap of the deepest point of each cluster (n, cluster), if its gap is less than `limit`.
+    """Write index and gap of the deepest point of each cluster (n, cluster), if its gap is less than `limit`.
 
     Else write the cluster's first point, and `limit`.
 

@@ -1,8 +1,8 @@
 """One linear step: constraint generation around the compiled QP of a group.
 
 The QP has a few slots for rows. All gaps are scanned, the deepest point of each cluster gets a slot, the QP is solved, and
-realizations in which another point is still inside enter again with their carrying points kept. Each round raises the
-optimum of a strictly convex problem, so the rounds end, with the solution of the QP that has every row.
+realizations with another point still inside are solved again and keep their active points. Each round raises the optimum of
+a strictly convex problem, so the rounds end with the solution of the QP that has every row.
 """
 
 import copy
@@ -69,9 +69,9 @@ class LinearStep:
         firmness: float = 1.0,
         newton: bool = False,
     ) -> Step:
-        """Take one linear step, with the QP in which every point has its row; write its answer into `state`.
+        """Take one linear step, the solution of the QP with a row for every point; write it into `state`.
 
-        stride     the largest turn of a part [rad] of which the step is taken
+        stride     the largest rotation of a part [rad] in the step
         caution    (n,): makes steps smaller, but does not change where they end
         firmness   multiplies the regularization
         newton     whether the curvature of objective and gaps counts
@@ -131,7 +131,7 @@ class LinearStep:
     ) -> tuple[list[Deepest], np.ndarray]:
         """Solve the QPs with some points in their slots, and write the answers into `state`.
 
-        Returns the deepest points of the varying pairs, with the depth by which they exceed the slack; and step sizes (2, n).
+        Returns the deepest points of the varying pairs, with their depth beyond the slack; and step sizes (2, n).
         """
         count = len(task)
         points = [
@@ -149,9 +149,9 @@ class LinearStep:
         guessed_slack = np.where(np.isfinite(state.slack), state.slack, 0.0)  # infinite before the first answer
         answer = self._solve(**inputs, P_m=P_m, P_r=P_r, n_r=n_r, filled=filled, guess=guess, guessed_slack=guessed_slack)
         slack, residual = np.maximum(answer["slack"], 0), answer["residual"][:, 0]
-        solved = residual <= self._max_residual  # what no solver could solve moves nothing
+        solved = residual <= self._max_residual  # a problem that no solver could solve moves nothing
         deepest = self._deepest(task, answer["linearized"].reshape(state.relative.shape))
-        # With the rows in conflict the points that carry stay inside by the slack; only what exceeds it is left undone.
+        # With conflicting rows, active points stay inside by the slack; only the excess is left undone.
         deepest = [Deepest(points, depth - slack[:, [k]]) for k, (points, depth) in zip(self.varying, deepest, strict=True)]
         for _, depth in deepest:
             residual = np.maximum(residual, depth.max(axis=1))
@@ -172,12 +172,12 @@ class LinearStep:
         return deepest, np.where(solved, answer["step"].T, 0.0)
 
     def _deepest(self, task: Task, relative: np.ndarray) -> list[Deepest]:
-        """Return the deepest points of the varying pairs that may carry, at X_RM (n, pair, 12)."""
+        """Return the deepest points of the varying pairs that may be active, at X_RM (n, pair, 12)."""
         return [changing(task.scans[k]).deepest(relative[:, k], task.deviations, task.may_carry[k]) for k in self.varying]
 
 
 def _cleared(multipliers: np.ndarray, spans: Sequence[slice]) -> np.ndarray:
-    """Return multipliers (n, row of the QP), zero if they are negligible beside the largest of their pair."""
+    """Return multipliers (n, row of the QP), zero if they are negligible compared with the largest of their pair."""
     of_pairs = (multipliers[:, span] for span in spans)
     return np.concatenate([np.where(m > NEGLIGIBLE_SHARE * m.max(axis=1, keepdims=True), m, 0.0) for m in of_pairs], axis=1)
 

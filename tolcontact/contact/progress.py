@@ -1,4 +1,4 @@
-"""The progress of repeated steps: the least true penetration and the smallest step so far, and when they fell last."""
+"""The progress of repeated steps: the smallest true penetration and the smallest step so far, and when they last fell."""
 
 from dataclasses import dataclass
 
@@ -7,16 +7,16 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.contact.state import State
 
-ASTRAY_WEIGHT = 1e3  # of a locator that does not hold, beside penetration
+ASTRAY_WEIGHT = 1e3  # of a locator that does not hold, relative to penetration
 PATIENCE_IN_CONFLICT, MIN_GAIN = 10, 1e-3  # steps without less penetration, and the share of it that counts as less
 PATIENCE, MIN_CALMING = 20, 0.1  # steps that are not smaller than all before, and the share that counts as smaller
 
 
 @dataclass(eq=False)
 class Progress:
-    """What was reached, and for how many steps, not held back, nothing better was.
+    """The best state reached, and the number of full steps without improvement.
 
-    best       State (n) of least true penetration; its `slack` is the penetration of each pair
+    best       State (n) of smallest true penetration; its `slack` is the penetration of each pair
     violation  (n,) [mm] of these poses
     stale      (n,) number of steps since the violation fell
     unrest     (n,) [mm]: the smallest step

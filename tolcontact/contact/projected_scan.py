@@ -13,7 +13,7 @@ from tolcontact.discretization import ContactPoints
 
 @dataclass(frozen=True, eq=False)
 class ProjectedScan(PairScan):
-    """A scan in which every realization has feet of its own.
+    """A scan with separate projections of the points for every realization.
 
     feet, normals    (realization, point, 3): P^r and n^r, nominal
     over             (realization, point): points that do not overhang the rim of the reference face; the others cannot touch
@@ -42,7 +42,7 @@ class ProjectedScan(PairScan):
 
 
 def half_spacing(scan: PairScan) -> float:
-    """Return half the usual distance of two contact points [mm]: how far each represents its surroundings."""
+    """Return half the usual spacing of contact points [mm]: the radius of the surroundings that each represents."""
     if len(scan.P_m) < 2:
         return 0.0
     distance, _ = KDTree(scan.P_m).query(scan.P_m, k=2)
@@ -52,7 +52,8 @@ def half_spacing(scan: PairScan) -> float:
 def project(scan: PairScan, pair: ContactPoints, relative: Float[Array, "realization 12"], margin: float) -> PairScan:
     """Return the scan of a pair with every contact point projected again at X_RM (realization, 12). Supports stay as they are.
 
-    Points that overhang the rim by up to `margin` [mm] still count: else points at the rim would come and go with every step.
+    Points that overhang the rim by up to `margin` [mm] still count, so that points at the rim do not appear and
+    vanish with every step.
     """
     surface = pair.reference_face
     if surface is None:

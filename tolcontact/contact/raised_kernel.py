@@ -37,7 +37,7 @@ def gather(P_m, P_r, n_r, raised, numbers, points, out_m, out_r, out_n):  # type
 
 @compiled
 def deepest(points, clusters, relative, raised, lowest, numbers, may_carry, limit, points_there, gaps_there):  # type: ignore[no-untyped-def]
-    """Write number and gap of the deepest point of each cluster (n, cluster), if its gap is less than `limit`.
+    """Write index and gap of the deepest point of each cluster (n, cluster), if its gap is less than `limit`.
 
     Else write the cluster's first point, and `limit`.
 

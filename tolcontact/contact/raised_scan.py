@@ -1,7 +1,7 @@
 """A scan of faces with form: heights of all points are summed up once for each realization, not in every pass.
 
-The least gap of a leaf follows from the gaps of its nominal points and its largest height. Planes also touch at local minima of
-the gap between their points, which are searched from the deepest point of each leaf.
+The smallest gap of a leaf follows from the gaps of its nominal points and its largest height. Planes also touch at local minima
+of the gap between their points, which are searched from the deepest point of each leaf.
 """
 
 from dataclasses import dataclass, replace
@@ -16,15 +16,15 @@ from tolcontact.discretization import ContactPoints
 from tolcontact.discretization.plane_minima import with_former
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
 
-MIN_HEIGHTS = 4  # that vary independently: fewer are as quick in every pass
+MIN_HEIGHTS = 4  # that vary independently: fewer are as fast in every pass
 
 
 class GapMinima(NamedTuple):
-    """Local minima of the gap between contact points, of every realization its own: see PlaneMinima.
+    """Local minima of the gap between contact points, separately for each realization: see PlaneMinima.
 
     labels             (realization, place), -1 for none
     P_m, feet, n_r     (realization, place, 3): P^m, P^r, n^r of nominal faces
-    heights            (realization, place) [mm] by which both faces have grown there, with their forms
+    heights            (realization, place) [mm]: growth of both faces there, including form deviations
     """
 
     labels: Int[Array, "realization place"]
@@ -35,7 +35,7 @@ class GapMinima(NamedTuple):
 
     @classmethod
     def none(cls, count: int, room: int = 0) -> "GapMinima":
-        """Return no minima of a number of realizations, with room for some."""
+        """Return empty minima for a number of realizations, with room for some."""
         P_m, feet, n_r = np.zeros((3, count, room, 3))
         return cls(np.full((count, room), -1), P_m, feet, n_r, np.zeros((count, room)))
 
@@ -52,13 +52,13 @@ class RaisedScan(CompiledScan):
 
     nominal          P_m, P_r, n_r (point, 3) of nominal faces
     compiled_points  of these
-    raised           (realization of the block, point) [mm]: added to the gaps of nominal faces, below 0 where faces stand out
+    raised           (realization of the block, point) [mm]: added to the gaps of nominal faces, below 0 where faces are raised
     lowest           (realization of the block, leaf) [mm]: the least of these
-    numbers          (realization,): numbers of the realizations in the block
+    numbers          (realization,): indices of the realizations in the block
     minima           of the gap between the points
 
-    The lowest points of clusters take the slots that are left, too: faces with form end up on few points anywhere, and fewer
-    QPs find these if all sides of the faces have rows from the first one on.
+    The lowest points of clusters take the remaining slots, too: faces with form end up on a few points anywhere, and fewer QPs
+    find these points if all sides of the faces have rows from the first QP on.
     """
 
     fills = True

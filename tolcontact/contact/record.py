@@ -1,4 +1,4 @@
-"""Numbers that the resolution of contact leaves of each realization.
+"""Numbers that the resolution of contact records for each realization.
 
 Each is declared once, here: states, blocks and archives follow.
 """

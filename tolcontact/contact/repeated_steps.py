@@ -1,6 +1,6 @@
-"""The exact resolution: linear steps about the poses reached, with their true gaps, until these stay.
+"""The exact resolution: linear steps about the poses reached, with their true gaps, until the poses converge.
 
-The first steps are like the paper's. Realizations that still move then have freedoms that next to nothing holds, while the
+The first steps are like the paper's. Realizations that still move then have freedoms that are almost unconstrained, while the
 curvature of gaps and objective counts: they continue with Newton steps, which hold those freedoms firmly at first.
 """
 
@@ -21,18 +21,18 @@ from tolcontact.contact.starts import Start
 from tolcontact.contact.state import State, Task, Unsettled
 
 STEP_TOLERANCE = 1e-9  # mm: a smaller step is the last one
-ROUNDING = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that next to nothing holds
-NEARLY_AT_REST = 1e-3  # mm: after a smaller step, places do not stay beside sharp edges
-CLOSED = 1e-6  # mm, and of rotation matrices: steps that come back so near to where they were will do so again
+ROUNDING = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that are almost unconstrained
+NEARLY_AT_REST = 1e-3  # mm: after a smaller step, places do not stay beyond sharp edges
+CLOSED = 1e-6  # mm, and of rotation matrices: steps that return this close to an earlier pose repeat themselves
 
 
 class StepKind(NamedTuple):
     """How a step is taken.
 
-    firmness   how firmly it holds what the objective leaves open
+    firmness   weight of the regularization of freedoms that the objective leaves open
     newton     whether it counts curvature
     width      how wide edges are taken (see Candidates.scans)
-    sharp      whether edges are sharp after it, where realizations are nearly at rest
+    sharp      whether edges are sharp after it, for realizations that have nearly converged
     """
 
     firmness: float
@@ -43,12 +43,12 @@ class StepKind(NamedTuple):
 
 FIRM_STEPS = (*[StepKind(1e4, newton=True)] * 6, *[StepKind(1e2, newton=True)] * 6)
 STEPS = (*[StepKind(1.0, newton=False)] * 8, *FIRM_STEPS, *[StepKind(1.0, newton=True)] * 80)
-# Places between the points of planes with form are added step by step: a few realizations need some more steps for that.
+# Places between the points of planes with form are added step by step: a few realizations need more steps for that.
 STEPS_WITH_FORM = (*[StepKind(1.0, newton=False)] * 8, *STEPS)
-# Where faces end, places come and go. Newton's curvature is that of places that stay, so steps like the paper's come first and,
-# held back, again later, with places that stay longer: they do not jump to and fro between places. Beside its edge
-# a place holds bodies apart that would touch nearby, at a lower objective. So places only stay while steps are large, unless
-# that takes too long.
+# Where faces end, places appear and vanish. Newton's curvature belongs to places that stay, so steps like the paper's come
+# first. Damped, they come again later, with places that stay longer, and do not alternate between places. Beyond its edge, a
+# place separates bodies that would touch nearby at a lower objective. So places only stay while steps are large, unless
+# convergence takes too long.
 WIDE = 32.0
 STEPS_WHERE_FACES_END = (
     *[StepKind(1.0, newton=False, sharp=True)] * 12,
@@ -77,7 +77,7 @@ def repeat(
     state: State,
     start: Start,
 ) -> None:
-    """Take the steps of `state` to their end, as the `start` says. Without rest there is only an answer to a contradiction."""
+    """Take steps from `state` until they converge, as `start` specifies; without convergence only a conflict is an answer."""
     unsettled, trail = Unsettled(task, state), list[np.ndarray]()
     progress: Progress | None = None
     if not len(task):
@@ -97,7 +97,7 @@ def repeat(
         moves = is_short | (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
         if kind.width > 1:
             moves |= ~candidates.hold(unsettled.task, unsettled.state, start)
-        # The smaller one tells: steps are large in freedoms that nothing holds, and in the norm of the objective if
+        # The smaller size counts: steps are large in unconstrained freedoms, and in the norm of the objective if
         # Newton's curvature is stiff.
         unrest = np.minimum(size, scaled)
         residual = unsettled.state.kkt_residual
@@ -109,7 +109,7 @@ def repeat(
         residual[lost] = np.inf
         moves &= ~lost
         unsettled.settle(~moves)
-        # What rests while it is held back need not be held back longer.
+        # Realizations that converge while steps are damped need no further damping.
         asleep = (size[moves] <= STEP_TOLERANCE) & (kind.width > 1)
         unrest, trail = unrest[moves], [poses[moves] for poses in trail]
         progress = None if progress is None else progress.take(moves)
@@ -130,14 +130,14 @@ def repeat(
 
 
 def _find_places(candidates: Candidates, unsettled: Unsettled, width: float, at_rest: np.ndarray, start: Start) -> None:
-    """Find the places of contact at the poses of unsettled realizations."""
+    """Find the contact places at the poses of unsettled realizations."""
     poses, task, slots = unsettled.state.relative, unsettled.task, unsettled.state.slots
     scans = candidates.scans(poses, task.deviations, slots=slots, width=width, at_rest=at_rest, earlier=task.scans, start=start)
     unsettled.task = replace(task, scans=scans)
 
 
 def _end(unsettled: Unsettled, progress: Progress | None, unrest: Float[Array, " n"], ends: Bool[Array, " n"]) -> None:
-    """End realizations without rest (n,): parts that contradict each other where their penetration was least."""
+    """End realizations that do not converge (n,): conflicting parts at the poses of their smallest penetration."""
     state = unsettled.state
     if progress is not None:
         stuck = np.flatnonzero(ends & _is_stuck(state))
@@ -159,7 +159,7 @@ def _take(step: LinearStep, unsettled: Unsettled, rows: np.ndarray, kind: StepKi
 
 
 def _goes_round(trail: Sequence[np.ndarray], state: State) -> Bool[Array, " n"]:
-    """Return whether parts that do not contradict each other are back where they were two steps ago, not one step (n,)."""
+    """Return whether parts without conflict are back at their poses of two steps ago, and not of one step ago (n,)."""
     if len(trail) < 2:
         return np.zeros(len(state), dtype=bool)
     two, one = (np.abs(state.poses - poses).reshape(len(state), -1).max(axis=1) for poses in trail)

@@ -1,4 +1,4 @@
-"""Resolve contact: from the raw poses of a group of parts to those in which nothing penetrates, and how sure that is.
+"""Resolve contact: move a group of parts from raw poses to poses without penetration, and rate the certainty of the answer.
 
 The linearized resolution takes one linear step. The exact one repeats them (see repeated_steps), with an iterated search
 about contact points that are projected again (see iterated_search). Realizations that end in a conflict, without an answer, or
@@ -36,9 +36,9 @@ from tolcontact.contact.starts import (
 from tolcontact.contact.state import NO_ANSWER, Resolved, State, Task
 from tolcontact.interference import ordered
 
-SAME_CONFLICT = 1e-3  # share by which the penetration of two conflicts differs that are taken for the same
+SAME_CONFLICT = 1e-3  # conflicts whose penetration differs by less than this share count as the same
 UNMOVED = 1e-9  # mm: contact moves bodies by more
-MIN_GAIN = 1e-6  # of the objective, or mm of penetration: what another start must gain to be preferred
+MIN_GAIN = 1e-6  # of the objective, or mm of penetration: the gain for which another start is preferred
 
 
 class ContactResolver:
@@ -77,7 +77,7 @@ class ContactResolver:
 
     @property
     def watched(self) -> list[tuple[int, int]]:
-        """Pairs of bodies that lie in each other in no certified answer, whatever deviates: these are tested here."""
+        """Pairs of bodies that interfere in no certified answer, whatever deviates: they are tested here."""
         return [
             ordered(pair.moving, pair.reference)
             for k, pair in enumerate(self.contact_points)
@@ -90,7 +90,7 @@ class ContactResolver:
     def raw_contact(
         self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
     ) -> tuple[Float[Array, "realization pair_of_group"], Int[Array, "realization pair_of_group"]]:
-        """Return the least gap [mm] and the number of active points of each pair of the group at raw X_RM."""
+        """Return the smallest gap [mm] and the number of active points of each pair of the group at raw X_RM."""
         survey = self._candidates.survey(relative[:, self.pairs], deviations)
         return survey.min_gap, survey.active
 
@@ -102,7 +102,7 @@ class ContactResolver:
     ) -> Resolved:
         """Correct the realizations of a block that contact in this group changes.
 
-        Forces move every realization; without forces, contact moves the realizations in which a point is inside.
+        Forces move every realization; without forces, contact moves only realizations with a point inside.
 
         poses        (realization, part, 12), raw
         relative     (realization, pair, 12): X_RM of the pairs, raw
@@ -135,7 +135,7 @@ class ContactResolver:
         return Resolved(touched[~stays], state.take(np.flatnonzero(~stays)), gap_min, survey.active)
 
     def _apart(self, task: Task, min_gap: Float[Array, "n pair"]) -> Int[Array, " k"]:
-        """Return the realizations (k,) whose raw bodies are apart, though places with a least gap (n, pair) [mm] deny it."""
+        """Return the realizations (k,) whose raw bodies are apart, although the smallest gaps (n, pair) [mm] deny it."""
         if not self._candidates.are_guarded or self._method.minimizes.presses:
             return np.zeros(0, dtype=int)
         rows = np.flatnonzero((min_gap < -FREE_DEPTH).any(axis=1))
@@ -150,7 +150,7 @@ class ContactResolver:
         """Take steps from the poses of `state` to an answer, and judge it."""
         projected = start.projected or self._method.is_iterated
         if projected:
-            caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull far if nothing holds
+            caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull parts far if nothing holds them
             search(self._step, self._limits, self._candidates, self._energy_of, task, state, start.stride, caution)
         elif self._method.is_exact:
             repeat(self._step, self._limits, self._candidates, self._free_steps, task, state, start)
@@ -180,13 +180,13 @@ class ContactResolver:
             self._doubt_rolled(task, state)
 
     def _leave_adrift(self, task: Task, state: State) -> None:
-        """Put realizations in which nothing holds a part against its forces back to their raw poses."""
+        """Reset realizations to their raw poses if nothing holds a part against its forces."""
         adrift = self._limits.is_adrift(task, state)
         state.kkt_residual[adrift], state.slack[adrift], state.multipliers[adrift] = np.inf, 0, 0
         state.poses[adrift], state.relative[adrift] = task.raw[adrift], task.relative[adrift]
 
     def _doubt_rolled(self, task: Task, state: State) -> None:
-        """Mark answers as doubtful in which contact points slid into a curved face, along planes that leave it there."""
+        """Mark answers as doubtful if contact points slid along tangent planes into a curved face."""
         for k in self._candidates.curved:
             rolled = np.flatnonzero(self._limits.rolled(k, state))
             if rolled.size:
@@ -197,7 +197,7 @@ class ContactResolver:
     def _try_other_starts(self, task: Task, state: State) -> None:
         """Try again, from other starts, realizations that are not certified, or far from their raw pose; keep the better.
 
-        The same conflict from two starts is not looked for from a third one.
+        If two starts lead to the same conflict, no third start is tried.
         """
         if self._candidates.curved:
             self._try_again(task, state, np.flatnonzero(state.rank == NO_ANSWER), BALANCE)
@@ -215,7 +215,7 @@ class ContactResolver:
             self._try_again(task, state, np.flatnonzero(state.rank > 0), start)
 
     def _without_answer(self, state: State) -> Int[Array, " k"]:
-        """Return the realizations (k,) without an answer in which bodies are apart; one that is far away counts as one."""
+        """Return the realizations (k,) without an answer that separates the bodies; a distant answer counts as one."""
         rows = np.flatnonzero(state.rank == NO_ANSWER)
         is_apart = state.solved[rows] & ~self._candidates.interfere(state.relative[rows])
         return rows[~is_apart]
@@ -259,7 +259,7 @@ class ContactResolver:
 def is_better(state: State, energy: Float[Array, " n"], best: State, best_energy: Float[Array, " n"]) -> Bool[Array, " n"]:
     """Return whether answers are better than the best ones so far (n,).
 
-    A lower rank is better. Of two certified answers the one with less energy (n,) is better, of two conflicts the less deep.
+    A lower rank is better. Of two certified answers, the one with less energy (n,) is better; of two conflicts, the shallower.
     """
     depth, best_depth = state.slack.max(axis=1), best.slack.max(axis=1)
     is_lower = energy < best_energy - MIN_GAIN * np.abs(best_energy)
@@ -268,16 +268,16 @@ def is_better(state: State, energy: Float[Array, " n"], best: State, best_energy
 
 
 def is_same_conflict(state: State, best: State) -> Bool[Array, " n"]:
-    """Return whether answers, and the best ones so far, are conflicts that go equally deep (n,)."""
+    """Return whether answers, and the best ones so far, are conflicts of equal depth (n,)."""
     depth, best_depth = state.slack.max(axis=1), best.slack.max(axis=1)
     goes_as_deep = np.abs(depth - best_depth) <= SAME_CONFLICT * np.maximum(depth, best_depth)
     return (state.rank == 1) & (best.rank == 1) & goes_as_deep
 
 
 def checked_residual(state: State, depth: Float[Array, " n"]) -> Float[Array, " n"]:
-    """Return the residual (n,) [mm] together with what the solver does not report.
+    """Return the residual (n,) [mm], including the errors that the solver does not report.
 
-    depth   (n,) [mm]: by how much points lie deeper inside than the slack at the poses reached
+    depth   (n,) [mm]: penetration beyond the slack at the poses reached
     """
     residual = np.maximum(state.kkt_residual, depth)
     # Penetration does not excuse locators that do not hold.

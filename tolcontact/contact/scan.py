@@ -1,4 +1,4 @@
-"""Scans: gaps of the contact points of a pair, the active points, and the points that deserve a row of the QP.
+"""Scans: gaps of the contact points of a pair, the active points, and the candidates for rows of the QP.
 
 Sums run over points in a fixed order, one realization independent of the others, so that results do not depend on
 how realizations are grouped into blocks. (A BLAS product would be faster and would not keep that.)
@@ -71,7 +71,7 @@ class Scan:
     def min_gap(
         self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
     ) -> Float[Array, " realization"]:
-        """Return the least gap of all points (realization,) [mm]."""
+        """Return the smallest gap of all points (realization,) [mm]."""
         return self.gaps(relative, deviations).min(axis=1)
 
     def depth_between(self, relative: Float[Array, "realization 12"]) -> Float[Array, " realization"]:
@@ -82,7 +82,7 @@ class Scan:
 class SlotScan(Scan):
     """A scan whose points take turns in the slots of the QP.
 
-    fills   whether points outside take the slots that are left: worth it where most points may carry
+    fills   whether points outside take the remaining slots: worthwhile if most points may be active
     """
 
     fills: ClassVar[bool] = False
@@ -249,9 +249,9 @@ def pair_scan(
 ) -> PairScan:
     """Sort the points of a pair into at most `clusters` clusters of neighbours, and each cluster into branches and leaves.
 
-    Each support has a cluster of its own.
+    Each support has its own cluster.
 
-    points   numbers of the points (point,) that the scan has; all if it is None
+    points   indices (point,) of the points of the scan; all if it is None
     """
     points = np.arange(len(pair.P_m)) if points is None else points
     label = cluster_labels(pair.P_m[points], len(points) if pair.is_supports else clusters)
@@ -315,9 +315,9 @@ def undone(
     may_carry: Sequence[Bool[Array, "realization _"] | None],
     slack: Float[Array, "realization pair"],
 ) -> Float[Array, "realization pair"]:
-    """Return by how much points that may carry are deeper inside than the slack (realization, pair) [mm].
+    """Return the penetration beyond the slack of points that may be active (realization, pair) [mm].
 
-    min_gap     (realization, pair) [mm]: the least gaps of all points
+    min_gap     (realization, pair) [mm]: the smallest gaps of all points
     may_carry   for each pair (realization, point), or None if all points may
     """
     depths = [
@@ -330,5 +330,5 @@ def undone(
 def min_gaps(
     scans: Sequence[Scan], relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
 ) -> Float[Array, "realization pair"]:
-    """Return the least gap (realization, pair) [mm] of each pair at X_RM (realization, pair, 12)."""
+    """Return the smallest gap (realization, pair) [mm] of each pair at X_RM (realization, pair, 12)."""
     return np.stack([scan.min_gap(relative[:, k], deviations) for k, scan in enumerate(scans)], axis=1)

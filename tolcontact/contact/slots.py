@@ -13,7 +13,7 @@ NEGLIGIBLE_SHARE = 1e-9  # of the largest multiplier of a pair: smaller ones are
 
 @dataclass(frozen=True, eq=False)
 class Slots:
-    """points (n, slot): numbers of contact points; filled (n, slot): which slots are in use; reactions (n, slot)."""
+    """points (n, slot): indices of contact points; filled (n, slot): which slots are in use; reactions (n, slot)."""
 
     points: Int[Array, "n slot"]
     filled: Bool[Array, "n slot"]
@@ -26,7 +26,7 @@ class Slots:
 
     @property
     def labels(self) -> Int[Array, "n slot"]:
-        """The numbers of the points, -1 in slots that are empty."""
+        """The indices of the points, -1 in empty slots."""
         return np.where(self.filled, self.points, -1)
 
     def only(self, present: Bool[Array, "n slot"]) -> "Slots":
@@ -47,7 +47,7 @@ class Slots:
         return np.where(matches, self.reactions[:, None, :], 0.0).max(axis=2)
 
     def carrying(self, multipliers: Float[Array, "n slot"]) -> "Slots":
-        """Return only the slots whose rows carry, at most MAX_CARRYING, those of the largest multipliers (n, slot) first."""
+        """Return only the slots of active rows, at most MAX_CARRYING, the largest multipliers (n, slot) first."""
         kept = _like(self)
         slots_kernel.keep(self.points, self.filled, multipliers, NEGLIGIBLE_SHARE, MAX_CARRYING, kept)
         return Slots(*kept)
@@ -58,7 +58,7 @@ class Slots:
         """Return slots whose free places hold the deepest of the candidate `points` (n, cluster) that are inside.
 
         Returns also whether any candidate that is inside is new, (n,). If it `fills`, candidates outside follow those inside;
-        a depth of -inf stands for no candidate.
+        a depth of -inf means no candidate.
         """
         extended, grows = _like(self), np.empty(len(points), dtype=bool)
         slots_kernel.extend(self.points, self.filled, self.reactions, points, depth, tolerance, fills, (*extended, grows))

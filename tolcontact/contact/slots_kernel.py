@@ -19,8 +19,8 @@ def extend(points, filled, reactions, candidates, depth, tolerance, fills, exten
     """Write slots that hold the points in use and then the deepest candidates; and which rows have new ones that are inside.
 
     points, filled, reactions   (n, slot): the slots before
-    candidates   (n, c): numbers of points
-    depth        (n, c) [mm]: candidates deeper than the tolerance are inside; -inf stands for no candidate
+    candidates   (n, c): indices of points
+    depth        (n, c) [mm]: candidates deeper than the tolerance are inside; -inf means no candidate
     fills        whether candidates outside follow those inside
     extended     points, filled, reactions (n, slot) after; grows (n,)
     """
@@ -36,7 +36,7 @@ def extend(points, filled, reactions, candidates, depth, tolerance, fills, exten
             point, is_inside = candidates[k, c], depth[k, c] > tolerance
             if not (is_inside or (fills and depth[k, c] > -np.inf)) or _has(new_points, k, used, point):
                 continue
-            # What had a row just now is inside by the solver's residual; another round would not change that.
+            # A point that already has a row is inside by the solver's residual; another round would not change that.
             grows[k] = grows[k] or (is_inside and not (fills and _has(points, k, room, point)))
             if count < room:
                 count += 1
@@ -57,10 +57,10 @@ def extend(points, filled, reactions, candidates, depth, tolerance, fills, exten
 
 @uncounted
 def keep(points, filled, multipliers, share, most, kept):  # type: ignore[no-untyped-def]
-    """Write slots that hold only points that carry, the largest multipliers first, at most so many.
+    """Write slots that hold only active points, the largest multipliers first, at most `most` points.
 
     points, filled, multipliers   (n, slot): the slots before
-    share        of the largest multiplier of a row that carries: points with less do not
+    share        of the largest multiplier: points with less are not active
     kept         points, filled, reactions (n, slot) after
     """
     kept_points, kept_filled, reactions = kept

@@ -1,4 +1,4 @@
-"""The law of contact that gives way: it pushes with its stiffness times its compression, and does not pull."""
+"""The law of compliant contact: it pushes with its stiffness times its compression, and does not pull."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What a group has to resolve, how far its steps have come, and what became of it: plain arrays.
+"""The task of a group, the state of its steps, and the outcome: plain arrays.
 
 Their first dimension is n: the realizations that contact touches, or some of them. `take` copies rows of these, `put` writes
 them back. Code that works on realizations takes a task and a state, and uses no other index.
@@ -23,14 +23,14 @@ ANSWER = ("poses", "relative", "multipliers", "slack", "astray")
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What stays the same while realizations are resolved.
+    """The constants of realizations while they are resolved.
 
     raw            (n, part of the group, 12)
     relative       (n, pair of the group, 12): X_RM in the raw state
     deviations     (n, contributor), in mm or the units of the contributor
     moments        (n, side, moment) of the points that count in the objective
     may_carry      for each pair of the group (n, point), or None if every point may
-    scans          for each pair of the group the points that may carry
+    scans          for each pair of the group the points that may be active
     """
 
     raw: Float[Array, "n part 12"]
@@ -57,16 +57,16 @@ class Task:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class State(Record):
-    """How far the steps of a task have come, with the numbers of its record. Steps write into the arrays.
+    """The progress of the steps of a task, with the numbers of its record. Steps write into the arrays.
 
     poses       (n, part of the group, 12)
     relative    (n, pair of the group, 12): X_RM
     slack       (n, pair of the group) [mm]: penetration that no increment could remove
-    astray      (n,) [mm]: how far two-sided locators are from where they should hold
+    astray      (n,) [mm]: distance of two-sided locators from the positions where they should hold
     multipliers (n, row of the QP): reactions
-    gap_min     (n, pair of the group) [mm]: least true gap at `poses`, once they are an answer
-    doubtful    (n,): whether the answer is farther from the raw pose than the method accepts
-    slots       of the pairs with changing points: the points that carried last
+    gap_min     (n, pair of the group) [mm]: smallest true gap at `poses`, once they are an answer
+    doubtful    (n,): whether the answer is further from the raw pose than the method accepts
+    slots       of the pairs with changing points: the points that were active last
     """
 
     poses: Float[Array, "n part 12"]
@@ -98,14 +98,14 @@ class State(Record):
 
     @property
     def loaded(self) -> Bool[Array, "n row"]:
-        """(n, row of the QP): whether its point carries."""
+        """(n, row of the QP): whether its point is under load."""
         return self.multipliers > LOADED_SHARE * self.multipliers.max(axis=1, initial=0)[:, None]
 
     @classmethod
     def start(
         cls, poses: Float[Array, "n part 12"], relative: Float[Array, "n pair 12"], rows: int, slots: Sequence[int]
     ) -> "State":
-        """Return the state before the first step, of a QP with `rows` rows; `slots` are those of pairs with changing points."""
+        """Return the state before the first step of a QP with `rows` rows; pairs with changing points have `slots` slots."""
         count, pairs = relative.shape[:2]
         return cls(
             **initial_numbers(count),
@@ -142,7 +142,7 @@ _ARRAYS = tuple(entry.name for entry in fields(State) if entry.name != "slots")
 
 
 class Unsettled:
-    """Realizations that still move, with a task and a state of their own; settled ones are put back where they came from."""
+    """Realizations that still move, with their own task and state; settled ones are written back to the original state."""
 
     def __init__(self, task: Task, state: State) -> None:
         self._whole, self._rows = state, np.arange(len(task))
@@ -163,14 +163,14 @@ class Unsettled:
 
 @dataclass(frozen=True, eq=False)
 class Resolved:
-    """What became of the realizations `touched` of a block, as far as one group is concerned.
+    """The outcome of one group for the realizations `touched` of a block.
 
-    touched   (n,): their numbers in the block
+    touched   (n,): their indices in the block
     state     their State in the end
 
     and of all realizations of the block:
 
-    gap_min   (realization, state, pair of the group) [mm]: least true gap
+    gap_min   (realization, state, pair of the group) [mm]: smallest true gap
     active    (realization, pair of the group): number of active contact points in the raw state
     """
 
@@ -191,6 +191,6 @@ class Resolved:
         )
 
     def carrying(self, spans: Sequence[slice]) -> Int[Array, "n pair"]:
-        """Return the number of carrying points of each pair, (n, pair)."""
+        """Return the number of points under load of each pair, (n, pair)."""
         loaded = self.state.loaded
         return np.stack([loaded[:, span].sum(axis=1) for span in spans], axis=1)

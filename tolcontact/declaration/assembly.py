@@ -130,7 +130,7 @@ class Assembly(Declarations, Pictured, Checked):
         return self._add("populations", _population(source, columns, script_line()))
 
     def may_overlap(self, *parts: Part) -> Overlap:
-        """Declare that parts may lie in each other, any two of them, and are meant to (see Overlap)."""
+        """Declare that parts, any two of them, are meant to overlap (see Overlap)."""
         for part in parts:
             expect("may_overlap: an argument", part, Part, "parts, as in may_overlap(shaft, hub)")
         return self._add("overlaps", Overlap(parts, script_line()))
@@ -163,7 +163,7 @@ class Assembly(Declarations, Pictured, Checked):
     def support_chain(self, part: Part) -> tuple[Part, ...]:
         """Return the first part of a part's body, the first one of the body that it is located on, and so on to the ground.
 
-        A circle of locations ends with the part that closes it: it stands in the chain twice.
+        A circle of locations ends with the part that closes it, which is in the chain twice.
         """
         chain: list[Part] = []
         support: Part | None = part

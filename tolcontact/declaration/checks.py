@@ -83,7 +83,7 @@ class Declaration(Checked):
         return designation(self.noun, self)
 
     def located_faults(self, faults: Iterator[str] | None = None, owner: str = "") -> Iterator[str]:
-        """Yield its faults, or some `faults` of it, after its kind, name and line; `owner` stands before these."""
+        """Yield its faults, or some `faults` of it, after its kind, name and line; `owner` precedes these."""
         line = f" ({self.declared_at})" if self.declared_at else ""
         return (f'{owner}{self.noun} "{self.name}"{line}: {fault}' for fault in (self.faults() if faults is None else faults))
 

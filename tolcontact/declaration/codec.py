@@ -160,7 +160,7 @@ CODECS: dict[Any, Codec] = {}  # of declared classes and unions, for the fields 
 
 
 def floats(value: Any, writing: Any) -> Any:
-    """Return a number as a float; also in tuples and mappings. Scripts may have integers, or numbers of NumPy."""
+    """Return a number as a float; also in tuples and mappings. Scripts may have integers, or NumPy numbers."""
     if isinstance(value, Mapping):
         return {key: float(item) for key, item in value.items()}
     if isinstance(value, tuple):

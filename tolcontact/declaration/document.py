@@ -22,7 +22,7 @@ from tolcontact.errors import ArchiveError
 from tolcontact.poses import ENTRIES
 
 MAX_FREEDOMS = 7  # of a feature, with its size
-# Lists that a document leaves out if there is none of what they go with.
+# Lists that a document leaves out if it has no items for them.
 GOES_WITH = {"stations": "stations", "joints": "stations", "overlaps": "overlaps"}
 CODECS_OF_LISTS = METHOD, TITLE_BLOCK, *RECORDS.values()
 DOCUMENT = msgspec.defstruct("Document", [

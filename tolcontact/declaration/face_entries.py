@@ -103,7 +103,7 @@ def _brep_faces(value: Any, place: Place) -> Any:
 
 
 def _is_axis(criterion: Any) -> bool:
-    """Return True for a criterion that is one of six directions, without an angle of its own."""
+    """Return True for a criterion that is one of six directions, without its own angle."""
     is_text = isinstance(criterion, Facing) and isinstance(criterion.direction, str)
     return is_text and criterion == Facing(criterion.direction)
 

@@ -26,7 +26,7 @@ def _lengths(per: Any) -> tuple[Any, ...]:
     return tuple(per) if isinstance(per, list | tuple) else (per,)
 
 
-# What the values of options must be; a direction `along` has a sentence of its own.
+# What the values of options must be; a direction `along` has its own sentence.
 OPTION_CHECKS = {
     "zone": one_of(ZONES),
     "material": one_of(MATERIALS),
@@ -159,7 +159,7 @@ class GeometricTolerance(Checked):
 
     @property
     def uneven_shift(self) -> float:
-        """The distance [mm], out of the material, from the nominal surface to the middle of an unequally disposed zone."""
+        """The distance [mm], out of the material, from the nominal surface to the centre of an unequally disposed zone."""
         return 0.0 if self.outside is None else self.outside - self.width / 2
 
     def faults(self) -> Iterator[str]:

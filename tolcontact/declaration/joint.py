@@ -1,4 +1,4 @@
-"""Bodies that belong together: parts that a station joined to one rigid body, and parts that may lie in each other."""
+"""Bodies that belong together: parts that a station joined to one rigid body, and parts that may overlap."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ MIN_MEMBERS = 2
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Joint(Declaration):
-    """Parts that keep, after the station that joins them, the poses relative to each other that they had there.
+    """Parts that keep, after the station that joins them, their relative poses in that station.
 
     `members` are the joined parts. The pose of the joint is the pose of the first one. A joint that is joined
     again is stated by its parts.
@@ -50,7 +50,7 @@ def parts_of(bodies: Sequence[Part | Joint]) -> tuple[Part, ...]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Overlap(Declaration):
-    """Parts that may lie in each other, any two of them: press fits, welds, parts that are modelled overlapping.
+    """Parts that may overlap, any two of them: press fits, welds, parts that are modelled overlapping.
 
     Neither checks nor runs watch these bodies. A contact pair between two of them still holds for its chosen faces.
     """

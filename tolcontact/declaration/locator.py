@@ -89,9 +89,9 @@ class ThreeTwoOne(Checked):
     """A 3-2-1 scheme on three faces; its six points follow from their geometry.
 
     A1 and A2 lie on the primary face near the secondary one, `inset` [mm] from its ends, and A3 opposite, half way between
-    them. B1 and B2 lie on the secondary face at the same two stations, half way up. C1 is the middle of the tertiary face.
+    them. B1 and B2 lie on the secondary face at the same two stations, half way up. C1 is the centre of the tertiary face.
     These are places of the bounding rectangle. Where the face has no material, a point moves to where the support is widest: A1
-    to A3 span the largest triangle, B1 and B2 lie farthest apart, C1 is nearest to the middle, all `inset` from every edge.
+    to A3 span the largest triangle, B1 and B2 lie farthest apart, C1 is nearest to the centre, all `inset` from every edge.
     """
 
     primary: Face

@@ -1,4 +1,4 @@
-"""Measurements of faces, and of other measurements: what a measure may be the value of, besides points and expressions.
+"""Measurements of faces, and of other measurements: values of measures, in addition to points and expressions.
 
 Each kind is a class, which `MEASUREMENTS` lists by the kind's name. Measurements can be nested: `tc.Minimum(tc.Gap(...), "m")`.
 """
@@ -102,8 +102,8 @@ class _OfStation(Measurement):
 class Gap(_OfStation):
     """The distance of a station, a point of one part, from a face of another, perpendicular to this face.
 
-    The face counts beyond its ends: as its plane, cylinder, cone, sphere or torus, or as its tangent plane at the place nearest
-    to the nominal station if its surface is of no such kind. The gap is negative if the station is inside the material.
+    The face is extended beyond its ends: as its plane, cylinder, cone, sphere or torus, or as its tangent plane at the point
+    nearest to the nominal station if its surface is of no such kind. The gap is negative if the station is inside the material.
     """
 
     kind = "gap"
@@ -112,7 +112,7 @@ class Gap(_OfStation):
 class Flush(_OfStation):
     """The height of a station, a point of one part, over a neighbouring outer face of another, perpendicular to this face.
 
-    The face counts beyond its ends, as for a Gap.
+    The face is extended beyond its ends, as for a Gap.
     """
 
     kind = "flush"
@@ -148,15 +148,15 @@ class _OfTwoFaces(Measurement):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Clearance(_OfTwoFaces):
-    """The least distance of two faces of different parts, negative where they overlap.
+    """The shortest distance of two faces of different parts, negative where they overlap.
 
-    Of planes it is the least height, perpendicular to the second face, in their overlap region at the present pose; in their
-    nominal overlap region if they do not overlap there, or if their rims have more than 2500 pairs of edges. Of a ball or a
-    shaft and walls it is the least gap of contact (see tolcontact.discretization), of two outer cylinders the
-    distance of their axes, each as long as its face, less both radii. Of all other faces, and of whole parts
-    (`part.face()`), it is the least distance of their triangles, negative by the depth of a corner or an edge inside the other
-    one. It looks at the corners and edges that are nearest nominally, and where parts move beyond these it is too small, never
-    too large, with a warning (see tolcontact.plausibility).
+    For planes it is the smallest height, perpendicular to the second face, in their overlap region at the current pose; in
+    their nominal overlap region if they do not overlap there, or if their rims have more than 2500 pairs of edges. For a ball
+    or a shaft and walls it is the smallest contact gap (see tolcontact.discretization); for two outer cylinders, the distance
+    of their axes, each as long as its face, less both radii. For all other faces, and for whole parts (`part.face()`), it is
+    the shortest distance of their triangles, negative by the depth of a corner or an edge inside the other one. It evaluates
+    the corners and edges that are nominally nearest; where parts move beyond these it is too small, never too large, with a
+    warning (see tolcontact.plausibility).
     """
 
     kind = "clearance"
@@ -167,20 +167,21 @@ class LargestGap(_OfTwoFaces):
 
     The gap is measured at places of the first face, perpendicular to the second one, with the form of both, and is negative
     inside the material. The places cover the region of the first face over which the second one lies in the nominal assembly,
-    its rim and its corners included. They are a seventh of the least correlation length of form apart; without form there are
-    some 200. The second face counts beyond its ends, as for a Gap, and its form is taken opposite the nominal place.
+    its rim and its corners included. Their spacing is a seventh of the shortest correlation length of form; without form there
+    are about 200 places. The second face is extended beyond its ends, as for a Gap, and its form deviation is taken opposite
+    the nominal place.
     """
 
     kind = "largest gap"
 
 
 class MeanGap(_OfTwoFaces):
-    """The mean by area of the gap left between two faces of different parts, at the places of a LargestGap.
+    """The area-weighted mean of the gap left between two faces of different parts, at the places of a LargestGap.
 
-    Each place counts by the area of the first face that is nearest to it, so that flat faces have the mean of the region where
-    they lie over each other. On curved faces the area is summed over triangles, each over the second face or not: where the
-    second face ends over the first one, the mean is off by up to some 0.4 % of the range of gaps. The mean times the area of
-    the region is the volume between both faces.
+    The weight of each place is the area of the first face that is nearest to it, so that flat faces have the mean of the region
+    where they lie over each other. On curved faces the area is summed over triangles, each over the second face or not: where
+    the second face ends over the first one, the mean is off by up to about 0.4 % of the range of gaps. The mean times the area
+    of the region is the volume between both faces.
     """
 
     kind = "mean gap"
@@ -192,9 +193,9 @@ class AxisDistance(_OfTwoFaces):
 
     By default it is the shortest distance of the two axes, each as long as its face.
 
-    across   a direction: the distance of the points where both axes, however long, pierce the plane across it through the
-             middle of the first axis
-    along    a direction: the component of the perpendicular from the middle of the first axis to the second axis, however long
+    across   a direction: the distance of the points where both axes, extended if needed, pierce the plane across it through the
+             midpoint of the first axis
+    along    a direction: the component of the perpendicular from the midpoint of the first axis to the infinite second axis
 
     Directions are fixed in the assembly frame.
     """

@@ -1,4 +1,4 @@
-"""Parts, their points and faces, and what is toleranced of them: features, patterns and datums."""
+"""Parts, their points and faces, and their toleranced geometry: features, patterns and datums."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field

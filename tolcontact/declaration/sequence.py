@@ -1,6 +1,6 @@
 """Stations of an assembly that is built in steps: the parts and bodies in each, and the faults of their sequence.
 
-A station is a model of its own: its parts, with the locations, contact pairs, forces and measures that it declares, and the
+A station is a separate model: its parts, with the locations, contact pairs, forces and measures that it declares, and the
 joints that it locates.
 """
 
@@ -24,7 +24,7 @@ class Station(Declarations, Declaration):
     """A step of building or measuring an assembly: `assembly.station(name)` declares it, in the order of the steps.
 
     Parts and joints are located again in each station; a station that only measures is an inspection. Features belong to parts:
-    their deviations are equal in all stations. A locator is a contributor of its own in each station, "weld.panel.A1".
+    their deviations are equal in all stations. A locator is a separate contributor in each station, "weld.panel.A1".
     """
 
     name: str
@@ -66,7 +66,7 @@ class Station(Declarations, Declaration):
 def joined_before(line: Line, station: Station) -> dict[Part, Joint]:
     """Return the joint of each part that is joined when a station begins: the latest one."""
     names = [earlier.name for earlier in line.stations[: line.stations.index(station)]]
-    # Of two joints of one station, which is a fault, the first one counts.
+    # Two joints of one station are a fault; the first one counts.
     joints = [joint for name in names for joint in reversed(line.joints) if joint.station == name]
     return {part: joint for joint in joints for part in joint.members}
 

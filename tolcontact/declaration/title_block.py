@@ -1,4 +1,4 @@
-"""The title block of a report: what identifies a document in a customer's files."""
+"""The title block of a report: entries that identify a document in a customer's files."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields

@@ -80,7 +80,7 @@ _DISTANCES_OF_SUBRANGES = {
     "zb": "40 50 67 90 108 136 160 200 242 300 360 445 525 620 700 780 880 960 1050 1200 1300 1500 1650 1850 2100",
     "zc": "60 80 97 130 150 188 218 274 325 405 480 585 690 800 900 1000 1150 1250 1350 1550 1700 1900 2100 2400 2600",
 }
-# Of j and J, which lie on both sides of the nominal size: the lower limit of shafts below it, the upper one of holes above it.
+# For j and J, on both sides of the nominal size: the lower limit of shafts below it, the upper limit of holes above it.
 _LOWER_LIMITS_OF_J = {
     "5": "2 2 2 3 4 5 7 9 11 13 16 18 20",
     "6": "2 2 2 3 4 5 7 9 11 13 16 18 20",

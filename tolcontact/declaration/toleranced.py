@@ -1,4 +1,4 @@
-"""What features and patterns have in common: tolerances, and whether these go together."""
+"""The common base of features and patterns: tolerances, and whether these are compatible."""
 
 import re
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ class Toleranced(Declaration):
     """A feature or a pattern, with its tolerances.
 
     noun              its name in messages
-    has_common_zone   True if the zones of a position without datums keep to each other
+    has_common_zone   True if the zones of a position without datums keep their relative positions
     """
 
     noun: ClassVar[str] = "feature"

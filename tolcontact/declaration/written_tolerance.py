@@ -1,7 +1,7 @@
 """Tolerances as drawings write them: limit deviations such as "±0.1" and "+0.1/-0.05", and lengths such as "0.2 mm".
 
-Plus and minus may be written "±", "+-" and "+/-", a minus as in Unicode; between two deviations stands a slash, a semicolon, a
-space, or nothing. A comma between digits is a decimal comma. Deviations are pairs (lower, upper) everywhere else.
+Plus and minus may be written "±", "+-" and "+/-", a minus as in Unicode. Two deviations are separated by a slash, a semicolon,
+a space, or nothing. A comma between digits is a decimal comma. Deviations are pairs (lower, upper) everywhere else.
 """
 
 import math
@@ -44,7 +44,7 @@ class Deviations(NamedTuple):
 
     @property
     def middle(self) -> float:
-        """The middle of the zone."""
+        """The midpoint of the zone."""
         return round((self.upper + self.lower) / 2, _DIGITS)
 
     def __str__(self) -> str:
@@ -54,8 +54,8 @@ class Deviations(NamedTuple):
 def written(value: Any, *, units: str = "mm", nominal: float | None = None) -> Any:
     """Return Deviations for texts of limit deviations and for pairs, a number for the text of one; other values as they are.
 
-    A tolerance class such as "H7" needs a `nominal` size [mm]. Degrees become radians if the `units` are "rad". Numbers of
-    NumPy become numbers of Python. Raises TextFault for other texts and pairs.
+    A tolerance class such as "H7" needs a `nominal` size [mm]. Degrees become radians if the `units` are "rad". NumPy numbers
+    become Python numbers. Raises TextFault for other texts and pairs.
     """
     if isinstance(value, list | tuple):
         return _pair(value)

@@ -79,7 +79,7 @@ class AnalyticSurface(ABC):
         return np.asarray((points - self.origin) @ self.axis)
 
     def extent(self, points: np.ndarray) -> tuple[float, float]:
-        """Return the least and the largest coordinate [mm] of points (point, 3) along the axis, from the origin."""
+        """Return the smallest and the largest coordinate [mm] of points (point, 3) along the axis, from the origin."""
         along = self.along(points)
         return float(along.min()), float(along.max())
 

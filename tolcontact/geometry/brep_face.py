@@ -66,7 +66,7 @@ def faces_on_surfaces(mesh: trimesh.Trimesh) -> Sequence[FaceOnSurface]:
 
 
 def faces_at(mesh: trimesh.Trimesh, point: Vector) -> tuple[list[int], float]:
-    """Return the numbers of the faces nearest to a point, several where they meet, and their distance [mm]."""
+    """Return the face numbers nearest to a point, several where faces meet, and the distance of these faces [mm]."""
     face_of, _ = number_faces(mesh)
     copies = np.tile(point, (len(face_of), 1))
     distances = np.linalg.norm(trimesh.triangles.closest_point(mesh.triangles, copies) - copies, axis=1)
@@ -88,7 +88,7 @@ def _grouped(mesh: trimesh.Trimesh, faces: Sequence[FaceInFile], surfaces: Seque
 
 
 def _wholes(mesh: trimesh.Trimesh, touching: np.ndarray, faces: Sequence[FaceOnSurface]) -> Iterator[tuple[int, ...]]:
-    """Yield for each B-rep face the numbers of the faces that form one surface with it; none if it is alone.
+    """Yield for each B-rep face the face numbers of its whole surface; none if it is the only face of its surface.
 
     Such faces touch, as listed in `touching` (pair, 2), or belong to an interrupted cylinder or cone.
     """

@@ -169,7 +169,7 @@ def patterns(cylinders: Mapping[Group, HollowCylinder]) -> list[Group]:
 
 
 def _whole(face: FaceInFile) -> Group:
-    """Return the numbers of the faces that form the surface of a face."""
+    """Return the face numbers of the whole surface of a face."""
     return face.whole or (face.number,)
 
 

@@ -25,7 +25,7 @@ class FaceInFile(Readable):
     area        [mm2]; of its triangles, if the file contains only triangles
     residual    [mm] largest distance of its vertices from a fitted surface; 0 if the file states the surface
     name        its name in the file, not necessarily unique; empty if it has none
-    whole       numbers of the faces that form its surface, including its own; empty if it is the only one
+    whole       face numbers of its whole surface, including its own; empty if it is the only face
     slot        face numbers of its slot; empty if there is none
     pattern     face numbers of its pattern of equal holes; empty if there is none
     copies      number of other faces in the same position, which have no numbers of their own

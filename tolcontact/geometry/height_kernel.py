@@ -22,13 +22,13 @@ class HeightTable(NamedTuple):
 
 
 class Plane(NamedTuple):
-    """A flat face in coordinates of its own.
+    """A flat face in its own coordinates.
 
     origin   (3,) [mm]
     axes     (2, 3) unit vectors in the plane, and
     normal   (3,) out of the material
     edges    (edge, 7) [mm] of its rim: start (2,), unit direction (2,), length, and unit vector into the face (2,)
-    corners  (2, 2) [mm]: least and largest coordinates
+    corners  (2, 2) [mm]: smallest and largest coordinates
     table    of its form deviation
     """
 

@@ -60,7 +60,7 @@ def _share(edges, u, v, du, dv, slack, skipped):  # type: ignore[no-untyped-def]
 
 @inner
 def _slide(edges, u, v, du, dv, derivatives, reach, slack):  # type: ignore[no-untyped-def]
-    """Return the longest step du, dv towards the least gap along an edge that blocks a step at u, v."""
+    """Return the longest step du, dv towards the smallest gap along an edge that blocks a step at u, v."""
     g_u, g_v, g_uu, g_uv, g_vv = derivatives
     longest, best_u, best_v = 0.0, 0.0, 0.0
     for e in range(edges.shape[0]):
@@ -132,7 +132,7 @@ def _is_over(edges, first, end, u, v, slack):  # type: ignore[no-untyped-def]
 
 @compiled
 def choose_starts(points, gaps, limits, distance, starts):  # type: ignore[no-untyped-def]
-    """Write the indices (n, start) of the points with the least gaps, at least a distance [mm] apart; -1 for none.
+    """Write the indices (n, start) of the points with the smallest gaps, at least a distance [mm] apart; -1 for none.
 
     points   (n, point, 3) [mm], or (1, point, 3) if they are the same in all rows
     gaps     (n, point) [mm]

@@ -1,4 +1,4 @@
-"""The nearest corners, triangles and edges of two meshes, which determine their least distance. Lengths in mm.
+"""The nearest corners, triangles and edges of two meshes, which determine their shortest distance. Lengths in mm.
 
 The nearest points of two disjoint polyhedra lie at a corner and a facet, or at two convex edges or their ends.
 """
@@ -13,7 +13,7 @@ from tolcontact.geometry.body_overlap import SolidBody
 from tolcontact.geometry.tolerances import ROUNDING, SAME_DIRECTION
 from tolcontact.geometry.triangle_mesh import blocks, edges
 
-SPARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the smaller mesh's size: distance of the horizon beyond the least distance
+SPARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the smaller mesh's size: distance of the horizon beyond the shortest distance
 MIN_SPARE = 1e-3  # of this size: smallest permitted spare if there are too many elements
 MAX_ELEMENTS = (500, 500, 200)  # pairs of a corner and a triangle (both ways), and pairs of edges
 MAX_COMPARISONS = 30_000_000  # of triangles with triangles
@@ -91,9 +91,9 @@ class Edged:
 
 
 def nearest_elements(mesh: trimesh.Trimesh, other_mesh: trimesh.Trimesh, distance: float) -> NearestElements:
-    """Return the elements of two meshes that determine their least distance, including after small motions.
+    """Return the elements of two meshes that determine their shortest distance, including after small motions.
 
-    distance   [mm] an upper bound of the least distance
+    distance   [mm] an upper bound of the shortest distance
 
     Raises GeometryFault if there are too many of them.
     """

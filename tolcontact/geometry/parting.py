@@ -1,4 +1,4 @@
-"""The separating axis of two convex bodies: the axis of the largest gap, or of the least penetration.
+"""The separating axis of two convex bodies: the axis of the largest gap, or of the smallest penetration.
 
 Convex bodies that do not penetrate each other are on different sides of a plane. The candidate axes are the normals of all
 planes of both bodies and the common normals of their edges. The largest gap along these axes is negative if and only if the

@@ -1,4 +1,4 @@
-"""Compiled search for the separating axis of two convex bodies: the largest gap, or the least penetration."""
+"""Compiled search for the separating axis of two convex bodies: the largest gap, or the smallest penetration."""
 
 import math
 from typing import NamedTuple

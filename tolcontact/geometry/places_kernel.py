@@ -40,7 +40,7 @@ class Candidates(NamedTuple):
 
     The candidates of a corner or edge and one facing plane, or no plane, are a run; runs begin at `runs` (run + 1,). From
     `middles` (run,) on they are sorted by the first value of their boxes, which are no wider than `widths` (run,) [mm].
-    `boxes` (candidate, 4) [mm] are the least and largest coordinates of the facets or the edge that a corner or an edge may
+    `boxes` (candidate, 4) [mm] are the smallest and largest coordinates of the facets or the edge that a corner or an edge may
     touch in a facing plane, along the vectors in `frames` (facing planes, body, 2, 3). `segments` (segment, 5) are the outlines
     of facing planes in these coordinates (see is_within). The outlines of a plane of the moving and of the reference body begin
     at `outlines` (2 planes + 1,). Their sorted segments begin at `outline_middles`, and are no taller than `tallest` (2
@@ -153,7 +153,7 @@ def _is_near(candidates, s, projection, projections, touching, gaps, distance): 
 
 @inlined_uncounted
 def _range(A, candidates, s, moved, slack):  # type: ignore[no-untyped-def]
-    """Return the least and largest coordinates of the corner or edge of candidate s in the plane that faces it."""
+    """Return the smallest and largest coordinates of the corner or edge of candidate s in the plane that faces it."""
     corners, lines, back = moved
     kind, index_A, index_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
     body = 0 if kind == FACET_ON_CORNER else 1
@@ -225,7 +225,7 @@ def _find_at(A, B, candidates, reach, margins, nearness, overhang, retained, X, 
 
 @uncounted
 def _choose(touching, gaps, projections, retained, directions, is_chosen, labels):  # type: ignore[no-untyped-def]
-    """Write the labels (p,) of relevant points: retained ones, those with the least gaps, and the outermost; -1 for none."""
+    """Write the labels (p,) of relevant points: retained ones, those with the smallest gaps, and the outermost; -1 for none."""
     number = 0
     for s in touching:
         is_chosen[s] = gaps[s] == np.inf
@@ -308,7 +308,7 @@ def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, direc
 def find(A, B, candidates, reach, margin, error, poses, retained, directions, labels, gaps, points, projections, normals):  # type: ignore
     """Write the relevant points at which bodies can touch, at poses X_RM (n, 12).
 
-    First come the candidates in `retained` (n, k), then the candidates with the least gaps, then the outermost in each of the
+    First come the candidates in `retained` (n, k), then those with the smallest gaps, then the outermost in each of the
     `directions` (direction, 3). All are written if there is room for them.
 
     A, B          Body, the moving and the reference one

@@ -69,7 +69,7 @@ def leave_low(X_RM, P_m, rim, gaps, limits, reference, moving):  # type: ignore[
 
 @compiled
 def lowest_over(X_RM, P_m, rim, gaps, groups, reference, moving, indices):  # type: ignore[no-untyped-def]
-    """Write the index of the point with the least gap over the other face, by group, to indices (n, group); -1 for none.
+    """Write the index of the point with the smallest gap over the other face, by group, to indices (n, group); -1 for none.
 
     P_m         (point, 3) of the moving face, which must be over the reference region at X_RM (n, 12)
     rim         (n, rim point, 3) of the plane of the moving face, which must be over the moving region

@@ -1,4 +1,4 @@
-"""Tolerances by which geometry counts as equal. Tolerances of lengths are shares of the size of a face or part."""
+"""Tolerances for the equality of geometry. Tolerances of lengths are shares of the size of a face or part."""
 
 ROUNDING = 1e-9  # of a size: positions that only rounding distinguishes
 SAME_PLACE = 1e-6  # of a size: distance of a point that lies on a rim, in a plane or on an axis

@@ -1,4 +1,4 @@
-"""Interference: whether closed bodies lie in each other, by a complete test.
+"""Interference of closed bodies, by a complete test.
 
 .. include:: ../guide/interference.md
 """

@@ -7,7 +7,7 @@ import numpy as np
 from tolcontact.arrays import Array, Float, Int
 
 LEAF = 4  # triangles in a leaf
-LEVELS = 1 << 10  # cells along each side of the mesh, by which triangles are sorted
+LEVELS = 1 << 10  # cells along each side of the mesh, for sorting triangles
 
 
 class BoxTree(NamedTuple):
@@ -29,7 +29,7 @@ def box_tree(corners: Float[Array, "t 3 3"]) -> BoxTree:
     leaves = 1 << max(int(np.ceil(np.log2(max(len(corners), 1) / LEAF))), 0)
     order = np.argsort(_morton(corners.mean(axis=1)), kind="stable")
     places = np.full(leaves * LEAF, -1)
-    # Triangles are spread over all leaves, so that none is much fuller than another.
+    # Triangles are spread over all leaves, so that all are about equally full.
     leaf = np.arange(len(corners)) * leaves // max(len(corners), 1)
     places[leaf * LEAF + np.arange(len(corners)) - np.searchsorted(leaf, leaf)] = order
     triangles = places.reshape(leaves, LEAF)
@@ -37,7 +37,7 @@ def box_tree(corners: Float[Array, "t 3 3"]) -> BoxTree:
 
 
 def boxes_of_nodes(triangles: Int[Array, "l 4"], lower: Float[Array, "t 3"], upper: Float[Array, "t 3"]) -> Float[Array, "n 6"]:
-    """Return the boxes of the nodes of a tree with `triangles` in its leaves, whose own boxes are `lower` to `upper`."""
+    """Return the boxes of the nodes of a tree with `triangles` in its leaves, whose boxes are `lower` to `upper`."""
     places = triangles.ravel()
     boxes = np.concatenate([np.full((places.size, 3), np.inf), np.full((places.size, 3), -np.inf)], axis=1)
     boxes[places >= 0] = np.concatenate([lower, upper], axis=1)[places[places >= 0]]

@@ -20,12 +20,12 @@ from tolcontact.interference.kernel import (
 
 SAMPLES = 4  # of a piece of an edge inside the other body
 MAX_PASSES = 64  # of one edge
-RAY = (1.0, 0.01307, 0.00713)  # a direction that few edges have, and in which few boxes are passed
+RAY = (1.0, 0.01307, 0.00713)  # a direction that few edges have, and along which few boxes are passed
 
 
 @inlined_uncounted
 def _nearest_on_triangle(p, a, b, c):  # type: ignore[no-untyped-def]  # noqa: PLR0911
-    """Return the place on a triangle that is nearest to p (Ericson, Real-Time Collision Detection, 5.1.5)."""
+    """Return the point on a triangle that is nearest to p (Ericson, Real-Time Collision Detection, 5.1.5)."""
     ab, ac, ap, bp, cp = minus(b, a), minus(c, a), minus(p, a), minus(p, b), minus(p, c)
     d1, d2, d3, d4, d5, d6 = dot(ab, ap), dot(ac, ap), dot(ab, bp), dot(ac, bp), dot(ab, cp), dot(ac, cp)
     va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
@@ -64,7 +64,7 @@ def _seems_within(side, p, shares, senses):  # type: ignore[no-untyped-def]
 
 @uncounted
 def _near_leaf(side, p):  # type: ignore[no-untyped-def]
-    """Return a bound from above of the squared distance of p from the surface: that from a leaf with a near box."""
+    """Return an upper bound of the squared distance of p from the surface: its distance from a leaf with a near box."""
     node, inner, square = 0, side.next.size // 2, np.inf
     while node < inner:
         left, right = 2 * node + 1, 2 * node + 2
@@ -108,7 +108,7 @@ def _nearest(side, p, enough):  # type: ignore[no-untyped-def]
 
 @uncounted
 def _sound(target, k, X, is_forward, p, q, edge, depths, triangles, places):  # type: ignore[no-untyped-def]
-    """Raise the depth of realization k to that of a piece of an edge from p to q, which lies in the other body."""
+    """Raise the depth of realization k to the depth of the edge segment from p to q, which lies in the other body."""
     for j in range(SAMPLES + 1):
         place = along(p, j / SAMPLES, minus(q, p))
         depth, triangle, foot = _nearest(target, place, depths[k])
@@ -122,7 +122,7 @@ def _sound(target, k, X, is_forward, p, q, edge, depths, triangles, places):  # 
 
 @uncounted
 def _sound_edges(owner, target, k, X, is_forward, motion, is_in, shares, senses, depths, triangles, places):  # type: ignore
-    """Raise the depth of realization k to that of the edges of a body in the other one; `is_in` (v,) is false before."""
+    """Raise the depth of realization k to the depth of one body's edges in the other; `is_in` (v,) is false before."""
     for is_first in (True, False):
         changes = True
         while changes:
@@ -154,9 +154,9 @@ def _sound_edges(owner, target, k, X, is_forward, motion, is_in, shares, senses,
 
 @uncounted
 def _sound_centres(owner, target, k, X, is_forward, shares, senses, depths, triangles, places):  # type: ignore[no-untyped-def]
-    """Raise the depth of realization k to that of centres of triangles of a body that lie in the other one, deeper than edges.
+    """Raise the depth of realization k to the depth of triangle centres of one body that lie deeper in the other than edges.
 
-    Where faces are flush, edges lie on the surface, and only what is between them is inside.
+    Where faces are flush, edges lie on the surface, and only the area between them is inside.
     """
     for t in range(owner.faces.shape[0]):
         a, b, c = corners_of(owner, t)
@@ -175,14 +175,14 @@ def _sound_centres(owner, target, k, X, is_forward, shares, senses, depths, tria
 
 @compiled
 def sound(A, B, poses, depths, triangles, places):  # type: ignore[no-untyped-def]
-    """Write how deep bodies lie in each other at poses X_BA (n, 12) of realizations that interfere.
+    """Write the penetration of bodies at poses X_BA (n, 12) of realizations that interfere.
 
-    The depth is that of the deepest of some places, on edges and in the middle of triangles of one body, below the surface of
-    the other.
+    The penetration is the largest depth below the surface of one body among sample points of the other, on its edges and at the
+    centres of its triangles.
 
     depths      (n,) [mm]
-    triangles   (n, 2): of A and of B, the triangle nearest to that place, or on which it lies; -1 minus an edge
-    places      (n, 2, 3) [mm], in the frame of B: of A and of B, the place on the edge and the nearest one on the surface
+    triangles   (n, 2): of A and of B, the triangle that contains that point or is nearest to it; -1 minus an edge
+    places      (n, 2, 3) [mm], in the frame of B: of A and of B, the sample point and the nearest point on the surface
     """
     shares, senses = np.empty(MAX_PASSES), np.empty(MAX_PASSES, dtype=np.int64)
     for k in range(poses.shape[0]):

@@ -1,4 +1,4 @@
-"""A body whose faces deviate: its vertices stay on all planes that meet in them, wherever these planes go."""
+"""A body whose faces deviate: its vertices stay on all planes that meet in them, wherever these planes move."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,13 +16,13 @@ IN_PLANE = 1e-9  # of the largest motion of a vertex: a motion along the normal 
 
 @dataclass(frozen=True, eq=False)
 class DeviatingSolid:
-    """A solid and what moves its faces.
+    """A solid and the deviations that move its faces.
 
     solid      without deviations
     columns    (k,) of the deviations that move its faces
     outward    (t, 3, k) [mm]: how far the plane of each triangle moves outwards at each of its corners for unit deviations
-    bulges     (t,) [mm]: how far triangles of hollow round faces stand in the hollow
-    cylinders  those on which its triangles are known to lie, in its frame
+    bulges     (t,) [mm]: how far triangles of hollow round faces protrude into the hollow
+    cylinders  that are known to contain some of its triangles, in its frame
     """
 
     solid: Solid

@@ -60,7 +60,7 @@ def _sum_of_sizes(lengths, deviations, k):  # type: ignore[no-untyped-def]
 
 @inlined_uncounted
 def _level(region, i, k, deviations, fall):  # type: ignore[no-untyped-def]
-    """Return the level of constraint i in realization k, in which no bound falls by more than `fall`."""
+    """Return the level of constraint i in realization k, where no bound falls by more than `fall`."""
     level = np.inf
     for j in range(region.starts[i], region.starts[i + 1]):
         bound = region.bounds[j]
@@ -133,7 +133,7 @@ def _holds(region, k, X, inner, levels, count):  # type: ignore[no-untyped-def]
 
 @compiled
 def certify(region, poses, outer, inner, are_apart):  # type: ignore[no-untyped-def]
-    """Write true for realizations (n,) in which the inner body lies in the region at poses X_BA (n, 12).
+    """Write true for realizations (n,) whose inner body lies in the region at poses X_BA (n, 12).
 
     outer, inner   (n, k), (n, j): deviations of both bodies
     are_apart      (n,): realizations that are true already are left out

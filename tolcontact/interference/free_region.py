@@ -1,20 +1,20 @@
-"""Convex regions that the surface of one body does not reach and in which another body lies: a certificate that both are apart.
+"""Convex regions that contain one body and no part of another body's surface: a certificate that both are apart.
 
 A region C is the common part of half-spaces and at most one hollow: points whose distance from a segment, taken across an axis,
-is below a radius. Each triangle of the outer body is assigned to one of them, a constraint, and the level of the constraint is
-the least value that it has at the corners of its triangles. So no triangle reaches into C, however the outer body deviates:
+is below a radius. Each triangle of the outer body is assigned to one of these constraints, and the level of a constraint is
+its smallest value at the corners of its triangles. So no triangle reaches into C, however the outer body deviates:
 
-- n . x of a half-space is linear, so that the least value in a triangle is that at a corner;
+- n . x of a half-space is linear, so its smallest value in a triangle occurs at a corner;
 - the distance from the segment is at least e . x - max e . s over its ends s, for any unit vector e across the axis. Each
-  triangle has an e, in which it is nominally farthest from the segment.
+  triangle has the e along which it is nominally furthest from the segment.
 
 Both are linear in the deviations, as the corners are. If all vertices of the inner body lie in C, which is convex, all of its
 triangles do. Then both surfaces have no point in common. No component of the outer body lies in the inner one, since its
-surface would lie in C. Nor does one of the inner body lie in the outer one: C holds no point of that one's surface, so that it
-is inside or outside as a whole. It is outside nominally, and remains so while deviations grow from 0 to what they are: levels
-are least values of linear functions, so C never becomes empty on the way, as it is not empty at its ends.
+surface would lie in C. Nor does one of the inner body lie in the outer one: C contains no point of the outer surface, so it is
+inside or outside as a whole. It is outside nominally, and remains so while deviations grow from 0 to their values: levels
+are minima of linear functions, so C never becomes empty on the way, as it is not empty at its ends.
 
-Hence bodies of which this is true do not interfere, and the complete test need not run.
+Hence such bodies do not interfere, and the complete test need not run.
 """
 
 import math
@@ -30,10 +30,10 @@ from tolcontact.interference.deviating_solid import DeviatingSolid
 from tolcontact.interference.free_kernel import Region
 from tolcontact.interference.kernel import ROUNDED
 
-MAX_HALF_SPACES = 64  # that are considered: those of the largest facets
+MAX_HALF_SPACES = 64  # that are considered, from the largest facets
 MAX_CORES = 16
 MAX_CONSTRAINTS = 4
-SAME_DIRECTION = 1e-6  # rad, and the share of a radius by which the ends of a slot may differ
+SAME_DIRECTION = 1e-6  # rad; for the radii at the ends of a slot, their relative difference
 CORNERS = np.array(np.meshgrid(*[(0, 1)] * 3)).reshape(3, -1).T
 
 
@@ -60,8 +60,8 @@ class Constraint(NamedTuple):
     """A half-space, or the hollow around a core.
 
     directions  (t, 3): for each triangle of the outer body the unit vector along which its corners are compared
-    offsets     (t,) [mm]: what is subtracted from these
-    values      (v,) [mm]: what the constraint compares, at the vertices of the inner body
+    offsets     (t,) [mm]: subtracted from these
+    values      (v,) [mm]: values that the constraint compares, at the vertices of the inner body
     core        of a hollow (see Region), None for a half-space
     """
 
@@ -82,7 +82,7 @@ class Constraint(NamedTuple):
 
 
 def free_region(outer: InsetBody, inner: InsetBody, *, is_forward: bool) -> Region | None:
-    """Return a region that the outer body does not reach and in which the inner one nominally lies; None if there is none."""
+    """Return a region that nominally contains the inner body and that the outer one does not reach; None if there is none."""
     size = float(max(np.abs(outer.vertices).max(), np.abs(inner.vertices).max()))
     corners, least = outer.corners, 2 * ROUNDED * size
     candidates = [*_half_spaces(outer, inner), *_hollows(outer, inner)]
@@ -107,7 +107,7 @@ def free_region(outer: InsetBody, inner: InsetBody, *, is_forward: bool) -> Regi
 def _region(
     outer: InsetBody, inner: InsetBody, constraints: Sequence[Constraint], owner: np.ndarray, size: float, is_forward: bool
 ) -> Region:
-    """Return the region of some constraints; `owner` (t,) has the one to which each triangle of the outer body is assigned."""
+    """Return the region of some constraints; `owner` (t,) assigns one of them to each triangle of the outer body."""
     order = sorted(range(len(constraints)), key=lambda k: constraints[k].core is not None)
     half_spaces = [constraints[k].directions[0] for k in order if constraints[k].core is None]
     groups = [_bounds(outer, constraints[k], owner == k) for k in order]
@@ -141,7 +141,7 @@ def _region(
 
 
 def _bounds(outer: InsetBody, constraint: Constraint, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return bounds (g,) [mm] and slopes (g, k) of the level of a constraint, to which some triangles are assigned.
+    """Return bounds (g,) [mm] and slopes (g, k) of the level of a constraint from its assigned triangles.
 
     Corners whose slopes agree but for rounding, most corners of a face that varies in size, share a bound.
     """
@@ -184,8 +184,8 @@ def _hollows(outer: InsetBody, inner: InsetBody) -> Iterator[Constraint]:
 def _cores(cylinders: Sequence[Cylinder], bulge: float) -> Iterator[tuple[np.ndarray, float]]:
     """Yield cores (see Region) and radii: of single cylinders, and of two with parallel axes and equal radii.
 
-    Where a flat wall of a slot goes over into a round one, triangles stand in the hollow by up to `bulge` [mm]. A core that
-    ends a little before has its full radius, since places there are no nearer to it.
+    Where a flat wall of a slot meets a round one, triangles protrude into the hollow by up to `bulge` [mm]. A core that
+    ends a little before has its full radius, since points there are no nearer to it.
     """
     for k, cylinder in enumerate(cylinders):
         u = cylinder.axis / np.linalg.norm(cylinder.axis)
@@ -201,7 +201,7 @@ def _cores(cylinders: Sequence[Cylinder], bulge: float) -> Iterator[tuple[np.nda
 
 
 def _arms(points: np.ndarray, core: np.ndarray) -> np.ndarray:
-    """Return the vectors (..., 3) [mm] across the axis from the nearest place on a core to points (..., 3)."""
+    """Return the vectors (..., 3) [mm] across the axis from the nearest point on a core to points (..., 3)."""
     u, start, span = core
     arms = points - start
     arms = arms - (arms @ u)[..., None] * u
@@ -216,7 +216,7 @@ def _distances(points: np.ndarray, core: np.ndarray) -> np.ndarray:
 def _hollow(corners: np.ndarray, vertices: np.ndarray, core: np.ndarray) -> Constraint:
     """Return the hollow around a core, for triangles with `corners` (t, 3, 3) and vertices of the inner body (v, 3).
 
-    A segment and a triangle are nearest to each other at an end of the one or a corner of the other.
+    A segment and a triangle are nearest to each other at an end of the segment or a corner of the triangle.
     """
     u, start, span = core
     flat = corners - (corners @ u)[..., None] * u

@@ -1,4 +1,4 @@
-"""Compiled test whether closed bodies interfere: edges of one that pass triangles of the other, and how deep they do."""
+"""Compiled test whether closed bodies interfere: edges of one that pass triangles of the other, and how deep they reach."""
 
 import math
 from typing import NamedTuple
@@ -9,8 +9,8 @@ from tolcontact.compiled import compiled, inlined_uncounted, uncounted
 from tolcontact.geometry.vector_kernel import along, cross, dot, minus, move, move_back, row, row_of, turn_back
 
 LEAF = 4
-MANY = 8  # triangles of a facet: of more, only those are looked at that lie where an edge passes their plane
-ROUNDED = 1e-9  # of coordinates: how far a place may be off
+MANY = 8  # triangles of a facet: with more, only triangles near the point where an edge passes their plane are tested
+ROUNDED = 1e-9  # of coordinates: the largest error of a point
 
 
 class Side(NamedTuple):
@@ -19,24 +19,24 @@ class Side(NamedTuple):
     vertices    (v, 3) [mm], without deviations
     moved       (v,): index of each vertex among those that deviations move, -1 for others
     motions     (m, j, 3) [mm]: how far a unit of each deviation moves these
-    deviations  (n, j) that do
+    deviations  (n, j) that move them
     shifts      (m, 3) [mm]: how far they move in one realization; see `deviate`
     faces       (t, 3)
     planes      (t, 4): outward normal n and level n . x of each triangle; NaN for triangles that deviations move
     edges       (e, 2), those nominally nearest to the other body first
     sides       (e, 2): the facets at each edge
     outward     (e, 3): sums of the outward normals of the facets that meet at each edge
-    distances   (e,) [mm]: bounds from below of their nominal distances from it
+    distances   (e,) [mm]: lower bounds of their nominal distances from it
     facets      (f, 10): of each facet, triangles in one plane, its box (6), normal n and level n . x; NaN if it is not flat
     facet_of    (t,): the facet of each triangle
     members, first_members   the triangles of each facet, as in a CSR matrix
     vertices_of_facets   (f, 3): three vertices of facets that deviations move, -1 for others
     starts, listed, reaches   the facets near each edge, as in a CSR matrix, the nearest first, with their nominal distances
-    reach       [mm] up to which facets are near
+    reach       [mm]: the largest distance of near facets
     triangles, boxes, next   its BoxTree
     bounds      (8, 3) [mm]: corners of a box that holds the body
     witnesses   (c,): a vertex of each connected component, nominally far from the surface of the other body
-    clearances  (c,) [mm]: bounds from below of that distance
+    clearances  (c,) [mm]: lower bounds of that distance
     is_in       (c,): whether that vertex lies nominally in the other body
     """
 
@@ -102,7 +102,7 @@ def corners_of(side, triangle):  # type: ignore[no-untyped-def]
 def crossing(side, triangle, p, q):  # type: ignore[no-untyped-def]
     """Return the share of the segment from p to q at which it passes a triangle, and its sense: -1 inwards, 1 outwards, 0 none.
 
-    Places on the edges of the triangle count, so that none gets through between two triangles.
+    Points on the edges of the triangle count, so that no segment slips between two triangles.
     """
     planes, is_known = side.planes, side.planes[triangle, 3] == side.planes[triangle, 3]
     if is_known:
@@ -126,7 +126,7 @@ def crossing(side, triangle, p, q):  # type: ignore[no-untyped-def]
 
 @inlined_uncounted
 def passes(side, p, q, shares, senses):  # type: ignore[no-untyped-def]
-    """Write at which shares, in order, and in which senses the segment from p to q passes the surface; return how often."""
+    """Write shares, in order, and senses of the passes of the segment from p to q through the surface; return their number."""
     low, high = (min(p[0], q[0]), min(p[1], q[1]), min(p[2], q[2])), (max(p[0], q[0]), max(p[1], q[1]), max(p[2], q[2]))
     return passes_in(side, low, high, p, q, shares, senses)
 
@@ -175,7 +175,7 @@ def near_count(distances, motion):  # type: ignore[no-untyped-def]
 
 @uncounted
 def _holds(owner, target, X, is_forward, motion):  # type: ignore[no-untyped-def]
-    """Return whether a component of a body lies in the other one, if its surface passes that one's nowhere."""
+    """Return whether a component of a body lies in the other one, given that their surfaces do not cross."""
     for c in range(owner.witnesses.size):
         if owner.clearances[c] > motion:
             if owner.is_in[c]:
@@ -225,7 +225,7 @@ def motion_of(X, bounds):  # type: ignore[no-untyped-def]
 
 @inlined_uncounted
 def _misses(boxes, p, q):  # type: ignore[no-untyped-def]
-    """Return whether the box around p and q misses that of a whole body."""
+    """Return whether the box around p and q misses the box of a whole body."""
     return (
         boxes[0, 0] > max(p[0], q[0]) or boxes[0, 3] < min(p[0], q[0]) or boxes[0, 1] > max(p[1], q[1])
         or boxes[0, 4] < min(p[1], q[1]) or boxes[0, 2] > max(p[2], q[2]) or boxes[0, 5] < min(p[2], q[2])
@@ -236,7 +236,7 @@ def _misses(boxes, p, q):  # type: ignore[no-untyped-def]
 def _heights(side, f, p, q):  # type: ignore[no-untyped-def]
     """Return heights of p and q over the plane of a facet: both 1 if their segment misses its box.
 
-    Of facets that are not flat nothing is known: then they are 1 and -1.
+    For facets that are not flat they are 1 and -1, since nothing is known of them.
     """
     facets = side.facets
     if (
@@ -261,7 +261,7 @@ def _passes_facet(side, f, p, q, start, end, shares, senses):  # type: ignore[no
     n = (side.facets[f, 6], side.facets[f, 7], side.facets[f, 8])
     size = 1.0 + max(abs(p[0]), abs(p[1]), abs(p[2]), abs(q[0]), abs(q[1]), abs(q[2]))
     margin, share = ROUNDED * size, start / (start - end)
-    spare = margin * math.sqrt(dot(n, n)) / abs(start - end)  # the flatter, the less it is known where
+    spare = margin * math.sqrt(dot(n, n)) / abs(start - end)  # the flatter the angle, the less certain the point
     x, y = along(p, max(share - spare, 0.0), minus(q, p)), along(p, min(share + spare, 1.0), minus(q, p))
     low = (min(x[0], y[0]) - margin, min(x[1], y[1]) - margin, min(x[2], y[2]) - margin)
     high = (max(x[0], y[0]) + margin, max(x[1], y[1]) + margin, max(x[2], y[2]) + margin)

@@ -38,7 +38,7 @@ def distances(lower, upper, boxes, successors, result):  # type: ignore[no-untyp
 
 @compiled
 def near_facets(lower, upper, tree, around, facet_of, reach, is_written, starts, listed, reaches):  # type: ignore[no-untyped-def]
-    """Count, or write, the facets that are no farther than `reach` [mm] from each box from `lower` to `upper` (n, 3).
+    """Count, or write, the facets within `reach` [mm] of each box from `lower` to `upper` (n, 3).
 
     tree        triangles, boxes, next of a BoxTree
     around      (t, 6) [mm]: boxes of the triangles

@@ -1,4 +1,4 @@
-"""Two bodies near each other: whether, and how deep, they lie in each other at any poses."""
+"""Two bodies near each other: whether they interfere at given poses, and how deep."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,11 +17,11 @@ MIN_TRIANGLES = 100  # of two bodies: with fewer, a complete test takes no longe
 
 
 class Interference(NamedTuple):
-    """How bodies A and B lie in each other, in n realizations.
+    """The interference of bodies A and B, in n realizations.
 
-    depths      (n,) [mm]: how deep the deepest of some places on edges of one lies below the surface of the other
-    triangles   (n, 2): of A and of B, the triangle of its solid nearest to that place, or -1 minus the edge on which it lies
-    places      (n, 2, 3) [mm], in the frame of B: of A and of B, the place on the edge and the nearest one on the surface
+    depths      (n,) [mm]: depth of the deepest sample point of one body below the surface of the other
+    triangles   (n, 2): of A and of B, the triangle of its solid that contains the point or is nearest to it; -1 minus an edge
+    places      (n, 2, 3) [mm], in the frame of B: of A and of B, the sample point and the nearest point on the surface
     """
 
     depths: Float[Array, " n"]
@@ -30,12 +30,12 @@ class Interference(NamedTuple):
 
 
 class WayOut(NamedTuple):
-    """How bodies A and B part with the least motion, in n realizations.
+    """The least motion that separates bodies A and B, in n realizations.
 
     places      (n, 3) [mm] of A: its lowest point in B, in the frame of A
     feet        (n, 3) [mm] of B: its highest point in A, in the frame of B
-    normals     (n, 3): the direction in which A moves against B, in the frame of B
-    widths      (n,) [mm] by which it does; 0 if no edge shows one
+    normals     (n, 3): the direction of the motion of A relative to B, in the frame of B
+    widths      (n,) [mm]: the length of the motion; 0 if no edge shows one
     """
 
     places: Float[Array, "n 3"]
@@ -49,15 +49,15 @@ FLAT = 1e-12  # of coordinates: how far corners of a facet may be from its plane
 
 @dataclass(frozen=True, eq=False)
 class Neighbours:
-    """Two bodies, which count as a little smaller than they are.
+    """Two bodies, which count as slightly smaller than they are.
 
-    insets   [mm] by which the surfaces of A and of B lie inside the bodies: touching bodies are apart by their sum, and faces
-             that are flush are not, since the insets differ
-    reach    [mm]: how far A usually moves against B, with deviations; beyond, tests take longer
-    round_faces    (t,) of the triangles of A and of B: the number of the round face for which each stands, -1 for none. Two
+    insets   [mm]: depths of the surfaces of A and of B inside the bodies. Touching bodies are apart by the sum of the insets;
+             flush faces do not stay flush, since the insets differ
+    reach    [mm]: usual motion of A relative to B, with deviations; beyond it, tests take longer
+    round_faces    (t,) of the triangles of A and of B: the number of the round face that each represents, -1 for none. Two
                    faces of one number touch by their exact gaps (see `tolcontact.discretization.round_contact`), and their
                    triangles are not compared
-    min_triangles  of both bodies, from which on a certificate may spare the complete test
+    min_triangles  of both bodies; with fewer, no certificate is tried before the complete test
     """
 
     A: DeviatingSolid
@@ -85,7 +85,7 @@ class Neighbours:
 
     @cached_property
     def _regions(self) -> list[free_kernel.Region]:
-        """Regions in which one body nominally lies, and which the other one does not reach; none if tests are quick anyway."""
+        """Regions that nominally contain one body and that the other one does not reach; none if tests are quick anyway."""
         A, B = (InsetBody(body, side.vertices) for body, side in zip((self.A, self.B), self._nominal, strict=True))
         if len(self.A.solid.faces) + len(self.B.solid.faces) < self.min_triangles:
             return []
@@ -95,7 +95,7 @@ class Neighbours:
     def are_apart(
         self, X_BA: Float[Array, "n 12"], deviations: Float[Array, "n contributor"] | None = None
     ) -> Bool[Array, " n"]:
-        """Return in which realizations (n,) one body certainly lies in a region that the other one does not reach."""
+        """Return whether one body certainly lies in a region that the other one does not reach (n,)."""
         are_apart = np.zeros(len(X_BA), dtype=bool)
         for region in self._regions:
             outer, inner = (
@@ -117,9 +117,9 @@ class Neighbours:
     def interfere(
         self, X_BA: Float[Array, "n 12"], deviations: Float[Array, "n contributor"] | None = None
     ) -> Bool[Array, " n"]:
-        """Return whether (n,) the bodies lie in each other by more than both insets at X_BA, the pose of A in the frame of B.
+        """Return whether (n,) the bodies interfere by more than both insets at X_BA, the pose of A in the frame of B.
 
-        Without `deviations`, faces are as they are nominally.
+        Without `deviations`, faces are nominal.
         """
         X_BA, interferes = np.ascontiguousarray(X_BA), np.zeros(len(X_BA), dtype=bool)
         rows = np.flatnonzero(~self.are_apart(X_BA, deviations))
@@ -130,10 +130,10 @@ class Neighbours:
         return interferes
 
     def ways_out(self, X_BA: Float[Array, "n 12"], directions: Float[Array, "n 3"] | None = None) -> WayOut:
-        """Return how bodies without deviations part at poses X_BA (n, 12) at which they interfere.
+        """Return how bodies without deviations separate at poses X_BA (n, 12) at which they interfere.
 
-        directions   (n, 3), in the frame of B: where bodies lie in each other at several places, that one counts at which they
-                     part most nearly along these, or else the deepest one
+        directions   (n, 3), in the frame of B: where bodies interfere at several places, the place counts whose separation is
+                     closest to these, or else the deepest one
         """
         places, feet, normals = np.zeros((3, len(X_BA), 3))
         way = WayOut(places, feet, normals, np.zeros(len(X_BA)))
@@ -142,7 +142,7 @@ class Neighbours:
         return way
 
     def measured(self, X_BA: Float[Array, "n 12"], deviations: Float[Array, "n contributor"] | None = None) -> Interference:
-        """Return how deep bodies lie in each other at poses X_BA at which they interfere."""
+        """Return the penetration of bodies at poses X_BA where they interfere."""
         result = Interference(np.empty(len(X_BA)), np.empty((len(X_BA), 2), dtype=np.int64), np.empty((len(X_BA), 2, 3)))
         depth_kernel.sound(*self._sides(deviations), np.ascontiguousarray(X_BA), *result)
         for solid, side, triangles in zip((self.A.solid, self.B.solid), self._nominal, result.triangles.T, strict=True):
@@ -166,7 +166,7 @@ def _side(
     round_faces_of_target: np.ndarray,
     reach: float,
 ) -> kernel.Side:
-    """Return a body with inset vertices (v, 3) as compiled passes take it, with what its other body decides."""
+    """Return a body with inset vertices (v, 3) for compiled passes, with the arrays that depend on the other body."""
     solid, tree, tree_of_target = (
         body.solid,
         box_tree(vertices[body.solid.faces]),
@@ -231,7 +231,7 @@ class _NearFacets(NamedTuple):
 
 
 def _near_facets(edges: np.ndarray, tree: BoxTree, corners: np.ndarray, facets: np.ndarray, reach: float) -> _NearFacets:
-    """Return the facets no farther than `reach` [mm] from edges (e, 2, 3); triangles have `corners` (t, 3, 3)."""
+    """Return the facets within `reach` [mm] of edges (e, 2, 3); triangles have `corners` (t, 3, 3)."""
     boxes = np.ascontiguousarray(edges.min(axis=1)), np.ascontiguousarray(edges.max(axis=1))
     around = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
     lists = _NearFacets(np.zeros(len(edges) + 1, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0))
@@ -243,9 +243,9 @@ def _near_facets(edges: np.ndarray, tree: BoxTree, corners: np.ndarray, facets: 
 
 
 def _planes_of_facets(body: DeviatingSolid, corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
-    """Return the planes (f, 4) of the facets; NaN where corners (t, 3, 3) of their triangles lie beside them.
+    """Return the planes (f, 4) of the facets; NaN where corners (t, 3, 3) of their triangles lie off these planes.
 
-    Triangles in one plane are not in one any more where a vertex of a smaller body cannot lie on all planes around it.
+    Coplanar triangles do not stay coplanar where a vertex of a smaller body cannot lie on all planes around it.
     """
     of_facets = planes[body.first_of_facet]
     n = of_facets[body.facet_of, None, :3]
@@ -257,7 +257,7 @@ def _planes_of_facets(body: DeviatingSolid, corners: np.ndarray, planes: np.ndar
 
 
 def _boxes_of_facets(body: DeviatingSolid, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Return the boxes (f, 6) of the facets, from those of the triangles, `lower` to `upper` (t, 3)."""
+    """Return the boxes (f, 6) of the facets, from the boxes of the triangles, `lower` to `upper` (t, 3)."""
     count = len(body.first_of_facet)
     boxes = np.concatenate([np.full((count, 3), np.inf), np.full((count, 3), -np.inf)], axis=1)
     np.minimum.at(boxes[:, :3], body.facet_of, lower)

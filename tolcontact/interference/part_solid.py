@@ -17,8 +17,8 @@ from tolcontact.vocabulary import ROUNDED
 def part_solid(nominal: Nominal, index: int) -> DeviatingSolid | None:
     """Return the solid of a part of the nominal assembly; None if it is not closed.
 
-    Faces of features deviate, without their forms. Triangles of hollow round faces stand in the hollow, and the solid
-    does not.
+    Faces of features deviate, without their form deviations. Triangles of hollow round faces protrude into the hollow, and the
+    solid does not.
     """
     body = solid(nominal.parts[index].body)
     if body is None:
@@ -52,13 +52,13 @@ def _deviating_faces(
                     _, slope = piece.surface.distance(corners[rows])
                     normals[rows] = slope * np.sign((slope * facets[rows]).sum(axis=1, keepdims=True))
             motion = np.hstack([normals, np.cross(corners - face.centre, normals)]) @ face.twist + face.height
-            # Corners of a shaft stay on it; the facets of a bore stay behind it, in their middle, too.
+            # Corners of a shaft stay on it; the facets of a bore stay behind it, also at their centres.
             motion *= (normals * facets).sum(axis=1, keepdims=True)
             yield triangles, face.columns[columns], motion[:, columns].reshape(len(triangles), 3, -1)
 
 
 def _bulges(body: Solid, surface_of_body: Surface, round_faces: Sequence[tuple[AnalyticSurface, np.ndarray]]) -> np.ndarray:
-    """Return how far (t,) [mm] triangles stand out of the round faces for which they stand, mostly into hollow ones."""
+    """Return how far (t,) [mm] triangles protrude from the round faces that they represent, mostly into hollow ones."""
     bulges = np.zeros(len(body.faces))
     corners = np.asarray(surface_of_body.mesh.triangles)
     points = np.concatenate(
@@ -77,7 +77,7 @@ def _bulges(body: Solid, surface_of_body: Surface, round_faces: Sequence[tuple[A
 def _round_faces(
     nominal: Nominal, part: NominalPart, body: Solid, surface_of_body: Surface
 ) -> Iterator[tuple[AnalyticSurface, np.ndarray]]:
-    """Yield the round surfaces of a part in the nominal assembly, and the triangles (m,) of its solid that stand for them."""
+    """Yield the round surfaces of a part in the nominal assembly, and the triangles (m,) of its solid that represent them."""
     faces_of_file = known_surfaces(part.mesh)
     if faces_of_file is not None:
         numbers, surfaces, _ = faces_of_file
@@ -93,12 +93,12 @@ def _round_faces(
 
 
 def curved_triangles(body: Solid, face: Surface) -> np.ndarray:
-    """Return the triangles (m,) of a body on which the round surfaces of a face lie."""
+    """Return the triangles (m,) of a body that form the round surfaces of a face."""
     surface_of_body = Surface(trimesh.Trimesh(body.vertices, body.faces, process=False))
     pieces = [piece for piece in face.pieces if not isinstance(piece.surface, Plane)]
     return np.concatenate([np.zeros(0, dtype=int), *(_triangles(surface_of_body, piece.face) for piece in pieces)])
 
 
 def _triangles(surface_of_body: Surface, face: Surface) -> np.ndarray:
-    """Return the triangles (m,) of a body on which a face of it lies."""
+    """Return the triangles (m,) of a body that form one of its faces."""
     return np.unique(surface_of_body.nearest(np.asarray(face.mesh.triangles_center))[0])

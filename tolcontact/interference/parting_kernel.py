@@ -1,4 +1,4 @@
-"""Compiled directions in which bodies that interfere part with the least motion."""
+"""Compiled search for the direction of the least motion that separates bodies that interfere."""
 
 import math
 from typing import NamedTuple
@@ -13,7 +13,7 @@ MIN_SINE = 1e-3  # of the angle between edges that have a common normal
 MAX_POINTS = 512  # of the common region of two bodies
 MAX_NORMALS = 256
 MAX_CROSSING = 12  # edges of each body whose common normals are compared
-SAME_SHARE = 1e-9  # of an edge: triangles that it passes nearer to each other share the edge at which it does
+SAME_SHARE = 1e-9  # of an edge: two triangles that it passes within this distance share the edge where it passes
 NO_VERTEX = -1
 
 
@@ -22,8 +22,8 @@ class Region(NamedTuple):
 
     points     (p, 3) [mm]
     normals    (p, 3): of the facet that an edge passes, from B to A; 0 at vertices
-    facets     (p, 4): two facets of A and two of B, twice the same in the middle of one; -1 at vertices
-    vertices   (p,): that of A, or -2 minus that of B; NO_VERTEX where an edge passes a facet
+    facets     (p, 4): two facets of A and two of B, twice the same inside a facet; -1 at vertices
+    vertices   (p,): the vertex of A, or -2 minus the vertex of B; NO_VERTEX where an edge passes a facet
     edges      (p,): the edge that passes the facet, with the sign of `vertices`
     shares     (p,) of that edge
     senses     (p,): -1 inwards, 1 outwards, 0 at vertices
@@ -55,7 +55,7 @@ def _add(region, count, point, normal, number, share, sense):  # type: ignore[no
 
 @uncounted
 def _root(parents, j):  # type: ignore[no-untyped-def]
-    """Return the corner that stands for all of the same connected part."""
+    """Return the corner that represents all of the same connected part."""
     while parents[j] != j:
         parents[j] = parents[parents[j]]
         j = parents[j]
@@ -140,7 +140,7 @@ def _collect(owner, target, X, is_forward, region, count):  # type: ignore[no-un
 def _join_parts(region, count):  # type: ignore[no-untyped-def]
     """Join corners at the same vertex, or on the same facet of A and of B: an edge of the region may lie between them.
 
-    So regions that lie apart between the same two facets count as one.
+    So separate regions between the same two facets count as one.
     """
     facets = region.facets
     for i in range(count):
@@ -160,8 +160,8 @@ def _join_parts(region, count):  # type: ignore[no-untyped-def]
 def _normals_of_part(A, B, X, region, count, part, edges_A, edges_B, normals):  # type: ignore[no-untyped-def]
     """Write the normals along which a connected part of the region may be narrowest; return how many there are.
 
-    They are those of facets that edges pass, and the common ones of edges of A and of B, where both bodies are convex; some of
-    the edges that do are written.
+    They are the normals of facets that edges pass, and the common normals of edges of A and of B where both bodies are convex;
+    some of the passing edges are written.
     """
     found = 0
     count_A, count_B = 0, 0
@@ -194,7 +194,7 @@ def _normals_of_part(A, B, X, region, count, part, edges_A, edges_B, normals):  
 
 @uncounted
 def _narrowest(region, count, part, normals):  # type: ignore[no-untyped-def]
-    """Return of some normals the one along which a part of the region is narrowest, its width, and its ends along it."""
+    """Return the normal along which a part of the region is narrowest, its width, and its ends along the normal."""
     best, least, lowest, highest = 0, np.inf, 0, 0
     for m in range(normals.shape[0]):
         low, high, bottom, top = np.inf, -np.inf, 0, 0
@@ -210,13 +210,13 @@ def _narrowest(region, count, part, normals):  # type: ignore[no-untyped-def]
 
 @compiled
 def ways_out(A, B, poses, inset, directions, places, feet, normals, widths):  # type: ignore[no-untyped-def]
-    """Write how bodies that interfere at poses X_BA (n, 12) part: along n, by the width of what they share.
+    """Write how bodies that interfere at poses X_BA (n, 12) separate: along n, by the width of their common region.
 
     The corners of the region that both bodies share lie on their edges. Of the normals of facets that edges pass, and of
     crossing edges, the one counts along which this region is narrowest. Its lowest point is held above its highest one. Of
-    several connected parts of the region the widest counts, or that which parts most nearly in a given direction.
+    several connected parts of the region the widest counts, or the part whose normal is closest to a given direction.
 
-    inset         [mm] by which both surfaces together lie inside the bodies
+    inset         [mm]: sum of the depths of both surfaces inside the bodies
     directions    (n, 3): the given ones, 0 for none
     places, feet  (n, 3) [mm]: the lowest point, on A, and the highest one, on B, in the frames of these bodies
     normals       (n, 3), from B to A, in the frame of B

@@ -1,4 +1,4 @@
-"""A body as the test of interference sees it: its triangles a little inside its surface, and the edges between its planes."""
+"""A body for the interference test: its triangles slightly inside its surface, and the edges between its planes."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,8 +13,8 @@ from tolcontact.geometry.triangle_mesh import coordinate_error, edges
 from tolcontact.geometry.vertex_displacements import capped, displacements
 
 SAME_PLANE = 1e-5  # rad: facets whose normals differ by less are one plane
-MIN_SINGULAR = 0.05  # of the planes around a vertex: a direction that they determine worse is left alone
-MAX_SHIFT = 8.0  # insets: a vertex of a needle moves no farther
+MIN_SINGULAR = 0.05  # of the planes around a vertex: directions with a smaller singular value are left alone
+MAX_SHIFT = 8.0  # insets: the largest motion of a vertex, for needles
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class Solid:
     vertices    (v, 3) [mm]
     faces       (t, 3): triangles
     edges       (e, 2): edges between different planes
-    sides       (e, 2): the triangles at each edge, twice the same where the other one has no area
+    sides       (e, 2): the triangles at each edge, the same one twice where the other has no area
     flat        (n, 2): triangles that share an edge and lie in one plane
     sources     (t,): the triangle of the part's mesh that each triangle is
     """
@@ -55,7 +55,7 @@ class Solid:
     def shifts(self, outward: Float[Array, "t 3 k"]) -> Float[Array, "v 3 k"]:
         """Return how vertices move if the plane of each triangle moves out of the body by `outward` at its corners.
 
-        A vertex stays on all planes around it (see `displacements`). Each of the k columns is a case of its own.
+        A vertex stays on all planes around it (see `displacements`). Each of the k columns is a separate case.
         """
         N, heights = self.normals.repeat(3, axis=0), outward.reshape(-1, outward.shape[2])
         return displacements(self.faces.ravel(), N, heights, len(self.vertices), MIN_SINGULAR)

@@ -1,4 +1,4 @@
-"""The watch over all bodies of an assembly: which of them lie in each other, in every realization."""
+"""The watch over all bodies of an assembly: which of them interfere, in every realization."""
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -16,19 +16,19 @@ from tolcontact.interference.free_region import CORNERS
 from tolcontact.interference.neighbours import Interference, Neighbours
 from tolcontact.interference.part_solid import curved_triangles, part_solid
 
-# Of the smallest tolerance range, twice the radius of a ball in both bodies: the depth from which on these lie in each other.
+# Share of the smallest tolerance range: bodies interfere from this depth on, the diameter of a ball that lies in both of them.
 ALLOWED_SHARE = 1 / 1000
-RANGE = 1.0  # mm: in its place if nothing is toleranced
-MIN_DEPTH = 1e-7  # mm, and MIN_SHARE of the sizes of both bodies: below, poses and vertices are rounded
+RANGE = 1.0  # mm: replaces the tolerance range if nothing is toleranced
+MIN_DEPTH = 1e-7  # mm, and MIN_SHARE of the sizes of both bodies: smaller depths are rounding of poses and vertices
 MIN_SHARE = 1e-8
-MOTION_FACTOR = 2.0  # times the motion of raw poses: how far bodies usually move
-SHARES = (0.4, 0.6)  # of that depth, by which the surfaces of both bodies are moved inwards
+MOTION_FACTOR = 2.0  # times the motion of raw poses: the usual motion of bodies
+SHARES = (0.4, 0.6)  # of that depth: inward offsets of the surfaces of both bodies
 
 
 class Clash(NamedTuple):
-    """Realizations in which two bodies lie in each other.
+    """Realizations with interference between two bodies.
 
-    pair    the numbers of the bodies among the parts of the nominal assembly, the smaller one first
+    pair    the indices of the bodies among the parts of the nominal assembly, the smaller one first
     rows    (k,) realizations
     """
 
@@ -37,7 +37,7 @@ class Clash(NamedTuple):
 
 
 def ordered(first: int, second: int) -> tuple[int, int]:
-    """Return the numbers of two bodies, the smaller one first."""
+    """Return the indices of two bodies, the smaller one first."""
     return (first, second) if first < second else (second, first)
 
 
@@ -53,9 +53,9 @@ class Watch:
     """The bodies of an assembly that may come near each other.
 
     nominal   the assembly
-    allowed   [mm] by pair of bodies: a depth at which they do not count as in each other yet, if that is larger than usual;
-              infinite where they may lie in each other
-    poses, deviations   (n, part, 12), (n, contributor): some raw poses; tests are quickest where bodies move about as far
+    allowed   [mm] by pair of bodies: a depth that does not count as interference yet, if it is larger than usual; infinite if
+              any depth is allowed
+    poses, deviations   (n, part, 12), (n, contributor): some raw poses; tests are fastest if bodies move about as far
     """
 
     nominal: Nominal
@@ -66,13 +66,13 @@ class Watch:
     _solids: dict[int, DeviatingSolid | None] = field(default_factory=dict, init=False)
 
     def allowing(self, allowed: Mapping[tuple[int, int], float]) -> "Watch":
-        """Return the same bodies with other depths that are allowed."""
+        """Return the same bodies with other allowed depths."""
         watch = Watch(self.nominal, allowed, self.poses, self.deviations)
         watch._solids.update(self._solids)
         return watch
 
     def overlap(self, first: int, second: int) -> bool:
-        """Return whether two bodies lie in each other in the nominal assembly, or may, since one of them is not closed."""
+        """Return whether two bodies interfere in the nominal assembly, or may, since one of them is not closed."""
         return self.neighbours(ordered(first, second)) is None or self._overlaps(ordered(first, second))
 
     @cached_property
@@ -112,7 +112,7 @@ class Watch:
         return np.array([0.0 if body is None else body.growth(deviations) for body in solids])
 
     def neighbours(self, pair: tuple[int, int]) -> Neighbours | None:
-        """Return two bodies that are tested; None if one of them is not closed, or they may lie in each other."""
+        """Return two bodies that are tested; None if one of them is not closed, or they may interfere."""
         if pair not in self._neighbours:
             A, B, depth, neighbours = self.solid(pair[0]), self.solid(pair[1]), self.depth(pair), None
             if A is not None and B is not None and np.isfinite(depth):
@@ -122,7 +122,7 @@ class Watch:
         return self._neighbours[pair]
 
     def _round_faces(self, pair: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-        """Return the numbers (t,) of the pairs of round faces for which the triangles of both bodies stand, -1 for none."""
+        """Return the numbers (t,) of the pairs of round faces that the triangles of both bodies represent, -1 for none."""
         numbers = [np.full(len(body.solid.faces), -1) for body in map(self.solid, pair) if body is not None]
         for k, points in enumerate(self.nominal.pairs):
             if points.round is None or points.reference is None or ordered(points.moving, points.reference) != pair:
@@ -149,7 +149,7 @@ class Watch:
         return MOTION_FACTOR * float(self._usual_motions[list(pair)].sum())
 
     def depth(self, pair: tuple[int, int]) -> float:
-        """Return the depth [mm] from which on two bodies count as in each other; infinite if they may be."""
+        """Return the interference threshold of two bodies, a depth [mm]; infinite if any depth is allowed."""
         size = float(np.ptp(self._bounds[list(pair)], axis=1).max())
         return max(self._usual_depth, self.allowed.get(pair, 0.0), MIN_DEPTH, MIN_SHARE * size)
 
@@ -159,19 +159,19 @@ class Watch:
 
     @property
     def largest_depth(self) -> float:
-        """The largest depth [mm] from which on bodies count as in each other, of tested pairs."""
+        """The largest interference threshold [mm] of tested pairs."""
         depths = [self.depth(pair) for pair in self.declared]
         return max([self._usual_depth, MIN_DEPTH, *(depth for depth in depths if np.isfinite(depth))])
 
     @property
     def open_parts(self) -> tuple[str, ...]:
-        """The names of parts that are not closed, so that nothing can lie in them."""
+        """The names of parts that are not closed and so have no inside."""
         numbers = {part.name: number for number, part in enumerate(self.nominal.parts)}
         return tuple(name for name, number in numbers.items() if self.solid(number) is None)
 
     @property
     def untested_pairs(self) -> tuple[str, ...]:
-        """The names of contact pairs whose bodies may lie in each other, since they give way or have form."""
+        """The names of contact pairs whose bodies may interfere, since they are compliant or have form deviations."""
         pairs = [pair for pair in self.nominal.pairs if pair.reference is not None and (pair.is_springy or pair.has_form)]
         return tuple(dict.fromkeys(pair.name for pair in pairs))
 
@@ -183,12 +183,12 @@ class Watch:
 
     @cached_property
     def overlapping(self) -> frozenset[tuple[int, int]]:
-        """Pairs of bodies that lie in each other in the nominal assembly."""
+        """Pairs of bodies that interfere in the nominal assembly."""
         return frozenset(pair for pair in self._near(np.zeros(len(self.nominal.parts))) if self._overlaps(pair))
 
     @property
     def overlapping_parts(self) -> tuple[str, ...]:
-        """The names of parts that lie in each other in the nominal assembly, as "(part, part)"."""
+        """The names of parts that interfere in the nominal assembly, as "(part, part)"."""
         parts = self.nominal.parts
         return tuple(dict.fromkeys(f"({parts[i].name}, {parts[j].name})" for i, j in sorted(self.overlapping)))
 
@@ -216,9 +216,9 @@ class Watch:
         left_out: Collection[tuple[int, int]] = (),
         among: Collection[tuple[int, int]] | None = None,
     ) -> Iterator[Clash]:
-        """Yield the pairs of bodies that lie in each other at poses (n, part, 12), for deviations (n, contributor).
+        """Yield the pairs of bodies that interfere at poses (n, part, 12), for deviations (n, contributor).
 
-        Pairs of numbers in `left_out` are not tested, nor pairs that are not `among` others, if these are given.
+        Pairs of indices in `left_out` are not tested, nor are pairs that are not in `among`, if it is given.
         """
         is_finite = np.isfinite(poses).all(axis=(1, 2))
         reach = self._motions(poses[is_finite]).max(axis=0, initial=0) + self._growth(deviations[is_finite])
@@ -234,7 +234,7 @@ class Watch:
     def measured(
         self, clash: Clash, poses: Float[Array, "n part 12"], deviations: Float[Array, "n contributor"]
     ) -> Interference:
-        """Return how deep two bodies lie in each other, in the realizations of a clash."""
+        """Return the penetration of two bodies in the realizations of a clash."""
         neighbours = self.neighbours(clash.pair)
         assert neighbours is not None
         i, j = clash.pair

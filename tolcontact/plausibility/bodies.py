@@ -1,4 +1,4 @@
-"""Bodies that lie in each other: nominally, or in some draws where no contact is declared that holds them apart."""
+"""Bodies that interfere: nominally, or in some draws without a declared contact that keeps them apart."""
 
 import itertools
 from collections.abc import Iterator
@@ -27,9 +27,9 @@ MAX_CLASHES = 20  # pairs of parts that are named
 
 @dataclass(frozen=True, eq=False)
 class MeasuredClash:
-    """Two bodies that lie in each other in some draws.
+    """Two bodies that interfere in some draws.
 
-    pair     numbers of the bodies
+    pair     indices of the bodies
     share    of the draws
     depths   (m,) [mm], of some of these draws, the deepest one first
     places   of these draws
@@ -42,9 +42,9 @@ class MeasuredClash:
 
 
 def clashes(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence for each two parts without declared contact that lie in each other in some draws.
+    """Yield a sentence for each two parts without declared contact that interfere in some draws.
 
-    Parts that contact moves are judged where it puts them.
+    Parts that contact moves are judged at their poses with contact.
     """
     nominal, watch = draws.program.nominal, draws.program.watch
     declared = {_parts(nominal, pair) for pair in watch.declared}
@@ -74,7 +74,7 @@ def clashes(draws: TrialDraws) -> Iterator[str]:
 
 
 def clashes_beyond_faces(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence for each two parts with declared contact that it leaves in each other, beyond the chosen faces."""
+    """Yield a sentence for each two parts with declared contact that still interfere beyond the chosen faces."""
     nominal, watch = draws.program.nominal, draws.program.watch
     if not draws.program.method.is_bounded:
         return
@@ -105,14 +105,14 @@ def _parts(nominal: Nominal, pair: tuple[int, int]) -> frozenset[Part]:
 
 
 def _is_carried(nominal: Nominal, pair: tuple[int, int]) -> bool:
-    """Return whether two bodies are of one joint, so that an earlier station decides how they lie to each other."""
+    """Return whether two bodies belong to one joint, so that an earlier station determines their relative pose."""
     first, second = ((k, nominal.parts[k]) for k in pair)
     roots = [part.parent if part.carried is not None else number for number, part in (first, second)]
     return roots[0] == roots[1]
 
 
 def _rows_with_contact(draws: TrialDraws, pair: tuple[int, int]) -> Int[Array, " k"]:
-    """Return the draws (k,) with two bodies in each other after contact has moved them."""
+    """Return the draws (k,) with interference of two bodies after contact has moved them."""
     clashes = draws.program.watch.clashes(draws.resolved.poses[:, CORRECTED], draws.deviations, among=[pair])
     return next((clash.rows for clash in clashes), np.zeros(0, dtype=int))
 
@@ -120,7 +120,7 @@ def _rows_with_contact(draws: TrialDraws, pair: tuple[int, int]) -> Int[Array, "
 def _measured(
     draws: TrialDraws, pair: tuple[int, int], rows: Int[Array, " k"], poses: Float[Array, "n part 12"]
 ) -> MeasuredClash:
-    """Return where two bodies lie in each other at poses (n, part, 12) of draws, rows (k,), and how deep in some of them."""
+    """Return where two bodies interfere at poses (n, part, 12) of draws, rows (k,), and how deep in some of them."""
     watch = draws.program.watch
     triangles = sum(len(draws.program.nominal.parts[body].mesh.faces) for body in pair)
     count = min(len(rows), max(MIN_MEASURED, MAX_TRIANGLES // triangles))
@@ -143,7 +143,7 @@ def _chosen_faces(nominal: Nominal, pair: tuple[int, int]) -> list[tuple[np.ndar
 
 
 def _extent(draws: TrialDraws, measured: MeasuredClash, row: int) -> str:
-    """Return in how many draws bodies lie in each other, how deep, and where."""
+    """Return in how many draws bodies interfere, how deep, and where."""
     place = ", ".join(f"{c + 0.0:.4g}" for c in measured.places[row].position.round(6))
     return f"{_percent(measured.share)} of {len(draws.deviations)} draws, up to {measured.depths[row]:.2g} mm, near ({place})"
 

@@ -31,7 +31,7 @@ class DeclaredPoint(NamedTuple):
 
 
 def location_designation(assembly: Assembly, part: Part, station: str = "") -> str:
-    """Return how a warning names the location of a part: the part, and the line of the script that locates it in a station."""
+    """Return the name of a part's location in a warning: the part, and the line of the script that locates it in a station."""
     location = next((entry for entry in assembly.locations if entry.part is part and entry.station == station), None)
     return f'part "{part.name}" ({location.declared_at if location else part.declared_at})'
 
@@ -135,8 +135,8 @@ def far_points(draws: TrialDraws) -> Iterator[str]:
 def unfit_directions(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence for each part with locators on its surface whose directions are probably stated in the assembly frame.
 
-    All of them would then point into the part, while some lie along its surface as they are stated. One-sided locators that
-    point out of the part have a sentence each.
+    All of them would then point into the part, while some lie along its surface as they are stated. Each one-sided locator that
+    points out of the part has its own sentence.
     """
     for nominal in draws.program.nominal.parts:
         scheme = nominal.scheme

@@ -18,7 +18,7 @@ ROUNDING = 1e-6  # of the width of a zone
 def partial_surfaces(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence for each face on some B-rep faces of a curved surface that continues in faces not chosen.
 
-    Only B-rep faces that are chosen one by one are looked at: other criteria are meant to leave out the rest.
+    Only B-rep faces that are chosen individually are checked: other criteria leave out the rest on purpose.
     """
     nominal = draws.program.nominal
     meshes = nominal.meshes

@@ -61,7 +61,7 @@ def _widths(nominal: NominalPart, place: str) -> list[tuple[str, float]]:
 
 
 def _tilt(nominal: NominalPart, place: str) -> str:
-    """Return a sentence on locators that turn their part by more than MAX_TILT; empty if they do not."""
+    """Return a sentence on locators that rotate their part by more than MAX_TILT; empty if they do not."""
     locators = nominal.locators
     if not len(locators):
         return ""

@@ -15,7 +15,7 @@ MIN_RANGE_SHARE = 0.05  # of the smallest tolerance range
 
 
 def pair_overlaps(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence for each contact pair whose faces lie in each other in nearly every realization."""
+    """Yield a sentence for each contact pair whose faces penetrate each other in nearly every realization."""
     for k, pair, noise in _face_pairs(draws):
         gaps = draws.nominal_gaps(k)
         deepest = int(gaps.argmin())

@@ -17,7 +17,7 @@ SAME_DIRECTION = 1e-4  # of the cosine of an angle
 
 
 class ClashPlace(NamedTuple):
-    """Where two bodies lie in each other.
+    """A place where two bodies interfere.
 
     triangles   candidates of the mesh of each body: several at an edge and its ends
     position    (3,) [mm] in the nominal assembly
@@ -47,7 +47,7 @@ class ClashPlace(NamedTuple):
         return not any(np.isin(first, moving).any() and np.isin(second, reference).any() for moving, reference in faces)
 
     def facing(self, nominal: Nominal, pair: tuple[int, int]) -> tuple[int, int]:
-        """Return the triangle of each body there that faces the other one most."""
+        """Return the triangle of each body there that faces the other body most directly."""
         normals = [
             np.asarray(nominal.parts[body].body.face_normals)[triangles]
             for body, triangles in zip(pair, self.triangles, strict=True)
@@ -97,7 +97,7 @@ def _title(nominal: Nominal, pair: tuple[int, int]) -> str:
 
 
 def moving_first(nominal: Nominal, pair: tuple[int, int]) -> tuple[NominalPart, NominalPart]:
-    """Return two bodies, first the one that moves: that with locators, or the one that is declared later."""
+    """Return two bodies, the moving one first: the one with locators, or the one that is declared later."""
     first, second = (nominal.parts[body] for body in pair)
     return (first, second) if len(first.locators) and not len(second.locators) else (second, first)
 

@@ -22,7 +22,7 @@ class TrialDraws:
 
     deviations   (draw, contributor)
     relative     (draw, pair, 12): X_RM of every pair
-    measured     (draw, measure); a function of poses may return what is no number
+    measured     (draw, measure); a function of poses may return NaN
     poses        (draw, part, 12)
     """
 
@@ -62,7 +62,7 @@ class TrialDraws:
 
     @cached_property
     def clashes(self) -> list[Clash]:
-        """Pairs of bodies that lie in each other in some draws."""
+        """Pairs of bodies that interfere in some draws."""
         return list(self.program.watch.clashes(self.poses, self.deviations))
 
     @cached_property
@@ -86,6 +86,6 @@ class TrialDraws:
 
 
 def spread(values: Float[Array, "n ..."]) -> Float[Array, "..."]:
-    """Return the standard deviation of draws (draw, ...) from the quantiles at one sigma, which far values do not move."""
+    """Return the standard deviation of draws (draw, ...) from the quantiles at one sigma, which are insensitive to outliers."""
     low, high = np.quantile(values, (0.1587, 0.8413), axis=0)
     return np.asarray((high - low) / 2)

@@ -110,7 +110,7 @@ class Dimension(Readable):
     lower, upper   limits of the dimension, not deviations; None on a side where the file states none
     fit            tolerance class of ISO 286, such as "H7 hole"; `lower` and `upper` are stated by the file alone
     modifiers      in words: "theoretical", "auxiliary", "statistical", "controlled radius", "maximum", ...
-    face_records, other_records           of the feature of a size, or of that where a location begins
+    face_records, other_records           of the feature of a size, or of the feature where a location begins
     end_face_records, end_other_records   of the feature where a location ends
     """
 

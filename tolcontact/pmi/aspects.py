@@ -1,4 +1,4 @@
-"""Shape aspects, and the faces, edges and points for which they stand."""
+"""Shape aspects, and the faces, edges and points that they represent."""
 
 from collections import defaultdict
 from typing import NamedTuple
@@ -55,7 +55,7 @@ class Aspects:
                 self._relate(number)
 
     def items(self, *aspects: int) -> Items:
-        """Return all items for which aspects, dimensions or datums stand, each once, in their order."""
+        """Return all items that aspects, dimensions or datums represent, each once, in their order."""
         for aspect in aspects:
             if aspect not in self._known:
                 self._known[aspect] = self._search(aspect)

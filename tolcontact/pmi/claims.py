@@ -13,14 +13,14 @@ Annotation = Tolerance | Dimension | Datum
 Place = tuple[frozenset[int], ...]  # of a feature: the face indices of its surface, or of each of its two planes
 NO_FACE = "the file states no face for it"  # a reason
 MAX_NAMES = 6  # of features in a reason
-_MEDIAN_KINDS = ("position", "symmetry")  # of two opposed planes: of the middle between them
+_MEDIAN_KINDS = ("position", "symmetry")  # of two opposed planes: of their median plane
 
 
 @dataclass(frozen=True, repr=False)
 class DeclaredAnnotation(Readable):
     """A tolerance, dimension or datum of a file: the names of the `features` that state it, and the `reason` if none does.
 
-    With both, the reason says what of it is not declared.
+    If both are present, the reason says which part of it is not declared.
     """
 
     annotation: Annotation
@@ -34,11 +34,11 @@ class DeclaredAnnotation(Readable):
 
 @dataclass(eq=False)
 class Claim:
-    """An annotation, the faces that it claims, and what becomes of it.
+    """An annotation, the faces that it claims, and its outcome.
 
     stated    number of faces and targets that the file states for it
     numbers   of its faces on the part
-    targets   points of a datum that is established by points alone, with the numbers of their faces
+    targets   points of a datum that is established by points alone, with their face numbers
     places    of the features that are to state it
     names     of the features that state it
     refusals  reasons why it is not declared, with the names of the features, or none of them for all
@@ -67,7 +67,7 @@ class Claim:
 
     @property
     def result(self) -> DeclaredAnnotation:
-        """What became of it."""
+        """The outcome."""
         missing = [missing_faces(self.stated - len(self.numbers), self.stated)] if self.numbers else []
         reasons = dict.fromkeys(filter(None, [*missing, *self.reasons]))
         return DeclaredAnnotation(self.annotation, tuple(dict.fromkeys(self.names)), "; ".join(reasons))
@@ -81,7 +81,7 @@ def missing_faces(missing: int, stated: int) -> str:
 def claims_of(pmi: Pmi, surfaces: TolerancedSurfaces) -> list[Claim]:
     """Return the claims of all annotations of a file on the surfaces of a part, in the order of the file.
 
-    Those of fewest faces find their places first, so that a note for many faces cannot join what others tell apart.
+    Claims of the fewest faces find their places first, so that a note for many faces cannot join features that others separate.
     """
     claims = [_datum_claim(datum, surfaces) for datum in pmi.datums]
     toleranced: tuple[Tolerance | Dimension, ...] = (*pmi.dimensions, *pmi.tolerances)
@@ -144,7 +144,7 @@ def _places(claim: Claim, surfaces: TolerancedSurfaces, place_of: dict[int, Plac
 
 
 def _has_middle(annotation: Annotation, groups: Place, place_of: dict[int, Place]) -> bool:
-    """Return whether an annotation of two opposed planes is one of their middle, or of their distance."""
+    """Return whether an annotation of two opposed planes applies to their median plane, or to their distance."""
     if isinstance(annotation, Tolerance):
         return annotation.kind in _MEDIAN_KINDS or set(place_of.get(min(groups[0]), ())) == set(groups)
     return True

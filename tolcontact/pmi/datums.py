@@ -97,7 +97,7 @@ def _target(records: Records, aspects: Aspects, number: int, letter: str, point:
 
 
 def _target_points(records: Records) -> dict[int, Vector]:
-    """Return the points [mm] of datum targets, in the frame of their product, by the numbers of their records."""
+    """Return the points [mm] of datum targets, in the frame of their product, by record number."""
     shapes = {
         target: records.parameters(definition.reference(1), _SHAPE)
         for number in records.numbers("SHAPE_DEFINITION_REPRESENTATION")

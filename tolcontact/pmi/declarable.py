@@ -1,4 +1,4 @@
-"""What features can state of the annotations of a file: tolerances and sizes as they are declared. Lengths in mm."""
+"""The annotations of a file that features can state: tolerances and sizes as they are declared. Lengths in mm."""
 
 import math
 from typing import Any

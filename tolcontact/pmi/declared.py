@@ -18,7 +18,7 @@ from tolcontact.readable import Readable
 
 @dataclass(frozen=True, repr=False)
 class DeclaredPmi(Readable):
-    """The features, patterns and datum targets that the PMI of a file has become, and what became of each annotation."""
+    """The features, patterns and datum targets declared from the PMI of a file, and the outcome of each annotation."""
 
     features: tuple[Declared, ...]
     annotations: tuple[DeclaredAnnotation, ...]
@@ -40,7 +40,7 @@ class DeclaredPmi(Readable):
 
 @dataclass(frozen=True, repr=False)
 class DeclaredFile(Readable):
-    """The PMI of a file as features of `parts`, one for each body with toleranced faces, and what became of each annotation.
+    """The PMI of a file as features of `parts`, one for each body with toleranced faces, and the outcome of each annotation.
 
     faces    the faces of the file by their records
     faults   sentences on bodies whose shapes cannot be used
@@ -83,7 +83,7 @@ def features_from_pmi(part: Part) -> DeclaredPmi:
 def declared_file(path: Path, pmi: Pmi) -> DeclaredFile:
     """Declare the PMI of a file on its bodies, where features can state it.
 
-    A body that stands at several places is declared once. Raises OptionError if the file has no shapes that can be used.
+    A body with several occurrences is declared once. Raises OptionError if the file has no shapes that can be used.
     """
     model = Assembly(path.stem)
     bodies, faces = bodies_in(path), faces_of_records(path)
@@ -107,7 +107,7 @@ def declared_file(path: Path, pmi: Pmi) -> DeclaredFile:
         faces |= {record: replace(faces[record], kind=kinds[faces[record].number]) for record in records}
     if faults and not parts:
         raise OptionError("; ".join(faults))
-    if not parts:  # what the file states is on edges and curves, or on no body
+    if not parts:  # the annotation is on edges and curves, or on no body
         reasons = (
             (annotation, "none of its faces is on a body" if annotation.face_records else NO_FACE) for annotation in _all(pmi)
         )
@@ -127,7 +127,7 @@ def _all(pmi: Pmi) -> tuple[Annotation, ...]:
 
 
 def _merged(parts: Sequence[Part], claims: Sequence[Claim]) -> DeclaredAnnotation:
-    """Return what became of an annotation on all parts together, from its claims on each of them."""
+    """Return the outcome of an annotation on all parts together, from its claims on each of them."""
     placed = [(part, claim) for part, claim in zip(parts, claims, strict=True) if claim.numbers] or [(parts[0], claims[0])]
     names, reasons = list[str](), list[str]()
     for part, claim in placed:

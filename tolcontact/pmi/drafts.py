@@ -1,7 +1,7 @@
 """Declaration of features, patterns and datum targets of a part from the PMI of its file.
 
 Annotations of one surface make up a draft. Drafts become features one after the other, each after its datums and with as many
-of its tolerances as go together; the claims of the others get the reasons. The part gets each feature as it is made, since
+of its tolerances as are compatible; the claims of the others get the reasons. The part gets each feature as it is made, since
 patterns ask it for their members.
 """
 
@@ -133,7 +133,7 @@ def _with_claim(draft: Draft, claim: Claim) -> Draft:
 
 
 def _patterns(drafts: Mapping[Place, Draft], datums: Collection[frozenset[Place]]) -> Iterator[tuple[Draft, frozenset[Place]]]:
-    """Yield drafts of patterns with their places: of like features that state the same, with zones that keep to each other.
+    """Yield drafts of patterns with their places: of like features that state the same, with zones in fixed relative positions.
 
     Members of a datum of several surfaces are one pattern, or each is a feature.
     """
@@ -152,7 +152,7 @@ def _patterns(drafts: Mapping[Place, Draft], datums: Collection[frozenset[Place]
 
 
 def _keeps_together(claim: Claim) -> bool:
-    """Return whether the zones of several features of a tolerance keep their places to each other, as in a pattern."""
+    """Return whether the zones of several features of a tolerance keep their relative positions, as in a pattern."""
     stated = claim.annotation
     return isinstance(stated, Tolerance) and (
         stated.kind == "position" or stated.refines is not None or "common zone" in stated.modifiers
@@ -168,7 +168,7 @@ def _are_alike(geometries: Sequence[FeatureGeometry]) -> bool:
 
 
 def _common_datum(claim: Claim, drafts: Mapping[Place, Draft]) -> Draft:
-    """Return the draft of a datum of several surfaces, or of targets on them; each surface is a feature of its own."""
+    """Return the draft of a datum of several surfaces, or of targets on them; each surface is a separate feature."""
     place_of = {number: place for place in claim.places for surface in place for number in surface}
     places = [place_of[number] for number, _ in claim.targets] or claim.places
     borrowed = tuple(drafts[place] for place in places)
@@ -176,7 +176,7 @@ def _common_datum(claim: Claim, drafts: Mapping[Place, Draft]) -> Draft:
 
 
 class _Trial:
-    """The features of a part as numbers, and what drafts become of them one after the other."""
+    """The features of a part as numbers, and the drafts that become features one after the other."""
 
     def __init__(self, part: Part, meshes: Meshes) -> None:
         self._part, self._meshes = part, meshes
@@ -186,7 +186,7 @@ class _Trial:
             self._add(earlier, self._numbers)
 
     def features(self, drafts: Sequence[Draft]) -> dict[Draft, Declared]:
-        """Declare the features of drafts, each after its datums and members, with the tolerances that go together."""
+        """Declare the features of drafts, each after its datums and members, with the tolerances that are compatible."""
         needed = {member for draft in drafts for member in draft.borrowed}
         letters = {None, *self._numbers.datums(0)}
         known_letters = letters | {draft.letter for draft in drafts}

@@ -1,4 +1,4 @@
-"""The surfaces of a part that the records of PMI mean: B-rep faces of one surface together. Part's own frame, mm."""
+"""The surfaces of a part that PMI records refer to: B-rep faces of one surface together. Part's own frame, mm."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -22,7 +22,7 @@ _ROUND = ("cylinder", "cone", "sphere", "torus")
 
 
 class TolerancedSurfaces:
-    """The surfaces of a part, found by the numbers of the records of their faces.
+    """The surfaces of a part, by the record numbers of their faces.
 
     faces   the faces of the part, by their numbers less 1
     """

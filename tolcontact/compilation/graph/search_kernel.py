@@ -33,7 +33,7 @@ MAX_ROUNDING = 1e-9  # mm: upper bound of the tolerance
 
 @inlined_inner
 def _tolerance(layout, work, refines):  # type: ignore[no-untyped-def]
-    """Solve with the active rows as equations, and return the violation [mm] up to which other rows count as satisfied."""
+    """Solve with the active rows as equations, and return the largest violation [mm] of a row that counts as satisfied."""
     largest = multiply(layout, work)
     missed = refine(layout, work) if refines or any_open(work) else 0.0
     return min(FEASIBLE + ROUNDING * largest + 2 * missed, MAX_ROUNDING)

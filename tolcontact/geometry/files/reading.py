@@ -39,8 +39,8 @@ log = logging.getLogger(__name__)
 class ReadingLimits:
     """The limits for reading a file: processor time, memory [byte] and number of triangles.
 
-    On an idle core a STEP file of 1 MB takes some 2 s, one of 20 MB 41 s. A million triangles take some 0.5 GiB to read, and
-    some 3 GiB on the way through a simulation with contact on all of them.
+    On an idle core a STEP file of 1 MB takes about 2 s, one of 20 MB 41 s. A million triangles take about 0.5 GiB to read, and
+    about 3 GiB in a simulation with contact on all of them.
     """
 
     seconds: float = 30.0
@@ -86,7 +86,7 @@ def _state(path: Path, chord: float | None, limits: ReadingLimits) -> State | No
 
 
 def _remember(state: State | None, content: Content | GeometryFault) -> None:
-    """Keep the content of a STEP file, since listing, declaring and discretizing its bodies each ask for it."""
+    """Keep the content of a STEP file, since listing, declaring and discretizing its bodies each require it."""
     if isinstance(content, Product) and state is not None:
         while len(_cache) >= CACHE_SIZE:
             _cache.pop(next(iter(_cache)), None)

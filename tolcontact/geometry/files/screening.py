@@ -104,7 +104,7 @@ def _article(suffix: str) -> str:
 
 
 def _announced_triangles(path: Path, head: bytes, size: int) -> int:
-    """Return the number of triangles that a file announces; 0 if only reading all of it would tell."""
+    """Return the number of triangles that a file announces; 0 if that requires reading the entire file."""
     suffix = path.suffix.lower()
     if suffix == ".stl" and size == _stl_size(head):
         return int.from_bytes(head[80:84], "little")
@@ -115,7 +115,7 @@ def _announced_triangles(path: Path, head: bytes, size: int) -> int:
         return 0
     with path.open("rb") as file:
         count = sum(chunk.count(mark) for chunk in iter(lambda: file.read(1 << 24), b""))
-    return count // 2 if mark == b"facet" else count  # "facet" also stands in "endfacet"
+    return count // 2 if mark == b"facet" else count  # "facet" also occurs in "endfacet"
 
 
 def _check_stl(path: Path, head: bytes, size: int) -> None:

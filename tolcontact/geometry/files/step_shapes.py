@@ -36,7 +36,7 @@ class StatedFace:
     surface  None for an unknown one
     name     "" for a face without a name
     records  numbers of its records in the file's text, its own first, then the records of its copies; empty if it states no PMI
-    copies   number of other faces in the same place, and have no triangles of their own
+    copies   number of other faces in the same place, which have no triangles
     measure  None if the kernel finds none, as for a face that the file states by triangles, and for faces from an archive
     """
 
@@ -118,7 +118,7 @@ def _proper_triangles(triangles: np.ndarray, omissions: Counter[str]) -> tuple[n
     """Return indices of triangles (triangle, 3), without repeated ones and without those that have two corners in one place.
 
     The second array (repeated, 2) has the indices of each repeated triangle and of the triangle that it repeats: they come
-    from a face that stands twice in its shell. Corners fall together at the ends of an edge that is shorter than coordinates
+    from a face that occurs twice in its shell. Corners fall together at the ends of an edge that is shorter than coordinates
     resolve.
     """
     proper = np.flatnonzero((triangles != np.roll(triangles, 1, axis=1)).all(axis=1))
@@ -197,7 +197,7 @@ def onto(
 def _steps(vertices: np.ndarray, meetings: np.ndarray, surfaces: Sequence[AnalyticSurface | None]) -> np.ndarray:
     """Return the shortest steps (vertex, 3) that end, to first order, on all surfaces that meet in a vertex.
 
-    `meetings` (meeting, 2) are the numbers of a vertex and of a surface there, in order of vertices.
+    `meetings` (meeting, 2) are the indices of a vertex and of a surface there, in order of vertices.
     """
     value, slope = np.zeros(len(meetings)), np.zeros((len(meetings), 3))
     for number in np.unique(meetings[:, 1]):

@@ -57,8 +57,8 @@ class StepText:
     order         numbers of all records in the order of the file
     bodies        entity and parameters of each record by its number, without most shapes
     entities      the entity of a record by its number; none of a complex instance, which has several
-    numbers       numbers of the records of each entity, by its name
-    documents     names of other files to which the file refers, each once
+    numbers       record numbers of each entity, by its name
+    documents     names of other files that the file refers to, each once
     """
 
     def __init__(self, content: bytes) -> None:
@@ -125,7 +125,7 @@ class StepText:
     @property
     def endless_number(self) -> str:
         """The first number that is NaN or too large; "" if all numbers are finite."""
-        if _ENDLESS.search(self.content) is None:  # the usual case, in which strings need not be left out
+        if _ENDLESS.search(self.content) is None:  # the usual case: strings need not be left out
             return ""
         match = _ENDLESS.search(_STRING.sub(b"''", self.content))
         return match[1].decode() if match else ""
