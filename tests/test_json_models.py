@@ -4,6 +4,7 @@ import inspect
 import json
 import re
 
+import numpy as np
 import pytest
 import trimesh
 import xarray as xr
@@ -178,3 +179,24 @@ def test_an_archive_does_not_name_files():
     results["model"]["declaration"] = xr.DataArray(json.dumps(document))
     with pytest.raises(tc.ArchiveError, match="a part with a mesh, or with a box"):
         tc.model_of(results)
+
+
+def test_numbers_of_numpy_are_written_as_plain_ones(tmp_path):
+    def model(number, vector):
+        a = tc.Assembly("block on a table")
+        table, block = a.part("table", tc.Box(number(100), 50, 10)), a.part("block", tc.Box(50, 25, 10), at=vector(50, 12, 10))
+        for part in (table, block):
+            scheme = tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x"), inset=number(5))
+            a.locate(part, scheme, tolerance=number(1))
+        a.contact("seat", moving=block.face("-z"), reference=table.face("+z"), points=50)
+        a.measure("height", block.point(number(50), 0, 10), along=vector(0, 0, 1), tolerance=number(1))
+        return a
+
+    def written(assembly, path):
+        tc.write_model(assembly, path)
+        return json.loads(path.read_text())
+
+    plain = written(model(float, lambda *values: values), tmp_path / "plain.json")
+    for number in (np.float64, np.float32, np.int64):
+        document = written(model(number, lambda *values: np.array(values, dtype=float)), tmp_path / "numpy.json")
+        assert document == plain

@@ -1,5 +1,7 @@
 """Intervals that cover, fields that equal the plain sums."""
 
+import resource
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -8,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from tests import cases
 from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.discretization import discretize
+from tolcontact.errors import TolcontactError
 from tolcontact.statistics import DisplacementFields, intervals
 from tolcontact.statistics.sample import Sample
 
@@ -59,6 +62,17 @@ def test_a_sample_that_is_read_in_pieces_gives_the_same_as_one_that_is_sorted(ti
     assert intervals.variance_ratio(*pieces) == pytest.approx(intervals.variance_ratio(x, y), rel=1e-12)
     assert intervals.mean(pieces[0] - pieces[1]) == pytest.approx(intervals.mean(x - y), rel=1e-12)
     assert np.isnan(Sample(lambda: iter([x, np.array([np.nan])]), max_sorted=100).ordered(ranks)).all()
+
+
+def test_a_full_disk_is_an_error_that_names_the_folder():
+    large = Sample(lambda: iter([np.zeros(10_000)]), max_sorted=100)
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limit[1]))
+    try:
+        with pytest.raises(TolcontactError, match=r"10000 values cannot be sorted: .*; folder .* needs room for 0.08 MB"):
+            large.ordered([0])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
 
 
 def test_a_percentile_beyond_the_sample_has_no_bound():

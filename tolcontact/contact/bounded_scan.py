@@ -7,7 +7,7 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import SLOTS
 from tolcontact.contact import bounded_kernel
-from tolcontact.contact.guard import GUARD, Guard, is_guard, no_places
+from tolcontact.contact.guard import PARTING, Guard, is_guard, no_places
 from tolcontact.contact.scan import Deepest, Scan, SlotScan
 from tolcontact.discretization import FIRST_POINT, ContactPoints, raised_places
 from tolcontact.geometry.kernel import CORNER_ON_FACET, INSIDE
@@ -156,11 +156,11 @@ def _with_parting(
     found = found._replace(gaps=np.where(counts, found.gaps, np.inf))
     shown = np.where(is_aligned, found.gaps - heights, np.inf).min(axis=1, initial=np.inf)
     is_new = axis.gaps < shown - SHOWN_SHARE * np.maximum(np.abs(axis.gaps), INSIDE)
-    labels = np.where(is_new, GUARD + 1 + axis.edges, -1)[:, None]
+    labels = np.where(is_new, PARTING + axis.edges, -1)[:, None]
     best = Places(labels, np.where(is_new, axis.gaps, np.inf)[:, None], *(values[:, None] for values in axis[2:]))
     added = [best]
     if carried is not None:
-        edges = np.where((carried > GUARD) & (carried != labels), carried - GUARD - 1, -1)
+        edges = np.where((carried >= PARTING) & (carried != labels), carried - PARTING, -1)
         crossings = parting.crossings(X_RM, edges, axis.n_r)
         added.append(Places(np.where(np.isfinite(crossings.gaps), carried, -1), *crossings))
     joined = Places(*(np.concatenate(arrays, axis=1) for arrays in zip(found, *added, strict=True)))

@@ -11,13 +11,14 @@ from tolcontact.geometry.meeting import Places
 from tolcontact.interference import Neighbours, WayOut, ordered
 
 GUARD = 1 << 41  # first label of places that a guard adds: a label encodes the direction that separates the bodies
+PARTING = 2 * GUARD  # first label of places along which convex bodies part best (see Parting)
 LEVELS = 1 << 12  # of a component of that direction
 APART = 2.0 * 8.0 ** np.arange(3)  # insets of both bodies: the distances at which a place that holds them apart is searched
 
 
 def is_guard(labels: Int[Array, "..."]) -> Bool[Array, "..."]:
     """Return which labels belong to places that a guard added."""
-    return (labels >= GUARD) & (labels < 2 * GUARD)
+    return (labels >= GUARD) & (labels < PARTING)
 
 
 def _label(normals: Float[Array, "n 3"]) -> Int[Array, " n"]:

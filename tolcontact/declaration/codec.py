@@ -12,6 +12,7 @@ from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
 import msgspec
+import numpy as np
 from msgspec import Meta
 
 from tolcontact.declaration.place import MAX_NUMBER, Place
@@ -77,7 +78,7 @@ class Plain(Codec):
         self.wire, self.write, self.read, self.when, self.are_finite = _wire(annotation), write, read, when, are_finite
 
     def encode(self, value: Any, writing: Any) -> Any:
-        return self.write(value, writing)
+        return _without_numpy(self.write(value, writing))
 
     def decode(self, entry: Any, place: Place, **arguments: Any) -> Any:
         value = place.converted(entry, self.wire)
@@ -90,6 +91,13 @@ class Plain(Codec):
 
     def holds(self, value: Any, writing: Any) -> bool:
         return self.when(value)
+
+
+def _without_numpy(value: Any) -> Any:
+    """Return an entry whose numbers are Python's own, as JSON takes them."""
+    if isinstance(value, tuple | list):
+        return [_without_numpy(item) for item in value]
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
 
 
 def _check_numbers(value: Any, place: Place) -> None:

@@ -9,6 +9,7 @@ from types import MappingProxyType, NoneType
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import msgspec
+import numpy as np
 from msgspec import UNSET, Meta, UnsetType
 
 from tolcontact.declaration.codec import CODECS, Codec, Document, Items, Plain, floats, reference
@@ -94,7 +95,8 @@ class Record(Codec):
 
         def split(thing: Any, writing: Any) -> Document:
             value = tuple(getattr(thing, member) for member in (name, *others)) if others else getattr(thing, name)
-            return {} if is_omitted and value == default else {key: value}
+            is_default = is_omitted and not isinstance(value, np.ndarray) and value == default
+            return {} if is_default else {key: value}
 
         def join(values: Document, place: Place) -> Document:
             return dict(zip((name, *others), values[key] if others else (values[key],), strict=True)) if values else {}

@@ -54,9 +54,10 @@ class Table:
         yield from map(Text, self.remarks)
 
     def _figures(self, width: int) -> RenderResult:
-        rows = [[cell.split("\n") for cell in row] for row in self.rows]
+        texts = self.texts
+        rows = [[cell.split("\n") for cell in row] for row in texts]
         if self._full_width(rows) > width:
-            rows = [[cell.replace(" [", "\n[").split("\n") for cell in row] for row in self.rows]
+            rows = [[cell.replace(" [", "\n[").split("\n") for cell in row] for row in texts]
         if self._full_width(rows) <= width:
             yield from self._lines(rows)
             return
@@ -79,7 +80,7 @@ class Table:
     def _headings(self) -> list[tuple[str, ...]]:
         """Return the lines of the heading, with each column aligned to the last line."""
         headings = [column.split("\n") for column in self.columns]
-        height = max(map(len, headings))
+        height = max(map(len, headings), default=0)
         return list(zip(*([""] * (height - len(lines)) + lines for lines in headings), strict=True))
 
     def _lines(self, rows: Sequence[Sequence[Sequence[str]]]) -> Iterator[Text]:

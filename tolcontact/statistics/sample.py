@@ -9,6 +9,7 @@ import xarray as xr
 from scipy import special
 
 from tolcontact import vocabulary as terms
+from tolcontact.errors import TolcontactError
 from tolcontact.realizations import pieces
 
 MAX_SORTED_VALUES = 1 << 20  # larger samples are not sorted in memory
@@ -107,12 +108,17 @@ class Sample:
         """The values in ascending order; those of a sample that does not fit into memory are in a temporary file."""
         if self.count <= self.max_sorted:
             return np.sort(np.concatenate(list(self.pieces())))
-        with tempfile.TemporaryFile() as file:  # it exists until the array is gone
-            values = np.memmap(file, dtype=float, mode="w+", shape=(self.count,))
-        start = 0
-        for piece in self.pieces():
-            values[start : start + len(piece)] = piece
-            start += len(piece)
+        try:
+            with tempfile.TemporaryFile() as file:  # it exists until the array is gone
+                for piece in self.pieces():  # written, not mapped: a full disk is an error, and does not end the process
+                    file.write(np.ascontiguousarray(piece, dtype=float).data)
+                file.flush()
+                values = np.memmap(file, dtype=float, mode="r+", shape=(self.count,))
+        except OSError as error:
+            raise TolcontactError(
+                f"{self.count} values cannot be sorted: {error.strerror}; folder {tempfile.gettempdir()} needs room for "
+                f"{8 * self.count / 1e6:.2g} MB; choose another one by the variable TMPDIR"
+            ) from error
         values.sort()
         return values
 
