@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from tolcontact import poses as pose
-from tolcontact.arrays import Array, Bool, Float
+from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import FREE_DEPTH, Candidates
 from tolcontact.contact.linear_step import LinearStep
@@ -74,7 +74,9 @@ class FreeSteps:
             # Places deeper than the motion of the bodies are on the far side of a body.
             depth = self._depths(part, state.relative[rows], depths[rows] + share * motions[rows] + TOUCHING)
             fails = depth > TOUCHING + depths[rows] * (1 - share) + SINK_SHARE * share * size[rows]
-            fails |= enters[rows] & self._candidates.interfere(state.relative[rows])
+            interferes = enters[rows] & self._candidates.interfere(state.relative[rows])
+            fails |= interferes
+            self._guard(state, rows[interferes])
             fails |= self._energy(part, state.take(rows)) > objective[rows]
             rows, part = rows[fails], part.take(fails)
             if not rows.size:
@@ -86,6 +88,12 @@ class FreeSteps:
         rows = rows[enters[rows] & self._candidates.interfere(state.relative[rows])]
         state.poses[rows], state.relative[rows] = before.poses[rows], before.relative[rows]
         return shares < 1
+
+    def _guard(self, state: State, rows: Int[Array, " k"]) -> None:
+        """Give the places that separate interfering bodies of some realizations a slot."""
+        for k, guard in self._candidates.guards.items() if rows.size else ():
+            slots, labels = state.slots[self._candidates.slot_of(k)], guard.labels(state.relative[rows, k])
+            slots.hold(rows[labels >= 0], labels[labels >= 0])
 
     def lift(
         self, poses: Float[Array, "n part 12"], relative: Float[Array, "n pair 12"], deviations: Float[Array, "n contributor"]

@@ -6,6 +6,7 @@ import numpy as np
 import trimesh
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from tolcontact.arrays import Array, Int
 
@@ -35,14 +36,58 @@ def merged_surface(body: trimesh.Trimesh) -> MergedSurface:
     surface = trimesh.Trimesh(body.vertices, body.faces, process=False)
     surface.merge_vertices(digits_vertex=int(np.ceil(-np.log10(MERGE_SHARE * max(surface.scale, 1e-9)))))
     proper_faces = np.flatnonzero((np.diff(np.sort(surface.faces, axis=1), axis=1) > 0).all(axis=1))
-    twins = _twins(np.asarray(surface.vertices), np.asarray(surface.faces)[proper_faces])
-    if twins is not None:
-        surface = _apart(np.asarray(surface.vertices), np.asarray(surface.faces)[proper_faces], twins)
-    else:
+    vertices = np.asarray(surface.vertices)
+    faces, divided = _divided(vertices, np.asarray(surface.faces)[proper_faces])
+    twins = _twins(vertices, faces)
+    if twins is None:
         surface.update_faces(proper_faces)
+        sources = proper_faces
+    else:
+        surface, sources = _apart(vertices, faces, twins), proper_faces[divided]
     has_area = np.asarray(surface.area_faces) > 0
     surface.update_faces(has_area)
-    return MergedSurface(surface, proper_faces[has_area], twins is not None)
+    return MergedSurface(surface, sources[has_area], twins is not None)
+
+
+def _divided(vertices: np.ndarray, faces: np.ndarray) -> tuple[Int[Array, "d 3"], Int[Array, " d"]]:
+    """Return faces (t, 3) divided at vertices that lie on their edges, and the face that each one is part of (d,).
+
+    The mesh of two blocks that touch along part of an edge may have a vertex in the middle of that edge. Only edges between
+    different planes are divided.
+    """
+    sources = np.arange(len(faces))
+    vertex, ends = _on_edges(vertices, faces)
+    for v, (a, b) in zip(vertex, ends, strict=True):
+        there = np.flatnonzero((faces == a).any(axis=1) & (faces == b).any(axis=1) & (faces != v).all(axis=1))
+        first, second = faces[there].copy(), faces[there]
+        first[first == a], second[second == b] = v, v
+        faces = np.concatenate([np.delete(faces, there, axis=0), first, second])
+        sources = np.concatenate([np.delete(sources, there), sources[there], sources[there]])
+    order = np.argsort(sources, kind="stable")
+    return faces[order], sources[order]
+
+
+def _on_edges(vertices: np.ndarray, faces: np.ndarray) -> tuple[Int[Array, " m"], Int[Array, "m 2"]]:
+    """Return the vertices (m,) that lie on an edge between different planes, and the ends (m, 2) of that edge.
+
+    Those of one edge follow each other from its second end to the first, so that each divides what the others left.
+    """
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    ends = np.asarray(mesh.face_adjacency_edges)[np.asarray(mesh.face_adjacency_angles) > ROUNDED]
+    start, along = vertices[ends[:, 0]], np.subtract(*vertices[ends[:, ::-1]].swapaxes(0, 1))
+    lengths = np.linalg.norm(along, axis=1)
+    near = cKDTree(vertices).query_ball_point(start + along / 2, lengths / 2)
+    edge = np.repeat(np.arange(len(ends)), [len(of_edge) for of_edge in near])
+    vertex = np.concatenate([np.zeros(0, dtype=np.int64), *(np.asarray(of_edge, dtype=np.int64) for of_edge in near)])
+    arms = vertices[vertex] - start[edge]
+    shares = (arms * along[edge]).sum(axis=1) / np.maximum(lengths[edge], 1e-300) ** 2
+    distances = np.linalg.norm(arms - shares[:, None] * along[edge], axis=1)
+    limit = MERGE_SHARE * mesh.scale
+    lies = (distances <= limit) & (shares * lengths[edge] > limit) & ((1 - shares) * lengths[edge] > limit)
+    lies &= (ends[edge] != vertex[:, None]).all(axis=1)
+    edge, vertex, shares = edge[lies], vertex[lies], shares[lies]
+    order = np.lexsort([-shares, edge])
+    return vertex[order], ends[edge[order]]
 
 
 def _twins(vertices: np.ndarray, faces: np.ndarray) -> Int[Array, " h"] | None:

@@ -11,9 +11,9 @@ from tolcontact.geometry.inset import smaller
 from tolcontact.geometry.merged_surface import merged_surface
 from tolcontact.geometry.triangle_mesh import coordinate_error, edges
 from tolcontact.geometry.vertex_displacements import capped, displacements
+from tolcontact.interference.opposing_planes import MIN_SINGULAR, divided
 
 SAME_PLANE = 1e-5  # rad: facets whose normals differ by less are one plane
-MIN_SINGULAR = 0.05  # of the planes around a vertex: directions with a smaller singular value are left alone
 MAX_SHIFT = 8.0  # insets: the largest motion of a vertex, for needles
 
 
@@ -27,6 +27,7 @@ class Solid:
     sides       (e, 2): the triangles at each edge, the same one twice where the other has no area
     flat        (n, 2): triangles that share an edge and lie in one plane
     sources     (t,): the triangle of the part's mesh that each triangle is
+    normals     (t, 3) outward, of unit length; triangles without an area have that of their plane
     """
 
     vertices: Float[Array, "v 3"]
@@ -35,13 +36,7 @@ class Solid:
     sides: Int[Array, "e 2"]
     flat: Int[Array, "n 2"]
     sources: Int[Array, " t"]
-
-    @cached_property
-    def normals(self) -> Float[Array, "t 3"]:
-        """The outward unit normals of the triangles."""
-        a, b, c = self.vertices[self.faces].swapaxes(0, 1)
-        normals = np.cross(b - a, c - a)
-        return normals / np.linalg.norm(normals, axis=1)[:, None]
+    normals: Float[Array, "t 3"]
 
     @cached_property
     def components(self) -> list[Int[Array, " _"]]:
@@ -74,15 +69,23 @@ def solid(body: trimesh.Trimesh) -> Solid | None:
     merged, sources, is_closed = merged_surface(body)
     if not is_closed or body.volume <= 0:
         return None
-    merged = smaller(merged, coordinate_error(body))
-    ends, edge, triangles_there = edges(merged.faces)
+    whole = divided(smaller(merged, coordinate_error(body)), SAME_PLANE)
+    faces, plane = np.asarray(whole.mesh.faces), np.arange(len(whole.mesh.faces))
+    plane[whole.added] = whole.extended
+    a, b, c = np.asarray(whole.mesh.vertices)[faces[plane]].swapaxes(0, 1)
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    ends, edge, triangles_there = edges(faces)
     lone = np.flatnonzero(triangles_there[edge] == 1)
-    sharp = np.asarray(merged.face_adjacency_angles) > SAME_PLANE
+    neighbours = np.asarray(whole.mesh.face_adjacency)
+    angles = trimesh.geometry.vector_angle(normals[neighbours])
+    sharp = (angles > SAME_PLANE) & (plane[neighbours[:, 0]] != plane[neighbours[:, 1]])
     return Solid(
-        np.ascontiguousarray(merged.vertices, dtype=np.float64),
-        np.ascontiguousarray(merged.faces, dtype=np.int64),
-        np.concatenate([merged.face_adjacency_edges[sharp], ends[lone]]).astype(np.int64),
-        np.concatenate([merged.face_adjacency[sharp], lone[:, None].repeat(2, axis=1) // 3]).astype(np.int64),
-        np.asarray(merged.face_adjacency)[~sharp],
-        sources,
+        np.ascontiguousarray(whole.mesh.vertices, dtype=np.float64),
+        np.ascontiguousarray(faces, dtype=np.int64),
+        np.concatenate([whole.mesh.face_adjacency_edges[sharp], ends[lone]]).astype(np.int64),
+        np.concatenate([neighbours[sharp], lone[:, None].repeat(2, axis=1) // 3]).astype(np.int64),
+        neighbours[~sharp],
+        np.concatenate([sources, sources[whole.extended]]),
+        normals,
     )
