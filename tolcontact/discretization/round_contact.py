@@ -11,7 +11,7 @@ from tolcontact.discretization.round_points import NO_DIRECTION, NotRoundError, 
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder, Plane, RoundSurface, Sphere
 from tolcontact.geometry.surface import Piece, Surface
 from tolcontact.geometry.tolerances import PARALLEL, SAME_PLACE
-from tolcontact.geometry.triangle_mesh import CREASE
+from tolcontact.geometry.triangle_mesh import CREASE, have_area
 
 MAX_POINTS = 40  # of a pair
 ARC_MARGIN = math.radians(5.0)  # between the line of contact and the ends of a shaft's arc
@@ -43,7 +43,7 @@ def _pieces(face: Surface) -> list[Piece]:
     remainder = face.unknown
     if not len(remainder.mesh.faces):
         return pieces
-    if not (np.asarray(remainder.mesh.area_faces) > 0).all():
+    if not have_area(remainder.mesh).all():
         raise NotRoundError
     neighbours, normals = np.asarray(remainder.mesh.face_adjacency), np.asarray(remainder.mesh.face_normals)
     left_normals, right_normals = normals[neighbours[:, 0]], normals[neighbours[:, 1]]

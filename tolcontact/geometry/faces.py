@@ -18,7 +18,7 @@ from tolcontact.geometry.files import BREP, STATED_FACES
 from tolcontact.geometry.shapes import placement_of
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.tolerances import OPPOSING_COSINE, ROUNDING
-from tolcontact.geometry.triangle_mesh import overlaps, subdivided
+from tolcontact.geometry.triangle_mesh import have_area, overlaps, subdivided
 
 NEAR_DIVISIONS = 100
 CUT = 4  # refinement factor of the pieces of triangles in one step
@@ -97,7 +97,7 @@ def triangles(face: Face, meshes: Meshes) -> np.ndarray:
     Raises GeometryFault if there are none.
     """
     mesh = meshes[face.part]
-    mask = np.asarray(mesh.area_faces) > 0
+    mask = have_area(mesh)
     for selection in face.selections:
         match selection:
             case Facing():

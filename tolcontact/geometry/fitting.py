@@ -10,6 +10,7 @@ import scipy
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, Plane, Sphere
 
 MIN_DIRECTIONS = 5  # of facets: with fewer, a surface is a fold, not round
+MIN_SPARE = 2  # vertices beyond the numbers of a round surface: it passes through as many vertices as it has numbers anyway
 NORMAL_TOLERANCE = 1e-9  # normals that differ by less are one direction
 MIN_CONE_ANGLE = 1e-4  # rad: between a cone and its axis, and between a cone and the plane across it
 SAMPLED_TRIANGLES = 300  # triangles in a first trial
@@ -25,8 +26,8 @@ def fit_surface(triangles: np.ndarray, tolerance: float) -> AnalyticSurface | No
     """Return a surface within `tolerance` [mm] of the corners of `triangles` (face, 3, 3) [mm], if there is one.
 
     Both a sphere and a cone pass through two rings of vertices: the simpler one is used. Triangles in fewer than
-    MIN_DIRECTIONS directions are a plane or a fold. Fasteners, features and contact pairs request the same faces, and parts of
-    one shape share them, so each face is fitted once.
+    MIN_DIRECTIONS directions are a plane or a fold, and a round surface needs MIN_SPARE vertices that do not determine it.
+    Fasteners, features and contact pairs request the same faces, and parts of one shape share them: each face is fitted once.
     """
     key = hashlib.blake2b(triangles.tobytes()).digest(), tolerance
     if key not in _known_fits:
@@ -46,7 +47,8 @@ def _fit(triangles: np.ndarray, tolerance: float) -> AnalyticSurface | None:
     if len(triangles) > SAMPLED_TRIANGLES:  # a few triangles rule out most surfaces at once
         sample = _sampled(triangles)
         trials.insert(0, (_vertices(sample), sample, tolerance * SAMPLE_TOLERANCE))
-    for fit in FITS[:1] if is_bent else FITS:
+    fits = [fit for fit, numbers in FITS.items() if len(vertices) >= numbers + MIN_SPARE or fit is fit_plane]
+    for fit in fits[:1] if is_bent else fits:
         for corners, faces, limit in trials:
             surface = fit(corners, faces)
             if surface is None or surface.residual > limit:
@@ -157,8 +159,13 @@ def fit_sphere(vertices: np.ndarray, triangles: np.ndarray) -> AnalyticSurface |
     return _with_residual(sphere, vertices)
 
 
-# From the simplest to the most general; all except the plane are round.
-FITS: tuple[Callable[[np.ndarray, np.ndarray], AnalyticSurface | None], ...] = (fit_plane, fit_cylinder, fit_cone, fit_sphere)
+# From the simplest to the most general, with how many numbers each is determined by; all except the plane are round.
+FITS: dict[Callable[[np.ndarray, np.ndarray], AnalyticSurface | None], int] = {
+    fit_plane: 3,
+    fit_cylinder: 5,
+    fit_cone: 6,
+    fit_sphere: 4,
+}
 
 
 def _least_squares(

@@ -10,6 +10,7 @@ import numpy as np
 import trimesh
 
 from tolcontact.arrays import Array, Float, Int
+from tolcontact.geometry.triangle_mesh import have_area
 from tolcontact.geometry.vertex_displacements import TINY, capped, displacements
 
 MIN_ANGLE, MAX_ANGLE = 1e-6, 0.05  # rad: triangles at a smaller angle may always be one plane, at a larger one never
@@ -37,7 +38,7 @@ def smaller(body: trimesh.Trimesh, error: float) -> trimesh.Trimesh:
     """Return a body with flat planes and all faces offset inward by an `error` [mm]; the body itself if that is 0."""
     if not error:
         return body
-    whole = trimesh.Trimesh(body.vertices, np.asarray(body.faces)[np.asarray(body.area_faces) > 0], process=False)
+    whole = trimesh.Trimesh(body.vertices, np.asarray(body.faces)[have_area(body)], process=False)
     return trimesh.Trimesh(inset(whole, error), body.faces, process=False)
 
 

@@ -9,9 +9,10 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from tolcontact.arrays import Array, Int
+from tolcontact.geometry.tolerances import ROUNDING
+from tolcontact.geometry.triangle_mesh import have_area
 
-MERGE_SHARE = 1e-9  # of the size: largest distance between vertices that are merged
-ROUNDED = 1e-9  # of a full turn: largest angle between triangles at an edge that count as coincident
+SAME_TURN = 1e-9  # of a full turn: largest angle between triangles at an edge that count as coincident
 
 
 class MergedSurface(NamedTuple):
@@ -34,7 +35,7 @@ def merged_surface(body: trimesh.Trimesh) -> MergedSurface:
     vertex.
     """
     surface = trimesh.Trimesh(body.vertices, body.faces, process=False)
-    surface.merge_vertices(digits_vertex=int(np.ceil(-np.log10(MERGE_SHARE * max(surface.scale, 1e-9)))))
+    surface.merge_vertices(digits_vertex=int(np.ceil(-np.log10(ROUNDING * max(surface.scale, 1e-9)))))
     proper_faces = np.flatnonzero((np.diff(np.sort(surface.faces, axis=1), axis=1) > 0).all(axis=1))
     vertices = np.asarray(surface.vertices)
     faces, divided = _divided(vertices, np.asarray(surface.faces)[proper_faces])
@@ -44,36 +45,37 @@ def merged_surface(body: trimesh.Trimesh) -> MergedSurface:
         sources = proper_faces
     else:
         surface, sources = _apart(vertices, faces, twins), proper_faces[divided]
-    has_area = np.asarray(surface.area_faces) > 0
-    surface.update_faces(has_area)
-    return MergedSurface(surface, sources[has_area], twins is not None)
+    proper = have_area(surface)
+    surface.update_faces(proper)
+    return MergedSurface(surface, sources[proper], twins is not None)
 
 
 def _divided(vertices: np.ndarray, faces: np.ndarray) -> tuple[Int[Array, "d 3"], Int[Array, " d"]]:
     """Return faces (t, 3) divided at vertices that lie on their edges, and the face that each one is part of (d,).
 
     The mesh of two blocks that touch along part of an edge may have a vertex in the middle of that edge. Only edges between
-    different planes are divided.
+    different planes are divided. Triangles without an area that join such a vertex to its edge are left out.
     """
     sources = np.arange(len(faces))
     vertex, ends = _on_edges(vertices, faces)
     for v, (a, b) in zip(vertex, ends, strict=True):
-        there = np.flatnonzero((faces == a).any(axis=1) & (faces == b).any(axis=1) & (faces != v).all(axis=1))
-        first, second = faces[there].copy(), faces[there]
+        there = np.flatnonzero((faces == a).any(axis=1) & (faces == b).any(axis=1))
+        at_edge = there[(faces[there] != v).all(axis=1)]
+        first, second = faces[at_edge].copy(), faces[at_edge]
         first[first == a], second[second == b] = v, v
         faces = np.concatenate([np.delete(faces, there, axis=0), first, second])
-        sources = np.concatenate([np.delete(sources, there), sources[there], sources[there]])
+        sources = np.concatenate([np.delete(sources, there), sources[at_edge], sources[at_edge]])
     order = np.argsort(sources, kind="stable")
     return faces[order], sources[order]
 
 
 def _on_edges(vertices: np.ndarray, faces: np.ndarray) -> tuple[Int[Array, " m"], Int[Array, "m 2"]]:
-    """Return the vertices (m,) that lie on an edge between different planes, and the ends (m, 2) of that edge.
+    """Return the vertices (m,) that lie on an edge between different planes, and the ends (m, 2) of what they divide.
 
-    Those of one edge follow each other from its second end to the first, so that each divides what the others left.
+    Several vertices of one edge follow each other, so that each divides what is left by the one before.
     """
     mesh = trimesh.Trimesh(vertices, faces, process=False)
-    ends = np.asarray(mesh.face_adjacency_edges)[np.asarray(mesh.face_adjacency_angles) > ROUNDED]
+    ends = np.asarray(mesh.face_adjacency_edges)[np.asarray(mesh.face_adjacency_angles) > SAME_TURN]
     start, along = vertices[ends[:, 0]], np.subtract(*vertices[ends[:, ::-1]].swapaxes(0, 1))
     lengths = np.linalg.norm(along, axis=1)
     near = cKDTree(vertices).query_ball_point(start + along / 2, lengths / 2)
@@ -82,12 +84,14 @@ def _on_edges(vertices: np.ndarray, faces: np.ndarray) -> tuple[Int[Array, " m"]
     arms = vertices[vertex] - start[edge]
     shares = (arms * along[edge]).sum(axis=1) / np.maximum(lengths[edge], 1e-300) ** 2
     distances = np.linalg.norm(arms - shares[:, None] * along[edge], axis=1)
-    limit = MERGE_SHARE * mesh.scale
+    limit = ROUNDING * mesh.scale
     lies = (distances <= limit) & (shares * lengths[edge] > limit) & ((1 - shares) * lengths[edge] > limit)
     lies &= (ends[edge] != vertex[:, None]).all(axis=1)
     edge, vertex, shares = edge[lies], vertex[lies], shares[lies]
     order = np.lexsort([-shares, edge])
-    return vertex[order], ends[edge[order]]
+    vertex, divided = vertex[order], ends[edge[order]]
+    divided[1:, 1] = np.where(np.diff(edge[order]) == 0, vertex[:-1], divided[1:, 1])
+    return vertex, divided
 
 
 def _twins(vertices: np.ndarray, faces: np.ndarray) -> Int[Array, " h"] | None:
@@ -126,7 +130,7 @@ def _across_material(
     u = arms[np.argmax(np.linalg.norm(arms, axis=1))]
     turns = np.arctan2(arms @ np.cross(along, u), arms @ u) / (2 * np.pi)
     # Among coincident triangles the one that ends material comes first, so that flush blocks remain two.
-    order = np.lexsort([~is_forward, np.round(turns / ROUNDED) % (1 / ROUNDED)])
+    order = np.lexsort([~is_forward, np.round(turns / SAME_TURN) % (1 / SAME_TURN)])
     opened, pairs = list[int](), list[tuple[int, int]]()
     for half_edge in [*order, *order]:  # twice around
         if not is_forward[half_edge] and edge[half_edge] not in [back for back, _ in pairs] and half_edge not in opened:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 import trimesh
 
 from tolcontact.arrays import Array, Float, Int
@@ -87,7 +88,7 @@ def convex(body: trimesh.Trimesh) -> parting_kernel.Convex | None:
     if not body.is_watertight or body.volume <= 0:
         return None
     body = smaller(body, coordinate_error(body))
-    hull = trimesh.convex.convex_hull(np.asarray(body.vertices)[np.unique(body.faces)])
+    hull = _hull(np.asarray(body.vertices)[np.unique(body.faces)])
     vertices, facet_normals = np.asarray(hull.vertices), np.asarray(hull.face_normals)
     neighbours, is_sharp = np.asarray(hull.face_adjacency), np.asarray(hull.face_adjacency_angles) > SHARP_ANGLE
     planes = trimesh.graph.connected_component_labels(neighbours[~is_sharp], node_count=len(facet_normals))
@@ -107,3 +108,13 @@ def convex(body: trimesh.Trimesh) -> parting_kernel.Convex | None:
     towards = np.asarray(hull.triangles_center)[sharp_neighbours] - ends[:, :1]
     into *= np.where((into * towards).sum(axis=2) < 0, -1.0, 1.0)[..., None]
     return parting_kernel.Convex(*(np.ascontiguousarray(values) for values in (vertices, normals, heights, ends, into)))
+
+
+def _hull(points: Float[Array, "point 3"]) -> trimesh.Trimesh:
+    """Return the convex hull of points, with triangles that face outwards."""
+    hull = scipy.spatial.ConvexHull(points, qhull_options="QbB Pp Qt")
+    faces, (a, b, c) = hull.simplices, points[hull.simplices].swapaxes(0, 1)
+    is_inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0
+    mesh = trimesh.Trimesh(points, np.where(is_inward[:, None], faces[:, ::-1], faces), process=False)
+    mesh.remove_unreferenced_vertices()
+    return mesh

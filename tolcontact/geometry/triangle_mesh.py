@@ -7,6 +7,7 @@ import numpy as np
 import trimesh
 
 from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.geometry.tolerances import ROUNDING
 
 CREASE = np.cos(np.radians(30.0))  # facets that meet at a wider angle are two faces; else they approximate one curved face
 MAX_ROUNDS = 30  # of subdivision; each halves the longest edges
@@ -25,6 +26,13 @@ def edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     key = ends.min(axis=1) * (int(ends.max(initial=0)) + 1) + ends.max(axis=1)
     _, edge, triangles = np.unique(key, return_inverse=True, return_counts=True)
     return ends, edge, triangles
+
+
+def have_area(mesh: trimesh.Trimesh) -> Bool[Array, " face"]:
+    """Return which triangles of a mesh have an area that exceeds its rounding, and so a normal."""
+    corners = np.asarray(mesh.triangles)
+    longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1, initial=0.0)
+    return np.asarray(mesh.area_faces > ROUNDING * mesh.scale * longest / 2)
 
 
 def on_rim(faces: np.ndarray) -> np.ndarray:
