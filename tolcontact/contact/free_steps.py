@@ -43,12 +43,16 @@ class FreeSteps:
         self._relate, self._energy = relate, energy
         self._centres = np.array([np.asarray(mobility.centre, dtype=float).ravel() for mobility in group.mobilities])
 
-    def shorten(self, step: LinearStep, task: Task, before: State, state: State, size: Float[Array, " n"]) -> Bool[Array, " n"]:
+    def shorten(
+        self, step: LinearStep, task: Task, before: State, state: State, size: Float[Array, " n"], *, is_guarded: bool
+    ) -> Bool[Array, " n"]:
         """Shorten steps from `before` to `state`, of a size (n,) [mm], so that bodies stay free; return which are short (n,).
+
+        If steps are guarded, the places that separate bodies where a step would end take slots (see Guard).
 
         If a short step leaves penetration because rotations are curved, the smallest step that removes it follows.
         """
-        is_short = self._hold_back(task, before, state, size)
+        is_short = self._hold_back(task, before, state, size, is_guarded)
         rows = np.flatnonzero(is_short)
         if rows.size:
             part, held = task.take(rows), state.take(rows)
@@ -56,11 +60,13 @@ class FreeSteps:
             part = replace(part, raw=held.poses, relative=held.relative, scans=scans)
             freed = held.take(np.arange(len(rows)))
             size_of_rows, _ = step.take(part, freed, stride=STRIDE)
-            self._hold_back(part, held, freed, size_of_rows)
+            self._hold_back(part, held, freed, size_of_rows, is_guarded)
             state.poses[rows], state.relative[rows] = freed.poses, freed.relative
         return is_short
 
-    def _hold_back(self, task: Task, before: State, state: State, size: Float[Array, " n"]) -> Bool[Array, " n"]:
+    def _hold_back(
+        self, task: Task, before: State, state: State, size: Float[Array, " n"], is_guarded: bool
+    ) -> Bool[Array, " n"]:
         """Halve steps until no body penetrates another one and the objective is lower; return which are short (n,)."""
         shares = np.ones(len(task))
         rows = np.flatnonzero(np.isfinite(before.poses).all(axis=(1, 2)) & np.isfinite(state.poses).all(axis=(1, 2)))
@@ -76,7 +82,8 @@ class FreeSteps:
             fails = depth > TOUCHING + depths[rows] * (1 - share) + SINK_SHARE * share * size[rows]
             interferes = enters[rows] & self._candidates.interfere(state.relative[rows])
             fails |= interferes
-            self._guard(state, rows[interferes])
+            if is_guarded:
+                self._guard(state, rows[interferes])
             fails |= self._energy(part, state.take(rows)) > objective[rows]
             rows, part = rows[fails], part.take(fails)
             if not rows.size:

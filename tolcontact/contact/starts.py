@@ -36,5 +36,5 @@ BALANCE = Start(balances=True)
 GUARDED = (Start(guarded=True, at_answer=True), Start(guarded=True), Start(guarded=True, stride=SMALL_STRIDE))
 PARTED = (Start(parted=True), Start(parted=True, stride=SMALL_STRIDE))
 # Where bodies can separate in several directions, full steps alternate between these, or their rows contradict each other.
-FREE_WHERE_RAW = Start(free=True, guarded=True)
-FREE = (Start(free=True, guarded=True, at_nominal=True), FREE_WHERE_RAW)
+FREE_WHERE_RAW = Start(free=True)
+FREE = (Start(free=True, at_nominal=True), FREE_WHERE_RAW, Start(free=True, guarded=True, at_nominal=True))
