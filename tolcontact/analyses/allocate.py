@@ -286,7 +286,7 @@ class Search:
         rows = np.unique(np.concatenate([r.decisive(corrected[:, r.measure]) for r in self.requirements]))
         rows, groups = rows[trial.is_resolved[rows]], np.flatnonzero(self.is_free)
         changes = self._changes(logs, trial)
-        of_signs = [changes.of_groups(groups, logs + step, rows) for step in (STEP, -STEP)]
+        of_signs = [changes.of_sets(groups, rows, logs + step) for step in (STEP, -STEP)]
         for group, wider, narrower in zip(groups, *of_signs, strict=True):
             wide, narrow = corrected.copy(), corrected.copy()
             wide[wider.rows], narrow[narrower.rows] = wider.corrected, narrower.corrected
