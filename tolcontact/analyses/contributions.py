@@ -143,7 +143,8 @@ def contributions(
     )  # fmt: skip
     program = analysis.program
     deviations = program.draws.without_shared_causes(analysis.sampled_deviations())
-    groups, units = (_varying_groups(program, by, deviations, correlated=correlated) for correlated in (True, False))
+    names, varies = owners(program, by), np.ptp(deviations, axis=0) > 0
+    groups, units = (independent_groups(program.draws, names, varies, correlated=correlated) for correlated in (True, False))
     analysis.check_varies(groups)
     released = ReleasedDraws(program.draws, units) if len(units) > len(groups) else None
     engine = analysis.engine(analysis.samples * _realizations_each(len(groups), released))
@@ -172,12 +173,6 @@ def contributions(
 def _realizations_each(groups: int, released: ReleasedDraws | None) -> int:
     """Return the realizations per base realization for Sobol' indices of groups, and for Shapley effects if any."""
     return 2 + groups + (0 if released is None else released.size)
-
-
-def _varying_groups(program: Program, by: str, deviations: np.ndarray, *, correlated: bool) -> dict[str, np.ndarray]:
-    """Return the columns that vary in own deviations (n, contributor), by independent group."""
-    varies = np.ptp(deviations, axis=0) > 0
-    return independent_groups(program.draws, owners(program, by), varies, correlated=correlated)
 
 
 def _indices(screening: Screening, measured: np.ndarray, accuracies: np.ndarray) -> dict[str, Any]:

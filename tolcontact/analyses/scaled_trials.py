@@ -7,7 +7,7 @@ largest ranges of influential groups many realizations are slow; so blocks of re
 such groups before the next.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -137,8 +137,8 @@ class ChangedRows:
         """The numbers of the realizations (row,) that are resolved before the change."""
         return np.flatnonzero(self.before.is_resolved)
 
-    def of_sets(self, sets: Sequence[Any], rows: np.ndarray, changed_logs: np.ndarray) -> list[Hits]:
-        """Return those of the rows (row,) that change if the logarithms of factors become `changed_logs` (group,).
+    def of_sets(self, sets: Iterable[Any], rows: np.ndarray, changed_logs: np.ndarray) -> list[Hits]:
+        """Return the rows, out of `rows` (row,), that change if the logarithms of factors become `changed_logs` (group,).
 
         sets   for each of the results, the group or the groups (k,) that change at the same time
         """
