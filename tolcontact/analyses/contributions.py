@@ -17,7 +17,7 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis, Engine, Progress
 from tolcontact.analyses.designs import MixedDraws, ReleasedDraws
-from tolcontact.analyses.grouping import check_grouping, independent_groups, owners
+from tolcontact.analyses.grouping import independent_groups, owners
 from tolcontact.analyses.linear_model import total_derivatives
 from tolcontact.compilation import Program
 from tolcontact.simulation import Block
@@ -136,7 +136,6 @@ def contributions(
     `progress` is called with the number of finished realizations and the total.
     Arguments that all analyses share, and their errors, are described in tolcontact.analyses.
     """
-    check_grouping(by)
     analysis = Analysis(
         terms.CONTRIBUTIONS, model, samples=MIN_SAMPLES if samples is None else samples, seed=seed, solver=solver,
         method=method, into=into, client=client, progress=progress,

@@ -42,10 +42,8 @@ def compare_runs(runs: Mapping[str, xr.DataTree]) -> xr.Dataset:
         raise OptionError(
             f"{', '.join(runs)} share no measurement of the same name, units and quantity; there is nothing to compare"
         )
-    draws, changes, furthest = zip(
-        *(_changes(run, reference, (summaries[name], summaries[reference_name]), shared) for name, run in runs.items()),
-        strict=True,
-    )
+    rows = [_changes(run, reference, (summaries[name], summaries[reference_name]), shared) for name, run in runs.items()]
+    draws, changes, furthest = zip(*rows, strict=True)
     selection = {terms.MEASURE: shared, terms.STATISTIC: list(terms.COMPARED_STATISTICS)}
     estimates = [summary[terms.STATISTIC_VALUE.name].sel(selection) for summary in summaries.values()]
     values = {
