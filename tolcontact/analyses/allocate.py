@@ -12,7 +12,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Progress
-from tolcontact.analyses.grouping import check_grouping, owners
+from tolcontact.analyses.grouping import owners
 from tolcontact.analyses.requirement import MIN_DECISIVE, Requirement
 from tolcontact.analyses.scaled_trials import STEP, ChangedRows, ScaledTrials, Trial, effect_samples, narrowing_effects
 from tolcontact.compilation import Program
@@ -64,7 +64,6 @@ def allocate(
     the approximate total. Arguments that all analyses share, and their errors, are described in tolcontact.analyses. Also
     raises OptionError if no range varies.
     """
-    check_grouping(by)
     analysis = Analysis(
         terms.ALLOCATION, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
         progress=progress,
@@ -286,7 +285,7 @@ class Search:
         rows = np.unique(np.concatenate([r.decisive(corrected[:, r.measure]) for r in self.requirements]))
         rows, groups = rows[trial.is_resolved[rows]], np.flatnonzero(self.is_free)
         changes = self._changes(logs, trial)
-        of_signs = [changes.of_groups(groups, logs + step, rows) for step in (STEP, -STEP)]
+        of_signs = [changes.of_sets(groups, rows, logs + step) for step in (STEP, -STEP)]
         for group, wider, narrower in zip(groups, *of_signs, strict=True):
             wide, narrow = corrected.copy(), corrected.copy()
             wide[wider.rows], narrow[narrower.rows] = wider.corrected, narrower.corrected

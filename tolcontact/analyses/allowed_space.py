@@ -8,14 +8,13 @@ tolerances, with the bonus that its size permits. Measured parts are one of thei
 import numpy as np
 import scipy
 
+from tolcontact.analyses.round_zone import TOLERANCE, RoundZone
 from tolcontact.declaration import Tolerance
 from tolcontact.features.freedoms import TAIL, Freedom
 from tolcontact.variation.draws import Draws
-from tolcontact.variation.spreads import ComponentZone
 
 RANDOM_DIRECTIONS = 32  # for the extreme points of a zone, in addition to the directions of its components
 MAX_CUTS = 40  # successive tangents of a round zone
-TOLERANCE = 1e-9  # of a zone's width: points further outside count as outside
 LP_TOLERANCES = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
 COARSE_TOLERANCE, FINE_TOLERANCE = 1e-2, 1e-7  # of a zone's width: distance between tangents and a round zone
 
@@ -38,9 +37,12 @@ class AllowedRegion:
         measured = [column for columns, _ in self._populations for column in columns]
         for columns, values in self._populations:
             self.lower[columns], self.upper[columns] = values.min(axis=0), values.max(axis=0)
-        self.zones = [zone for zone in draws.zones if not np.isin(zone.columns, measured).any()]
-        for zone in self.zones:
-            self._enclose(zone)
+        self.zones = [RoundZone(zone, self._drive) for zone in draws.zones if not np.isin(zone.columns, measured).any()]
+        for zone in self.zones:  # a narrower tolerance may already bound a component
+            columns, extent = zone.components, zone.extent(self._driven_bounds())
+            is_bounded = self.upper[columns] > self.lower[columns]
+            self.lower[columns] = np.where(is_bounded, self.lower[columns], zone.middle - extent)
+            self.upper[columns] = np.where(is_bounded, self.upper[columns], zone.middle + extent)
         for shift in draws.shifts:
             self.lower[shift.columns.start], self.upper[shift.columns.start] = shift.bounds(*self._driven_bounds())
         self._joined = [(np.array(columns), values) for columns, values in self._populations]
@@ -106,9 +108,7 @@ class AllowedRegion:
             room = np.where(step > 0, (self.upper - points) / step, np.where(step < 0, (self.lower - points) / step, np.inf))
         shares = np.minimum(1.0, room.min(axis=1, initial=np.inf))
         for zone in self.zones:
-            start, along = self._lengths(zone, points), np.einsum("pec,nc->npe", zone.rows, step[:, zone.columns])
-            half, half_after = self._half(zone, points), self._half(zone, points + step)
-            shares = np.minimum(shares, _first_crossing(start, along, half, half_after))
+            shares = np.minimum(shares, zone.reach(points, step))
         return np.asarray(np.maximum(shares, 0.0))
 
     def stepped(self, points: np.ndarray, steps: np.ndarray) -> np.ndarray:
@@ -119,59 +119,12 @@ class AllowedRegion:
         starts, flat = np.repeat(points, steps.shape[1], axis=0), steps.reshape(-1, steps.shape[2])
         return np.asarray((starts + self.reach(starts, flat)[:, None] * flat).reshape(steps.shape))
 
-    def enclosed(self, points: np.ndarray) -> np.ndarray:
-        """Return points (n, contributor) moved into the region, separately for each zone, towards the centre of the zone."""
-        points = np.clip(points, self.lower, self.upper)
-        middle = self.middle
-        for columns in self._joint_columns():
-            offsets = np.zeros_like(points)
-            offsets[:, columns] = points[:, columns] - middle[columns]
-            shares = self.reach(np.broadcast_to(middle, points.shape), offsets)
-            is_outside = shares < 1
-            points[np.ix_(is_outside, columns)] = (middle + shares[:, None] * offsets)[np.ix_(is_outside, columns)]
-        return points
-
-    def ridge_end(
-        self, center: np.ndarray, half_widths: np.ndarray, points: np.ndarray, values: np.ndarray, slopes: np.ndarray
-    ) -> np.ndarray:
-        """Return the point (contributor,) near `center` (contributor,) that maximizes the least linear function.
-
-        half_widths  (contributor,): largest distance of the point from the center
-        points, values, slopes  (n, contributor), (n,), (n, contributor): function k is values_k + slopes_k (x - points_k)
-
-        The center is returned if there is no such point, or no value.
-        """
-        rows, columns = np.flatnonzero(np.isfinite(values)), np.flatnonzero(half_widths > 0)
-        if not rows.size or not columns.size:
-            return center
-        scale = half_widths[columns]  # the solver's tolerances are absolute
-        at_center = values[rows] + ((center - points[rows]) * slopes[rows]).sum(axis=1)
-        size = max(float(np.ptp(at_center)), float(np.abs(slopes[rows][:, columns] * scale).sum(axis=1).max()), 1e-300)
-        functions = np.column_stack([-slopes[rows][:, columns] * scale / size, np.ones(len(rows))])
-        planes, limits = self.planes()
-        planes, limits = planes[:, columns] * scale, limits - planes @ center
-        has_part = np.abs(planes).any(axis=1)
-        planes = np.column_stack([planes[has_part], np.zeros(int(has_part.sum()))])
-        lower, upper = ((end[columns] - center[columns]) / scale for end in (self.lower, self.upper))
-        solution = scipy.optimize.linprog(
-            np.append(np.zeros(len(columns)), -1.0),
-            np.vstack([functions, planes]),
-            np.concatenate([(at_center - at_center.min()) / size, np.maximum(limits[has_part], 0.0)]),
-            bounds=[*zip(np.maximum(lower, -1.0).clip(max=0), np.minimum(upper, 1.0).clip(min=0), strict=True), (None, None)],
-        )
-        if solution.x is None:
-            return center
-        step = np.zeros(len(center))
-        step[columns] = scale * solution.x[:-1]
-        return np.asarray(self.enclosed((center + step)[None])[0])
-
     def is_inside(self, points: np.ndarray) -> np.ndarray:
         """Return whether points (n, contributor) lie in the region."""
         slack = TOLERANCE * (self.upper - self.lower)
         inside = ((points >= self.lower - slack) & (points <= self.upper + slack)).all(axis=1)
         for zone in self.zones:
-            lengths = np.linalg.norm(self._lengths(zone, points), axis=2)
-            inside &= (lengths <= self._half(zone, points) + TOLERANCE * zone.width).all(axis=1)
+            inside &= zone.contains(points)
         return np.asarray(inside)
 
     def planes(self, point: np.ndarray | None = None, slack: float = TOLERANCE) -> tuple[np.ndarray, np.ndarray]:
@@ -180,43 +133,9 @@ class AllowedRegion:
         They are tangents where a point (contributor,) leaves a zone by more than `slack` of its width. Without a point they
         enclose all zones.
         """
-        rows, ends = [], []
-        for zone in self.zones:
-            for number, row in enumerate(zone.rows):
-                for normal in _normals(row, None if point is None else row @ (point[zone.columns] - zone.middle)):
-                    plane = np.zeros(len(self.lower))
-                    plane[zone.columns] = normal @ row
-                    end = zone.width / 2 + plane[zone.columns] @ zone.middle
-                    if zone.sizes is not None:
-                        # |row| <= (width + growth (size - limit)) / 2, with the effects of shared causes in the size
-                        plane -= zone.growth / 2 * self._drive[:, zone.sizes[number]]
-                        end -= zone.growth / 2 * zone.limit
-                    if point is None or plane @ point > end + slack * zone.width:
-                        rows.append(plane)
-                        ends.append(end)
+        tangents = [tangent for zone in self.zones for tangent in zone.tangents(point, slack)]
+        rows, ends = [row for row, _ in tangents], [end for _, end in tangents]
         return np.array(rows).reshape(-1, len(self.lower)), np.array(ends)
-
-    def _half(self, zone: ComponentZone, points: np.ndarray) -> np.ndarray:
-        """Return half the width (n, point) of a zone, with its bonus."""
-        if zone.sizes is None:
-            return np.full((len(points), len(zone.rows)), zone.width / 2)
-        return np.asarray((zone.width + zone.growth * (points @ self._drive[:, zone.sizes] - zone.limit)) / 2)
-
-    def _lengths(self, zone: ComponentZone, points: np.ndarray) -> np.ndarray:
-        """Return the rows of a zone (n, point, entry) at points of the region."""
-        return np.asarray(np.einsum("pec,nc->npe", zone.rows, points[:, zone.columns] - zone.middle))
-
-    def _enclose(self, zone: ComponentZone) -> None:
-        """Bound each component by the extent of its zone."""
-        widest = zone.width
-        if zone.sizes is not None:
-            ends = np.array(self._driven_bounds())[:, zone.sizes]
-            widest += float((zone.growth * (ends - zone.limit)).max())
-        # From |rows c| <= half follows |c| <= |inverse| half, entry by entry.
-        extent = np.abs(np.linalg.pinv(zone.rows.reshape(-1, zone.rows.shape[2]))).sum(axis=1) * widest / 2
-        is_bounded = self.upper[zone.columns] > self.lower[zone.columns]  # by a narrower tolerance
-        columns = zone.columns[~is_bounded]
-        self.lower[columns], self.upper[columns] = (zone.middle - extent)[~is_bounded], (zone.middle + extent)[~is_bounded]
 
     def _driven_bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Return bounds (contributor,), (contributor,) of deviations, including the largest effects of shared causes."""
@@ -228,8 +147,6 @@ class AllowedRegion:
         sets: list[set[int]] = []
         for zone in self.zones:
             joined = {int(column) for column in zone.columns}
-            if zone.sizes is not None:
-                joined |= {int(column) for column in np.flatnonzero(self._drive[:, zone.sizes].any(axis=1))}
             overlapping = [columns for columns in sets if columns & joined]
             sets = [columns for columns in sets if columns not in overlapping] + [joined.union(*overlapping)]
         return [np.array(sorted(joined)) for joined in sets]
@@ -274,33 +191,3 @@ def _bounds(contributor: Freedom) -> tuple[float, float]:
     quantiles = tolerance.distribution.ppf([TAIL, 1 - TAIL])
     lower, upper = (float(end if np.isfinite(end) else q) for end, q in zip(ends, quantiles, strict=True))
     return tolerance.shift + lower, tolerance.shift + upper
-
-
-def _normals(row: np.ndarray, position: np.ndarray | None) -> np.ndarray:
-    """Return unit normals (n, entry) of a zone: all around, or only towards a position (entry,)."""
-    entries = len(row)
-    if entries == 1:
-        return np.array([[1.0], [-1.0]])
-    if position is not None:
-        length = np.linalg.norm(position)
-        return position[None] / length if length else np.zeros((0, entries))
-    if entries == 2:
-        angles = np.arange(16) * np.pi / 8
-        return np.column_stack([np.cos(angles), np.sin(angles)])
-    return np.vstack([np.eye(entries), -np.eye(entries)])
-
-
-def _first_crossing(start: np.ndarray, along: np.ndarray, half: np.ndarray, half_after: np.ndarray) -> np.ndarray:
-    """Return the least t (n,), at most 1, at which any |start + t along| (n, point, entry) is half + t (half_after - half).
-
-    half, half_after   (n, point)
-    """
-    grows = half_after - half
-    a = (along**2).sum(axis=2) - grows**2
-    b = (start * along).sum(axis=2) - half * grows
-    c = (start**2).sum(axis=2) - half**2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        root = np.sqrt(np.maximum(b**2 - a * c, 0.0))
-        # The root at which the segment leaves the zone, in the form without cancellation.
-        t = np.where(b < 0, np.where(a > 0, (root - b) / a, np.inf), np.where(b + root > 0, -c / (b + root), np.inf))
-    return np.asarray(np.clip(t.min(axis=1, initial=1.0), 0.0, 1.0))

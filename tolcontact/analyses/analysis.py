@@ -1,9 +1,6 @@
 """The common base of all analyses: checks, the engine that simulates, the returned dataset, and its storage in an archive."""
 
-import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import CancelledError
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +14,7 @@ from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import Block, block_rows, outcomes
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
-from tolcontact.simulation.threads import Sampler, processors
+from tolcontact.simulation.threads import Sampler
 from tolcontact.variation import GivenDraws
 from tolcontact.workflow.forecast import check_affordable
 from tolcontact.workflow.models import Choice, Model, check_counts, program_of
@@ -29,34 +26,6 @@ VERIFICATION_FACTOR = 4  # realizations of a fresh run, in multiples of samples
 Progress = Callable[[int, int], None]  # called with the number of finished steps, and the total
 Observer = Callable[[Block], tuple[Any, ...]]  # returns arrays of a block; the last one is the statuses (n,)
 SPREAD_SAMPLES = 1 << 14  # realizations for the spreads of contributors
-
-
-class SharedProgress:
-    """The common progress of several engines in different threads.
-
-    has_ended   whether engines that are still simulating must stop
-    """
-
-    def __init__(self, progress: Progress | None, total: int) -> None:
-        self._progress, self._total = progress, total
-        self._finished: list[int] = []
-        self._lock = threading.Lock()
-        self.has_ended = False
-
-    def for_engine(self) -> Progress:
-        """Return the progress function of a further engine. It raises CancelledError after the end."""
-        number = len(self._finished)
-        self._finished.append(0)
-
-        def report(finished: int, _: int) -> None:
-            if self.has_ended:
-                raise CancelledError
-            with self._lock:
-                self._finished[number] = finished
-                if self._progress:
-                    self._progress(min(sum(self._finished), self._total), self._total)
-
-        return report
 
 
 class Engine:
@@ -216,24 +185,6 @@ class Analysis(Question):
         """
         self.check_affordable(self.samples if total is None else total)
         return Engine(self.program, self.blocks, progress=None if total is None else self.progress, total=total or 0)
-
-    @contextmanager
-    def engines(self, count: int, total: int) -> Iterator[list[Engine]]:
-        """Open engines for different threads, with common progress; they stop when this context ends.
-
-        Raises OptionError if `total` realizations would take too much time or memory.
-        """
-        self.check_affordable(total)
-        progress = SharedProgress(self.progress, total)
-        try:
-            yield [Engine(self.program, self.blocks, progress=progress.for_engine(), total=total) for _ in range(count)]
-        finally:
-            progress.has_ended = True
-
-    @property
-    def threads(self) -> int:
-        """The number of threads of this process that may simulate at the same time; one if a client's workers simulate."""
-        return processors() if self._client is None else 1
 
     def check_affordable(self, realizations: int) -> None:
         """Raise OptionError if that many realizations would take too much time or memory."""

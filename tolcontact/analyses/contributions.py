@@ -17,7 +17,7 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis, Engine, Progress
 from tolcontact.analyses.designs import MixedDraws, ReleasedDraws
-from tolcontact.analyses.grouping import check_grouping, independent_groups, owners
+from tolcontact.analyses.grouping import independent_groups, owners
 from tolcontact.analyses.linear_model import total_derivatives
 from tolcontact.compilation import Program
 from tolcontact.simulation import Block
@@ -136,14 +136,14 @@ def contributions(
     `progress` is called with the number of finished realizations and the total.
     Arguments that all analyses share, and their errors, are described in tolcontact.analyses.
     """
-    check_grouping(by)
     analysis = Analysis(
         terms.CONTRIBUTIONS, model, samples=MIN_SAMPLES if samples is None else samples, seed=seed, solver=solver,
         method=method, into=into, client=client, progress=progress,
     )  # fmt: skip
     program = analysis.program
     deviations = program.draws.without_shared_causes(analysis.sampled_deviations())
-    groups, units = (_varying_groups(program, by, deviations, correlated=correlated) for correlated in (True, False))
+    names, varies = owners(program, by), np.ptp(deviations, axis=0) > 0
+    groups, units = (independent_groups(program.draws, names, varies, correlated=correlated) for correlated in (True, False))
     analysis.check_varies(groups)
     released = ReleasedDraws(program.draws, units) if len(units) > len(groups) else None
     engine = analysis.engine(analysis.samples * _realizations_each(len(groups), released))
@@ -172,12 +172,6 @@ def contributions(
 def _realizations_each(groups: int, released: ReleasedDraws | None) -> int:
     """Return the realizations per base realization for Sobol' indices of groups, and for Shapley effects if any."""
     return 2 + groups + (0 if released is None else released.size)
-
-
-def _varying_groups(program: Program, by: str, deviations: np.ndarray, *, correlated: bool) -> dict[str, np.ndarray]:
-    """Return the columns that vary in own deviations (n, contributor), by independent group."""
-    varies = np.ptp(deviations, axis=0) > 0
-    return independent_groups(program.draws, owners(program, by), varies, correlated=correlated)
 
 
 def _indices(screening: Screening, measured: np.ndarray, accuracies: np.ndarray) -> dict[str, Any]:

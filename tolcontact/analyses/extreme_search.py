@@ -21,7 +21,6 @@ END_SHARES = 0.5 ** np.arange(9)  # of the way to a far end, for trial points
 WAY_SHARES = np.arange(1, 9) / 8  # of the way to a better end, at which a measure must increase
 SHRINKAGE = 0.25  # of a step
 ROUNDING, STEP_GAIN = 1e-10, 0.01  # of a measure's spread: the least gain is ROUNDING + STEP_GAIN step^2
-NEARBY_POINTS, NEARBY_STEP = 4, 0.1  # points around a search without a gain, and steps there, in shares of its own step
 MAX_STEPS = 200
 MAX_POLISHES, POLISHING_STEP, POLISHED = 3, 0.25, 0.2  # of the best searches; their first step; ratio of finest steps
 POLISHING_SHARE = 0.15  # of the combinations tried so far: polishing ends after as many more
@@ -187,31 +186,29 @@ class Searcher:
 
     def search(
         self, searches: Searches, advanced: Callable[[float], None] = lambda share: None, *, fineness: float = 1.0,
-        limit: float | None = None,
+        limit: float = math.inf,
     ) -> None:  # fmt: skip
         """Move until all steps are small. `advanced` is called with the finished share of the search.
 
         fineness   factor of the finest step
-        limit      number of combinations at which the search ends; with a limit it also moves along kinks
+        limit      number of combinations at which the search ends
         """
         finest_step = self._finest_step * fineness
         for _ in range(MAX_STEPS):
             rows = np.flatnonzero(searches.step > finest_step)
-            if not rows.size or (limit is not None and self._evaluation.count > limit):
+            if not rows.size or self._evaluation.count > limit:
                 break
             active = searches.take(rows)
             candidates, values, slopes = self._neighbours(active, active.step, self._random_steps())
             gains = active.move(candidates, values, self._min_gain(active))
             gains |= self._move_towards(active, self._region.farthest(slopes))
-            if limit is not None:
-                gains |= self._move_along_ridges(active, gains)
             active.step[~gains] *= SHRINKAGE
             searches.put(rows, active)
             steps = np.log(np.maximum(searches.step, finest_step)[searches.state == terms.CORRECTED])
             advanced(float(steps.mean() / math.log(finest_step)))
 
     def polish(self, searches: Searches) -> None:
-        """Continue the searches with contact, including along kinks, until they gain no more, or have cost too much."""
+        """Continue the searches with contact until they gain no more, or have cost too much."""
         limit = (1 + POLISHING_SHARE) * self._evaluation.count
         for _ in range(MAX_POLISHES):
             values = searches.value.copy()
@@ -263,74 +260,19 @@ class Searcher:
         """Return the points a step (n,) away, limited to the region, their values, and the slopes between them.
 
         Points (n, candidate, contributor) lie along each contributor, and along `directions` (direction, contributor), in both
-        senses. Slopes (n, contributor) come from the differences along contributors.
+        senses. Slopes (n, contributor) come from the differences along contributors; they are 0 where undefined.
         """
         steps = step[:, None, None] * np.vstack([self._compass, -self._compass, directions, -directions])
-        steps *= self._searched(searches)[:, None]
+        steps *= (self._is_active[searches.measure] | (searches.state == terms.RAW)[:, None])[:, None]
         candidates = self._region.stepped(searches.point, steps)
         values = searches.values_at(candidates, self._evaluation)
         up, down = slice(0, len(self._compass)), slice(len(self._compass), 2 * len(self._compass))
-        return candidates, values, self._slopes(candidates[:, up] - candidates[:, down], values[:, up], values[:, down])
-
-    def _slopes(self, ways: np.ndarray, ends: np.ndarray, starts: np.ndarray) -> np.ndarray:
-        """Return slopes (n, contributor) from values at the ends of ways, one along each moving contributor; 0 if undefined.
-
-        ways           (n, move, contributor)
-        ends, starts   (n, move) values
-        """
-        distances = ways[:, :, self._region.moves].diagonal(axis1=1, axis2=2)
+        distances = (candidates[:, up] - candidates[:, down])[:, :, self._region.moves].diagonal(axis1=1, axis2=2)
         with np.errstate(invalid="ignore", divide="ignore"):
-            rise = np.where(distances != 0, (ends - starts) / distances, 0.0)
-        slopes = np.zeros((len(ways), ways.shape[2]))
+            rise = np.where(distances != 0, (values[:, up] - values[:, down]) / distances, 0.0)
+        slopes = np.zeros_like(searches.point)
         slopes[:, self._region.moves] = np.where(np.isfinite(rise), rise, 0.0)
-        return slopes
-
-    def _searched(self, searches: Searches) -> np.ndarray:
-        """Return whether each search uses each contributor, (n, contributor)."""
-        return np.asarray(self._is_active[searches.measure] | (searches.state == terms.RAW)[:, None])
-
-    def _move_along_ridges(self, searches: Searches, gains: np.ndarray) -> np.ndarray:
-        """Move the searches with contact that did not gain along possible kinks. Return whether each moved, (n,).
-
-        At a kink, a measure is the minimum of several linear functions, and may not increase along any single contributor.
-        These functions come from slopes at a few nearby points; a linear program maximizes their minimum within a step (compare
-        gradient sampling; Burke, Lewis, Overton, 2005).
-        """
-        rows = np.flatnonzero(~gains & (searches.state == terms.CORRECTED))
-        moves = np.zeros(len(gains), dtype=bool)
-        if rows.size:
-            stalled = searches.take(rows)
-            nearby = self._scattered_about(stalled)
-            slopes = self._one_sided_slopes(nearby)
-            shape = len(rows), NEARBY_POINTS
-            ends = [
-                self._region.ridge_end(search_point, step * self._ranges * is_searched, *model)
-                for search_point, step, is_searched, *model in zip(
-                    stalled.point, stalled.step, self._searched(stalled),
-                    nearby.point.reshape(*shape, -1), nearby.value.reshape(shape), slopes.reshape(*shape, -1), strict=True,
-                )
-            ]  # fmt: skip
-            moves[rows] = self._move_towards(stalled, np.array(ends))
-            searches.put(rows, stalled)
-        return moves
-
-    def _scattered_about(self, searches: Searches) -> Searches:
-        """Return searches at points within a step of each search: its own point, and random ones."""
-        points = searches.take(np.repeat(np.arange(len(searches.value)), NEARBY_POINTS))
-        shares = self._rng.uniform(-1, 1, points.point.shape) * self._searched(points)
-        shares[::NEARBY_POINTS] = 0.0
-        offsets = shares * points.step[:, None] * self._ranges
-        points.point = self._region.stepped(points.point, offsets[:, None])[:, 0]
-        points.value = points.values_at(points.point[:, None], self._evaluation)[:, 0]
-        return points
-
-    def _one_sided_slopes(self, searches: Searches) -> np.ndarray:
-        """Return slopes (n, contributor) by short steps towards the centre of the region; 0 for unused contributors."""
-        towards = np.where(searches.point > self._region.middle, -1.0, 1.0) * self._ranges * self._searched(searches)
-        steps = (NEARBY_STEP * searches.step[:, None] * towards)[:, None] * np.eye(len(self._ranges))[self._region.moves]
-        candidates = self._region.stepped(searches.point, steps)
-        values = searches.values_at(candidates, self._evaluation)
-        return self._slopes(candidates - searches.point[:, None], values, searches.value[:, None])
+        return candidates, values, slopes
 
     def _move_towards(self, searches: Searches, ends: np.ndarray) -> np.ndarray:
         """Move a share of the way to far ends (n, contributor), if the gain suffices. Return whether each search moved, (n,).

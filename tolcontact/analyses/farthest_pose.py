@@ -102,19 +102,10 @@ class _Problem:
         if not 0 < len(A) <= MAX_BINARY or model.round_pairs or np.linalg.cond(hessian) >= MAX_CONDITION:
             return None
         # A motion d that opens all gaps by 1, with the least sum of |d|: nearly the least energy suffices.
-        freedoms, eye = A.shape[1], np.eye(A.shape[1])
-        lift = scipy.optimize.milp(
-            np.r_[np.zeros(freedoms), np.ones(freedoms)],
-            constraints=[
-                scipy.optimize.LinearConstraint(np.hstack([A, np.zeros_like(A)]), 1.0, np.inf),
-                scipy.optimize.LinearConstraint(np.hstack([eye, eye]), 0.0, np.inf),
-                scipy.optimize.LinearConstraint(np.hstack([-eye, eye]), 0.0, np.inf),
-            ],
-            bounds=scipy.optimize.Bounds(-np.inf, np.inf),
-        )
+        lift = scipy.optimize.linprog(np.ones(2 * A.shape[1]), -np.hstack([A, -A]), -np.ones(len(A)))
         if not lift.success:
             return None
-        d = lift.x[:freedoms]
+        d = np.subtract(*np.split(lift.x, 2))
         energy = float(np.sqrt(d @ hessian @ d))
         slopes = region.slopes(model.gaps_by_deviations)
         centre, reach = (region.lower + region.upper) / 2, np.abs(slopes) @ ((region.upper - region.lower) / 2)

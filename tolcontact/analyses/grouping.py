@@ -12,14 +12,13 @@ from tolcontact.variation.draws import Draws
 from tolcontact.vocabulary import GROUPED_BY
 
 
-def check_grouping(by: str) -> None:
-    """Raise OptionError for a grouping that does not exist."""
+def owners(program: Program, by: str) -> list[str]:
+    """Return the owner of each column of deviations: its contributor, feature or part; the modes of a form have one owner.
+
+    Raises OptionError for a grouping that does not exist.
+    """
     if by not in GROUPED_BY:
         raise OptionError(f"by is {by!r}; expected one of: {', '.join(GROUPED_BY)}")
-
-
-def owners(program: Program, by: str) -> list[str]:
-    """Return the owner of each column of deviations: its contributor, feature or part; the modes of a form have one owner."""
     nominal, labels = program.nominal, list(program.nominal.contributors)
     if by == "contributor":
         contributors = zip(labels, program.draws.contributors, strict=True)

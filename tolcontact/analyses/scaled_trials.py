@@ -1,8 +1,5 @@
 """Simulations with scaled tolerance ranges, and realizations where required measures change, by group of tolerances.
 
-Most groups affect few realizations. The ranges of these groups are changed all at once; only where a realization changes, the
-set of groups is bisected. So most groups cost almost nothing.
-
 A group without effect near its present range may still be decisive once it is wider, or once others are narrower. So it counts
 as idle only if no resolved realization of a run changes at its smallest and at its largest range. All groups that may be idle
 are scaled at the same time: while nothing changes, all of them are idle, and the run costs as much as for one group. At the
@@ -10,10 +7,10 @@ largest ranges of influential groups many realizations are slow; so blocks of re
 such groups before the next.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,7 +24,6 @@ STEP = 0.1  # of ranges, for differences
 FIRST_TRIALS = 64  # realizations that show whether most are unresolved
 MAX_ROWS = 1 << 16  # realizations per simulation, over several factors
 NEGLIGIBLE = 1e-6  # of a measure's spread: smaller changes count as 0
-FIRST_ROWS = 32  # realizations for finding the groups that affect many
 FIRST_BLOCK = 64  # realizations; each further block has as many as all previous ones
 MAX_HITS = 8  # changed realizations that are used to identify the groups
 BATCHES = 32  # of realizations, for the intervals of effects
@@ -83,24 +79,16 @@ class ScaledTrials:
             start = stop
         return Trial(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
-    def corrected_rows(self, factors: Sequence[np.ndarray], rows: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Return corrected measures (row, measure) of selected realizations, for each of several factors (group,).
-
-        rows  numbers (row,) of the realizations for each of the factors
-        """
-        corrected: list[np.ndarray] = []
-        while len(corrected) < len(rows):
-            start, counts = len(corrected), np.cumsum([len(numbers) for numbers in rows[len(corrected) :]])
-            stop = start + max(int(np.searchsorted(counts, MAX_ROWS, side="right")), 1)
-            deviations = [self._deviations(*trial) for trial in zip(factors[start:stop], rows[start:stop], strict=True)]
-            corrected += np.split(self._corrected(np.concatenate(deviations)), counts[: stop - start - 1])
+    def corrected_rows(self, factors: Sequence[np.ndarray], rows: np.ndarray) -> list[np.ndarray]:
+        """Return corrected measures (row, measure) of the realizations with numbers `rows`, for several factors (group,)."""
+        if not len(rows):
+            return [np.empty((0, len(self.engine.program.nominal.measures)))] * len(factors)
+        corrected, at_once = [], max(MAX_ROWS // len(rows), 1)
+        for start in range(0, len(factors), at_once):
+            deviations = [self._deviations(trial, rows) for trial in factors[start : start + at_once]]
+            measured, _ = self.engine.simulate_deviations(np.concatenate(deviations))
+            corrected += np.split(measured[:, terms.CORRECTED], len(deviations))
         return corrected
-
-    def _corrected(self, deviations: np.ndarray) -> np.ndarray:
-        """Return corrected measures (n, measure) of deviations (n, contributor); n may be 0."""
-        if not len(deviations):
-            return np.empty((0, len(self.engine.program.nominal.measures)))
-        return self.engine.simulate_deviations(deviations)[0][:, terms.CORRECTED]
 
     def _deviations(self, factors: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Return the deviations (row, contributor) of the realizations with numbers `rows` (row,)."""
@@ -149,52 +137,20 @@ class ChangedRows:
         """The numbers of the realizations (row,) that are resolved before the change."""
         return np.flatnonzero(self.before.is_resolved)
 
-    def of_sets(self, sets: Sequence[tuple[np.ndarray, np.ndarray]], changed_logs: np.ndarray) -> list[Hits]:
-        """Return the rows that each set of groups changes if the logarithms of its factors become `changed_logs` (group,).
+    def of_sets(self, sets: Iterable[Any], rows: np.ndarray, changed_logs: np.ndarray) -> list[Hits]:
+        """Return the rows, out of `rows` (row,), that change if the logarithms of factors become `changed_logs` (group,).
 
-        sets  groups (k,) that change at the same time, and the rows (row,) to check
+        sets   for each of the results, the group or the groups (k,) that change at the same time
         """
-        factors = [np.exp(np.where(np.isin(np.arange(len(self.logs)), groups), changed_logs, self.logs)) for groups, _ in sets]
-        rows_of_sets = [rows for _, rows in sets]
+        factors = [np.exp(np.where(np.isin(np.arange(len(self.logs)), groups), changed_logs, self.logs)) for groups in sets]
         resolved = self.before.corrected[self.resolved_rows][:, self.measures]
         spreads = resolved.std(axis=0) if len(resolved) else np.zeros(len(self.measures))
         hits = []
-        for rows, corrected in zip(rows_of_sets, self.trials.corrected_rows(factors, rows_of_sets), strict=True):
+        for corrected in self.trials.corrected_rows(factors, rows):
             changes = np.abs(corrected - self.before.corrected[rows])[:, self.measures]
             is_hit = ~(changes <= NEGLIGIBLE * spreads).all(axis=1)
             hits.append(Hits(rows[is_hit], corrected[is_hit]))
         return hits
-
-    def of_groups(self, groups: np.ndarray, changed_logs: np.ndarray, rows: np.ndarray) -> list[Hits]:
-        """Return the rows that each of the groups (k,) changes on its own.
-
-        Groups that change none of the first rows share the search in the remaining ones.
-        """
-        leading, remaining = np.split(rows, [FIRST_ROWS])
-        first_hits = self.of_sets([(np.array([group]), leading) for group in groups], changed_logs)
-        if not len(remaining):
-            return first_hits
-        is_frequent = np.array([len(hits.rows) > 0 for hits in first_hits], dtype=bool)
-        further = dict(self.shared(groups[~is_frequent], changed_logs, remaining))
-        frequent = self.of_sets([(np.array([group]), remaining) for group in groups[is_frequent]], changed_logs)
-        further |= zip(groups[is_frequent].tolist(), frequent, strict=True)
-        return [
-            Hits(*map(np.concatenate, zip(hits, further[group], strict=True))) if group in further else hits
-            for group, hits in zip(groups.tolist(), first_hits, strict=True)
-        ]
-
-    def shared(self, groups: np.ndarray, changed_logs: np.ndarray, rows: np.ndarray) -> list[tuple[int, Hits]]:
-        """Return the groups that change any of the rows on their own, with these rows, by bisection of the groups."""
-        sets, hits_of_groups = [(groups, rows)] if len(groups) else [], []
-        while sets:
-            halves = []
-            for (members, _), hits in zip(sets, self.of_sets(sets, changed_logs), strict=True):
-                if len(hits.rows) and len(members) == 1:
-                    hits_of_groups.append((int(members[0]), hits))
-                elif len(hits.rows):
-                    halves += [(half, hits.rows) for half in np.array_split(members, 2)]
-            sets = halves
-        return hits_of_groups
 
     def idle(self, candidates: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
         """Return the candidates (group,) bool that jointly change no realization, with their ranges times either of `ends`.
@@ -204,11 +160,8 @@ class ChangedRows:
         """
         idle = candidates.copy()
         for end in reversed(ends):
-            logs, groups = np.full(len(candidates), np.log(end)), np.flatnonzero(idle)
-            hits = self.of_groups(groups, logs, self.resolved_rows[:FIRST_BLOCK])
-            idle[[group for group, hit in zip(groups, hits, strict=True) if len(hit.rows)]] = False
-            while self._release(idle, logs):  # only a last run over all blocks shows that the remaining groups change nothing
-                pass
+            while self._release(idle, np.full(len(candidates), np.log(end))):
+                pass  # only a last run over all blocks shows that the remaining groups change nothing
         return idle
 
     def _release(self, idle: np.ndarray, logs: np.ndarray) -> bool:
@@ -217,11 +170,11 @@ class ChangedRows:
         while start < count and idle.any():
             stop = min(max(2 * start, FIRST_BLOCK), count)
             rows = self.resolved_rows[start:stop]
-            while idle.any() and len(rows := self.of_sets([(np.flatnonzero(idle), rows)], logs)[0].rows):
+            while idle.any() and len(rows := self.of_sets([np.flatnonzero(idle)], rows, logs)[0].rows):
                 groups = np.flatnonzero(idle)
-                influential = [group for group, _ in self.shared(groups, logs, rows[:MAX_HITS])]
+                is_hit = [len(hits.rows) > 0 for hits in self.of_sets(groups, rows[:MAX_HITS], logs)]
                 # Groups that change realizations only jointly are all influential.
-                idle[influential or groups] = False
+                idle[groups[is_hit] if any(is_hit) else groups] = False
             start = stop
         return bool(idle.sum() < before)
 
@@ -235,20 +188,17 @@ def effect_samples(samples: int, groups: int) -> int:
 def narrowing_effects(trials: ScaledTrials) -> np.ndarray:
     """Return changes (measure, of_effect, group, interval) if a group's zones were a tenth narrower.
 
-    Intervals come from means over batches of the same draws. A group that changes none of the first batches has no effect.
+    Intervals come from means over batches of the same draws. A group that changes none of the first realizations has no effect.
     """
     program = trials.engine.program
     limits = [program.limits(number) for number in range(len(program.nominal.measures))]
-    ones = np.ones(len(trials))
+    factors = 1 - STEP * np.eye(1 + len(trials), len(trials), -1)
     rows = np.arange(effect_samples(trials.samples, len(trials)))
-    factors, leading = list(ones - STEP * np.eye(len(trials))), rows[:MIN_DECISIVE]
-    present, *firsts = trials.corrected_rows([ones, *factors], [rows, *[leading] * len(trials)])
-    negligible = NEGLIGIBLE * present.std(axis=0)
-    groups = [k for k, x in enumerate(firsts) if (np.abs(x - present[: len(leading)]).max(axis=0) > negligible).any()]
-    remaining = trials.corrected_rows([factors[k] for k in groups], [rows[len(leading) :]] * len(groups))
+    present, *narrowed_groups = trials.corrected_rows(list(factors), rows)
     effects = np.zeros((len(limits), len(terms.EFFECTS), len(trials), len(terms.ESTIMATE)))
-    for group, values in zip(groups, remaining, strict=True):
-        narrowed = np.concatenate([firsts[group], values])
+    for group, narrowed in enumerate(narrowed_groups):
+        if (np.abs(narrowed - present)[:MIN_DECISIVE].max(axis=0) <= NEGLIGIBLE * present.std(axis=0)).all():
+            continue
         for measure, limits_of_measure in enumerate(limits):
             batches = [np.array_split(values[:, measure], BATCHES) for values in (narrowed, present)]
             spreads = [np.array([6 * x.std(ddof=1) for x in values]) for values in batches]

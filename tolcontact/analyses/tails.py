@@ -1,10 +1,9 @@
 """Probabilities of rare events: a measure outside its limits, or parts that cannot be assembled."""
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -62,22 +61,19 @@ def tails(
     events = _events(program)
     if samples is None:
         samples = int(np.clip(BUDGET // len(events), *DEFAULT_RANGE))
-    searches = [
-        _Search(make_score, samples // len(sides), number, side)
-        for number, sides in enumerate(events.values())
-        for side, make_score in enumerate(sides)  # each has its own region, and could hide the region of the other
-    ]
-    with analysis.engines(len(searches), len(events) * samples) as engines:
-        results = _run_searches(analysis, searches, engines)
+    engine, dimensions = analysis.engine(len(events) * samples), len(program.draws.varying)
     event_tails, statuses, stops = [], [], []
-    for number in range(len(events)):
-        sides = [k for k, search in enumerate(searches) if search.number == number]
-        scores, side_tails = zip(*(results[k] for k in sides), strict=True)
+    for number, sides in enumerate(events.values()):
+        before, scores, side_tails = engine.statuses.copy(), [make_score(engine) for make_score in sides], []
+        for side, score in enumerate(scores):  # each has its own region, and could hide the region of the other
+            rng = np.random.default_rng([analysis.seed, number, side])
+            side_samples = samples // len(sides)
+            side_tails.append(sufficient_tail(score, dimensions, samples=side_samples, rng=rng, leads=score.leads))
         # If the other limit can be exceeded, a limit that acts as a stop would only add its detection bound, so it is left out.
         exceedable = [tail for score, tail in zip(scores, side_tails, strict=True) if not score.is_stop] or side_tails
         event_tails.append(UNDEFINED_TAIL if any(score.is_undefined for score in scores) else either(exceedable))
         stops.append(any(score.is_stop for score in scores))
-        statuses.append(np.sum([engines[k].statuses for k in sides], axis=0))
+        statuses.append(engine.statuses - before)
     values = {
         "probability": [tail.probability for tail in event_tails],
         "disagreement": [tail.disagreement for tail in event_tails],
@@ -99,32 +95,6 @@ def simulated_scores(engine: Engine, u: np.ndarray) -> tuple[np.ndarray, np.ndar
         return np.full(len(u), 0.5)
 
     return engine.simulate_deviations(draws.from_numbers(numbers, len(u)))
-
-
-class _Search(NamedTuple):
-    """The search for one side of the event with index `number`, with about `samples` realizations."""
-
-    make_score: "Callable[[Engine], _Beyond | NotAssemblable]"
-    samples: int
-    number: int
-    side: int
-
-    def run(self, engine: Engine, seed: int) -> "tuple[_Beyond | NotAssemblable, Tail]":
-        """Return the score of the search, with what it has seen, and its result."""
-        score, rng = self.make_score(engine), np.random.default_rng([seed, self.number, self.side])
-        dimensions = len(engine.program.draws.varying)
-        return score, sufficient_tail(score, dimensions, samples=self.samples, rng=rng, leads=score.leads)
-
-
-def _run_searches(analysis: Analysis, searches: Sequence[_Search], engines: Sequence[Engine]) -> list[Any]:
-    """Return the results of all searches. They are independent, and run concurrently in threads of this process."""
-    longest_first = sorted(range(len(searches)), key=lambda k: -searches[k].samples)
-    pool = ThreadPoolExecutor(analysis.threads)
-    try:
-        running = {k: pool.submit(searches[k].run, engines[k], analysis.seed) for k in longest_first}
-        return [running[k].result() for k in range(len(searches))]
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)  # normally none is left; a stopped analysis does not wait
 
 
 def _events(program: Program) -> "dict[str, list[Callable[[Engine], Any]]]":

@@ -1,5 +1,6 @@
 """The least and the largest possible value of each measure, with the combination of deviations that causes it."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -154,13 +155,12 @@ def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
     influences.explore(starts[rng.choice(len(starts), EXCHANGES)], region.scattered(rng, EXCHANGES))
     searches = Searches.begin(starts, measured, effort, rng)
     searcher = Searcher(region, evaluation, spread, influences.is_active, rng, effort.finest_step)
-    best = _searched(
-        searcher, searches, influences, effort, Forecast(engine, influences, effort), region.scattered(rng, EXCHANGES)
-    )
+    advanced = _forecast(engine, influences.is_active.sum(axis=1), effort)
+    best = _searched(searcher, searches, influences, effort, advanced, region.scattered(rng, EXCHANGES))
     _check_defined(program, evaluation.is_undefined)
     values = searches.value.reshape(-1, effort.searches)
     tolerances = END_TOLERANCE * spread[best.measure]
-    ends = np.array([_count_ends(row[effort.best :], tolerance) for row, tolerance in zip(values, tolerances, strict=True)])
+    ends = 1 + (np.diff(np.sort(values[:, effort.best :], axis=1), axis=1) > tolerances[:, None]).sum(axis=1)
     corrected = best.take(np.flatnonzero(best.state == terms.CORRECTED))
     shape = (len(program.nominal.measures), len(terms.STATES), len(terms.ENDS))
     arrays = {
@@ -190,15 +190,16 @@ def _check_defined(program: Program, is_undefined: np.ndarray) -> None:
 
 
 def _searched(
-    searcher: Searcher, searches: Searches, influences: Influences, effort: Effort, forecast: "Forecast", partners: np.ndarray
-) -> Searches:
+    searcher: Searcher, searches: Searches, influences: Influences, effort: Effort, advanced: Callable[[float], None],
+    partners: np.ndarray,
+) -> Searches:  # fmt: skip
     """Search, and return the best search for each extreme value.
 
     If an exchange with partners (n, contributor) at an end shows an influence of further contributors, the searches of that
     measure also continue along these.
     """
     for _ in range(MAX_RESTARTS):
-        searcher.search(searches, forecast.advanced)
+        searcher.search(searches, advanced)
         searcher.meet(searches, effort.searches)
         best = searches.best_of(effort.searches)
         points = np.repeat(best.point[best.state == terms.CORRECTED], len(partners), axis=0)
@@ -216,21 +217,20 @@ def _expected(active: np.ndarray, effort: Effort) -> int:
     return round(len(terms.ENDS) * effort.searches * effort.levels * (PER_LEVEL + PER_CONTRIBUTOR * active).sum())
 
 
-class Forecast:
-    """The forecast number of combinations of the searches, reported by the engine."""
+def _forecast(engine: Engine, active: np.ndarray, effort: Effort) -> Callable[[float], None]:
+    """Return a function that revises the engine's total when a share of the searches is finished.
 
-    def __init__(self, engine: Engine, influences: Influences, effort: Effort) -> None:
-        self._engine, self._before = engine, engine.simulated
-        active = influences.is_active.sum(axis=1)
-        self._expected = _expected(active, effort)
-        self._polishing = round(len(terms.ENDS) * (PER_POLISH + PER_POLISHED_CONTRIBUTOR * active).sum())
-        self.advanced(0.0)
+    active   (measure,) number of contributors along which each measure is searched
+    """
+    before, of_searches = engine.simulated, _expected(active, effort)
+    of_polishing = round(len(terms.ENDS) * (PER_POLISH + PER_POLISHED_CONTRIBUTOR * active).sum())
 
-    def advanced(self, share: float) -> None:
-        """Revise the total when a share of the searches is finished."""
-        searched = self._engine.simulated - self._before
-        expected = (1 - share) * self._expected + searched
-        self._engine.total = self._engine.simulated + round((1 - share) * expected) + self._polishing
+    def advanced(share: float) -> None:
+        expected = (1 - share) * of_searches + engine.simulated - before
+        engine.total = engine.simulated + round((1 - share) * expected) + of_polishing
+
+    advanced(0.0)
+    return advanced
 
 
 def _starts(
@@ -272,8 +272,3 @@ def _as_realizations(program: Program, deviations: np.ndarray) -> dict[str, np.n
         terms.TRANSLATION.name: poses.translation(last_poses),
         terms.GAP_MIN.name: block.gap_min, terms.KKT_RESIDUAL.name: block.kkt_residual, terms.STATUS.name: block.status,
     }  # fmt: skip
-
-
-def _count_ends(values: np.ndarray, tolerance: float) -> int:
-    """Return the number of values (n,) that exceed the next smaller one by more than a tolerance."""
-    return 1 + int((np.diff(np.sort(values)) > tolerance).sum())

@@ -145,11 +145,8 @@ def _chosen_faces(nominal: Nominal, pair: tuple[int, int]) -> list[tuple[np.ndar
 def _extent(draws: TrialDraws, measured: MeasuredClash, row: int) -> str:
     """Return in how many draws bodies interfere, how deep, and where."""
     place = ", ".join(f"{c + 0.0:.4g}" for c in measured.places[row].position.round(6))
-    return f"{_percent(measured.share)} of {len(draws.deviations)} draws, up to {measured.depths[row]:.2g} mm, near ({place})"
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %" if share < 1 else "all"
+    share = f"{100 * measured.share:.2g} %" if measured.share < 1 else "all"
+    return f"{share} of {len(draws.deviations)} draws, up to {measured.depths[row]:.2g} mm, near ({place})"
 
 
 def body_overlaps(draws: TrialDraws) -> Iterator[str]:

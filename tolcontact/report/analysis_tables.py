@@ -235,8 +235,7 @@ def _tails(dataset: xr.Dataset) -> AnalysisReport:
 def _allocation(dataset: xr.Dataset) -> AnalysisReport:
     requirements = []
     for name, values in zip(dataset["requirement"].values, dataset["kept"].values, strict=True):
-        text = share if f": {terms.PPM}" in str(name) else number
-        requirements.append([str(name), *map(text, values)])
+        requirements.append([str(name), *map(share if f": {terms.PPM}" in str(name) else number, values)])
     ranges = []
     for group in dataset["group"].values:
         row = dataset.sel(group=group)
@@ -252,18 +251,14 @@ def _allocation(dataset: xr.Dataset) -> AnalysisReport:
     least, most = (f"{dataset.attrs[name]:g} times" for name in ("floor", "ceiling"))
     notes.append(f"Tolerances may be {least} (smallest allowed) to {most} (largest allowed) those before.\n")
     if dataset["idle"].values.any():
-        count, ends = (
-            dataset.attrs["idle_tried"],
-            " or ".join(f"{dataset.attrs[name]:g} times" for name in ("floor", "ceiling")),
-        )
+        count = dataset.attrs["idle_tried"]
         notes.append(
-            f"No influence: with all of these tolerances together at {ends} those before, none of {grouped(count)} "
+            f"No influence: with all of these tolerances together at {least} or {most} those before, none of {grouped(count)} "
             f"resolved realizations changed. So at most {3 / count:.2g} of them do, with 95 % confidence.\n"
         )
-    met = dataset["met"].values
-    for name, values in zip(dataset["requirement"].values[met == 0], dataset["kept"].values[met == 0], strict=True):
-        text = share if f": {terms.PPM}" in str(name) else number
-        notes.append(f'"{name}" is not met by any tolerances allowed; the best found: {text(values[1])}.\n')
+    for (name, _, after), is_met in zip(requirements, dataset["met"].values, strict=True):
+        if not is_met:
+            notes.append(f'"{name}" is not met by any tolerances allowed; the best found: {after}.\n')
     return AnalysisReport("Allocation", f"{grouped(dataset.attrs['samples'])} realizations", notes, tables)
 
 

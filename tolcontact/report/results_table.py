@@ -66,11 +66,6 @@ def share_in(values: np.ndarray, units: str) -> str:
     return number(100 * np.asarray(values), max_decimals=2)
 
 
-def with_units(values: np.ndarray, units: str) -> str:
-    """Return a share (estimate, lower, upper) in "%" or "ppm", with its interval and its units."""
-    return share_in(values, units).replace(" [", f" {units} [")
-
-
 def share_heading(summary: xr.Dataset) -> str:
     """Return the heading above the last two columns of the table, `SIDES`."""
     return f"{terms.OUT_OF_SPECIFICATION}, {share_units(summary)}"
@@ -151,5 +146,7 @@ def overview_table(summary: xr.Dataset) -> Table:
         values = measure["statistic_value"].sel(statistic=[terms.MEAN, terms.SIX_SIGMA, terms.PPK, terms.OUTSIDE])
         for word, state in zip(terms.STATE_WORDS, terms.STATES, strict=True):
             mean, spread, ppk, outside = values.sel(state=state).values
-            rows.append([f"  {word}", number(mean), number(spread), number(ppk), with_units(outside, units)])
+            rows.append(
+                [f"  {word}", number(mean), number(spread), number(ppk), share_in(outside, units).replace(" [", f" {units} [")]
+            )
     return Table("", ["", "mean", "6 sigma", terms.PPK, terms.OUT_OF_SPECIFICATION_COLUMN], rows)

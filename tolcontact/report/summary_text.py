@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
 import xarray as xr
 from rich.console import Group
 from rich.padding import Padding
@@ -99,8 +98,8 @@ def _measure_rows(measure: xr.Dataset) -> list[list[str]]:
         label, figures = SHORT_LABELS.get(statistic, statistic), [number(value) for value in values]
         if statistic in PERCENTILE_COUNTERPART:
             counterpart = estimates[PERCENTILE_COUNTERPART[statistic]]
-            for k in range(len(values)):
-                if _are_disjoint(values[k], counterpart[k]):
+            for k, ((_, lower, upper), (_, other_lower, other_upper)) in enumerate(zip(values, counterpart, strict=True)):
+                if lower > other_upper or other_lower > upper:
                     figures[k] = f"* {figures[k]}"
         change = ""
         if statistic in CHANGE_OF_STATISTIC:
@@ -110,25 +109,16 @@ def _measure_rows(measure: xr.Dataset) -> list[list[str]]:
     return rows
 
 
-def _are_disjoint(a: np.ndarray, b: np.ndarray) -> bool:
-    """Return True if the intervals of two estimates do not overlap."""
-    return bool(a[1] > b[2] or b[1] > a[2])
-
-
 def _field_table(summary: xr.Dataset) -> Table:
     """Return the table of the displacement fields of the parts that move."""
     rows = []
-    for part in summary["part"].values[_is_moving(summary)]:
+    is_moving = (summary["field_extreme"].values != 0).any(axis=(1, 2, 3))
+    for part in summary["part"].values[is_moving]:
         for state in (RAW, CORRECTED):
             field = summary["field_extreme"].sel(part=part, state=state)
             extremes = [number(field.sel(extreme=extreme).values) for extreme in ("least", "largest")]
             rows.append([str(part), terms.WORD_OF_STATE[state], *extremes])
     return Table("", ["part", "", "smallest", "largest"], rows)
-
-
-def _is_moving(summary: xr.Dataset) -> np.ndarray:
-    """Return a mask (part,) of the parts with a displacement other than 0 in any state."""
-    return np.asarray((summary["field_extreme"].values != 0).any(axis=(1, 2, 3)))
 
 
 def pair_table(summary: xr.Dataset) -> Table:

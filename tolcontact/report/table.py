@@ -1,8 +1,7 @@
 """A table: the same for the terminal, where it fits into the width, for the page and for the spreadsheet."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import zip_longest
 from typing import Any
 
 import rich.table
@@ -16,7 +15,7 @@ from tolcontact.report.figures import plain
 Cell = str | float | None  # None is an empty cell
 NAME_WIDTH = 12  # longer names and labels may be wrapped
 FILE_WIDTH = 80  # of tables in files and pipes
-BETWEEN = "  "  # separator of columns
+BETWEEN = 2  # characters between columns
 
 
 @dataclass(frozen=True)
@@ -50,50 +49,29 @@ class Table:
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         if self.title:
             yield Text(f"\n{self.title}", style="bold")
-        yield from self._figures(options.max_width if console.is_terminal else FILE_WIDTH)
+        yield self._figures(options.max_width if console.is_terminal else FILE_WIDTH)
         yield from map(Text, self.remarks)
 
-    def _figures(self, width: int) -> RenderResult:
-        texts = self.texts
-        rows = [[cell.split("\n") for cell in row] for row in texts]
-        if self._full_width(rows) > width:
-            rows = [[cell.replace(" [", "\n[").split("\n") for cell in row] for row in texts]
-        if self._full_width(rows) <= width:
-            yield from self._lines(rows)
-            return
-        table = rich.table.Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
-        for k, (heading, least) in enumerate(zip(zip(*self._headings(), strict=True), self._widths(rows), strict=True)):
-            min_width = min(least, NAME_WIDTH) if k == 0 else None
-            table.add_column("\n".join(heading), justify="left" if k == 0 else "right", no_wrap=k > 0, min_width=min_width)
+    def _figures(self, width: int) -> rich.table.Table:
+        rows, headings = self.texts, [column.split("\n") for column in self.columns]
+        if self._width(rows) > width:
+            rows = [[cell.replace(" [", "\n[") for cell in row] for row in rows]
+        fits, height = self._width(rows) <= width, max(map(len, headings), default=0)
+        table = rich.table.Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), collapse_padding=fits, show_edge=False)
+        for k, lines in enumerate(headings):
+            heading = "\n".join([""] * (height - len(lines)) + lines)  # aligned to the last line
+            min_width = None if k or fits else min(self._widths(rows)[0], NAME_WIDTH)
+            table.add_column(heading, justify="right" if k else "left", no_wrap=fits or k > 0, min_width=min_width)
         for row in rows:
-            table.add_row(*map("\n".join, row))
-        yield table
+            table.add_row(*row)
+        return table
 
-    def _widths(self, rows: Sequence[Sequence[Sequence[str]]]) -> list[int]:
+    def _widths(self, rows: Sequence[Sequence[str]]) -> list[int]:
         """Return the width of each column, for cells of several lines."""
-        cells: list[Sequence[Sequence[str]]] = [[column.split("\n") for column in self.columns], *rows]
-        return [max(cell_len(line) for row in cells for line in row[k]) for k in range(len(self.columns))]
+        return [
+            max(cell_len(line) for cell in cells for line in cell.split("\n"))
+            for cells in zip(self.columns, *rows, strict=True)
+        ]
 
-    def _full_width(self, rows: Sequence[Sequence[Sequence[str]]]) -> int:
-        return sum(self._widths(rows)) + len(BETWEEN) * (len(self.columns) - 1)
-
-    def _headings(self) -> list[tuple[str, ...]]:
-        """Return the lines of the heading, with each column aligned to the last line."""
-        headings = [column.split("\n") for column in self.columns]
-        height = max(map(len, headings), default=0)
-        return list(zip(*([""] * (height - len(lines)) + lines for lines in headings), strict=True))
-
-    def _lines(self, rows: Sequence[Sequence[Sequence[str]]]) -> Iterator[Text]:
-        """Yield the lines of the equivalent rich table, which takes a hundred times as long for cells without wrapping."""
-        widths = self._widths(rows)
-        for cells in self._headings():
-            yield Text(_line(cells, widths), style="table.header", no_wrap=True)
-        yield Text("─" * self._full_width(rows), no_wrap=True)
-        if rows:
-            lines = [_line(cells, widths) for row in rows for cells in zip_longest(*row, fillvalue="")]
-            yield Text("\n".join(lines), no_wrap=True)
-
-
-def _line(cells: Sequence[str], widths: Sequence[int]) -> str:
-    first, *others = (" " * (width - cell_len(cell)) for cell, width in zip(cells, widths, strict=True))
-    return BETWEEN.join([cells[0] + first, *(space + cell for space, cell in zip(others, cells[1:], strict=True))])
+    def _width(self, rows: Sequence[Sequence[str]]) -> int:
+        return sum(self._widths(rows)) + BETWEEN * (len(self.columns) - 1)

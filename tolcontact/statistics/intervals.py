@@ -37,7 +37,7 @@ UNDEFINED = Estimate(math.nan, math.nan, math.nan)
 def mean(x: np.ndarray | Sample) -> Estimate:
     """Return the mean with Student's t interval."""
     x = Sample.of(x)
-    deviation = np.sqrt(_unbiased(x))
+    deviation = np.sqrt(x.moments[0] * x.count / (x.count - 1))
     half = float(student(x.count - 1) * deviation / np.sqrt(x.count)) * x.widening
     return Estimate(x.mean, x.mean - half, x.mean + half)
 
@@ -69,14 +69,12 @@ def from_standardized_influence(x: Sample, estimate: float, influence: Sequence[
     if x.count < MIN_VARIANCE:
         return Estimate(float(estimate), math.nan, math.nan)
     scale, square = np.sqrt(x.moments[0]), np.convolve(influence, influence)
-    squares, fourths = (_sum_over(x, polynomial) for polynomial in (square, np.convolve(square, square)))
+    squares, fourths = (  # sums over the standardized values, without rounding below 0
+        max(float(polynomial @ x.standardized_moments[: len(polynomial)] * x.count), 0.0)
+        for polynomial in (square, np.convolve(square, square))
+    )
     widening = x.map(lambda piece: np.polyval(influence[::-1], (piece - x.mean) / scale)).widening
     return from_influence(estimate, squares * widening**2, x.count, fourths * widening**4)
-
-
-def _sum_over(x: Sample, polynomial: np.ndarray) -> float:
-    """Return the sum of a non-negative polynomial, given by its coefficients, over standardized values."""
-    return max(float(polynomial @ x.standardized_moments[: len(polynomial)] * x.count), 0.0)  # no rounding below 0
 
 
 def is_shape_known(x: Sample) -> bool:
@@ -225,10 +223,6 @@ def variance_from_moments(count: int, moment2: ArrayLike, moment4: ArrayLike) ->
 def is_constant(x: Sample, accuracy: float = 0.0) -> bool:
     """Return whether the spread of a sample may be due to rounding, or to a solver with a finite accuracy."""
     return not x.moments[0] > max(8 * np.finfo(float).eps * abs(x.mean), accuracy) ** 2
-
-
-def _unbiased(x: Sample) -> float:
-    return x.moments[0] * x.count / (x.count - 1)
 
 
 class _QuantileRanks(NamedTuple):

@@ -67,7 +67,8 @@ def linear_shares(x: np.ndarray, y: np.ndarray, groups: Sequence[np.ndarray]) ->
     scale = np.abs(y).max(axis=0)
     varies = is_sound & (scale > 0)
     y = y / np.where(varies, scale, 1.0)
-    moments = np.array([_moments(*block) for block in zip(np.array_split(x, BLOCKS), np.array_split(y, BLOCKS), strict=True)])
+    # Sums of products of 1, x and y over each block, (block, 1 + contributor + measure, 1 + contributor + measure).
+    moments = np.array([z.T @ z for z in np.array_split(np.column_stack([np.ones(n), x, y]), BLOCKS)])
     total = moments.sum(axis=0)
     membership = np.zeros((len(groups), count))
     for k, group in enumerate(groups):
@@ -77,12 +78,6 @@ def linear_shares(x: np.ndarray, y: np.ndarray, groups: Sequence[np.ndarray]) ->
     half = intervals.student(BLOCKS - 1) * np.sqrt((BLOCKS - 1) * replicates.var(axis=0))
     values = np.stack([estimates, estimates - half, estimates + half], axis=-1)
     return [LinearShares(values[k, :-1], values[k, -1]) if varies[k] else None for k in range(y.shape[1])]
-
-
-def _moments(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the sums of products of 1, x and y, (1 + contributor + measure) squared."""
-    z = np.column_stack([np.ones(len(x)), x, y])
-    return z.T @ z
 
 
 def _shares(moments: np.ndarray, count: int, membership: np.ndarray) -> np.ndarray:

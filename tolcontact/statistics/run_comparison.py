@@ -1,5 +1,6 @@
 """Comparison of runs: the statistics of their common measures, and the changes from the first run."""
 
+import itertools
 import json
 from collections.abc import Mapping
 from typing import Any
@@ -41,17 +42,17 @@ def compare_runs(runs: Mapping[str, xr.DataTree]) -> xr.Dataset:
         raise OptionError(
             f"{', '.join(runs)} share no measurement of the same name, units and quantity; there is nothing to compare"
         )
-    changes = {name: _Change(run, reference, summaries[name], summaries[reference_name]) for name, run in runs.items()}
-    undefined = np.full((len(terms.STATES), len(shared), len(terms.CHANGES_OF_RUNS), len(terms.ESTIMATE)), np.nan)
+    rows = [_changes(run, reference, (summaries[name], summaries[reference_name]), shared) for name, run in runs.items()]
+    draws, changes, furthest = zip(*rows, strict=True)
     selection = {terms.MEASURE: shared, terms.STATISTIC: list(terms.COMPARED_STATISTICS)}
     estimates = [summary[terms.STATISTIC_VALUE.name].sel(selection) for summary in summaries.values()]
     values = {
         "value": [estimate.transpose(terms.STATE, terms.MEASURE, ...).values for estimate in estimates],
-        "change": [undefined if name == reference_name else change.estimates(shared) for name, change in changes.items()],
-        "furthest": [change.furthest(shared) for change in changes.values()],
+        "change": [np.full_like(changes[0], np.nan), *changes[1:]],
+        "furthest": furthest,
         terms.BY_STATUS.name: [summary[terms.BY_STATUS.name].values for summary in summaries.values()],
         terms.PENETRATION.name: [summary[terms.PENETRATION.name].values for summary in summaries.values()],
-        "draws": [change.draws for change in changes.values()],
+        "draws": draws,
     }
     units = summaries[reference_name].sel(measure=shared)[terms.MEASURE_UNITS.name].values.astype(str)
     bounds = {
@@ -124,55 +125,42 @@ def _drawn_declaration(run: xr.DataTree) -> dict[str, Any]:
     return {key: value for key, value in declaration.items() if key != "method"}
 
 
-class _Change:
-    """The change from the reference run to a run, measure by measure."""
+def _changes(
+    run: xr.DataTree, reference: xr.DataTree, summaries: tuple[xr.Dataset, xr.Dataset], measures: list[str]
+) -> tuple[str, np.ndarray, np.ndarray]:
+    """Return how the draws of a run compare with a reference run, and the changes of measures from it.
 
-    def __init__(self, run: xr.DataTree, reference: xr.DataTree, summary: xr.Dataset, reference_summary: xr.Dataset) -> None:
-        self._summaries = summary, reference_summary
-        counts = [summary.attrs["realizations"] for summary in self._summaries]
-        self.draws = _draws(run, reference, min(counts))
-        self._paired = self.draws != terms.OTHER_DRAWS
-        if self._paired:
-            counts = [min(counts)] * 2
-        self._rows = [
-            tree.to_dataset()[[terms.MEASURED.name]].isel({terms.REALIZATION: slice(count)})
-            for tree, count in zip((run, reference), counts, strict=True)
-        ]
-
-    def estimates(self, measures: list[str]) -> np.ndarray:
-        """Return all changes, (state, measure, change_of, interval)."""
-        return np.array([[self._estimates(measure, state) for measure in measures] for state in terms.STATES])
-
-    def furthest(self, measures: list[str]) -> np.ndarray:
-        """Return the largest difference in a realization, (state, measure)."""
-        return np.array([[self._furthest(measure, state) for measure in measures] for state in terms.STATES])
-
-    def _samples(self, measure: str, state: str) -> list[Sample]:
-        return [measured_sample(rows, rows[terms.MEASURE].values.tolist().index(measure), state) for rows in self._rows]
-
-    def _estimates(self, measure: str, state: str) -> list[Estimate]:
-        sample, baseline = self._samples(measure, state)
-        if not (np.isfinite(sample.mean) and np.isfinite(baseline.mean)):
-            return [UNDEFINED] * len(terms.CHANGES_OF_RUNS)
-        hits = [
-            _outside(x, summary.sel(measure=measure)) for x, summary in zip((sample, baseline), self._summaries, strict=True)
-        ]
-        shift = None if None in hits else two_samples.share_shift(*hits, paired=self._paired)  # type: ignore[arg-type]
-        estimates = {
-            terms.SHIFT: two_samples.shift(sample, baseline, paired=self._paired),
-            terms.SPREAD_RATIO: intervals.root(two_samples.variance_ratio(sample, baseline, paired=self._paired)),
-            terms.SHARE_SHIFT: shift or UNDEFINED,
-        }
-        return [estimates[name] for name in terms.CHANGES_OF_RUNS]
-
-    def _furthest(self, measure: str, state: str) -> float:
-        if self.draws != terms.SAME_DRAWS:
-            return np.nan
-        sample, baseline = self._samples(measure, state)
-        return float(max(np.abs(a - b).max() for a, b in zip(sample.pieces(), baseline.pieces(), strict=True)))
+    Changes are (state, measure, change_of, interval), and largest differences in a realization (state, measure).
+    """
+    counts = [summary.attrs["realizations"] for summary in summaries]
+    draws = _draws(run, reference, min(counts))
+    if draws != terms.OTHER_DRAWS:
+        counts = [min(counts)] * 2
+    rows = [
+        tree.to_dataset()[[terms.MEASURED.name]].isel({terms.REALIZATION: slice(count)})
+        for tree, count in zip((run, reference), counts, strict=True)
+    ]
+    is_paired, changes, furthest = draws != terms.OTHER_DRAWS, [], []
+    for state, measure in itertools.product(terms.STATES, measures):
+        sample, baseline = (measured_sample(each, each[terms.MEASURE].values.tolist().index(measure), state) for each in rows)
+        selections = [summary.sel(measure=measure) for summary in summaries]
+        limits = [Limits(*(float(selection[name]) for name in terms.MEASURE_LIMITS)) for selection in selections]
+        changes.append(_estimates(sample, baseline, limits, paired=is_paired))
+        pairs = zip(sample.pieces(), baseline.pieces(), strict=True) if draws == terms.SAME_DRAWS else ()
+        furthest.append(max((float(np.abs(a - b).max()) for a, b in pairs), default=np.nan))
+    shape = (len(terms.STATES), len(measures))
+    return draws, np.array(changes).reshape(*shape, *np.shape(changes[0])), np.array(furthest).reshape(shape)
 
 
-def _outside(x: Sample, summary: xr.Dataset) -> Sample | None:
-    """Return which values are beyond the limits of a summary's measure, as a sample of booleans; None without limits."""
-    limits = Limits(*(float(summary[name]) for name in terms.MEASURE_LIMITS))
-    return None if limits.are_open else x.map(limits.outside)
+def _estimates(sample: Sample, baseline: Sample, limits: list[Limits], *, paired: bool) -> list[Estimate]:
+    """Return the changes from a baseline to a sample, each with its own limits."""
+    if not (np.isfinite(sample.mean) and np.isfinite(baseline.mean)):
+        return [UNDEFINED] * len(terms.CHANGES_OF_RUNS)
+    hits = [x.map(limits_of_x.outside) for x, limits_of_x in zip((sample, baseline), limits, strict=True)]
+    are_open = any(limits_of_x.are_open for limits_of_x in limits)
+    estimates = {
+        terms.SHIFT: two_samples.shift(sample, baseline, paired=paired),
+        terms.SPREAD_RATIO: intervals.root(two_samples.variance_ratio(sample, baseline, paired=paired)),
+        terms.SHARE_SHIFT: UNDEFINED if are_open else two_samples.share_shift(*hits, paired=paired),
+    }
+    return [estimates[name] for name in terms.CHANGES_OF_RUNS]

@@ -1,6 +1,5 @@
 """The summary of a run: estimates of measures, parts and contact, read from its archive piece by piece."""
 
-from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -175,10 +174,14 @@ def _contact_values(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], 
 def _field_values(results: xr.DataTree) -> dict[ArchiveVariable, Any]:
     """Return the extremes of the displacement fields, and the number of realizations that all of them cover."""
     parts = [str(part) for part in results.to_dataset()[terms.PART].values]
+    fields = [results["field"].children[terms.group_of(part)].to_dataset() for part in parts]
+    is_written = [int(field[terms.GROUP_CHECKSUM.name]) != terms.UNFINISHED for field in fields]
+    summed = [int(field[terms.FIELD_REALIZATIONS.name]) * written for field, written in zip(fields, is_written, strict=True)]
+    magnitudes = [int(field[terms.MAGNITUDE_REALIZATIONS.name]) for field in fields]
     return {
-        terms.FIELD_EXTREME: np.array([_field_extremes(results, part) for part in parts]),
-        terms.REALIZATIONS_IN_FIELDS: min(_summed(results, part) for part in parts),
-        terms.REALIZATIONS_IN_MAGNITUDES: min(_magnitudes(results, part) for part in parts),
+        terms.FIELD_EXTREME: np.array([_field_extremes(field, count) for field, count in zip(fields, summed, strict=True)]),
+        terms.REALIZATIONS_IN_FIELDS: min(summed),
+        terms.REALIZATIONS_IN_MAGNITUDES: min(*magnitudes, *summed),
     }
 
 
@@ -201,16 +204,9 @@ def _penetration(rows: xr.Dataset, rigid: np.ndarray) -> np.ndarray:
 
 def _steps(rows: xr.Dataset) -> list[float]:
     """Return the median and the largest number of linear steps, over the realizations with at least one."""
-    counts: Counter[int] = Counter()
-    for piece in pieces(rows[[terms.ITERATIONS.name]]):
-        steps, times = np.unique(piece[terms.ITERATIONS.name].values, return_counts=True)
-        counts.update(dict(zip(steps.tolist(), times.tolist(), strict=True)))
-    positive = sorted(steps for steps in counts if steps > 0)
-    if not positive:
-        return [0.0, 0.0]
-    cumulative = np.cumsum([counts[steps] for steps in positive])
-    middle = np.searchsorted(cumulative, [(cumulative[-1] - 1) // 2, cumulative[-1] // 2], side="right")
-    return [float(np.mean([positive[k] for k in middle])), float(positive[-1])]
+    steps = rows[terms.ITERATIONS.name].values
+    positive = steps[steps > 0]
+    return [float(np.median(positive)), float(positive.max())] if positive.size else [0.0, 0.0]
 
 
 def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
@@ -242,32 +238,16 @@ def _planned_samples(results: xr.DataTree, count: int) -> int:
     return max(samples, count) if is_unfinished else count
 
 
-def _field_extremes(results: xr.DataTree, part: str) -> np.ndarray:
-    """Return 6 sigma of |u|, and its interval, where the archived field is least and largest, (state, extreme, interval)."""
+def _field_extremes(field: xr.Dataset, count: int) -> np.ndarray:
+    """Return 6 sigma of |u|, and its interval, where a field of `count` realizations is least and largest.
+
+    The extremes are (state, extreme, interval).
+    """
     extremes = np.full((len(terms.STATES), len(terms.EXTREMES), len(terms.ESTIMATE)), np.nan)
-    if not _summed(results, part):
-        return extremes
-    field = _field(results, part)
     six_sigma = field[terms.FIELD_SIX_SIGMA.name].sel({terms.COMPONENT: "magnitude"}).values
     for state, values in enumerate(six_sigma):
-        if np.isfinite(values).all():
+        if count and np.isfinite(values).all():
             vertices = [values.argmin(), values.argmax()]
             extremes[state, :, 0] = values[vertices]
             extremes[state, :, 1:] = field[terms.FIELD_INTERVAL.name].values[state, vertices]
     return extremes
-
-
-def _summed(results: xr.DataTree, part: str) -> int:
-    """Return the number of realizations in the field of a part; 0 while the field is being written."""
-    field = _field(results, part)
-    is_written = int(field[terms.GROUP_CHECKSUM.name]) != terms.UNFINISHED
-    return int(field[terms.FIELD_REALIZATIONS.name]) if is_written else 0
-
-
-def _magnitudes(results: xr.DataTree, part: str) -> int:
-    """Return the number of realizations in the magnitude of a part's field."""
-    return min(int(_field(results, part)[terms.MAGNITUDE_REALIZATIONS.name]), _summed(results, part))
-
-
-def _field(results: xr.DataTree, part: str) -> xr.Dataset:
-    return results["field"].children[terms.group_of(part)].to_dataset()

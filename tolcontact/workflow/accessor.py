@@ -1,6 +1,6 @@
 """Summaries of results, and their accessor `results.tolcontact`, of `tc.run`, `tc.open_archive` or xarray itself."""
 
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -31,22 +31,16 @@ def summarize(results: xr.DataTree | str | Path) -> Summary:
 
 
 class Plots:
-    """The pictures of `tc.plot` for these results (see tolcontact.plot)."""
+    """The functions of `tc.plot` for these results (see tolcontact.plot): histogram, field, assembly."""
 
     def __init__(self, results: xr.DataTree) -> None:
         self._results = results
 
-    def histogram(self, measure: str | None = None, **options: Any) -> Any:
-        """Draw a histogram (see tc.plot.histogram)."""
-        return plot.histogram(self._results, measure, **options)
+    def __getattr__(self, name: str) -> Any:
+        return partial(getattr(plot, name), self._results)
 
-    def field(self, statistic: str = "6 sigma", **options: Any) -> Any:
-        """Draw a displacement field (see tc.plot.field)."""
-        return plot.field(self._results, statistic, **options)
-
-    def assembly(self, **options: Any) -> Any:
-        """Draw the assembly (see tc.plot.assembly)."""
-        return plot.assembly(self._results, **options)
+    def __dir__(self) -> list[str]:
+        return list(plot.__all__)
 
 
 class Results:

@@ -26,10 +26,9 @@ def charts_of(results: xr.DataTree, summary: xr.Dataset) -> list[dict[str, Any]]
     for number, name in enumerate(summary["measure"].values):
         measure = summary.sel(measure=name)
         states = [_convergence(rows, number, state) for state in range(len(terms.STATES))]
-        edges = _edges(states)
+        edges = _edges([_range(rows, number, state) for state in range(len(terms.STATES))])
         for state, chart in enumerate(states):
             chart["counts"] = _counts(rows, number, state, edges)
-            del chart["range"]
         charts.append(
             {
                 "name": str(name),
@@ -61,7 +60,7 @@ def compared_charts(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> 
     for name in comparison["measure"].values:
         positions = {run: table[terms.MEASURE].values.tolist().index(name) for run, table in rows.items()}
         states = range(len(terms.STATES))
-        edges = _edges([{"range": _range(table, positions[run], state)} for run, table in rows.items() for state in states])
+        edges = _edges([_range(table, positions[run], state) for run, table in rows.items() for state in states])
         shares = [
             {
                 "name": run,
@@ -106,14 +105,12 @@ def _estimates(measure: xr.Dataset, statistic: str) -> xr.DataArray:
 
 
 def _convergence(rows: xr.Dataset, measure: int, state: int) -> dict[str, Any]:
-    """Return the range of a measure, and its mean by number of realizations, with the half width of its 95 % interval."""
+    """Return the mean of a measure by number of realizations, with the half width of its 95 % interval."""
     total = rows.sizes[terms.REALIZATION]
     steps = np.unique(np.geomspace(2, total, CONVERGENCE_STEPS).round().astype(int))
-    low, high, count, centre = np.inf, -np.inf, 0, None
-    sums, estimates = np.zeros(2), []
+    count, centre, sums, estimates = 0, None, np.zeros(2), []
     for piece in pieces(rows):
         x = piece[terms.MEASURED.name].values[:, state, measure]
-        low, high = min(low, float(x.min())), max(high, float(x.max()))
         centre = float(x[0]) if centre is None else centre
         cumulated = np.cumsum([x - centre, (x - centre) ** 2], axis=1)
         for n in steps[(steps > count) & (steps <= count + len(x))]:
@@ -121,7 +118,7 @@ def _convergence(rows: xr.Dataset, measure: int, state: int) -> dict[str, Any]:
             s = float(np.sqrt(max(mean_square - mean**2, 0) * n / (n - 1)))
             estimates.append([int(n), centre + mean, intervals.student(n - 1) * s / np.sqrt(n)])
         sums, count = sums + cumulated[:, -1], count + len(x)
-    return {"range": (low, high), "settling": packed(np.array(estimates).reshape(-1, 3))}
+    return {"settling": packed(np.array(estimates).reshape(-1, 3))}
 
 
 def _range(rows: xr.Dataset, measure: int, state: int) -> tuple[float, float]:
@@ -130,8 +127,8 @@ def _range(rows: xr.Dataset, measure: int, state: int) -> tuple[float, float]:
     return min(float(x.min()) for x in values), max(float(x.max()) for x in values)
 
 
-def _edges(states: list[dict[str, Any]]) -> np.ndarray:
-    low, high = min(chart["range"][0] for chart in states), max(chart["range"][1] for chart in states)
+def _edges(ranges: list[tuple[float, float]]) -> np.ndarray:
+    low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
     if not (np.isfinite(low) and np.isfinite(high)):
         return np.array([])
     return np.linspace(low, high, BINS + 1) if high > low else np.array([low - 0.5, high + 0.5])

@@ -167,13 +167,14 @@ def _page(kind: str, values: dict[str, Any], data: dict[str, Any]) -> str:
     """Return a page of a kind, which selects its template and scripts."""
     scripts = [_as_is(file) for file in SCRIPTS[kind]]
     data |= {"states": terms.STATE_WORDS}
+    hashes = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts]
     return _template(kind).render(
         **WORDS,
-        data=jinja2.utils.htmlsafe_json_dumps(data, dumps=_plain_json),
+        data=jinja2.utils.htmlsafe_json_dumps(data, dumps=json.dumps, allow_nan=False, separators=(",", ":")),
         style=_as_is("page.css"),
         generator=markupsafe.Markup(GENERATOR),
         scripts=scripts,
-        allowed=" ".join(map(_hash, scripts)),  # no other script runs, even if data contain one
+        allowed=" ".join(f"'sha256-{digest}'" for digest in hashes),  # no other script runs, even if data contain one
         **values,
     )
 
@@ -193,15 +194,6 @@ def _write(page: str, path: Path) -> None:
 
 def _as_is(file: str) -> markupsafe.Markup:
     return markupsafe.Markup((HERE / file).read_text(encoding="utf-8").replace("</script", "<\\/script"))
-
-
-def _hash(script: markupsafe.Markup) -> str:
-    """Return the hash of a script for a content security policy."""
-    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
-
-
-def _plain_json(data: Any, **_: Any) -> str:
-    return json.dumps(data, allow_nan=False, separators=(",", ":"))
 
 
 def _results(summary: xr.Dataset) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.declaration import Assembly, Part
 from tolcontact.discretization import Nominal
 from tolcontact.geometry import PartPreview, preview
-from tolcontact.realizations import finished, pieces
+from tolcontact.realizations import finished
 from tolcontact.report.analysis_tables import archived_analysis
 from tolcontact.report.annotations import Marks, fixed_points, marks_of, marks_of_nominal
 from tolcontact.report.html.feature_list import feature_lists
@@ -48,20 +48,11 @@ def single_realizations(results: xr.DataTree) -> dict[int, str]:
 
 
 def _extremes(rows: xr.Dataset, measure: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rows with the smallest and with the largest values, the most extreme first."""
-    candidate_rows, candidates = np.zeros(0, dtype=int), np.zeros(0)
-    start = 0
-    for piece in pieces(rows[[terms.MEASURED.name]]):
-        values = piece[terms.MEASURED.name].values[:, -1, measure]
-        candidates = np.concatenate([candidates, values])
-        candidate_rows = np.concatenate([candidate_rows, start + np.arange(len(values))])
-        start += len(values)
-        order = np.argsort(candidates, kind="stable")
-        order = order[np.isfinite(candidates[order])]
-        selection = np.unique(np.concatenate([order[:EXTREMES], order[-EXTREMES:]])) if order.size else order
-        candidates, candidate_rows = candidates[selection], candidate_rows[selection]
-    order = np.argsort(candidates, kind="stable")
-    return candidate_rows[order[:EXTREMES]], candidate_rows[order[::-1][:EXTREMES]]
+    """Return the rows with the smallest and with the largest corrected values, the most extreme first."""
+    values = rows[terms.MEASURED.name].isel({terms.STATE: terms.CORRECTED, terms.MEASURE: measure}).values
+    order = np.argsort(values, kind="stable")
+    order = order[np.isfinite(values[order])]
+    return order[:EXTREMES], order[::-1][:EXTREMES]
 
 
 def packed(values: Any, kind: str = "f4") -> Packed:
