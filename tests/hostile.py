@@ -5,9 +5,9 @@ import shutil
 
 import netCDF4
 import numpy as np
+from tolcontact.checksums import crc32
 
 from tolcontact import vocabulary
-from tolcontact.checksums import crc32
 
 ESCAPE = "\x1b]0;owned\x07"
 

@@ -3,13 +3,13 @@
 import netCDF4
 import pytest
 import xarray as xr
+from tolcontact.checksums import crc32
 
 import tolcontact as tc
 from tests import cases
 from tests.helpers import PAPER, contents, nightly
 from tolcontact import vocabulary
 from tolcontact.archive import Run
-from tolcontact.checksums import crc32
 from tolcontact.errors import ArchiveError
 from tolcontact.vocabulary import UNFINISHED
 from tolcontact.workflow.runs import write_archive

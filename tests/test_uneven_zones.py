@@ -4,12 +4,12 @@ import netCDF4
 import numpy as np
 import pytest
 from scipy.stats import binom
+from tolcontact.checksums import crc32
 
 import tolcontact as tc
 from tests.cases import toleranced
 from tests.population_referee import measured_back
 from tolcontact import vocabulary
-from tolcontact.checksums import crc32
 from tolcontact.discretization import discretize
 from tolcontact.variation import Draws
 

@@ -10,6 +10,6 @@ from .reader import (
 )
 from .rows import Row as Row, kept_rows as kept_rows, row_values as row_values
 from .settings import Run as Run, run_settings as run_settings
-from .stored_rows import check_rows as check_rows, stored as stored
+from .stored_rows import check_rows as check_rows
 from .variables import sizes_of_rows as sizes_of_rows
 from .writer import ArchiveWriter as ArchiveWriter, replacing_archive as replacing_archive

@@ -237,9 +237,7 @@ def _datum_shifts(results: xr.DataTree) -> list[str]:
 
 def _planned_samples(results: xr.DataTree, count: int) -> int:
     """Return the number of realizations that the run was started with, or `count` if rows were selected from an archive."""
-    samples, size = int(results.attrs["samples"]), results.to_dataset().sizes[terms.REALIZATION]
-    is_unfinished = size > count or size == terms.FIRST_ROWS
-    return max(samples, count) if is_unfinished else count
+    return int(results.attrs["samples"]) if count == int(results.attrs["realizations"]) else count
 
 
 def _field_extremes(results: xr.DataTree, part: str) -> np.ndarray:
@@ -258,10 +256,8 @@ def _field_extremes(results: xr.DataTree, part: str) -> np.ndarray:
 
 
 def _summed(results: xr.DataTree, part: str) -> int:
-    """Return the number of realizations in the field of a part; 0 while the field is being written."""
-    field = _field(results, part)
-    is_written = int(field[terms.GROUP_CHECKSUM.name]) != terms.UNFINISHED
-    return int(field[terms.FIELD_REALIZATIONS.name]) if is_written else 0
+    """Return the number of realizations in the field of a part."""
+    return int(_field(results, part)[terms.FIELD_REALIZATIONS.name])
 
 
 def _magnitudes(results: xr.DataTree, part: str) -> int:
