@@ -10,7 +10,7 @@ import math
 import zipfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import BinaryIO, NamedTuple
 
 import netCDF4
 import numpy as np
@@ -18,6 +18,8 @@ import numpy as np
 from tolcontact import vocabulary as terms
 from tolcontact.archive.rows import Row
 from tolcontact.replacing import replacing
+
+WRITTEN_BYTES = 1 << 24  # that the netCDF library writes together; each call takes as long as many realizations
 
 
 class Checkpoint(NamedTuple):
@@ -72,13 +74,18 @@ class Journal:
 
     def put_into(self, file: netCDF4.Dataset, start: int, stop: int) -> None:
         """Write the realizations `start` to `stop`, the first ones in the journal, to an archive."""
+        if start == stop:
+            return
+        variables = [file[row.path] for row in self._kept]
+        row_bytes = sum(stored.dtype.itemsize * math.prod(stored.shape[1:]) for stored in variables)
+        step = max(1, WRITTEN_BYTES // (self._block * row_bytes)) * self._block
         with self._rows.open("rb") as journal:
-            for begin in range(start, stop, self._block):
-                end = min(begin + self._block, stop)
-                for row in self._kept:
-                    stored = file[row.path]
-                    shape = (end - begin, *stored.shape[1:])
-                    stored[begin:end] = np.fromfile(journal, stored.dtype, math.prod(shape)).reshape(shape)
+            for begin in range(start, stop, step):
+                end = min(begin + step, stop)
+                counts = [min(self._block, end - first) for first in range(begin, end, self._block)]
+                blocks = [[_read(journal, stored, count) for stored in variables] for count in counts]
+                for stored, arrays in zip(variables, zip(*blocks, strict=True), strict=True):
+                    stored[begin:end] = np.concatenate(arrays)
                 file[terms.REALIZATION][begin:end] = np.arange(begin, end)
 
     def remove(self) -> None:
@@ -86,3 +93,9 @@ class Journal:
         self._checkpoint.unlink(missing_ok=True)
         self._rows.unlink(missing_ok=True)
         self.size = 0
+
+
+def _read(journal: BinaryIO, stored: netCDF4.Variable, count: int) -> np.ndarray:
+    """Return the next values in a journal, which are the values of a variable in `count` realizations."""
+    shape = (count, *stored.shape[1:])
+    return np.fromfile(journal, stored.dtype, math.prod(shape)).reshape(shape)
