@@ -14,7 +14,7 @@ import tolcontact as tc
 from tests import cases
 from tests.cases import stations
 from tests.helpers import contents
-from tolcontact.archive import Run
+from tolcontact.archive import Run, locked_archive
 from tolcontact.workflow.runs import write_archive
 
 folder, step = Path(sys.argv[1]), int((*sys.argv, 1)[2])
@@ -51,11 +51,12 @@ def is_killed(path, write):
 def check_resumed(path, write):
     """Resumed it comes to the same, and goes on after the last checkpoint."""
     begun = []
-    write_archive(path, program, settings, progress=begun.append, is_resumed=path.exists())
+    with locked_archive(path, resume=True):
+        write_archive(path, program, settings, progress=begun.append, is_resumed=path.exists())
     reached.append((begun[0] - 1) // 4096 * 4096)
     for group in (None, *(f"field/{part.name}" for part in program.nominal.last_parts)):
         assert contents(path, group).identical(contents(whole, group)), f"{group} after kill {write}"
-    assert [file.name for file in folder.iterdir() if file.name.startswith(f".{path.name}.")] == []
+    assert not [file.name for file in folder.iterdir() if file.name.startswith(".")], f"left after kill {write}"
 
 
 reached = []

@@ -17,7 +17,7 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive.rows import Row
-from tolcontact.replacing import replacing
+from tolcontact.replacing import remove_abandoned, replacing
 
 WRITTEN_BYTES = 1 << 24  # that the netCDF library writes together; each call takes as long as many realizations
 
@@ -90,9 +90,10 @@ class Journal:
 
     def remove(self) -> None:
         """Remove the files."""
+        self.size = 0
+        remove_abandoned(self._checkpoint)
         self._checkpoint.unlink(missing_ok=True)
         self._rows.unlink(missing_ok=True)
-        self.size = 0
 
 
 def _read(journal: BinaryIO, stored: netCDF4.Variable, count: int) -> np.ndarray:
