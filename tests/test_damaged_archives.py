@@ -19,7 +19,8 @@ from tolcontact.child import environment
 from tolcontact.errors import ArchiveError
 
 CRASHES = ("measured is text",)  # the netCDF library, so only where it is another process's
-HARMLESS = ("declared_at is an escape",)  # what is shown as it is written
+# What is shown as it is written: checksums detect damage, not values that somebody wrote with the netCDF library.
+HARMLESS = ("declared_at is an escape", "times", "iterations are huge", "iterations are negative", "measured is endless")
 LIES = [name for name in HOSTILE if name not in CRASHES]
 NAMES = [coordinate.name for coordinate in vocabulary.COORDINATES]
 

@@ -11,7 +11,6 @@ from tolcontact.archive.datum_values import datum_sizes, datum_values
 from tolcontact.archive.form_values import form_sizes, form_values
 from tolcontact.archive.rows import Row, kept_rows
 from tolcontact.archive.settings import Run, declaration, now, run_settings, versions, watch_settings
-from tolcontact.archive.station_header import write_stations
 from tolcontact.archive.stored_rows import empty_checks
 from tolcontact.archive.variables import add, add_all, define, labels_of_rows, units_of_rows
 from tolcontact.compilation import Program
@@ -47,7 +46,7 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
     )
     rows = kept_rows(nominal, run.keep)
     _write_labels(file, nominal)
-    write_stations(file, nominal, rows)
+    _write_stations(file, nominal, rows)
     _write_rows(file, program, rows)
     _write_measures(file, program)
     _write_model(file.createGroup("model"), nominal, declaration(program))
@@ -83,6 +82,24 @@ def _write_rows(file: netCDF4.Dataset, program: Program, rows: Sequence[Row]) ->
     for variable, units in units_of_rows(program).items():
         file[variable.name].units = units
     add(file, terms.SUMMED_ROWS, 0)
+
+
+def _write_stations(file: netCDF4.Dataset, nominal: Nominal, rows: Sequence[Row]) -> None:
+    """Write the station of each measure, pair and part, and define the variables of each station; nothing without stations."""
+    if not nominal.scenes:
+        return
+    add(file, terms.MEASURE_STATION, [measure.station for measure in nominal.measures])
+    add(file, terms.PAIR_STATION, [nominal.parts[pair.moving].station for pair in nominal.pairs])
+    add(file, terms.PART_STATION, [part.station for part in nominal.last_parts])
+    for scene in nominal.scenes:
+        path = terms.station_group(scene.station)
+        group = file.createGroup(path)
+        group.setncattr("station", scene.station)
+        group.createDimension(terms.STATION_PART, len(scene.assembly.parts))
+        add(group, terms.STATION_PART_LABEL, [part.name for part in scene.assembly.parts])
+        for row in rows:
+            if row.group == path:
+                define(group, row.variable)
 
 
 def _write_measures(file: netCDF4.Dataset, program: Program) -> None:
