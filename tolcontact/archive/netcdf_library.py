@@ -11,7 +11,7 @@ from xarray.backends import NetCDF4DataStore
 CACHE_BYTES = 1 << 20  # a chunk of most variables; with the usual size, all caches would take as much memory as all else
 
 with netCDF4.Dataset("in memory", "w", diskless=True) as _file:
-    XARRAY_LOCK = NetCDF4DataStore(_file).lock  # xarray holds it while it reads or closes a file
+    XARRAY_LOCK = NetCDF4DataStore(_file).lock  # type: ignore[no-untyped-call]  # held while xarray uses the library
 
 
 @contextlib.contextmanager

@@ -10,7 +10,7 @@ import signal
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from importlib.metadata import version
 from importlib.util import find_spec
 from multiprocessing import resource_tracker
@@ -51,12 +51,11 @@ def client_of(workers: int | None, scheduler: str | None) -> Iterator[Any]:
     """Open the client of new processes on this machine, or of a running scheduler; yield None if neither is given."""
     if workers is not None and scheduler is not None:
         raise OptionError("workers are started here, a scheduler has its own; choose one of --workers and --scheduler")
-    if workers is not None:
-        opened = local_cluster(workers)
-    else:
-        opened = nullcontext() if scheduler is None else running_cluster(scheduler)
-    with opened as client:
-        yield client
+    with ExitStack() as stack:
+        if workers is not None:
+            yield stack.enter_context(local_cluster(workers))
+        else:
+            yield stack.enter_context(running_cluster(scheduler)) if scheduler is not None else None
 
 
 @contextmanager
