@@ -6,9 +6,6 @@ import shutil
 import netCDF4
 import numpy as np
 
-from tolcontact import vocabulary
-from tolcontact.checksums import crc32
-
 ESCAPE = "\x1b]0;owned\x07"
 
 
@@ -28,7 +25,6 @@ def _declared(file, change):
         stored.set_auto_chartostring(False)
         room = len(encoded)
     stored[...] = np.frombuffer(encoded.ljust(room, b"\0"), "S1")
-    stored.setncattr("crc32", np.int64(crc32(vocabulary.DECLARATION, text)))
 
 
 def _distribution(name, args=(), kwds=None):
@@ -110,7 +106,6 @@ def _label(name, text):
         stored.set_auto_chartostring(False)
         encoded = text.encode("utf-8", "surrogatepass")[: stored.shape[1]]
         stored[0] = np.frombuffer(encoded.ljust(stored.shape[1], b"\0"), "S1")
-        stored.delncattr("crc32")
 
     return change
 
@@ -245,7 +240,6 @@ HOSTILE = {
     "claims a coordinate": _claims(10**12, name="far", size_name="far"),
     "claims 1e9 realizations": _grown("realization", 10**9),
     "claims 1e12 realizations": _grown("status", 10**12),
-    "claims 1e10 blocks": _grown("row_checksum", 10**10),
     "compound type": _compound,
     "type of free length": _free_length,
     "status is text": _other_type("status", "S1"),
@@ -279,9 +273,10 @@ HOSTILE = {
     "iterations are huge": lambda file: file["iterations"].__setitem__(slice(5, 9), 2_000_000_000),
     "iterations are negative": lambda file: file["iterations"].__setitem__(slice(5, 9), -7),
     "measured is endless": lambda file: file["measured"].__setitem__(slice(5, 9), np.inf),
-    "sums are others": lambda file: file["field/top/sums"].__setitem__(slice(None), 0.0),
-    "summed rows are huge": lambda file: file["summed_rows"].__setitem__(slice(None), 10**15),
-    "summed rows are negative": lambda file: file["summed_rows"].__setitem__(slice(None), -(10**15)),
+    "no sums": _renamed("Variable", "field/top/sums", "sum_s"),
+    "realizations are more": _attribute("realizations", np.int64(10**9)),
+    "summed rows are huge": lambda file: file["summed_rows"].__setitem__(..., 10**15),
+    "summed rows are negative": lambda file: file["summed_rows"].__setitem__(..., -(10**15)),
 }  # fmt: skip
 
 

@@ -28,7 +28,7 @@ from tolcontact.simulation import cluster
 from tolcontact.simulation.cluster import local_cluster, running_cluster
 
 pytestmark = pytest.mark.slow
-VARYING = ("summed_rows", "sums", "sums_checksum")  # which checkpoint was the last depends on time
+VARYING = ("summed_rows", "sums")  # which checkpoint was the last depends on time
 
 
 @pytest.fixture(scope="module")
@@ -185,7 +185,7 @@ def test_a_killed_run_goes_on_with_other_workers_and_leaves_none_behind(seed, tm
     gone, alive = psutil.wait_procs(children, timeout=20)
     assert not alive and len(gone) >= 2
     with tc.open_archive(path) as results:
-        assert (results["status"].values == -1).any()
+        assert results.sizes["realization"] < 60_000
     done = call(tmp_path, *options, path, "--resume", "--workers", "1")
     assert done.returncode == 0, done.stderr
     assert call(tmp_path, *options, whole).returncode == 0

@@ -19,7 +19,8 @@ from tolcontact.child import environment
 from tolcontact.errors import ArchiveError
 
 CRASHES = ("measured is text",)  # the netCDF library, so only where it is another process's
-HARMLESS = ("declared_at is an escape",)  # what is shown as it is written
+# What is shown as it is written: checksums detect damage, not values that somebody wrote with the netCDF library.
+HARMLESS = ("declared_at is an escape", "times", "iterations are huge", "iterations are negative", "measured is endless")
 LIES = [name for name in HOSTILE if name not in CRASHES]
 NAMES = [coordinate.name for coordinate in vocabulary.COORDINATES]
 
@@ -123,23 +124,18 @@ def test_a_damaged_file_is_refused_or_says_what_it_said(seed, said, good, progra
 
 
 def test_damage_to_realizations_is_told_with_its_place(good, tmp_path):
-    path = tmp_path / "damaged.nc"
-    path.write_bytes(good.read_bytes())
-    with netCDF4.Dataset(path, "r+") as file:
-        file["measured"][4500, 1, 0] += 1e-9
-    with pytest.raises(ArchiveError, match='"measured" of realizations 4096 to 4999 is not what was written'):
+    path, content = tmp_path / "damaged.nc", bytearray(good.read_bytes())
+    with netCDF4.Dataset(good) as file:
+        value = np.asarray(file["measured"][4500, 1, 0]).tobytes()
+    assert content.count(value) == 1
+    content[content.index(value)] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(ArchiveError, match='"measured" of realizations 0 to 4999 is not what was written'):
         tc.summarize(path)
     with pytest.raises(ArchiveError, match="is not what was written"):
         tc.run(ra1.assembly, samples=6000, solver="daqp", out=path, resume=True, surfaces=4)
-
-
-def test_a_status_that_turned_to_unfinished_does_not_hide_what_comes_behind(good, tmp_path):
-    path = tmp_path / "damaged.nc"
-    path.write_bytes(good.read_bytes())
-    with netCDF4.Dataset(path, "r+") as file:
-        file["status"][100] = vocabulary.UNFINISHED
-    with pytest.raises(ArchiveError, match="status"):
-        tc.summarize(path)
+    with xr.open_dataset(path) as without_us, pytest.raises(RuntimeError):
+        without_us["measured"].load()
 
 
 @pytest.mark.slow

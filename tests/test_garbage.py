@@ -63,8 +63,8 @@ def test_files_may_be_closed_by_any_thread_while_rows_are_written(tmp_path, left
 def test_files_may_be_closed_by_any_thread_while_the_netcdf_library_reads(readings, tmp_path, left):
     program = tc.build(cases.stack(), solver="daqp")
     sizes = DisplacementFields(program.nominal, "none").sizes
-    with ArchiveWriter(tmp_path / "stack.nc", program, Run(1, 1000, "all", 8, "none"), sizes) as writer:
-        rows, _ = writer.rows_to_check(1)
-        for _ in range(readings):
-            del left[:1]
-            assert (writer.rows_to_check(1)[0] == rows).all()
+    writer = ArchiveWriter(tmp_path / "stack.nc", program, Run(1, 1000, "all", 8, "none"), sizes)
+    rows, _ = writer.rows_to_check(1)
+    for _ in range(readings):
+        del left[:1]
+        assert (writer.rows_to_check(1)[0] == rows).all()

@@ -1,4 +1,4 @@
-"""The realizations of a run, as results and archives have them: read piece by piece, and which of them are finished."""
+"""The realizations of a run, as results and archives have them: read piece by piece."""
 
 from collections.abc import Iterator
 
@@ -19,17 +19,11 @@ def statuses(rows: xr.Dataset) -> Iterator[np.ndarray]:
     """Yield their statuses, piece by piece. Raises ArchiveError for one that has no meaning."""
     for piece in pieces(rows[[terms.STATUS.name]]):
         status = piece[terms.STATUS.name].values
-        if status.min(initial=0) < terms.UNFINISHED or status.max(initial=0) >= len(terms.STATUS_MEANINGS):
+        if status.min(initial=0) < 0 or status.max(initial=0) >= len(terms.STATUS_MEANINGS):
             raise ArchiveError("the archive is damaged: some statuses are unknown; run the model again")
         yield status
 
 
 def finished(results: xr.DataTree) -> int:
-    """Return how many rows, from the first on, were written completely."""
-    rows = 0
-    for piece in statuses(results.to_dataset()):
-        unfinished = np.flatnonzero(piece == terms.UNFINISHED)
-        if unfinished.size:
-            return rows + int(unfinished[0])
-        rows += len(piece)
-    return rows
+    """Return the number of realizations. Raises ArchiveError for a status that has no meaning."""
+    return sum(map(len, statuses(results.to_dataset())))

@@ -23,7 +23,8 @@ import peers
 import shapes
 
 import tolcontact as tc
-from tolcontact.archive import ArchiveWriter, Run, stored
+from tolcontact.archive import ArchiveWriter, Run, row_values
+from tolcontact.archive.journal import Journal
 from tolcontact.compilation.functions import InterpretedFunction, named
 from tolcontact.contact.scan import CompiledScan
 from tolcontact.simulation import simulate_blocks, threads as running
@@ -282,7 +283,7 @@ def breakdown(samples: int) -> None:
         "QP": [(InterpretedFunction, "__call__")],
         "rows, update, measures": [(named.AdaptiveFunction, "__call__")],
         "fields": [(DisplacementFields, "sums"), (DisplacementFields, "merge")],
-        "archive": [(ArchiveWriter, "append")],
+        "archive": [(ArchiveWriter, "append"), (Journal, "put_into")],
     }
     print("\n| us per realization, one thread |", " | ".join(where), "| between them |\n|---|" + "---:|" * (len(where) + 1))
     cases = {
@@ -304,10 +305,12 @@ def breakdown(samples: int) -> None:
                     path = Path(folder) / "run.nc"
                     fields = DisplacementFields(program.nominal, "all")
                     run = Run(seed=1, samples=samples // 4, keep="measures", surfaces=0, fields="all")
-                    with ArchiveWriter(path, program, run, fields.sizes) as writer:
-                        for block in blocks:
-                            fields.merge(fields.sums(block.poses, block.start))
-                            writer.append(stored(block, [row.label for row in writer.kept], program.nominal))
+                    writer = ArchiveWriter(path, program, run, fields.sizes)
+                    for block in blocks:
+                        fields.merge(fields.sums(block.poses, block.start))
+                        writer.append(row_values(block, [row.label for row in writer.kept], program.nominal))
+                    with writer.completed({}):
+                        pass
             inside = {word: seconds for word, seconds in spent.items() if word not in ("fields", "archive")}
             turns.append([*spent.values(), whole - sum(inside.values())])
         cells = 1e6 * np.median(turns, axis=0) / (samples // 4)

@@ -8,7 +8,7 @@ import tempfile
 
 import netCDF4  # noqa: F401 (imported once, for all)
 
-from tolcontact import checksums, vocabulary  # noqa: F401
+from tolcontact import vocabulary  # noqa: F401
 
 for line in sys.stdin:
     arguments = json.loads(line)

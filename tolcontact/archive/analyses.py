@@ -11,7 +11,6 @@ from tolcontact.archive.inspection import inspect
 from tolcontact.archive.netcdf_library import open_netcdf
 from tolcontact.archive.resuming import check_same_model
 from tolcontact.archive.writer import replacing_archive
-from tolcontact.checksums import crc32
 from tolcontact.compilation import Program
 from tolcontact.errors import ArchiveError
 
@@ -43,7 +42,5 @@ def keep(path: str | Path, record: terms.AnalysisRecord, dataset: "xr.Dataset", 
             shutil.copyfile(archive, part)
             stored = dataset.copy()
             for array in stored.variables.values():
-                array.encoding = {"dtype": "S1"} if array.dtype.kind in "UO" else {}
-            for name, values in stored.data_vars.items():
-                values.attrs[terms.CHECKSUM] = crc32(record.known[str(name)], values.values)
+                array.encoding = {"fletcher32": True} | ({"dtype": "S1"} if array.dtype.kind in "UO" else {})
             stored.to_netcdf(part, mode="a", group=f"{terms.ANALYSES_GROUP}/{record.name}", engine="netcdf4")

@@ -1,6 +1,6 @@
 """The header of an archive: everything except the values that are written block by block."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import netCDF4
@@ -11,9 +11,8 @@ from tolcontact.archive.datum_values import datum_sizes, datum_values
 from tolcontact.archive.form_values import form_sizes, form_values
 from tolcontact.archive.rows import Row, kept_rows
 from tolcontact.archive.settings import Run, declaration, now, run_settings, versions, watch_settings
-from tolcontact.archive.station_header import write_stations
 from tolcontact.archive.stored_rows import empty_checks
-from tolcontact.archive.variables import Contents, define, labels_of_rows, units_of_rows
+from tolcontact.archive.variables import add, add_all, define, labels_of_rows, units_of_rows
 from tolcontact.compilation import Program
 from tolcontact.declaration import Mesh
 from tolcontact.discretization import Nominal, NominalPart
@@ -28,7 +27,7 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
 
     `sums` is the length of the sums of each part's field, in one state.
     """
-    nominal, contents = program.nominal, Contents()
+    nominal = program.nominal
     file.setncatts(
         {
             "Conventions": terms.CONVENTIONS,
@@ -39,30 +38,30 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
             "Variation Simulation of Rigid Bodies with Contact Representation",
             "history": f"{now()} created",
             "versions": versions(),
+            "realizations": np.int64(0),
             **run_settings(program, run),
             **watch_settings(program),
             **(nominal.assembly.title_block.attributes if nominal.assembly.title_block else {}),
         }
     )
     rows = kept_rows(nominal, run.keep)
-    _write_labels(contents, file, nominal)
-    write_stations(contents, file, nominal, rows)
-    _write_rows(contents, file, program, rows)
-    _write_measures(contents, file, program)
-    _write_model(contents, file.createGroup("model"), nominal, declaration(program))
-    _write_contact(contents, file.createGroup("contact"), program)
-    _write_sample(contents, file.createGroup("sample"), program, deviations=Row("sample", terms.DEVIATION) in rows)
+    _write_labels(file, nominal)
+    _write_stations(file, nominal, rows)
+    _write_rows(file, program, rows)
+    _write_measures(file, program)
+    _write_model(file.createGroup("model"), nominal, declaration(program))
+    _write_contact(file.createGroup("contact"), program)
+    _write_sample(file.createGroup("sample"), program, deviations=Row("sample", terms.DEVIATION) in rows)
     file["contact"].createDimension(terms.BOUND, 2)
-    _lay_out_group(contents, file["contact"], empty_touching(file["contact"].dimensions[terms.POINT].size))
+    add_all(file["contact"], empty_touching(file["contact"].dimensions[terms.POINT].size))
     checked = file.createGroup("surface")
     checked.createDimension(terms.CHECKED, run.surfaces)
-    _lay_out_group(contents, checked, empty_checks(run.surfaces, len(nominal.pairs)))
+    add_all(checked, empty_checks(run.surfaces, len(nominal.pairs)))
     for part, numbers in zip(nominal.last_parts, sums, strict=True):
-        _write_field(contents, file.createGroup(terms.field_of(part.name)), part, numbers)
-    contents.write()
+        _write_field(file.createGroup(terms.field_of(part.name)), part, numbers)
 
 
-def _write_labels(contents: Contents, file: netCDF4.Dataset, nominal: Nominal) -> None:
+def _write_labels(file: netCDF4.Dataset, nominal: Nominal) -> None:
     """Write the dimensions of the root and their labels."""
     labels = labels_of_rows(nominal)
     file.createDimension(terms.REALIZATION, None)
@@ -70,40 +69,53 @@ def _write_labels(contents: Contents, file: netCDF4.Dataset, nominal: Nominal) -
         file.createDimension(name, len(values))
     for coordinate in terms.COORDINATES:
         if coordinate.name in labels:
-            contents.add(file, coordinate, labels[coordinate.name])
+            add(file, coordinate, labels[coordinate.name])
         else:
             define(file, coordinate)
 
 
-def _write_rows(contents: Contents, file: netCDF4.Dataset, program: Program, rows: Sequence[Row]) -> None:
-    """Define the variables of realizations, their checksums and checkpoints, all without values."""
+def _write_rows(file: netCDF4.Dataset, program: Program, rows: Sequence[Row]) -> None:
+    """Define the variables of realizations, without values."""
     for variable in terms.ROWS:
         if Row("", variable) in rows:
             define(file, variable)
     for variable, units in units_of_rows(program).items():
         file[variable.name].units = units
-    file.createDimension(terms.BLOCK, None)
-    file.createDimension(terms.ROW_VARIABLE, len(rows))
-    contents.add(file, terms.ROW_VARIABLE_LABEL, [row.label for row in rows])
-    define(file, terms.ROW_CHECKSUM)
-    file.createDimension(terms.CHECKPOINT, 2)
-    contents.lay_out(file, terms.SUMMED_ROWS, [terms.UNFINISHED] * 2)
+    add(file, terms.SUMMED_ROWS, 0)
 
 
-def _write_measures(contents: Contents, file: netCDF4.Dataset, program: Program) -> None:
+def _write_stations(file: netCDF4.Dataset, nominal: Nominal, rows: Sequence[Row]) -> None:
+    """Write the station of each measure, pair and part, and define the variables of each station; nothing without stations."""
+    if not nominal.scenes:
+        return
+    add(file, terms.MEASURE_STATION, [measure.station for measure in nominal.measures])
+    add(file, terms.PAIR_STATION, [nominal.parts[pair.moving].station for pair in nominal.pairs])
+    add(file, terms.PART_STATION, [part.station for part in nominal.last_parts])
+    for scene in nominal.scenes:
+        path = terms.station_group(scene.station)
+        group = file.createGroup(path)
+        group.setncattr("station", scene.station)
+        group.createDimension(terms.STATION_PART, len(scene.assembly.parts))
+        add(group, terms.STATION_PART_LABEL, [part.name for part in scene.assembly.parts])
+        for row in rows:
+            if row.group == path:
+                define(group, row.variable)
+
+
+def _write_measures(file: netCDF4.Dataset, program: Program) -> None:
     measures = program.nominal.measures
-    contents.add(file, terms.MEASURE_NOMINAL, program.nominal_measures)
-    contents.add(file, terms.MEASURE_TOLERANCE, [np.nan if measure.width is None else measure.width for measure in measures])
+    add(file, terms.MEASURE_NOMINAL, program.nominal_measures)
+    add(file, terms.MEASURE_TOLERANCE, [np.nan if measure.width is None else measure.width for measure in measures])
     bounds = np.array([m.bounds(nominal) for m, nominal in zip(measures, program.nominal_measures, strict=True)])
     bounds = np.where(np.isfinite(bounds), bounds, np.nan).reshape(-1, 2)
-    contents.add(file, terms.LOWER_LIMIT, bounds[:, 0])
-    contents.add(file, terms.UPPER_LIMIT, bounds[:, 1])
-    contents.add(file, terms.MEASURE_ACCURACY, program.accuracies)
-    contents.add(file, terms.QUANTITY, [measure.quantity for measure in measures])
-    contents.add(file, terms.MEASURE_UNITS, [measure.units for measure in measures])
+    add(file, terms.LOWER_LIMIT, bounds[:, 0])
+    add(file, terms.UPPER_LIMIT, bounds[:, 1])
+    add(file, terms.MEASURE_ACCURACY, program.accuracies)
+    add(file, terms.QUANTITY, [measure.quantity for measure in measures])
+    add(file, terms.MEASURE_UNITS, [measure.units for measure in measures])
 
 
-def _write_field(contents: Contents, group: netCDF4.Group, part: NominalPart, numbers: int) -> None:
+def _write_field(group: netCDF4.Group, part: NominalPart, numbers: int) -> None:
     """Write the surface of a part, and lay out its displacement field and its sums."""
     group.setncattr("part", part.name)
     sizes = {
@@ -116,13 +128,12 @@ def _write_field(contents: Contents, group: netCDF4.Group, part: NominalPart, nu
     }
     for name, size in sizes.items():
         group.createDimension(name, size)
-    contents.add(group, terms.COMPONENT_LABEL, terms.COMPONENTS)
-    contents.add(group, terms.FIELD_VERTICES, part.vertices)
-    contents.add(group, terms.FIELD_FACES, part.faces)
-    contents.add(group, terms.BOUND_LABEL, terms.BOUNDS)
-    _lay_out_group(contents, group, empty_field(len(part.vertices)))
-    contents.lay_out(group, terms.FIELD_SUMS, np.full([2, len(terms.STATES), numbers], np.nan))
-    contents.lay_out(group, terms.SUMS_CHECKSUM, [terms.UNFINISHED] * 2)
+    add(group, terms.COMPONENT_LABEL, terms.COMPONENTS)
+    add(group, terms.FIELD_VERTICES, part.vertices)
+    add(group, terms.FIELD_FACES, part.faces)
+    add(group, terms.BOUND_LABEL, terms.BOUNDS)
+    add_all(group, empty_field(len(part.vertices)))
+    add(group, terms.FIELD_SUMS, np.full([len(terms.STATES), numbers], np.nan))
 
 
 def empty_field(vertices: int) -> dict[ArchiveVariable, Any]:
@@ -145,20 +156,14 @@ def empty_touching(points: int) -> dict[ArchiveVariable, Any]:
     }
 
 
-def _lay_out_group(contents: Contents, group: netCDF4.Group, values: Mapping[ArchiveVariable, Any]) -> None:
-    for variable, initial in values.items():
-        contents.lay_out(group, variable, initial)
-    contents.lay_out(group, terms.GROUP_CHECKSUM, terms.UNFINISHED)
-
-
-def _write_model(contents: Contents, group: netCDF4.Group, nominal: Nominal, document: str) -> None:
-    contents.add(group, terms.DECLARATION, document)
+def _write_model(group: netCDF4.Group, nominal: Nominal, document: str) -> None:
+    add(group, terms.DECLARATION, document)
     lines = [(number, line) for number, lines in enumerate(nominal.lines) for line in lines]
     if lines:
         group.createDimension(terms.MEASURE_LINE, len(lines))
         group.createDimension(terms.LINE_END, 2)
-        contents.add(group, terms.MEASURE_OF_LINE, [number for number, _ in lines])
-        contents.add(group, terms.LINE_ENDS, np.array([line for _, line in lines]))
+        add(group, terms.MEASURE_OF_LINE, [number for number, _ in lines])
+        add(group, terms.LINE_ENDS, np.array([line for _, line in lines]))
     for part in nominal.last_parts:
         if isinstance(part.part.geometry, Mesh):
             mesh = group.createGroup(f"mesh/{terms.group_of(part.name)}")
@@ -166,27 +171,21 @@ def _write_model(contents: Contents, group: netCDF4.Group, nominal: Nominal, doc
             mesh.createDimension(terms.VERTEX, len(part.mesh.vertices))
             mesh.createDimension(terms.FACE, len(part.mesh.faces))
             mesh.createDimension(terms.CORNER, 3)
-            contents.add(mesh, terms.MESH_VERTICES, part.mesh.vertices)
-            contents.add(mesh, terms.MESH_FACES, part.mesh.faces)
+            add(mesh, terms.MESH_VERTICES, part.mesh.vertices)
+            add(mesh, terms.MESH_FACES, part.mesh.faces)
             if COORDINATE_SPACING in part.mesh.metadata:
-                contents.add(mesh, terms.COORDINATE_SPACING, coordinate_spacing(part.mesh))
+                add(mesh, terms.COORDINATE_SPACING, coordinate_spacing(part.mesh))
             surfaces = known_surfaces(part.mesh)
             if surfaces is not None:
                 mesh.createDimension(terms.BREP_FACE, len(surfaces[1]))
-                contents.add(mesh, terms.BREP_OF_FACE, surfaces[0])
-                _write_surfaces(contents, mesh, terms.OF_BREP_FACE, surface_arrays(surfaces[1]))
+                add(mesh, terms.BREP_OF_FACE, surfaces[0])
+                arrays = surface_arrays(surfaces[1])
+                add_all(mesh, {variable: arrays[name] for name, variable in terms.OF_BREP_FACE.items()})
                 if surfaces[2]:
-                    contents.add(mesh, terms.NAME_OF_BREP_FACE, surfaces[2])
+                    add(mesh, terms.NAME_OF_BREP_FACE, surfaces[2])
 
 
-def _write_surfaces(
-    contents: Contents, group: netCDF4.Group, variables: Mapping[str, ArchiveVariable], arrays: Mapping[str, np.ndarray]
-) -> None:
-    for name, variable in variables.items():
-        contents.add(group, variable, arrays[name])
-
-
-def _write_contact(contents: Contents, group: netCDF4.Group, program: Program) -> None:
+def _write_contact(group: netCDF4.Group, program: Program) -> None:
     nominal = program.nominal
     group.createDimension(terms.POINT, sum(len(pair.P_m) for pair in nominal.pairs))
     if any(pair.round for pair in nominal.pairs):
@@ -201,8 +200,7 @@ def _write_contact(contents: Contents, group: netCDF4.Group, program: Program) -
         }
         for name, size in sizes.items():
             group.createDimension(name, size)
-    for variable, values in contact_values(program).items():
-        contents.add(group, variable, values)
+    add_all(group, contact_values(program))
 
 
 def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
@@ -283,27 +281,27 @@ def _round_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
     }
 
 
-def _write_sample(contents: Contents, group: netCDF4.Group, program: Program, *, deviations: bool) -> None:
+def _write_sample(group: netCDF4.Group, program: Program, *, deviations: bool) -> None:
     nominal, contributors = program.nominal, program.draws.contributors
     group.createDimension(terms.CONTRIBUTOR, len(contributors))
     group.createDimension(terms.LOCATOR, len(nominal.locators))
     if deviations:
         define(group, terms.DEVIATION)
-    contents.add(group, terms.CONTRIBUTOR_LABEL, [contributor.label for contributor in contributors])
-    contents.add(group, terms.CONTRIBUTOR_SOURCE, [contributor.source for contributor in contributors])
-    contents.add(group, terms.CONTRIBUTOR_UNITS, [contributor.units for contributor in contributors])
-    contents.add(group, terms.TOLERANCE_RANGE, [contributor.range for contributor in contributors])
-    contents.add(group, terms.DISTRIBUTION, [contributor.description for contributor in contributors])
-    contents.add(group, terms.MEAN_SHIFT, [contributor.mean_shift for contributor in contributors])
+    add(group, terms.CONTRIBUTOR_LABEL, [contributor.label for contributor in contributors])
+    add(group, terms.CONTRIBUTOR_SOURCE, [contributor.source for contributor in contributors])
+    add(group, terms.CONTRIBUTOR_UNITS, [contributor.units for contributor in contributors])
+    add(group, terms.TOLERANCE_RANGE, [contributor.range for contributor in contributors])
+    add(group, terms.DISTRIBUTION, [contributor.description for contributor in contributors])
+    add(group, terms.MEAN_SHIFT, [contributor.mean_shift for contributor in contributors])
     locators = nominal.locators
-    contents.add(group, terms.LOCATOR_LABEL, locators.labels)
-    contents.add(group, terms.STIFFNESS, locators.stiffness)
-    contents.add(group, terms.ONE_SIDED, locators.one_sided)
-    contents.add(group, terms.LOCATOR_POINT, locators.points)
-    contents.add(group, terms.LOCATOR_DIRECTION, locators.directions)
-    contents.add(group, terms.FACE_OF_LOCATOR, _numbers(nominal, locators.faces))
+    add(group, terms.LOCATOR_LABEL, locators.labels)
+    add(group, terms.STIFFNESS, locators.stiffness)
+    add(group, terms.ONE_SIDED, locators.one_sided)
+    add(group, terms.LOCATOR_POINT, locators.points)
+    add(group, terms.LOCATOR_DIRECTION, locators.directions)
+    add(group, terms.FACE_OF_LOCATOR, _numbers(nominal, locators.faces))
     if any(locators.grounds):
-        contents.add(group, terms.GROUND_OF_LOCATOR, _numbers(nominal, locators.grounds))
+        add(group, terms.GROUND_OF_LOCATOR, _numbers(nominal, locators.grounds))
 
 
 def _numbers(nominal: Nominal, faces: Sequence[FaceDeviation | None]) -> list[int]:

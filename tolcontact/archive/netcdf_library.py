@@ -6,19 +6,18 @@ from pathlib import Path
 from typing import Literal
 
 import netCDF4
-from xarray.backends import locks
+from xarray.backends import NetCDF4DataStore
 
 CACHE_BYTES = 1 << 20  # a chunk of most variables; with the usual size, all caches would take as much memory as all else
+
+with netCDF4.Dataset("in memory", "w", diskless=True) as _file:
+    XARRAY_LOCK = NetCDF4DataStore(_file).lock  # type: ignore[no-untyped-call]  # held while xarray uses the library
 
 
 @contextlib.contextmanager
 def open_netcdf(path: Path, mode: Literal["w", "r+", "r"]) -> Iterator[netCDF4.Dataset]:
-    """Open a file whose values are read and written as they are, without masks.
-
-    Meanwhile xarray neither reads nor closes files: the lock that it takes for that is held.
-    """
-    library = locks.combine_locks([locks.NETCDFC_LOCK, locks.HDF5_LOCK])
-    with library, small_caches(), netCDF4.Dataset(path, mode, format="NETCDF4") as file:
+    """Open a file whose values are read and written as they are, without masks. Meanwhile xarray uses no netCDF file."""
+    with XARRAY_LOCK, small_caches(), netCDF4.Dataset(path, mode, format="NETCDF4") as file:
         file.set_auto_maskandscale(False)
         yield file
 

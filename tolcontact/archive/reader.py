@@ -35,7 +35,7 @@ def open_unchecked(path: Path) -> xr.DataTree:
     try:
         with small_caches():
             # Numbers of realizations are not read, which takes as much memory as all else together: they are 0, 1, 2, ...
-            tree = xr.open_datatree(path, engine="netcdf4", drop_variables=terms.REALIZATION)
+            tree = xr.open_datatree(path, engine="netcdf4", drop_variables=terms.REALIZATION, decode_times=False)
     except Exception as error:  # libraries may find a fault that the inspection did not
         raise ArchiveError(f'"{path}" cannot be read: {type(error).__name__}: {error}') from error
     numbers = pd.RangeIndex(tree.sizes[terms.REALIZATION])

@@ -1,9 +1,8 @@
 """The variables of each realization in an archive, their groups, and their values."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from typing import NamedTuple
 
-import netCDF4
 import numpy as np
 
 from tolcontact import poses as pose, vocabulary as terms
@@ -19,6 +18,11 @@ class Row(NamedTuple):
 
     group: str
     variable: ArchiveVariable
+
+    @property
+    def path(self) -> str:
+        """The path of the variable in a file."""
+        return f"{self.group}/{self.variable.name}"
 
     @property
     def label(self) -> str:
@@ -37,16 +41,6 @@ def kept_rows(nominal: Nominal, keep: str) -> tuple[Row, ...]:
 def group_of_rows(variable: ArchiveVariable) -> str:
     """Return the path of the group that holds a variable of realizations, if it belongs to no station."""
     return "sample" if variable is terms.DEVIATION else ""
-
-
-def stored_variables(file: netCDF4.Dataset) -> Iterable[tuple[netCDF4.Variable, ArchiveVariable]]:
-    """Yield the variables of realizations in a file, as they are stored and as they are defined."""
-    stations = file[terms.STATIONS_GROUP].groups.values() if terms.STATIONS_GROUP in file.groups else ()
-    groups = [(file, terms.ROWS), (file["sample"], (terms.DEVIATION,)), *((group, terms.STATION_ROWS) for group in stations)]
-    for group, variables in groups:
-        for variable in variables:
-            if variable.name in group.variables:
-                yield group[variable.name], variable
 
 
 def row_values(block: Block, labels: Collection[str], nominal: Nominal) -> dict[str, np.ndarray]:

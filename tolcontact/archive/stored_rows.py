@@ -1,86 +1,37 @@
-"""Rows of realizations as they are stored: their variables, chunks, blocks and checksums."""
+"""Realizations in an archive: whether they are undamaged, which ones are checked against surfaces, and their poses."""
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import netCDF4
 import numpy as np
 import xarray as xr
 
 from tolcontact import poses as pose, vocabulary as terms
-from tolcontact.archive.rows import Row, group_of_rows, kept_rows, row_values
-from tolcontact.checksums import crc32
-from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
-from tolcontact.realizations import finished
-from tolcontact.simulation import Block
 from tolcontact.vocabulary import ArchiveVariable
 
-PIECE_BYTES = 1 << 22  # of a variable that are read at once to compare them with their checksums
-
-
-class StoredBlock(NamedTuple):
-    """Realizations `start` to `stop`: the values of each archived variable, by label, and their checksums."""
-
-    start: int
-    stop: int
-    values: dict[str, np.ndarray]
-    checksums: list[int]
-
-
-def stored(block: Block, labels: Sequence[str], nominal: Nominal) -> StoredBlock:
-    """Return a block, converted once for the file and for its checksums; `labels` select its variables."""
-    values = row_values(block, labels, nominal)
-    checksums = [crc32(row.variable, values[row.label]) for row in kept_rows(nominal, "all") if row.label in values]
-    return StoredBlock(block.start, block.start + len(block), values, checksums)
+PIECE_BYTES = 1 << 22  # of a variable that are read at once
 
 
 def check_rows(results: xr.DataTree) -> None:
-    """Raise ArchiveError if finished realizations are not what was written; rows that were selected have no checksums."""
-    stored = results.to_dataset()
-    count, rows = stored.sizes[terms.REALIZATION], int(stored.attrs["block_rows"])
-    samples = int(stored.attrs["samples"])
-    if terms.ROW_CHECKSUM.name not in stored or count not in (samples, min(samples, terms.FIRST_ROWS)):
-        return
-    try:
-        for name, block in _damaged(results, stored, rows):
-            start, end = block * rows, min((block + 1) * rows, count) - 1
-            raise ArchiveError(
-                f'the archive is damaged: "{name}" of realizations {start} to {end} is not what was written; run it again'
-            )
-    except (OSError, RuntimeError) as error:
-        raise ArchiveError(f"the archive is damaged: its realizations cannot be read ({error}); run it again") from error
+    """Raise ArchiveError if realizations are not what was written: the library compares the checksums of what it reads."""
+    for group in results.subtree:
+        for name, values in group.to_dataset(inherit=False).data_vars.items():
+            if terms.REALIZATION in values.dims:
+                _check_variable(str(name), values)
 
 
-def _damaged(results: xr.DataTree, stored: xr.Dataset, rows: int) -> Iterator[tuple[str, int]]:
-    """Yield the variables and blocks of `rows` realizations whose values do not match their checksums."""
-    done = finished(results)
-    complete = done if done == stored.sizes[terms.REALIZATION] else done // rows * rows
-    # Blocks are finished in order: none behind the one that is being written.
-    behind = stored[terms.STATUS.name][complete + rows :].values
-    if (behind != terms.UNFINISHED).any():
-        yield terms.STATUS.name, done // rows
-    sums = stored[terms.ROW_CHECKSUM.name].values
-    names = stored[terms.ROW_VARIABLE].values.astype(str).tolist()
-    groups = results[terms.STATIONS_GROUP].children.values() if terms.STATIONS_GROUP in results.children else ()
-    candidates = [Row(group_of_rows(variable), variable) for variable in terms.BY_REALIZATION]
-    candidates += [Row(group.path.lstrip("/"), variable) for group in groups for variable in terms.STATION_ROWS]
-    for row in candidates:
-        if row.label in names:
-            values = (results[row.group].to_dataset() if row.group else stored)[row.variable.name][:complete]
-            actual, expected = _checksums(row.variable, values, rows), sums[: -(-complete // rows), names.index(row.label)]
-            wrong = np.flatnonzero(actual != expected)
-            yield from ((row.label, int(block)) for block in wrong[:1])
-
-
-def _checksums(variable: ArchiveVariable, values: xr.DataArray, rows: int) -> np.ndarray:
-    """Return the checksums (block,) of the values of a variable in blocks of `rows` realizations."""
+def _check_variable(name: str, values: xr.DataArray) -> None:
     row_bytes = values.dtype.itemsize * max(values.size // max(len(values), 1), 1)
-    checksums, step = [], max(min(terms.PIECE_ROWS, PIECE_BYTES // row_bytes) // rows, 1) * rows
+    step = max(PIECE_BYTES // row_bytes // terms.BLOCK_ROWS, 1) * terms.BLOCK_ROWS
     for start in range(0, len(values), step):
-        piece = values[start : start + step].values
-        checksums += [crc32(variable, piece[k : k + rows]) for k in range(0, len(piece), rows)]
-    return np.array(checksums, dtype=np.int64)
+        try:
+            values[start : start + step].load()
+        except (OSError, RuntimeError) as error:
+            raise ArchiveError(
+                f'the archive is damaged: "{name}" of realizations {start} to {min(start + step, len(values)) - 1} '
+                f"is not what was written ({error}); run it again"
+            ) from error
 
 
 def choose(file: netCDF4.Dataset, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -160,7 +111,7 @@ def _rows_of(stored: netCDF4.Variable, rows: np.ndarray) -> np.ndarray:
 def empty_checks(count: int, pairs: int) -> dict[ArchiveVariable, np.ndarray]:
     """Return the values of the group before any check."""
     return {
-        terms.CHECKED_REALIZATION: np.full(count, terms.UNFINISHED),
+        terms.CHECKED_REALIZATION: np.full(count, terms.UNCHECKED),
         terms.SURFACE_PENETRATION: np.full((count, pairs), np.nan),
         terms.BESIDE: np.full((count, pairs), np.nan),
         terms.FALSE_CONTACT: np.full((count, pairs), np.nan),

@@ -1,40 +1,39 @@
 """Variables of the vocabulary in a netCDF file."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import netCDF4
 import numpy as np
+import pandas as pd
+import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.checksums import crc32
 from tolcontact.compilation import Program
 from tolcontact.discretization import Nominal
 from tolcontact.vocabulary import ArchiveVariable
 
 MAX_CHUNK_BYTES = 1 << 22  # bytes: more would not stay in the library's cache
 MIN_CHUNK_ROWS = 16
-BLOCK_CHUNK = 256
 
 
-def define(group: netCDF4.Dataset, variable: ArchiveVariable) -> None:
-    """Define a variable of numbers, without values."""
-    options: dict[str, Any] = {}
-    if {terms.REALIZATION, terms.BLOCK} & set(variable.dims):
+def define(group: netCDF4.Dataset, variable: ArchiveVariable) -> netCDF4.Variable:
+    """Define a variable of numbers, without values. The library compares its checksums when it reads."""
+    options: dict[str, Any] = {"fletcher32": True}
+    if terms.REALIZATION in variable.dims:
         # netCDF's own choice, one row per chunk, reads some fifty times slower.
-        fixed = [1 if d in (terms.REALIZATION, terms.BLOCK) else max(len(_dimension(group, d)), 1) for d in variable.dims]
-        rows = rows_together(np.dtype(variable.kind).itemsize * math.prod(fixed))
-        grows = {terms.REALIZATION: rows, terms.BLOCK: BLOCK_CHUNK}
-        options["chunksizes"] = [grows.get(d, size) for d, size in zip(variable.dims, fixed, strict=True)]
+        fixed = [max(len(_dimension(group, dim)), 1) for dim in variable.dims[1:]]
+        options["chunksizes"] = [_chunk_rows(np.dtype(variable.kind).itemsize * math.prod(fixed)), *fixed]
     created = group.createVariable(variable.name, variable.kind, variable.dims, **options)
     attributes = variable.all_attributes
     if "flag_values" in attributes:
         attributes["flag_values"] = np.array(attributes["flag_values"], dtype=variable.kind)
     created.setncatts(attributes)
+    return created
 
 
-def rows_together(width: int) -> int:
+def _chunk_rows(width: int) -> int:
     """Return the rows in a chunk of the file, for rows of `width` bytes: a whole block, or fewer if they are too large."""
     rows = terms.BLOCK_ROWS
     while rows > MIN_CHUNK_ROWS and rows * width > MAX_CHUNK_BYTES:
@@ -49,43 +48,38 @@ def _dimension(group: netCDF4.Dataset, name: str) -> netCDF4.Dimension:
     return _dimension(group.parent, name)
 
 
-class Contents:
-    """Variables that are defined one after the other, and whose values are written together.
-
-    The library goes through all definitions again before the first value that follows one.
-    """
-
-    def __init__(self) -> None:
-        self._values: list[tuple[netCDF4.Variable, Any]] = []
-
-    def add(self, group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
-        """Add a variable with its final values and their checksum, in a group that has the dimensions."""
-        if variable.kind is str:
-            self._add_text(group, variable, values)
-        else:
-            self.lay_out(group, variable, values)
-        group[variable.name].setncattr(terms.CHECKSUM, np.int64(crc32(variable, values)))
-
-    def lay_out(self, group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
-        """Add a variable of numbers whose values will be overwritten."""
-        define(group, variable)
+def add(group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
+    """Add a variable with its values to a group that has the dimensions."""
+    if variable.kind is str:
+        _add_text(group, variable, values)
+    else:
+        created = define(group, variable)
         if np.size(values):
-            self._values.append((group[variable.name], values))
+            created[...] = values
 
-    def _add_text(self, group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
-        """Add text as characters. The netCDF library crashes if text of variable length is read through two open handles."""
-        text = np.char.encode(np.array(values, dtype=str), "utf-8")
-        length = group.createDimension(f"{variable.name}_length", max(text.dtype.itemsize, 1))
-        created = group.createVariable(variable.name, "S1", (*variable.dims, length.name))
-        if text.size:
-            letters = text.reshape(*text.shape, 1).view("S1") if text.dtype.itemsize else ""
-            self._values.append((created, letters))
-        created.setncatts({**variable.all_attributes, "_Encoding": "utf-8"})
 
-    def write(self) -> None:
-        """Write all values."""
-        for stored, values in self._values:
-            stored[...] = values
+def add_all(group: netCDF4.Dataset, values: Mapping[ArchiveVariable, Any]) -> None:
+    """Add variables with their values (see `add`)."""
+    for variable, array in values.items():
+        add(group, variable, array)
+
+
+def overwrite(file: netCDF4.Dataset, group: str, values: Mapping[ArchiveVariable, Any]) -> None:
+    """Overwrite the values of variables in the group of that path."""
+    for variable, array in values.items():
+        if np.size(array):
+            file[f"{group}/{variable.name}"][...] = array
+
+
+def _add_text(group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
+    """Add text as characters. The netCDF library crashes if text of variable length is read through two open handles."""
+    text = np.char.encode(np.array(values, dtype=str), "utf-8")
+    length = group.createDimension(f"{variable.name}_length", max(text.dtype.itemsize, 1))
+    created = group.createVariable(variable.name, "S1", (*variable.dims, length.name), fletcher32=True)
+    created.setncatts({**variable.all_attributes, "_Encoding": "utf-8"})
+    created.set_auto_chartostring(False)
+    if text.dtype.itemsize:
+        created[...] = text.reshape(*text.shape, 1).view("S1")
 
 
 def labels_of_rows(nominal: Nominal) -> dict[str, Sequence[str]]:
@@ -123,3 +117,15 @@ def attributes_of(variable: ArchiveVariable, program: Program) -> dict[str, Any]
         attributes["flag_values"] = np.array(attributes["flag_values"], dtype=variable.kind)
     units = units_of_rows(program)
     return attributes | ({"units": units[variable]} if variable in units else {})
+
+
+def labelled(program: Program, values: Mapping[ArchiveVariable, Any], attributes: Mapping[str, Any]) -> xr.Dataset:
+    """Return arrays of any kind as variables of realizations, with the labels and attributes of an archive."""
+    texts = {**labels_of_rows(program.nominal), terms.CONTRIBUTOR: program.nominal.contributors}
+    labels: dict[str, Any] = {name: np.array(list(names), dtype=object) for name, names in texts.items()}  # text of any length
+    labels[terms.REALIZATION] = pd.RangeIndex(len(values[terms.STATUS]))
+    return xr.Dataset(
+        {variable.name: (variable.dims, array, attributes_of(variable, program)) for variable, array in values.items()},
+        {label.name: label.entry(labels[label.name]) for label in (*terms.COORDINATES, terms.CONTRIBUTOR_LABEL)},
+        attributes,
+    )

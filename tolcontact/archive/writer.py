@@ -1,44 +1,35 @@
-"""Writing an archive block by block.
-
-A file that is being extended breaks when its writer is killed at the wrong moment. So room is laid out first, under another
-name: header, and rows with the status "unfinished". Once the file has its own name, bytes are only overwritten in
-place, the status of a row after its data. If the process is killed, the file still opens, finished rows stay, and `resume`
-continues after the last checkpoint. (Writes are not flushed to the disk: a power failure may lose more.) To get its name
-soon, a long run begins with room for few rows; when these are full, a copy gets room for all, and replaces the file.
-"""
+"""Writing an archive: its header first, its realizations block by block to a journal, and all of them at the end."""
 
 import contextlib
 import shutil
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.disk_space import check_room, lay_out_rows
-from tolcontact.archive.header import empty_field, empty_touching, write_header
+from tolcontact.archive.disk_space import check_room
+from tolcontact.archive.header import write_header
 from tolcontact.archive.inspection import inspect
+from tolcontact.archive.journal import Checkpoint, Journal
 from tolcontact.archive.netcdf_library import open_netcdf
-from tolcontact.archive.raw_file import RawFile
 from tolcontact.archive.reader import open_unchecked
 from tolcontact.archive.resuming import check_same_run
 from tolcontact.archive.rows import kept_rows
 from tolcontact.archive.settings import Run, now, run_settings, versions
-from tolcontact.archive.stored_rows import StoredBlock, archived_poses, check_rows, choose, empty_checks
-from tolcontact.checksums import crc32
+from tolcontact.archive.stored_rows import archived_poses, check_rows, choose, empty_checks
+from tolcontact.archive.variables import overwrite
 from tolcontact.compilation import Program
-from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
 from tolcontact.replacing import replacing
 
 
 class ArchiveWriter:
-    """An archive being written, whose file is locked (see `locked_archive`). Use it as a context manager.
+    """An archive being written, whose file is locked (see `locked_archive`).
 
-    rows      number of realizations in it; the next block starts there
+    rows      number of realizations in the archive and its journal; the next block starts there
     samples   number of realizations that it was started for
     kept      what it keeps of each realization
     """
@@ -51,8 +42,8 @@ class ArchiveWriter:
         check_room(path, program.nominal, kept_rows(program.nominal, run.keep), run.samples)
         with replacing_archive(path) as part, open_netcdf(part, "w") as file:
             write_header(file, program, run, sums)
-            lay_out_rows(file, 0, min(run.samples, terms.FIRST_ROWS))
-        self._go_on(path, program.nominal, run.checkpoint_interval)
+        self._start(path, program, run)
+        self._journal.remove()
 
     @classmethod
     def resume(cls, path: Path, program: Program, run: Run) -> "ArchiveWriter":
@@ -61,82 +52,57 @@ class ArchiveWriter:
         Raises ArchiveError if the file is not an archive, or contains another model or another run.
         """
         inspect(path)
+        with open_netcdf(path, "r") as file:
+            check_same_run(file, path, program, run_settings(program, run), run.surfaces)
+            software = "" if file.versions == versions() else f" with {versions()}"
+        with open_unchecked(path) as results:
+            check_rows(results)
         writer = cls.__new__(cls)
-        with replacing_archive(path) as copy:
-            # Only the copy is opened: the old file may be open in this process, and HDF5 does not open a file twice.
-            shutil.copyfile(path, copy)
-            with open_unchecked(copy) as results:
-                check_rows(results)
-            with open_netcdf(copy, "r+") as file:
-                check_same_run(file, path, program, run_settings(program, run), run.surfaces)
-                rows = last_checkpoint(file, path, [part.name for part in program.nominal.last_parts]).rows
-                samples, length = max(run.samples, int(file.samples)), len(file.dimensions[terms.REALIZATION])
-                check_room(path, program.nominal, kept_rows(program.nominal, run.keep), samples - length)
-                lay_out_rows(file, length, samples)
-                file.setncattr("samples", np.int64(samples))
-                software = "" if file.versions == versions() else f" with {versions()}"
-                file.setncattr("history", f"{file.history}\n{now()} resumed after {rows} realizations{software}")
-            # Fields and checks were of the earlier rows.
-            initial = {terms.field_of(part.name): empty_field(len(part.vertices)) for part in program.nominal.last_parts}
-            initial["surface"] = empty_checks(run.surfaces, len(program.nominal.pairs))
-            initial["contact"] = empty_touching(sum(len(pair.P_m) for pair in program.nominal.pairs))
-            with contextlib.closing(RawFile(copy)) as values:
-                values.overwrite_together(initial)
-        writer._go_on(path, program.nominal, run.checkpoint_interval)
+        writer._start(path, program, run)
+        writer._take_journal()
+        check_room(path, program.nominal, writer.kept, writer.samples - writer.rows)
+        writer._resumed = f"\n{now()} resumed after {writer.rows} realizations{software}"
         return writer
 
-    def _go_on(self, path: Path, nominal: Nominal, checkpoint_interval: float) -> None:
-        self._path, self._parts, self._pairs = path, [part.name for part in nominal.last_parts], len(nominal.pairs)
-        self._stations = [scene.station for scene in nominal.scenes]
-        self._checkpoint_interval = checkpoint_interval
-        with _as_archive_error(path):
-            self._values = RawFile(path)
-            with open_netcdf(path, "r") as file:
-                self._length, self._block_rows = len(file.dimensions[terms.REALIZATION]), int(file.block_rows)
-                self.samples, self._checked = int(file.samples), len(file["surface"].dimensions[terms.CHECKED])
-                self._go_back(last_checkpoint(file, path, self._parts))
-        self.kept = tuple(row for row in kept_rows(nominal, "all") if self._values.has(row.group, row.variable))
+    def _start(self, path: Path, program: Program, run: Run) -> None:
+        self._path = self._current = path
+        self._parts, self._pairs = [part.name for part in program.nominal.last_parts], len(program.nominal.pairs)
+        self._stations, self._checked = [scene.station for scene in program.nominal.scenes], run.surfaces
+        self._checkpoint_interval, self._since, self._resumed = run.checkpoint_interval, time.monotonic(), ""
+        self.kept = kept_rows(program.nominal, run.keep)
+        with open_netcdf(path, "r") as file:
+            self.rows = self._start_row = int(file[terms.SUMMED_ROWS.name][...])
+            self.samples, self._block_rows = max(run.samples, int(file.samples)), int(file.block_rows)
+            sums = [file[terms.field_of(part)][terms.FIELD_SUMS.name][...] for part in self._parts]
+            self._checkpoint = Checkpoint(file.history, self.rows, 0, self.samples, sums if self.rows else [])
+        self._journal = Journal(path, self.kept, self._block_rows)
 
-    def load_checkpoint(self) -> list[np.ndarray]:
-        """Go back to the last checkpoint, and return its sums of fields, (state, number) for each part; empty without one."""
-        with open_netcdf(self._path, "r") as file:
-            checkpoint = last_checkpoint(file, self._path, self._parts)
-        self._go_back(checkpoint)
-        return checkpoint.sums
+    def _take_journal(self) -> None:
+        """Put the journal of a killed run into the archive, up to its last checkpoint."""
+        checkpoint = self._journal.checkpoint(self._checkpoint.archive)
+        if checkpoint and checkpoint.rows > self.rows:
+            self.rows, self.samples = checkpoint.rows, max(self.samples, checkpoint.samples)
+            self._checkpoint = checkpoint
+            with self.completed({}):
+                pass
+            self._start_row = self.rows
+        self._journal.remove()
 
-    def _go_back(self, checkpoint: "Checkpoint") -> None:
-        self.rows, self._place = checkpoint.rows, checkpoint.place
-        self._since = time.monotonic()
+    @property
+    def sums(self) -> list[np.ndarray]:
+        """The sums of fields at the last checkpoint, (state, number) for each part; empty without one."""
+        return self._checkpoint.sums
 
-    def __enter__(self) -> "ArchiveWriter":
-        return self
-
-    def __exit__(self, *error: object) -> None:
+    def append(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Write the rows of a block to the journal; `arrays` have the labels of `kept`."""
         with _as_archive_error(self._path):
-            self._values.close()
+            self._journal.append(arrays[row.label] for row in self.kept)
+        self.rows += len(arrays[terms.STATUS.name])
 
-    def append(self, block: StoredBlock) -> None:
-        """Write the rows of a block to the file."""
-        with _as_archive_error(self._path):
-            if block.stop > self._length:
-                self._make_room_for_all()
-            for row in self.kept:
-                if row.variable is not terms.STATUS:
-                    self._values.overwrite(row.group, row.variable, block.values[row.label], block.start)
-            self._values.overwrite("", terms.ROW_CHECKSUM, [block.checksums], block.start // self._block_rows)
-            self._values.overwrite("", terms.STATUS, block.values[terms.STATUS.name], block.start)
-        self.rows = block.stop
-
-    def _make_room_for_all(self) -> None:
-        self._values.close()
-        try:
-            with replacing_archive(self._path) as part:
-                shutil.copyfile(self._path, part)
-                with open_netcdf(part, "r+") as file:
-                    lay_out_rows(file, self._length, self.samples)
-            self._length = self.samples
-        finally:  # a run may be stopped here, and still writes its fields
-            self._values = RawFile(self._path)
+    @property
+    def has_new_rows(self) -> bool:
+        """True if the journal holds realizations that the archive does not hold."""
+        return self._journal.size > 0
 
     @property
     def is_between_blocks(self) -> bool:
@@ -152,27 +118,50 @@ class ArchiveWriter:
 
     def write_checkpoint(self, sums: Sequence[np.ndarray]) -> None:
         """Write the sums of the fields (state, number) for each part so far, so that a killed run can continue."""
+        self._checkpoint = self._checkpoint._replace(
+            rows=self.rows, size=self._journal.size, samples=self.samples, sums=[array.copy() for array in sums]
+        )
         with _as_archive_error(self._path):
-            place = 1 - self._place
-            write_checkpoint(self._values, Checkpoint(self.rows, place, list(sums)), self._parts)
-            self._place = place  # not before: one that is interrupted is written again, the other one stays
+            self._journal.write_checkpoint(self._checkpoint)
         self._since = time.monotonic()
 
-    def write_fields(self, fields: Sequence[dict[terms.ArchiveVariable, Any]]) -> None:
-        """Write displacement fields: for each part the values of `FIELDS`."""
-        with _as_archive_error(self._path):
-            self._values.overwrite_together(
-                {terms.field_of(part): values for part, values in zip(self._parts, fields, strict=True)}
-            )
+    @contextlib.contextmanager
+    def completed(self, groups: Mapping[str, Mapping[terms.ArchiveVariable, Any]]) -> Iterator[None]:
+        """Replace the archive by one with all rows, with the last checkpoint, and with the values of `groups`.
+
+        Until it does so at the end of the block, `rows_to_check`, `poses` and `write_checked` refer to the new archive.
+        """
+        with contextlib.ExitStack() as stack:
+            with _as_archive_error(self._path):
+                part = stack.enter_context(replacing(self._path))
+                shutil.copyfile(self._path, part)
+                with open_netcdf(part, "r+") as file:
+                    self._journal.put_into(file, self._start_row, self.rows)
+                    overwrite(file, "", {terms.SUMMED_ROWS: self._checkpoint.rows})
+                    for name, sums in zip(self._parts, self._checkpoint.sums, strict=self._checkpoint.rows > 0):
+                        overwrite(file, terms.field_of(name), {terms.FIELD_SUMS: sums})
+                    checks = empty_checks(self._checked, self._pairs)  # an earlier check was of the earlier rows
+                    for group, values in ({"surface": checks} | dict(groups)).items():
+                        overwrite(file, group, values)
+                    numbers = {"samples": np.int64(self.samples), "realizations": np.int64(self.rows)}
+                    file.setncatts({**numbers, "history": f"{file.history}{self._resumed}"})
+            self._current = part
+            try:
+                yield
+            finally:
+                self._current = self._path
+            with _as_archive_error(self._path):
+                stack.close()
+        self._journal.remove()
 
     def rows_to_check(self, seed: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the numbers (row,) of the realizations to check against the surfaces, and whether each is a random choice."""
-        with open_netcdf(self._path, "r") as file:
+        with open_netcdf(self._current, "r") as file:
             return choose(file, self._checked, seed)
 
     def poses(self, rows: np.ndarray) -> np.ndarray | None:
         """Return corrected poses (row, part, 12) of some rows; None if they are not kept."""
-        with open_netcdf(self._path, "r") as file:
+        with open_netcdf(self._current, "r") as file:
             return archived_poses(file, rows, self._stations)
 
     def first_poses(self, end: int) -> tuple[np.ndarray, np.ndarray]:
@@ -191,14 +180,8 @@ class ArchiveWriter:
         values = empty_checks(self._checked, self._pairs)
         for variable, array in zip(terms.SURFACE, (rows, *findings, at_random), strict=True):
             values[variable][: len(rows)] = array
-        with _as_archive_error(self._path):
-            self._values.overwrite_together({"surface": values})
-
-    def write_touching(self, share: np.ndarray, interval: np.ndarray, realizations: int) -> None:
-        """Write the share of realizations in which each contact point touches (point,), with its interval (point, bound)."""
-        with _as_archive_error(self._path):
-            values = dict(zip(terms.TOUCHING, (share, interval, realizations), strict=True))
-            self._values.overwrite_together({"contact": values})
+        with _as_archive_error(self._path), open_netcdf(self._current, "r+") as file:
+            overwrite(file, "surface", values)
 
 
 @contextlib.contextmanager
@@ -216,42 +199,3 @@ def _as_archive_error(path: Path) -> Iterator[None]:
     except (OSError, RuntimeError) as error:
         reason = getattr(error, "strerror", None) or f"{error} (is the disk full?)"
         raise ArchiveError(f'archive "{path}" cannot be written: {reason}') from error
-
-
-class Checkpoint(NamedTuple):
-    """Sums (state, number) for each part over the first `rows` realizations, none if nothing is summed up; and their place."""
-
-    rows: int
-    place: int
-    sums: list[np.ndarray]
-
-
-def last_checkpoint(file: netCDF4.Dataset, path: Path, parts: Sequence[str]) -> Checkpoint:
-    """Return the last checkpoint of an archive. Raises ArchiveError if it is not what was written."""
-    summed = np.ma.getdata(file[terms.SUMMED_ROWS.name][:])
-    place = int(summed.argmax())
-    rows, sums = max(0, int(summed[place])), []
-    for part in parts if rows else ():
-        group = file[terms.field_of(part)]
-        sums.append(np.ma.getdata(group[terms.FIELD_SUMS.name][place]))
-        if _checksum(rows, sums[-1]) != int(group[terms.SUMS_CHECKSUM.name][place]):
-            raise ArchiveError(
-                f'archive "{path}" is damaged: the sums of the field of part "{part}" are not what was written; write to '
-                "a new file"
-            )
-    return Checkpoint(rows, place, sums)
-
-
-def write_checkpoint(archive: RawFile, checkpoint: Checkpoint, parts: Sequence[str]) -> None:
-    """Write a checkpoint to its place."""
-    archive.overwrite("", terms.SUMMED_ROWS, [terms.UNFINISHED], checkpoint.place)
-    for part, of_part in zip(parts, checkpoint.sums, strict=True):
-        archive.overwrite(terms.field_of(part), terms.FIELD_SUMS, of_part[None], checkpoint.place)
-        checksum = _checksum(checkpoint.rows, of_part)
-        archive.overwrite(terms.field_of(part), terms.SUMS_CHECKSUM, [checksum], checkpoint.place)
-    archive.overwrite("", terms.SUMMED_ROWS, [checkpoint.rows], checkpoint.place)
-
-
-def _checksum(rows: int, sums: np.ndarray) -> int:
-    """Return the checksum of the sums together with their number of realizations, so that neither matches alone."""
-    return crc32(terms.FIELD_SUMS, sums, crc32(terms.SUMMED_ROWS, rows))

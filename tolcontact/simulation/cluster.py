@@ -10,7 +10,7 @@ import signal
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from importlib.metadata import version
 from importlib.util import find_spec
 from multiprocessing import resource_tracker
@@ -51,14 +51,11 @@ def client_of(workers: int | None, scheduler: str | None) -> Iterator[Any]:
     """Open the client of new processes on this machine, or of a running scheduler; yield None if neither is given."""
     if workers is not None and scheduler is not None:
         raise OptionError("workers are started here, a scheduler has its own; choose one of --workers and --scheduler")
-    if workers is not None:
-        with local_cluster(workers) as client:
-            yield client
-    elif scheduler is not None:
-        with running_cluster(scheduler) as client:
-            yield client
-    else:
-        yield None
+    with ExitStack() as stack:
+        if workers is not None:
+            yield stack.enter_context(local_cluster(workers))
+        else:
+            yield stack.enter_context(running_cluster(scheduler)) if scheduler is not None else None
 
 
 @contextmanager
@@ -133,18 +130,13 @@ def running_cluster(address: str) -> Iterator[Any]:
         except (OSError, ValueError) as error:
             advice = "start one with: dask scheduler; if it asks for certificates, its address begins with tls://"
             raise ClusterError(f'no dask scheduler answers at "{address}": {error}; {advice}') from error
-    with _silent("distributed.client"), client:  # this module reports a lost scheduler
-        _log_dashboard(client)
-        yield client
-
-
-@contextmanager
-def _silent(name: str) -> Iterator[None]:
-    logger = logging.getLogger(name)
+    logger = logging.getLogger("distributed.client")
     level = logger.level
-    logger.setLevel(logging.CRITICAL + 1)
+    logger.setLevel(logging.CRITICAL + 1)  # this module reports a lost scheduler
     try:
-        yield
+        with client:
+            _log_dashboard(client)
+            yield client
     finally:
         logger.setLevel(level)
 
@@ -180,7 +172,7 @@ class Workers:
     def __init__(self, client: Any, timeout: float = WORKER_TIMEOUT) -> None:
         check_workers(client, timeout=timeout)
         self._client, self._timeout = client, timeout
-        self._model: _Model | None = None
+        self._sent: list[Any] = []
 
     def __call__(
         self, function: Callable[[Block], T], program: Program, *, samples: int, seed: int, start: int = 0,
@@ -188,38 +180,25 @@ class Workers:
     ) -> Iterator[T]:  # fmt: skip
         """Yield the result of `function` for each block of `simulate_blocks`, in order; it is called on the workers."""
         job = Packed.of((draws or program.draws, function), program.nominal)
-        shards = _Shards(self._client, self._sent(program), job, seed, samples, block or block_rows(program), self._timeout)
+        shards = _Shards(self._client, pack_model(program), job, seed, self._timeout)
+        self._sent = shards.sent  # so that workers keep the program until the next call
+        rows, blocks = block or block_rows(program), 1
         try:
-            position = start
-            while position < samples or shards:
-                while position < samples and len(shards) < SHARDS_AHEAD * shards.threads:
-                    position = shards.begin(position)
-                yield from shards.finish()
+            while start < samples or shards:
+                while start < samples and len(shards) < SHARDS_AHEAD * shards.threads:
+                    stop = min(start + blocks * rows, samples)
+                    shards.begin(start, stop)
+                    start = stop
+                seconds, results = shards.finish()
+                blocks = min(int(SHARD_SECONDS * len(results) / max(seconds, 1e-3)), MAX_SHARD_ROWS // rows, 2 * blocks)
+                blocks = max(1, blocks)
+                yield from results
         finally:
             shards.cancel()
 
     def get_ready(self, function: Callable[[Block], Any], program: Program) -> None:
         """Make all present workers import and compile the program; otherwise their first shard takes longer."""
-        model, job = self._sent(program).packed, Packed.of(function, program.nominal)
-        self._client.run(prepare_worker, model, job.data)
-
-    def _sent(self, program: Program) -> "_Model":
-        if self._model is None or self._model.program is not program:
-            self._model = _Model(self._client, program)
-        return self._model
-
-
-class _Model:
-    """A program that workers compile; its packed model is a dask result, which workers pass on to each other."""
-
-    def __init__(self, client: Any, program: Program) -> None:
-        self._client, self.program = client, program
-        self.packed = pack_model(program)
-        self.send()
-
-    def send(self) -> None:
-        """Send the packed model to the workers."""
-        self.sent = self._client.submit(bytes, self.packed.data, pure=False)
+        self._client.run(prepare_worker, pack_model(program), Packed.of(function, program.nominal).data)
 
 
 def check_workers(client: Any, timeout: float = WORKER_TIMEOUT) -> None:
@@ -255,14 +234,12 @@ def shard_result(client: Any, future: Any, timeout: float = WORKER_TIMEOUT) -> A
 
 
 class _Shards:
-    """Shards in progress, in order."""
+    """Shards in progress, in order. Workers pass a model and a job on to each other as dask results."""
 
-    def __init__(self, client: Any, model: _Model, job: Packed, seed: int, samples: int, block: int, timeout: float) -> None:
-        self._client, self._model, self._job = client, model, job
-        self._seed, self._samples, self._block, self._timeout = seed, samples, block, timeout
-        self._blocks = 1  # of the next shard
+    def __init__(self, client: Any, model: Packed, job: Packed, seed: int, timeout: float) -> None:
+        self._client, self._model, self._job, self._seed, self._timeout = client, model, job, seed, timeout
         self._pending: deque[tuple[int, int, Any]] = deque()
-        self._send_job()
+        self._send()
 
     def __len__(self) -> int:
         return len(self._pending)
@@ -275,14 +252,16 @@ class _Shards:
         except OSError:
             return 1
 
-    def begin(self, start: int) -> int:
-        """Submit the shard that starts at realization `start`; return the start of the next one."""
-        stop = min(start + self._blocks * self._block, self._samples)
-        self._pending.append((start, stop, self._submitted(start, stop)))
-        return stop
+    def begin(self, start: int, stop: int) -> None:
+        """Submit the shard of realizations `start` to `stop`."""
+        tokens = self._model.token, self._job.token
+        future = self._client.submit(
+            simulate_shard, *self.sent, tokens, self._model.versions, self._seed, start, stop, pure=False
+        )  # fmt: skip
+        self._pending.append((start, stop, future))
 
-    def finish(self) -> list[Any]:
-        """Wait for the first shard, and return its results."""
+    def finish(self) -> tuple[float, list[Any]]:
+        """Wait for the first shard, and return its time [s] and its results."""
         while True:
             start, stop, future = self._pending[0]
             try:
@@ -297,9 +276,7 @@ class _Shards:
                 self._begin_again()
             else:
                 self._pending.popleft()
-                limit = MAX_SHARD_ROWS // self._block
-                self._blocks = max(1, min(int(SHARD_SECONDS * len(results) / max(seconds, 1e-3)), limit, 2 * self._blocks))
-                return list(results)
+                return seconds, results
 
     def cancel(self) -> None:
         """Cancel all shards."""
@@ -307,21 +284,8 @@ class _Shards:
             self._client.cancel([future for _, _, future in self._pending], force=True)
         self._pending.clear()
 
-    def _send_job(self) -> None:
-        self._sent = self._client.submit(bytes, self._job.data, pure=False)
-
-    def _submitted(self, start: int, stop: int) -> Any:
-        return self._client.submit(
-            simulate_shard,
-            self._model.sent,
-            self._sent,
-            (self._model.packed.token, self._job.token),
-            self._model.packed.versions,
-            self._seed,
-            start,
-            stop,
-            pure=False,
-        )
+    def _send(self) -> None:
+        self.sent = [self._client.submit(bytes, packed.data, key=packed.token) for packed in (self._model, self._job)]
 
     def _begin_again(self) -> None:
         """Wait for a scheduler that has lost the shards in progress, and submit them again."""
@@ -334,9 +298,11 @@ class _Shards:
                     f"within {self._timeout:.0f} s; resume the run later"
                 )
             time.sleep(0.2)
-        self._model.send()
-        self._send_job()
-        self._pending = deque((start, stop, self._submitted(start, stop)) for start, stop, _ in self._pending)
+        self._send()
+        lost = list(self._pending)
+        self._pending.clear()
+        for start, stop, _ in lost:
+            self.begin(start, stop)
 
     def _has_workers(self) -> bool:
         """Whether the scheduler answers, and has workers."""

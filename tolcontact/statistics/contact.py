@@ -57,24 +57,18 @@ def _unique_rows(masks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class TouchingShares:
-    """The share of realizations with contact at each contact point, accumulated over realizations.
-
-    is_new   whether realizations were added since the last `values`
-    """
+    """The share of realizations with contact at each contact point, accumulated over realizations."""
 
     def __init__(self, points: int) -> None:
         self._counts, self._realizations = np.zeros(points, dtype=np.int64), 0
-        self.is_new = True
 
     def add(self, counts: np.ndarray, realizations: int) -> None:
         """Add the counts (point,) of contacts at each point in `realizations` further realizations."""
         self._counts += counts
         self._realizations += realizations
-        self.is_new |= realizations > 0
 
     def values(self) -> tuple[np.ndarray, np.ndarray, int]:
         """Return shares (point,), their intervals (point, bound) and the number of realizations; NaN if there are none."""
-        self.is_new = False
         if not self._realizations:
             return np.full(len(self._counts), np.nan), np.full((len(self._counts), len(terms.BOUNDS)), np.nan), 0
         counts, place = np.unique(self._counts, return_inverse=True)
@@ -123,7 +117,7 @@ def surface_values(results: xr.DataTree, limit: float) -> dict[ArchiveVariable, 
     def depths(variable: ArchiveVariable) -> np.ndarray:
         return np.asarray(surface[variable.name].values)
 
-    count = int((surface[terms.CHECKED_REALIZATION.name].values != terms.UNFINISHED).sum())
+    count = int((surface[terms.CHECKED_REALIZATION.name].values != terms.UNCHECKED).sum())
     at_random = surface[terms.AT_RANDOM.name].values == 1
     return {
         terms.DEEPEST_SURFACE: _over(np.nanmax, depths(terms.SURFACE_PENETRATION)),

@@ -175,8 +175,7 @@ def _field_values(results: xr.DataTree) -> dict[ArchiveVariable, Any]:
     """Return the extremes of the displacement fields, and the number of realizations that all of them cover."""
     parts = [str(part) for part in results.to_dataset()[terms.PART].values]
     fields = [results["field"].children[terms.group_of(part)].to_dataset() for part in parts]
-    is_written = [int(field[terms.GROUP_CHECKSUM.name]) != terms.UNFINISHED for field in fields]
-    summed = [int(field[terms.FIELD_REALIZATIONS.name]) * written for field, written in zip(fields, is_written, strict=True)]
+    summed = [int(field[terms.FIELD_REALIZATIONS.name]) for field in fields]
     magnitudes = [int(field[terms.MAGNITUDE_REALIZATIONS.name]) for field in fields]
     return {
         terms.FIELD_EXTREME: np.array([_field_extremes(field, count) for field, count in zip(fields, summed, strict=True)]),
@@ -233,9 +232,7 @@ def _datum_shifts(results: xr.DataTree) -> list[str]:
 
 def _planned_samples(results: xr.DataTree, count: int) -> int:
     """Return the number of realizations that the run was started with, or `count` if rows were selected from an archive."""
-    samples, size = int(results.attrs["samples"]), results.to_dataset().sizes[terms.REALIZATION]
-    is_unfinished = size > count or size == terms.FIRST_ROWS
-    return max(samples, count) if is_unfinished else count
+    return int(results.attrs["samples"]) if count == int(results.attrs["realizations"]) else count
 
 
 def _field_extremes(field: xr.Dataset, count: int) -> np.ndarray:

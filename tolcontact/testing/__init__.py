@@ -120,12 +120,11 @@ def assert_datums_recompute(results: Results) -> None:
         rows, planes = _rows(tree), tangents(tree)
         if planes and terms.DEVIATION.name not in rows:
             raise AssertionError(f'datums cannot be computed again without "{terms.DEVIATION.name}", which was not kept')
-        finished = np.flatnonzero(rows[terms.STATUS.name].values != terms.UNFINISHED)
         for plane in planes:
-            deviations = rows[terms.DEVIATION.name].values[finished]
+            deviations = rows[terms.DEVIATION.name].values
             label = rows[terms.DEVIATION.name][terms.CONTRIBUTOR].values[plane.columns.max()]
             for row, fault in plane.faults(deviations):
-                raise AssertionError(f'the plane of "{label}" in realization {_numbers(tree)[finished[row]]} {fault}')
+                raise AssertionError(f'the plane of "{label}" in realization {_numbers(tree)[row]} {fault}')
 
 
 def assert_same_run(a: Results, b: Results, *, variables: Sequence[str] | None = None) -> None:
@@ -202,8 +201,7 @@ def _numbers(tree: xr.DataTree) -> np.ndarray:
 
 
 def _meaning(status: int) -> str:
-    meanings = dict(enumerate(terms.STATUS_MEANINGS)) | {terms.UNFINISHED: "unfinished"}
-    return meanings.get(int(status), f"status {status}")
+    return dict(enumerate(terms.STATUS_MEANINGS)).get(int(status), f"status {status}")
 
 
 def _listed(numbers: np.ndarray) -> str:
@@ -224,7 +222,7 @@ def _meetings(tree: xr.DataTree) -> dict[int, tuple[Meeting, ContactPoints]]:
 
 def _comparable(rows: Rows) -> np.ndarray:
     """Return whether the archive holds the contact points that `gap_min` refers to, (realization,)."""
-    return np.asarray((rows[terms.STATUS.name].values != terms.UNFINISHED) & (rows[terms.SEARCHED.name].values != 1))
+    return np.asarray(rows[terms.SEARCHED.name].values != 1)
 
 
 def _least_gaps(pair: ArchivedPair, rows: Rows, piece: slice) -> np.ndarray:

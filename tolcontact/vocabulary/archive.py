@@ -10,10 +10,8 @@ from tolcontact.vocabulary.labels import (
     MEASURE,
     PAIR,
     PART,
-    ROW_VARIABLE,
     STATE,
     STATUS_MEANINGS,
-    UNFINISHED,
     label,
     variable,
 )
@@ -98,10 +96,7 @@ STATUS = variable(
     "i1 status(realization)",
     "outcome of the realization",
     None,
-    {
-        "flag_values": [UNFINISHED, *range(len(STATUS_MEANINGS))],
-        "flag_meanings": " ".join(["unfinished", *STATUS_MEANINGS]),
-    },
+    {"flag_values": [*range(len(STATUS_MEANINGS))], "flag_meanings": " ".join(STATUS_MEANINGS)},
 )
 ROWS = (
     MEASURED,
@@ -125,13 +120,6 @@ ROWS = (
 POSES = (TRANSLATION, ROTATION)
 
 BY_REALIZATION = (*ROWS, DEVIATION)
-ROW_VARIABLE_LABEL = label(ROW_VARIABLE, "variable of realizations")
-ROW_CHECKSUM = variable(
-    "i8 row_checksum(block, row_variable)",
-    "CRC-32 of the values of a variable in a block of `block_rows` realizations (the last one may be shorter), little-endian; "
-    "-1: unfinished",
-    "1",
-)
 
 MEASURE_NOMINAL = variable("f8 measure_nominal(measure)", "value of the measure in the nominal assembly")
 MEASURE_TOLERANCE = variable("f8 measure_tolerance(measure)", "full width of the allowed zone; NaN if it is open")
@@ -213,14 +201,10 @@ TOUCHING_REALIZATIONS = variable(
     "i8 touching_realizations()", "number of realizations, of the first ones, that this share is of", "1"
 )
 TOUCHING = (TOUCHING_SHARE, TOUCHING_INTERVAL, TOUCHING_REALIZATIONS)
-GROUP_CHECKSUM = variable(
-    "i8 checksum()", "CRC-32 of the variables of this group that may be overwritten, in their order; -1: being written", "1"
-)
-SUMMED_ROWS = variable("i8 summed_rows(checkpoint)", "number of realizations in the sums of a checkpoint; -1: none", "1")
+SUMMED_ROWS = variable("i8 summed_rows()", "number of realizations in `sums`; a resumed run continues after them", "1")
 FIELD_SUMS = variable(
-    "f8 sums(checkpoint, state, number)", "running sums of the displacement field; an unfinished run continues from them", "1"
+    "f8 sums(state, number)", "running sums of the displacement field; a resumed run continues from them", "1"
 )
-SUMS_CHECKSUM = variable("i8 sums_checksum(checkpoint)", "CRC-32 of the sums of a checkpoint", "1")
 
 
 def group_of(part: str) -> str:

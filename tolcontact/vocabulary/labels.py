@@ -16,10 +16,8 @@ REALIZATION, STATE, PART, PAIR, MEASURE = "realization", "state", "part", "pair"
 AXIS, BODY_AXIS, POINT, LOCATOR = "axis", "body_axis", "point", "locator"
 VERTEX, FACE, CORNER, COMPONENT, BOUND = "vertex", "face", "corner", "component", "bound"
 CONTRIBUTOR, FEATURE_FACE, FREEDOM = "contributor", "feature_face", "freedom"
-CHECKPOINT, NUMBER, CHECKED = "checkpoint", "number", "checked"
-BLOCK, ROW_VARIABLE = "block", "row_variable"
-FIRST_ROWS = 12 * 4096  # realizations that a new archive has room for at first
-BLOCK_ROWS = 4096  # realizations of a block at most: they are simulated together, and have a checksum of their own
+NUMBER, CHECKED = "number", "checked"
+BLOCK_ROWS = 4096  # realizations of a block at most: they are simulated together
 PIECE_ROWS = 24 * BLOCK_ROWS  # realizations that are read at once
 SOLVER, RUN, DESIGN, STATUS_MEANING, EXTENT = "solver", "run", "design", "status_meaning", "extent"
 BOUNDS = ("lower", "upper")
@@ -34,8 +32,7 @@ FIELD_CHOICES = ("some", "all", "none")  # besides a number
 
 _DECLARATION = re.compile(r"(\w+) (\w+)\(([\w, ]*)\)")
 
-UNFINISHED = -1
-CHECKSUM = "crc32"  # attribute: checksum of a variable that is written once
+UNCHECKED = -1  # instead of the number of a realization that was checked
 ROUNDED = 1e-9  # mm: less penetration than this is rounding
 
 

@@ -64,11 +64,7 @@ class Results:
         if part not in names:
             raise OptionError(f'part is "{part}"; expected one of: {", ".join(names)}')
         group = self._results["field"].children[terms.group_of(part)].to_dataset(inherit=True)
-        names = [
-            str(name)
-            for name, values in group.data_vars.items()
-            if terms.CHECKPOINT not in values.dims and name != terms.CHECKSUM
-        ]
+        names = [str(name) for name in group.data_vars if name != terms.FIELD_SUMS.name]
         dimensions = {dim for name in names for dim in group[name].dims}
         field = group[names]
         return field.drop_vars([name for name in field.coords if name not in dimensions])

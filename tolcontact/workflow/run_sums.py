@@ -3,14 +3,13 @@
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive import ArchiveWriter, Run, stored
-from tolcontact.archive.stored_rows import StoredBlock
+from tolcontact.archive import ArchiveWriter, Run, row_values
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation import Program
 from tolcontact.contact import kernel
@@ -81,7 +80,8 @@ def _nearest_counts(
     return np.bincount(realization_and_point[:, 1], minlength=len(pair.P_m))
 
 
-ReducedBlock = tuple[StoredBlock, tuple[BlockSums, TouchingCounts]]
+BlockTotals = tuple[BlockSums, TouchingCounts]
+ReducedBlock = tuple[dict[str, np.ndarray], BlockTotals]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +102,7 @@ class _BlockReduction:
 
     def __call__(self, program: Program, block: Block) -> ReducedBlock:
         counts = count_in_block(program, block, self.counted)
-        return stored(block, self.kept, program.nominal), (self.fields.sums(block.poses, block.start), counts)
+        return row_values(block, self.kept, program.nominal), (self.fields.sums(block.poses, block.start), counts)
 
 
 class RunSums:
@@ -123,29 +123,28 @@ class RunSums:
         """The sums of the fields, for each part (state, number), as stored in a checkpoint."""
         return self._fields.numbers
 
-    def start_from(self, writer: ArchiveWriter) -> bool:
-        """Start from the last checkpoint of an archive, and return whether it has one."""
+    def start_from(self, writer: ArchiveWriter) -> None:
+        """Start from the last checkpoint of an archive, if it has one."""
         kept = {row.variable for row in writer.kept}
         # Touching points are counted only if a reader of the archive could recompute the gaps.
         is_known = terms.ROTATION in kept and (terms.DEVIATION in kept or not gaps_need_deviations(self._program.nominal))
         counted = counted_realizations(self._program.nominal) if is_known else 0
         self.of_blocks = _BlockReduction(tuple(row.label for row in writer.kept), self._fields, counted)
-        checkpoint = writer.load_checkpoint()
-        self._fields.resume_from(checkpoint)
+        self._fields.resume_from(writer.sums)
         self._touching = TouchingShares(self._points)
         if end := min(writer.rows, counted):
             rows, poses = writer.first_poses(end)
             self._touching.add(*count_touching(self._program, poses, self._program.draws.rows(rows, seed=self._seed)))
-        return bool(checkpoint)
 
-    def merge(self, sums: tuple[BlockSums, TouchingCounts]) -> None:
+    def merge(self, sums: BlockTotals) -> None:
         """Add the sums of the next block."""
         fields, counts = sums
         self._fields.merge(fields)
         self._touching.add(*counts)
 
-    def write_to(self, writer: ArchiveWriter) -> None:
-        """Write fields and shares over the realizations so far."""
-        writer.write_fields(self._fields.fields())
-        if self._touching.is_new:
-            writer.write_touching(*self._touching.values())
+    @property
+    def groups(self) -> dict[str, dict[terms.ArchiveVariable, Any]]:
+        """The fields and shares over the realizations so far, as groups of an archive."""
+        parts = [terms.field_of(part.name) for part in self._program.nominal.last_parts]
+        touching = dict(zip(terms.TOUCHING, self._touching.values(), strict=True))
+        return dict(zip(parts, self._fields.fields(), strict=True)) | {"contact": touching}

@@ -3,10 +3,12 @@
 import logging
 import tempfile
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from tolcontact.archive import ArchiveWriter, Run, locked_archive, open_archive, open_unchecked
@@ -18,7 +20,7 @@ from tolcontact.vocabulary import FIELD_CHOICES, KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.accessor import Results
 from tolcontact.workflow.forecast import announce
 from tolcontact.workflow.models import Choice, Model, check_counts, check_program, program_of
-from tolcontact.workflow.run_sums import RunSums
+from tolcontact.workflow.run_sums import BlockTotals, RunSums
 from tolcontact.workflow.until import Target
 
 __all__ = ["SURFACES", "RunProgress", "open_archive", "run", "write_archive", "write_run"]
@@ -148,12 +150,13 @@ def write_archive(
     blocks = mapping(client)
     while True:
         sums = RunSums(program, settings)
-        with (
-            ArchiveWriter.resume(path, program, settings) if is_resumed else ArchiveWriter(path, program, settings, sums.sizes)
-        ) as writer:
-            remaining = writer.samples - writer.rows
-            announce(program, samples=remaining, seed=settings.seed, keep=settings.keep, threads=threads_of(client))
-            _simulate(program, writer, sums, settings.seed, blocks, progress)
+        if is_resumed:
+            writer = ArchiveWriter.resume(path, program, settings)
+        else:
+            writer = ArchiveWriter(path, program, settings, sums.sizes)
+        remaining = writer.samples - writer.rows
+        announce(program, samples=remaining, seed=settings.seed, keep=settings.keep, threads=threads_of(client))
+        _simulate(program, writer, sums, settings.seed, blocks, progress)
         enlarged = target.next(path, program) if target else None
         if enlarged is None:
             return
@@ -165,32 +168,39 @@ def _simulate(
 ) -> None:
     """Simulate the missing rows of an archive, write them with their sums, and check some of them against the surfaces."""
     sums.start_from(writer)
-    is_summed = bool(writer.rows)
     try:
-        for rows, block_sums in blocks(sums.of_blocks, program, samples=writer.samples, seed=seed, start=writer.rows):
-            is_summed = False
-            sums.merge(block_sums)
-            writer.append(rows)
-            is_summed = True
-            if writer.is_checkpoint_due:
+        # An interrupt, which only the main thread receives, cannot come between a block and its sums.
+        with ThreadPoolExecutor(1) as commits:
+            for block in blocks(sums.of_blocks, program, samples=writer.samples, seed=seed, start=writer.rows):
+                commits.submit(_commit, writer, sums, *block).result()
+                if progress:
+                    progress(writer.rows)
+        with writer.completed(sums.groups):
+            _check(program, writer, seed)
+    except BaseException:
+        if writer.has_new_rows:
+            if writer.is_between_blocks:
                 writer.write_checkpoint(sums.numbers)
-                sums.write_to(writer)
-            if progress:
-                progress(writer.rows)
-        sums.write_to(writer)
-    except KeyboardInterrupt:
-        if is_summed and writer.is_between_blocks:
-            writer.write_checkpoint(sums.numbers)
-        elif not is_summed:  # the interrupt may have come during a summation: only the sums of the last checkpoint are valid
-            is_summed = sums.start_from(writer)
-        if is_summed:
-            sums.write_to(writer)
+            with writer.completed(sums.groups):
+                pass
         raise
-    rows_to_check, at_random = writer.rows_to_check(seed)
-    if rows_to_check.size:
-        stored_poses = writer.poses(rows_to_check)
-        deviations = program.draws.rows(rows_to_check, seed=seed)
+
+
+def _commit(writer: ArchiveWriter, sums: RunSums, rows: dict[str, np.ndarray], block_sums: BlockTotals) -> None:
+    """Add a block to an archive and to its sums."""
+    writer.append(rows)
+    sums.merge(block_sums)
+    if writer.is_checkpoint_due:
+        writer.write_checkpoint(sums.numbers)
+
+
+def _check(program: Program, writer: ArchiveWriter, seed: int) -> None:
+    """Check some rows of an archive against the surfaces."""
+    rows, at_random = writer.rows_to_check(seed)
+    if rows.size:
+        stored_poses = writer.poses(rows)
+        deviations = program.draws.rows(rows, seed=seed)
         poses = simulated_poses(program, deviations) if stored_poses is None else stored_poses
         surfaces = check_surfaces(program, poses, deviations)
-        writer.write_checked(rows_to_check, at_random, surfaces)
+        writer.write_checked(rows, at_random, surfaces)
         warn_of(program, surfaces)
