@@ -144,22 +144,20 @@ def contact_qp(
         rows = contact_rows(system, points, current, moved, reactions)
         terms = quadratic_terms(system, rows, motion, reactions, ca.sum1(reactions), projects=projects)
     exact = misfit(system, moved, linear=True) if method.minimizes.presses else ca.SX(0, 1)
-    Q, gradient = terms.summed(inputs["newton"], inputs["proximal_weight"], call)
-    problem = conditioned(system, Q, gradient, rows, exact, terms.scale, call)
-    poses = motion.by(rigid if method.is_exact else published)
-    solution_symbols, results = outcome(system, terms.scale, rows, poses, problem, inputs["stride"], call)
-    pure_energy = ca.substitute(energy(system, current).value, system.regularization_factor, 1)
+    problem = conditioned(
+        system, *terms.summed(inputs["newton"], inputs["proximal_weight"], call), rows, exact, terms.scale, call
+    )
+    end = motion.by(rigid if method.is_exact else published)
+    solution, results = outcome(system, terms.scale, rows, end, problem, inputs["stride"], call)
+    pure_energy = ca.substitute(energy(system, current).value, inputs["regularization_factor"], 1)
     pure_energy += spring_energy(system, points, current) / terms.scale
+    relative = ca.vertcat(*(X.vector() for X in system.relative(current)))
     return ContactQP(
         assemble=_function("assemble", inputs, problem),
         plugin=plugin,
-        finish=_function("finish", inputs | solution_symbols, results),
+        finish=_function("finish", inputs | solution, results),
         energy=_function("energy", {name: inputs[name] for name in ENERGY_INPUTS}, {"energy": pure_energy}),
-        relate=_function(
-            "relate",
-            {name: inputs[name] for name in ("poses", "deviations")},
-            {"relative": ca.vertcat(*(X.vector() for X in system.relative(current)))},
-        ),
+        relate=_function("relate", {name: inputs[name] for name in ("poses", "deviations")}, {"relative": relative}),
         slacks=len(group.pairs) + len(rows.springs),
         has_springs=group.has_springs,
         equations=exact.numel(),

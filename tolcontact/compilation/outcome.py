@@ -74,7 +74,7 @@ def _spans(pairs: Int[Array, " row"], equations: int) -> list[slice]:
 
 def _products(matrix: ca.SX, vector: ca.SX, spans: Sequence[slice], call: Call) -> list[ca.SX]:
     """Return the product of some rows of a sparse matrix with a vector, for each span of rows."""
-    products = []
+    products: list[ca.SX] = []
     for span in spans:
         columns = sorted(set(matrix[span, :].sparsity().get_triplet()[1]))
         products += call("product", lambda block, values: [block @ values], matrix[span, columns], vector[columns])

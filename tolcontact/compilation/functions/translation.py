@@ -123,13 +123,13 @@ def _transfer(builder: ir.IRBuilder, k: ir.Value, size: ir.Value, arguments: Seq
 class Instruction(NamedTuple):
     """An instruction of a Function: the work entries that it writes and reads; for inputs and outputs, argument and entry.
 
-    index   its index in the Function
+    position   its index in the Function
     """
 
     operation: int
     to: list[int]
     operands: list[int]
-    index: int
+    position: int
 
 
 def _accesses(part: Sequence[Instruction]) -> tuple[set[int], set[int]]:
