@@ -15,9 +15,12 @@ from tests import cases
 from tests.helpers import nightly, recompiled
 from tolcontact.code_cache import cache_folder
 from tolcontact.compilation import contact_qp
+from tolcontact.compilation.calls import inline
 from tolcontact.compilation.functions import InterpretedFunction
 from tolcontact.compilation.functions.named import MIN_COMPILED_CALLS
-from tolcontact.compilation.functions.native import OPERATIONS, NativeFunction, UnknownInstructionError
+from tolcontact.compilation.functions.native import NativeFunction
+from tolcontact.compilation.functions.operations import OPERATIONS
+from tolcontact.compilation.functions.translation import UnknownInstructionError
 from tolcontact.compilation.plugins import plugin
 from tolcontact.compilation.quadratic_terms import is_convex
 from tolcontact.contact import kernel
@@ -71,6 +74,22 @@ def test_every_translated_instruction_does_what_casadi_does():
     found, expected = NativeFunction(function)(grid)[0], InterpretedFunction(function)(grid)[0][0]
     assert np.array_equal(found, expected, equal_nan=True)
     assert (np.signbit(found) == np.signbit(expected))[np.isfinite(expected)].all()
+
+
+def test_a_compiled_call_does_what_casadi_does():
+    x, y, z = ca.SX.sym("x", 3), ca.SX.sym("y"), ca.SX.sym("z", 30)
+    inner = ca.Function("inner", [x, y], [ca.sin(x) * y, ca.sum1(x) + y])
+    middle = ca.Function("middle", [x, y], inner.call(inner.call([x, y], False, True), False, True))
+    rows = [middle.call([z[k : k + 3], z[k + 3] + 1.5], False, True) for k in range(0, 27, 3)]
+    direct, _ = inner.call([z[:3], 0.25], False, True)
+    function = ca.Function("outer", [z], [ca.vertcat(*itertools.chain(*rows)), direct * z[:3], z])
+    inputs = [RNG.normal(size=(7, 30))]
+    assert len(function.find_functions()) == 2
+    for found, expected in zip(NativeFunction(function)(inputs), InterpretedFunction(function)(inputs)[0], strict=True):
+        assert np.array_equal(found, expected)
+    assert [len(result) for result in NativeFunction(function)([np.zeros((0, 30))])] == [0, 0, 0]
+    with pytest.raises(ValueError, match="expected"):
+        NativeFunction(function)([np.zeros((7, 29))])
 
 
 def test_an_instruction_without_translation_is_left_to_casadi():
@@ -264,7 +283,7 @@ def test_clusters_are_neighbours():
 
 def test_curvature_counts_only_where_every_block_is_positive_definite():
     Q = ca.SX.sym("Q", 12, 12)
-    convex = ca.Function("convex", [Q], [is_convex(Q)])
+    convex = ca.Function("convex", [Q], [is_convex(Q, inline)])
     one = np.eye(12)
     for k, value in itertools.product(range(12), (-1.0, 0.0, np.nan)):
         other = one.copy()

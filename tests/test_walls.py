@@ -22,7 +22,7 @@ ROOMS = {
     "pyvista": ("plot/",),
     "numba": ("compiled.py",),
     "jaxtyping": ("arrays.py",),
-    "llvmlite": ("compilation/functions/native.py",),
+    "llvmlite": ("compilation/functions/",),
     "netCDF4": ("archive/",),
     "typer": ("cli/",),
     "msgspec": ("declaration/",),

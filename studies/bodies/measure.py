@@ -29,9 +29,9 @@ import tolcontact as tc
 from studies.bodies.scenes import AS1, AS1_BODIES, SCENES, scene
 from tolcontact import poses as pose
 from tolcontact.compilation import ContactGroup, Program
+from tolcontact.compilation.calls import Call, FunctionCalls, inline
 from tolcontact.compilation.contact_qp import contact_qp
 from tolcontact.compilation.contact_solver import ContactSolver
-from tolcontact.compilation.elements import ElementQP
 from tolcontact.compilation.functions import named
 from tolcontact.discretization import Nominal
 from tolcontact.simulation import Block, simulate_blocks
@@ -42,7 +42,7 @@ import matplotlib.pyplot as plt
 
 HERE = Path(__file__).resolve().parent
 FEW_SAMPLES, MIN_SAMPLES, MAX_SAMPLES = 4, 20, 4096  # realizations: of a turn that warms up, and of one that counts
-FUNCTIONS: dict[str, Callable] = {"elements": ElementQP, "whole": contact_qp}
+FUNCTIONS: dict[str, Callable[[], Call]] = {"elements": FunctionCalls, "whole": lambda: inline}
 MIB = 1024  # KiB
 METHODS = {  # all minimize the displacements of all points, so that answers are unique
     "linearized": tc.Method(resolution="linearized", objective="all points"),
@@ -108,7 +108,8 @@ def resolved_by(program: Program, functions: str) -> Program:
     """Return a program whose QPs have their functions by one of FUNCTIONS."""
     groups = []
     for group in program.groups:
-        qp = FUNCTIONS[functions](program.nominal, group.group, program.gaps, program.method, program.plugin, group.qp.standing)
+        call = FUNCTIONS[functions]()
+        qp = contact_qp(program.nominal, group.group, program.gaps, program.method, program.plugin, group.qp.standing, call)
         groups.append(ContactGroup(group.group, qp, ContactSolver(qp)))
     return replace(program, groups=tuple(groups))
 

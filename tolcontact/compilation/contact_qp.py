@@ -16,10 +16,12 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from tolcontact.compilation.calls import Call, FunctionCalls, inline
 from tolcontact.compilation.conditioning import conditioned
-from tolcontact.compilation.contact_rows import contact_rows, row_points, standing_points
+from tolcontact.compilation.contact_rows import contact_rows, row_points, spring_energy, standing_points
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.outcome import outcome
+from tolcontact.compilation.pair_terms import is_summed, summed_terms
 from tolcontact.compilation.plugins import Plugin
 from tolcontact.compilation.quadratic_terms import quadratic_terms
 from tolcontact.discretization import Nominal
@@ -35,7 +37,8 @@ from tolcontact.method import Method
 
 Standing = Sequence[np.ndarray | int]  # see ContactQP
 ENERGY_INPUTS = ("poses", "raw", "moments", "deviations")
-MAX_BATCH = 1024  # realizations whose QPs fit into a processor's cache
+MAX_BATCH, MIN_BATCH = 1024, 16  # realizations that are solved together
+MAX_ENTRIES = 4_000_000  # of the inputs and outputs of `assemble` in a batch, so that they take little memory
 
 
 class Evaluators(NamedTuple):
@@ -72,7 +75,8 @@ class ContactQP:
     @property
     def max_batch(self) -> int:
         """The number of realizations that are solved together."""
-        return MAX_BATCH
+        entries = self.assemble.nnz_in() + self.assemble.nnz_out()
+        return min(MAX_BATCH, max(MIN_BATCH, MAX_ENTRIES // entries))
 
     @property
     def evaluators(self) -> Evaluators:
@@ -101,11 +105,18 @@ def _row_count(points: np.ndarray | int) -> int:
 
 
 def contact_qp(
-    nominal: Nominal, group: Group, gaps: Sequence[GapMap | None], method: Method, plugin: Plugin, standing: Standing = ()
+    nominal: Nominal,
+    group: Group,
+    gaps: Sequence[GapMap | None],
+    method: Method,
+    plugin: Plugin,
+    standing: Standing = (),
+    call: Call | None = None,
 ) -> ContactQP:
     """Return the Functions of a group.
 
-    `standing` lists the points of each pair of the group that always have a row, by default from `standing_points`.
+    `standing` lists the points of each pair of the group that always have a row, by default from `standing_points`. `call`
+    evaluates what recurs, by default in place, or with many bodies by FunctionCalls; both give the same results up to rounding.
     `_inputs` describes the inputs. The outputs for `p` parts, `q` pairs and `k` rows are:
 
     corrected (12 p)     poses after the correction; in an exact resolution after the share of it that `stride` allows
@@ -121,41 +132,49 @@ def contact_qp(
     """
     standing = standing or [standing_points(nominal.pairs[k], gaps[k], method) for k in group.pairs]
     inputs = _inputs(nominal, group, standing)
+    system = _equations(nominal, group, method, inputs)
+    motion = system.motion(poses_of(inputs["poses"]))
+    current, moved, reactions = motion.poses, motion.by(linear), inputs["reactions"]
+    points = row_points(system, standing, inputs)
+    call = call or (FunctionCalls() if is_summed(group, method) else inline)
+    projects = method.is_iterated or bool(curved_pairs(nominal, group))
+    if isinstance(call, FunctionCalls):
+        rows, terms = summed_terms(system, points, current, reactions, call, projects=projects)
+    else:
+        rows = contact_rows(system, points, current, moved, reactions)
+        terms = quadratic_terms(system, rows, motion, reactions, ca.sum1(reactions), projects=projects)
+    exact = misfit(system, moved, linear=True) if method.minimizes.presses else ca.SX(0, 1)
+    problem = conditioned(
+        system, *terms.summed(inputs["newton"], inputs["proximal_weight"], call), rows, exact, terms.scale, call
+    )
+    end = motion.by(rigid if method.is_exact else published)
+    solution, results = outcome(system, terms.scale, rows, end, problem, inputs["stride"], call)
+    pure_energy = ca.substitute(energy(system, current).value, inputs["regularization_factor"], 1)
+    pure_energy += spring_energy(system, points, current) / terms.scale
+    relative = ca.vertcat(*(X.vector() for X in system.relative(current)))
+    return ContactQP(
+        assemble=_function("assemble", inputs, problem),
+        plugin=plugin,
+        finish=_function("finish", inputs | solution, results),
+        energy=_function("energy", {name: inputs[name] for name in ENERGY_INPUTS}, {"energy": pure_energy}),
+        relate=_function("relate", {name: inputs[name] for name in ("poses", "deviations")}, {"relative": relative}),
+        slacks=len(group.pairs) + len(rows.springs),
+        has_springs=group.has_springs,
+        equations=exact.numel(),
+        standing=standing,
+    )
+
+
+def _equations(nominal: Nominal, group: Group, method: Method, inputs: Mapping[str, ca.SX]) -> GroupEquations:
+    """Return the equations of a group, with symbols for its increments."""
     pairs = [nominal.pairs[index] for index in group.pairs]
-    system = GroupEquations(
+    return GroupEquations(
         nominal, group, method, raw=poses_of(inputs["raw"]), z=ca.SX.sym("z", FREEDOMS * len(group.free)),
         **{name: inputs[name] for name in ("moments", "deviations", "regularization_factor")},
         faces=[face_poses(pair, inputs["deviations"]) for pair in pairs],
         heights=[face_heights(pair, inputs["deviations"]) for pair in pairs],
         steps=[bilateral_steps(nominal, group.parts[locators.part], inputs["deviations"]) for locators in group.bilateral],
     )  # fmt: skip
-    motion = system.motion(poses_of(inputs["poses"]))
-    current, moved, reactions = motion.poses, motion.by(linear), inputs["reactions"]
-    rows = contact_rows(system, row_points(system, standing, inputs), current, moved, reactions)
-    projects = method.is_iterated or bool(curved_pairs(nominal, group))
-    terms = quadratic_terms(system, rows, motion, reactions, ca.sum1(reactions), projects=projects)
-    exact = misfit(system, moved, linear=True) if method.minimizes.presses else ca.SX(0, 1)
-    problem = conditioned(system, *terms.summed(inputs["newton"], inputs["proximal_weight"]), rows, exact, terms.scale)
-    poses = motion.by(rigid if method.is_exact else published)
-    solution_symbols, results = outcome(system, terms.scale, rows, poses, problem, inputs["stride"])
-    pure_energy = (
-        ca.substitute(energy(system, current).value, system.regularization_factor, 1) + rows.spring_energy() / terms.scale
-    )
-    return ContactQP(
-        assemble=_function("assemble", inputs, problem),
-        plugin=plugin,
-        finish=_function("finish", inputs | solution_symbols, results),
-        energy=_function("energy", {name: inputs[name] for name in ENERGY_INPUTS}, {"energy": pure_energy}),
-        relate=_function(
-            "relate",
-            {name: inputs[name] for name in ("poses", "deviations")},
-            {"relative": ca.vertcat(*(X.vector() for X in system.relative(current)))},
-        ),
-        slacks=len(group.pairs) + len(rows.springs),
-        has_springs=group.has_springs,
-        equations=exact.numel(),
-        standing=standing,
-    )
 
 
 def _inputs(nominal: Nominal, group: Group, standing: Standing) -> dict[str, ca.SX]:

@@ -67,10 +67,6 @@ class Rows:
         """The compliant rows."""
         return springs_of(self.compliance)
 
-    def spring_energy(self) -> ca.SX:
-        """Return the energy [N mm] of the compressed springs at z = 0."""
-        return sum((ca.fmin(self.gaps[k], 0) ** 2 / (2 * self.compliance[k]) for k in self.springs), ca.SX(0))
-
 
 def springs_of(compliance: ca.SX) -> list[int]:
     """Return the rows with a nonzero compliance (row, 1)."""
@@ -103,8 +99,7 @@ def contact_rows(
     pairs: list[int] = []
     gaps, filled, compliance, relative, bends = ([] for _ in range(5))
     curvature, hollow_curvature = (ca.SX(system.z.numel(), system.z.numel()) for _ in range(2))
-    for k, (start, end) in enumerate(zip(system.relative(start_poses), system.relative(end_poses), strict=True)):
-        by_z = system.slope(end.vector())
+    for k, (start, by_z) in enumerate(relative_poses(system, start_poses, end_poses)):
         relative.append(start.vector() + by_z @ system.z)
         (points, pair_compliance, bend), pair = points_of_pairs[k], system.nominal.pairs[system.group.pairs[k]]
         compliance.append(pair_compliance)
@@ -144,6 +139,29 @@ def contact_rows(
         curvature=curvature,
         hollow_curvature=hollow_curvature,
     )
+
+
+def relative_poses(
+    system: GroupEquations, start_poses: Sequence[Pose], end_poses: Sequence[Pose]
+) -> Iterator[tuple[Pose, ca.SX]]:
+    """Yield X_RM of each pair at `start_poses`, and its derivatives (12, z); the increments lead to `end_poses`."""
+    for start, end in zip(system.relative(start_poses), system.relative(end_poses), strict=True):
+        yield start, system.slope(end.vector())
+
+
+def spring_energy(system: GroupEquations, points_of_pairs: Sequence[RowPoints], poses: Sequence[Pose]) -> ca.SX:
+    """Return the energy [N mm] of the compressed springs at `poses`."""
+    energy = ca.SX(0)
+    for k, (X_RM, (points, compliance, _)) in enumerate(zip(system.relative(poses), points_of_pairs, strict=True)):
+        pair = system.nominal.pairs[system.group.pairs[k]]
+        springs = springs_of(compliance)
+        if springs and pair.round is not None:
+            no_reactions, no_increments = ca.SX(len(pair.round), 1), ca.SX(ENTRIES, 0)
+            gaps = ca.vertsplit(round_gaps(pair.round, X_RM.vector(), system.heights[k], no_reactions, no_increments).gaps)
+        else:
+            gaps = [gap(X_RM, P_m, P_r, n_r) for P_m, P_r, n_r, _ in points]
+        energy += sum((ca.fmin(gaps[row], 0) ** 2 / (2 * compliance[row]) for row in springs), ca.SX(0))
+    return energy
 
 
 def compliance_of(pair: ContactPoints) -> np.ndarray:

@@ -7,7 +7,6 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.compilation.active_set import ActiveSet, band_order
 from tolcontact.compilation.contact_qp import ContactQP
-from tolcontact.compilation.elements import ElementQP
 from tolcontact.compilation.functions import InterpretedFunction, flat
 from tolcontact.compilation.graph import GraphSolver, Layouts
 from tolcontact.compilation.outcome import SOLUTION
@@ -26,7 +25,7 @@ Arrays = dict[str, Float[Array, "_ _"]]  # by name, (realization, entry)
 class ContactSolver:
     """A solver of the QPs of a ContactQP. Threads must not share it."""
 
-    def __init__(self, qp: ContactQP | ElementQP) -> None:
+    def __init__(self, qp: ContactQP) -> None:
         self._qp = qp
         self._assemble, self._finish, self._energy, self._relate = qp.evaluators
         self._plugin = qp.plugin
@@ -176,7 +175,7 @@ class ContactSolver:
 class _PluginSolver:
     """The solver of a plugin, with its own memory."""
 
-    def __init__(self, qp: ContactQP | ElementQP, plugin: Plugin) -> None:
+    def __init__(self, qp: ContactQP, plugin: Plugin) -> None:
         self.remembers = plugin.remembers
         with CONSTRUCTION_LOCK, quiet():
             conic = solver(plugin, qp.sparsity("h"), qp.sparsity("a"), springs=qp.has_springs)
@@ -211,7 +210,7 @@ class _PluginSolver:
 _Solver = _PluginSolver | GraphSolver
 
 
-def _new_solver(qp: ContactQP | ElementQP, plugin: Plugin, layouts: Layouts) -> _Solver:
+def _new_solver(qp: ContactQP, plugin: Plugin, layouts: Layouts) -> _Solver:
     if plugin.is_conic:
         return _PluginSolver(qp, plugin)
     sparsities = {name: qp.sparsity(name) for name in ("h", "g", "a", "lba")}

@@ -1,9 +1,13 @@
 """The outcome of a QP: poses, reactions, and their residuals."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 
 import casadi as ca
+import numpy as np
 
+from tolcontact.arrays import Array, Int
+from tolcontact.compilation.calls import Call
 from tolcontact.compilation.conditioning import SLACK
 from tolcontact.compilation.contact_rows import Rows
 from tolcontact.mechanics.correction import FREEDOMS
@@ -22,6 +26,7 @@ def outcome(
     poses: Sequence[Pose],
     problem: Mapping[str, ca.SX],
     stride: ca.SX,
+    call: Call,
 ) -> tuple[dict[str, ca.SX], dict[str, ca.SX]]:
     """Return symbols of the QP and its solution, and the outputs of contact_qp as expressions of them.
 
@@ -35,9 +40,11 @@ def outcome(
     symbols |= {"x": ca.SX.sym("x", size), "lam_a": ca.SX.sym("lam_a", count + equations), "lam_x": ca.SX.sym("lam_x", size)}
     x, lam_a, lam_x, length = symbols["x"], symbols["lam_a"], symbols["lam_x"], symbols["length"]
     y, s, lam_s = x[: z.numel()], x[z.numel() :], lam_x[z.numel() :]
-    excess = symbols["a"] @ x - symbols["lba"]
+    excess = ca.vertcat(*_products(symbols["a"], x, _spans(rows.pairs, equations), call)) - symbols["lba"]
     natural = ca.vertcat(row_residuals(excess[:count], lam_a[:count], length), ca.fmin(s, -lam_s))
-    stationarity = ca.norm_inf(symbols["h"] @ x + symbols["g"] + symbols["a"].T @ lam_a + lam_x)
+    movers = [slice(k, k + FREEDOMS) for k in range(0, z.numel(), FREEDOMS)] + [slice(z.numel(), size)]
+    pull, push = (_products(matrix, values, movers, call) for matrix, values in ((symbols["h"], x), (symbols["a"].T, lam_a)))
+    stationarity = ca.norm_inf(ca.vertcat(*pull) + symbols["g"] + ca.vertcat(*push) + lam_x)
     residuals = [stationarity, ca.norm_inf(natural), *([ca.norm_inf(excess[count:])] if equations else [])]
     step = symbols["to_z"] @ y
     taken_step = step
@@ -57,6 +64,21 @@ def outcome(
         **{name: ca.substitute(value, z, taken_step) for name, value in end_values.items()},
     }
     return symbols, {name: ca.densify(value) for name, value in results.items()}
+
+
+def _spans(pairs: Int[Array, " row"], equations: int) -> list[slice]:
+    """Return the rows of each pair, and the equations, which follow them."""
+    ends = np.flatnonzero(np.diff(pairs, prepend=-1, append=-1)).tolist()
+    return [slice(a, b) for a, b in itertools.pairwise([*ends, len(pairs) + equations])]
+
+
+def _products(matrix: ca.SX, vector: ca.SX, spans: Sequence[slice], call: Call) -> list[ca.SX]:
+    """Return the product of some rows of a sparse matrix with a vector, for each span of rows."""
+    products: list[ca.SX] = []
+    for span in spans:
+        columns = sorted(set(matrix[span, :].sparsity().get_triplet()[1]))
+        products += call("product", lambda block, values: [block @ values], matrix[span, columns], vector[columns])
+    return products
 
 
 def row_residuals(excess: ca.SX, lam: ca.SX, length: ca.SX) -> ca.SX:

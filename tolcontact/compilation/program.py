@@ -13,7 +13,6 @@ from tolcontact.compilation.bounded_pairs import TRIAL_SEED, TRIALS, Trial, boun
 from tolcontact.compilation.contact_qp import ContactQP, contact_qp
 from tolcontact.compilation.contact_rows import MIN_SLOTS, SLOTS, standing_points
 from tolcontact.compilation.contact_solver import ContactSolver
-from tolcontact.compilation.elements import ElementQP, has_elements
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.measure_accuracy import measure_accuracies
 from tolcontact.compilation.plugins import Plugin, plugin
@@ -49,7 +48,7 @@ class ContactGroup:
     """A group of coupled parts and its QP (see contact_qp)."""
 
     group: Group
-    qp: ContactQP | ElementQP
+    qp: ContactQP
     solve: ContactSolver
 
 
@@ -271,7 +270,7 @@ def _contact_group(
         else standing_points(nominal.pairs[k], gaps[k], method)
         for k in group.pairs
     ]
-    build = ElementQP if has_elements(group, method) else contact_qp
+    build = contact_qp
     qp = build(nominal, group, gaps, method, plugin, standing)
     return ContactGroup(group, qp, ContactSolver(qp))
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 
+from tolcontact.compilation.calls import Call
 from tolcontact.compilation.contact_rows import Rows
 from tolcontact.mechanics.correction import FREEDOMS, Motion, linear, quadratic
 from tolcontact.mechanics.group_equations import GroupEquations
@@ -30,13 +31,13 @@ class QuadraticTerms:
     proximal_hessian: ca.SX
     scale: ca.SX
 
-    def summed(self, newton: ca.SX, proximal_weight: ca.SX) -> tuple[ca.SX, ca.SX]:
+    def summed(self, newton: ca.SX, proximal_weight: ca.SX, call: Call) -> tuple[ca.SX, ca.SX]:
         """Return Q and the gradient, with curvature if `newton` is 1.
 
         Curvature counts only while Q stays convex. The check covers the diagonal block of each mover, not the coupling of
         movers.
         """
-        counts = ca.logic_and(newton, is_convex(self.Q + self.curvature))
+        counts = ca.logic_and(newton, is_convex(self.Q + self.curvature, call))
         Q = self.Q + ca.if_else(counts, self.curvature, 0) + proximal_weight * self.proximal_hessian
         return Q, self.gradient + ca.if_else(counts, self.augmented_gradient, 0)
 
@@ -75,8 +76,12 @@ def _lagrangian_hessian(system: GroupEquations, poses: Sequence[Pose], bends: ca
     return ca.substitute(system.curvature(energy(system, poses).value - work), weights, bends)
 
 
-def is_convex(Q: ca.SX) -> ca.SX:
+def is_convex(Q: ca.SX, call: Call) -> ca.SX:
     """Return 1 if the diagonal blocks of Q are positive definite, else 0; a NaN pivot gives 0, too."""
-    blocks = (ca.densify(Q[k : k + FREEDOMS, k : k + FREEDOMS]) for k in range(0, Q.size1(), FREEDOMS))
-    pivots = ca.vertcat(*(ca.diag(ca.chol(block)) for block in blocks))
+    blocks = (Q[k : k + FREEDOMS, k : k + FREEDOMS] for k in range(0, Q.size1(), FREEDOMS))
+    pivots = ca.vertcat(*(call("pivots", _pivots, block)[0] for block in blocks))
     return ca.mmin(ca.if_else(pivots > 0, 1, 0))
+
+
+def _pivots(block: ca.SX) -> list[ca.SX]:
+    return [ca.diag(ca.chol(ca.densify(block)))]

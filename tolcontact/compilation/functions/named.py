@@ -11,9 +11,9 @@ import casadi as ca
 import numpy as np
 
 from tolcontact import code_cache
-from tolcontact.arrays import Array, Float, Int, Real
-from tolcontact.compilation.functions.argument_columns import ArgumentColumns, Located
-from tolcontact.compilation.functions.native import NativeFunction, UnknownInstructionError, key_of
+from tolcontact.arrays import Array, Float, Real
+from tolcontact.compilation.functions.native import NativeFunction, key_of
+from tolcontact.compilation.functions.translation import UnknownInstructionError, called
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 
 WIDTHS = (256, 16)  # realizations in a call of CasADi
@@ -129,8 +129,8 @@ class _Buffers:
         return bool(self._buffer.ret() == 0)
 
 
-# Evaluations, in all processes, after which a Function is compiled. Compiling takes as long as interpreting this number of
-# evaluations once or twice. So the total time is at most about three times the time of the best choice in hindsight.
+# Evaluations, in all processes, after which a Function without calls is compiled. Compiling takes as long as interpreting this
+# number of evaluations once or twice. So the total time is at most about three times the time of the best choice in hindsight.
 MIN_COMPILED_CALLS = 10_000
 MAX_INSTRUCTIONS = 300_000  # that are compiled; more are interpreted, since compiling them takes more than a gigabyte
 
@@ -148,6 +148,13 @@ class Evaluations:
         code_cache.store(self._key, str(self.number).encode())
 
 
+def _instructions(function: ca.Function) -> tuple[int, int]:
+    """Return the number of instructions that have to be compiled, and that an evaluation executes."""
+    calls = [(f.__hash__(), *_instructions(f)) for f in called(function)]
+    compiled = sum({key: instructions for key, instructions, _ in calls}.values())
+    return function.n_instructions() + compiled, function.n_instructions() + sum(executed for *_, executed in calls)
+
+
 class AdaptiveFunction:
     """A Function of scalar expressions that is interpreted first, and compiled after many evaluations. Threads may share it.
 
@@ -160,7 +167,9 @@ class AdaptiveFunction:
         self._function = function
         self.sizes_out = [function.nnz_out(i) for i in range(function.n_out())]
         self.native: NativeFunction | None = None
-        self._may_be_compiled = function.n_instructions() <= MAX_INSTRUCTIONS
+        compiled, executed = _instructions(function)
+        self._may_be_compiled = compiled <= MAX_INSTRUCTIONS
+        self._min_calls = MIN_COMPILED_CALLS * compiled // executed
         self._evaluations: Evaluations | None = None
         self._lock = threading.Lock()
 
@@ -175,21 +184,6 @@ class AdaptiveFunction:
     def _interpreted(self) -> InterpretedFunction:
         with CONSTRUCTION_LOCK:
             return InterpretedFunction(self._function)
-
-    def evaluate(self, count: int, arrays: Sequence[Located], arguments: ArgumentColumns) -> None:
-        """Evaluate the Function for all elements of `count` realizations; see NativeFunction."""
-        if native := self._compiled(count * arguments.elements):
-            native.evaluate(count, arrays, arguments)
-            return
-        rows, cut = count * arguments.elements, len(arrays) - len(self.sizes_out)
-        inputs = [
-            np.broadcast_to(located.array[:, columns], (count, *columns.shape)).reshape(rows, columns.shape[1])
-            for located, columns in zip(arrays[:cut], arguments.tables, strict=False)
-        ]
-        with self._lock:
-            results = self._interpreted(inputs)[0]
-        for located, columns, values in zip(arrays[cut:], arguments.tables[cut:], results, strict=True):
-            located.array[:, columns] = values.reshape(count, *columns.shape)
 
     def _compiled(self, count: int) -> NativeFunction | None:
         """Return the machine code for `count` more evaluations, or None while CasADi interprets the Function."""
@@ -212,7 +206,7 @@ class AdaptiveFunction:
                 self._evaluations = Evaluations(key)
                 weakref.finalize(self, self._evaluations.store)
             self._evaluations.number += count
-            self._may_be_compiled = self._evaluations.number <= MIN_COMPILED_CALLS
+            self._may_be_compiled = self._evaluations.number <= self._min_calls
             return not self._may_be_compiled
 
 
@@ -228,11 +222,6 @@ class NamedFunction:
         """The names of its inputs."""
         return self._names
 
-    def at(self, columns: Mapping[str, Int[Array, "element _"]]) -> "IndexedFunction":
-        """Return the function for several elements, with inputs and results in these columns of arrays, by name."""
-        names = [*self._names, *self._results]
-        return IndexedFunction(self._evaluate, names, ArgumentColumns([columns[name] for name in names]))
-
     @classmethod
     def dense(cls, function: ca.Function) -> "NamedFunction":
         """Return a function with all entries of inputs and outputs, including those that are always zero."""
@@ -247,21 +236,6 @@ class NamedFunction:
         """
         outputs = self._evaluate([flat(arrays[name]) for name in self._names])
         return dict(zip(self._results, outputs, strict=True))
-
-
-class IndexedFunction:
-    """A Function that is evaluated for several elements of each realization, on arrays that all elements share."""
-
-    def __init__(self, function: AdaptiveFunction, names: Sequence[str], columns: ArgumentColumns) -> None:
-        self._function, self._names, self._columns = function, names, columns
-
-    def __call__(self, count: int, arrays: Mapping[str, Located]) -> None:
-        """Read inputs of `count` realizations from arrays by name, and write results into others.
-
-        An input array has one row if all realizations share it.
-        """
-        if self._columns.elements:
-            self._function.evaluate(count, [arrays[name] for name in self._names], self._columns)
 
 
 def flat(array: Real[Array, "realization ..."]) -> Float[Array, "realization _"]:

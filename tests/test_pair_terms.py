@@ -1,4 +1,4 @@
-"""A QP that is assembled from its elements is the QP of the whole group."""
+"""A QP whose terms are summed over its pairs, in Functions that are called, is the QP of the whole group."""
 
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -10,9 +10,9 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import EXACT, PAPER, ROOT, joined, nightly, simulate
 from tolcontact.compilation import ContactGroup
+from tolcontact.compilation.calls import FunctionCalls, inline
 from tolcontact.compilation.contact_qp import ENERGY_INPUTS, ContactQP, Evaluators, contact_qp
 from tolcontact.compilation.contact_solver import ContactSolver
-from tolcontact.compilation.elements import ElementQP
 from tolcontact.simulation import simulate_blocks
 
 ACCURACY = 1e-11  # mm: rounding of poses, over parts of some 100 mm
@@ -93,23 +93,28 @@ class RecordedQP(ContactQP):
         return Evaluators(functions.assemble, finish, functions.energy, functions.relate)
 
 
+def qp_of(program, group, standing, *, is_summed):
+    """The QP of a group of a program: summed over its pairs, or whole."""
+    call = FunctionCalls() if is_summed else inline
+    return contact_qp(program.nominal, group, program.gaps, program.method, program.plugin, standing, call)
+
+
 def recorded(program, samples):
     """The whole function of a program with one group, after a run."""
     group = program.groups[0].group
-    qp = contact_qp(program.nominal, group, program.gaps, program.method, program.plugin, program.groups[0].qp.standing)
-    recorded_qp = RecordedQP(**vars(qp))
+    recorded_qp = RecordedQP(**vars(qp_of(program, group, program.groups[0].qp.standing, is_summed=False)))
     groups = (ContactGroup(group, recorded_qp, ContactSolver(recorded_qp)),)
     list(simulate_blocks(replace(program, groups=groups), samples=samples, seed=1, threads=1))
     return recorded_qp
 
 
 def both_ways(model, samples, method):
-    """Runs of a model by the functions of whole groups, and by those of elements."""
+    """Runs of a model by the functions of whole groups, and by sums over pairs."""
     program, runs = tc.build(model, solver="daqp", method=method), []
-    for build in (contact_qp, ElementQP):
+    for is_summed in (False, True):
         groups = []
         for group in program.groups:
-            qp = build(program.nominal, group.group, program.gaps, program.method, program.plugin, group.qp.standing)
+            qp = qp_of(program, group.group, group.qp.standing, is_summed=is_summed)
             groups.append(ContactGroup(group.group, qp, ContactSolver(qp)))
         runs.append(joined(simulate_blocks(replace(program, groups=tuple(groups)), samples=samples, seed=1)))
     return runs
@@ -123,14 +128,14 @@ def both_ways(model, samples, method):
         *nightly(("chain", PAPER), ("ra1", EXACT)),
     ],
 )  # fmt: skip
-def test_elements_give_what_the_whole_function_gives(name, method):
+def test_sums_over_pairs_give_what_the_whole_function_gives(name, method):
     model = {"chain": cases.stack, "ra1": cases.ra1, "toleranced": lambda: tower(4, toleranced=True)}.get(name, lambda: name)()
-    whole, elements = both_ways(model, 60, method)
-    assert (whole["status"] == elements["status"]).all()
-    assert (whole["iterations"] == elements["iterations"]).all()
+    whole, summed = both_ways(model, 60, method)
+    assert (whole["status"] == summed["status"]).all()
+    assert (whole["iterations"] == summed["iterations"]).all()
     accuracy = WEAK_ACCURACY if method in (PAPER, CLOSED) else ACCURACY
     for quantity in ("poses", "measured", "gap_min"):
-        assert np.abs(whole[quantity] - elements[quantity]).max() < accuracy, quantity
+        assert np.abs(whole[quantity] - summed[quantity]).max() < accuracy, quantity
 
 
 @pytest.mark.parametrize(
@@ -140,23 +145,24 @@ def test_elements_give_what_the_whole_function_gives(name, method):
         ("rigid faces", "locator stiffness"), *nightly(*product(("hinge", "spindle", "bracket"), ("seating",))),
     ],
 )  # fmt: skip
-def test_functions_of_elements_are_those_of_the_whole(name, objective):
+def test_summed_functions_equal_the_functions_of_the_whole(name, objective):
     model = pressed(3, name) if name.endswith(("faces", "locators")) else cases.model(name)
     program = tc.build(model, solver="daqp", method={"objective": objective})
-    whole = recorded(program, samples=8)
+    whole = recorded(program, 8)
     group = program.groups[0].group
-    elements = ElementQP(program.nominal, group, program.gaps, program.method, program.plugin, whole.standing)
+    summed = qp_of(program, group, whole.standing, is_summed=True)
+    assert called(summed) and not called(whole)
     for size in ("slacks", "equations", "has_springs"):
-        assert getattr(elements, size) == getattr(whole, size)
+        assert getattr(summed, size) == getattr(whole, size)
     assert whole.calls
     for arrays in tuple(whole.calls):  # they are called again below
-        problem = elements.assemble(**arrays)
+        problem = summed.evaluators.assemble(**arrays)
         for matrix in ("h", "g", "a", "lba"):
-            expected, actual = dense(whole, matrix, arrays[matrix]), dense(elements, matrix, problem[matrix])
+            expected, actual = dense(whole, matrix, arrays[matrix]), dense(summed, matrix, problem[matrix])
             assert np.abs(actual - expected).max() < WHITENED_ACCURACY * max(1, np.abs(expected).max()), matrix
         for function, inputs in (("finish", arrays | problem), ("energy", {n: arrays[n] for n in ENERGY_INPUTS})):
             expected, actual = (
-                getattr(qp.evaluators, function)(**values) for qp, values in ((whole, arrays), (elements, inputs))
+                getattr(qp.evaluators, function)(**values) for qp, values in ((whole, arrays), (summed, inputs))
             )
             assert set(actual) == set(expected)
             for quantity, values in expected.items():
@@ -172,17 +178,22 @@ def test_blocks_of_realizations_do_not_change_a_bit():
         assert np.array_equal(values, runs[1][name], equal_nan=True), name
 
 
+def called(qp):
+    """The names of the Functions that `assemble` calls."""
+    return [function.name() for function in qp.assemble.find_functions(0)]
+
+
 def test_functions_are_shared_by_bodies_however_many():
-    kinds = [tc.build(tower(blocks)).groups[0].qp.kinds for blocks in (6, 9)]
-    assert kinds[0] == kinds[1] == 2  # a joint with the ground, and one between two blocks
-    # The first three joints differ, since the second block is located on the first one, and so do three blocks: one on the
-    # ground, that one on another block, and the last one with two forces.
-    kinds = [tc.build(pressed(blocks, "springy faces")).groups[0].qp.kinds for blocks in (6, 9)]
-    assert kinds[0] == kinds[1] == 7
+    names = [called(tc.build(tower(blocks)).groups[0].qp) for blocks in (6, 9)]
+    assert names[0] == names[1]
+    assert names[0].count("pair_terms") == 2  # a joint with the ground, and one between two blocks
+    # The first three joints differ, since the second block is located on the first one.
+    names = [called(tc.build(pressed(blocks, "springy faces")).groups[0].qp) for blocks in (6, 9)]
+    assert names[0].count("pair_terms") == names[1].count("pair_terms") == 4
 
 
 def test_few_bodies_have_one_function():
-    assert not isinstance(tc.build(tower(5)).groups[0].qp, ElementQP)
-    assert isinstance(tc.build(tower(6)).groups[0].qp, ElementQP)
+    assert not called(tc.build(tower(5)).groups[0].qp)
+    assert called(tc.build(tower(6)).groups[0].qp)
     by_origin = tc.Method(objective="all points", regularization="identity")
-    assert not isinstance(tc.build(tower(6), method=by_origin).groups[0].qp, ElementQP)
+    assert not called(tc.build(tower(6), method=by_origin).groups[0].qp)
