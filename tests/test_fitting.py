@@ -26,3 +26,13 @@ def test_a_surface_is_fitted_to_exact_and_to_noisy_vertices(kind, noise, error):
     assert getattr(surface, size) == pytest.approx(expected, rel=error)
     assert surface.residual <= max(2 * noise, 2e-14)
     assert np.abs(surface.distance(corners)[0]).max() <= max(2 * noise, 2e-14)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_few_facets_are_no_round_face(seed):
+    """A cone has six numbers, so that one passes through most hills of five facets, which have six vertices."""
+    rng = np.random.default_rng(seed)
+    angles = np.sort(rng.uniform(0, 2 * np.pi / 5, 5) + 2 * np.pi / 5 * np.arange(5))
+    rim = np.column_stack([np.cos(angles), np.sin(angles), rng.uniform(-0.2, 0.2, 5)])
+    triangles = np.stack([rim, np.roll(rim, -1, axis=0), np.broadcast_to((0.1, 0.0, 0.4), (5, 3))], axis=1)
+    assert fit_surface(triangles, 1e-3) is None

@@ -4,6 +4,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pytest
+import scipy.ndimage
 import trimesh
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
@@ -216,6 +217,24 @@ def test_blocks_that_touch_are_one_closed_body(at):
     cube = body(box((0, 0, 0), (3, 3, 3)))
     found = Neighbours(cube, deviating_solid(touching, [], np.zeros(len(touching.faces))), INSETS, 1.0).interfere(X)
     assert found.tolist() == [False, False, at == (10, 10, 0)]
+
+
+@pytest.mark.parametrize("heights", [(2, 1, 1, 0), (4, 2, 4, 0), (3, 1, 2, 4)], ids=["walls", "pinched", "staircase"])
+def test_planes_that_oppose_each_other_all_move_inwards(heights):
+    """Four blocks of some heights around a corner: walls that face opposite ways share a vertex, or touch along an edge."""
+    at, depth, size = [(-3, -3), (0, -3), (0, 0), (-3, 0)], 0.25, 12
+    blocks = [box((x, y, -2), (x + 3, y + 3, height)) for (x, y), height in zip(at, heights, strict=True)]
+    whole = solid(trimesh.boolean.union(blocks, engine="manifold"))
+    shifts = whole.inset(np.full(len(whole.faces), depth))
+    heights_of_corners = (shifts[whole.faces] * whole.normals[:, None]).sum(axis=2)
+    np.testing.assert_allclose(heights_of_corners, -depth, rtol=1e-9)
+    cells = np.zeros((2 * size, 2 * size, 4 * size), dtype=bool)  # of the width `depth`
+    for (x, y), height in zip(at, heights, strict=True):
+        i, j, top = (round(length / depth) for length in (x + 3, y + 3, height + 2))
+        cells[i : i + size, j : j + size, 8 : 8 + top] = True
+    left = scipy.ndimage.binary_erosion(cells, np.ones((3, 3, 3)))
+    inner = trimesh.Trimesh(whole.vertices + shifts, whole.faces, process=False)
+    assert inner.is_watertight and inner.volume == pytest.approx(left.sum() * depth**3, rel=1e-12)
 
 
 def test_facets_are_flat_or_known_not_to_be():

@@ -16,6 +16,7 @@ from tolcontact.geometry.vertex_displacements import displacements
 
 MIN_SINGULAR = 0.05  # of the planes around a vertex: directions with a smaller singular value are left alone
 OPPOSED = 0.1  # of the motion of the planes: a vertex that lies further from one of them has to be divided
+MAX_FACETS = 10  # around a vertex that is divided
 CONSISTENT = 1e-6  # of the motion: how close a vertex comes to planes that do not oppose each other
 
 
@@ -132,21 +133,45 @@ def _facets(
 
 
 def _cuts(facets: Sequence[Facet]) -> Iterator[tuple[int, float, Cut]]:
-    """Yield cuts, with the number of their halves whose planes oppose each other, and how far the other vertices move."""
-    normals, count = np.array([facet.normal for facet in facets]), len(facets)
-    for first, last in combinations(range(count), 2):
-        u, other_u = (_shift(normals[np.arange(*side) % count]) for side in ((first, last + 1), (last, first + count + 1)))
-        are_whole = all(np.isfinite(u)), all(np.isfinite(other_u))
-        if last - first in (1, count - 1) or not any(are_whole):
+    """Yield cuts, with the number of vertices that they end in, and the sum of the squares of their motions."""
+    count, vertices = len(facets), _Vertices(np.array([facet.normal for facet in facets]))
+    for first, last in combinations(range(count if count <= MAX_FACETS else 0), 2):
+        if last - first in (1, count - 1):
             continue
-        jog = np.where(np.isfinite(other_u), other_u, 0) - np.where(np.isfinite(u), u, 0)
-        first_at_end, last_at_end = facets[first].widens_at_end(jog), facets[last].widens_at_end(-jog)
+        halves = [
+            vertices.of(tuple(k % count for k in range(*side))) for side in ((first, last + 1), (last, first + count + 1))
+        ]
+        if not all(halves):
+            continue
+        u, other_u = (next(u for planes, u in half if first in planes and last in planes) for half in halves)
+        first_at_end, last_at_end = facets[first].widens_at_end(other_u - u), facets[last].widens_at_end(u - other_u)
         if first_at_end is not None and last_at_end is not None:
-            cut = Cut(first, last, first_at_end, last_at_end, are_whole)
-            yield 2 - sum(are_whole), float(np.nansum([u @ u, other_u @ other_u])), cut
+            motions = sum(float(u @ u) for half in halves for _, u in half)
+            are_whole = len(halves[0]) == 1, len(halves[1]) == 1
+            yield len(halves[0]) + len(halves[1]), motions, Cut(first, last, first_at_end, last_at_end, are_whole)
 
 
-def _shift(normals: np.ndarray) -> np.ndarray:
-    """Return how a vertex moves (3,) onto its planes if these move by 1; NaN if they oppose each other."""
-    u = np.linalg.lstsq(normals, np.ones(len(normals)), rcond=MIN_SINGULAR)[0]
-    return u if np.abs(normals @ u - 1).max() < CONSISTENT else np.full(3, np.nan)
+class _Vertices:
+    """The vertices that planes around one vertex need if they move by 1, as cuts leave them."""
+
+    def __init__(self, normals: np.ndarray) -> None:
+        self._normals = normals
+        self._known: dict[tuple[int, ...], list[tuple[tuple[int, ...], np.ndarray]]] = {}
+
+    def of(self, planes: tuple[int, ...]) -> list[tuple[tuple[int, ...], np.ndarray]]:
+        """Return the planes around each vertex, and how it moves (3,), for some planes around one; none if there are none."""
+        if planes not in self._known:
+            self._known[planes] = min(self._choices(planes), key=len, default=[])
+        return self._known[planes]
+
+    def _choices(self, planes: tuple[int, ...]) -> Iterator[list[tuple[tuple[int, ...], np.ndarray]]]:
+        N = self._normals[list(planes)]
+        u = np.linalg.lstsq(N, np.ones(len(N)), rcond=MIN_SINGULAR)[0]
+        if np.abs(N @ u - 1).max() < CONSISTENT:
+            yield [(planes, u)]
+            return
+        for first, last in combinations(range(len(planes)), 2):
+            if last - first not in (1, len(planes) - 1):
+                halves = self.of(planes[first : last + 1]), self.of(planes[last:] + planes[: first + 1])
+                if all(halves):
+                    yield [*halves[0], *halves[1]]
