@@ -17,12 +17,12 @@ from tolcontact.interference.neighbours import Interference, Neighbours
 from tolcontact.interference.part_solid import curved_triangles, part_solid
 
 # Share of the smallest tolerance range: bodies interfere from this depth on, the diameter of a ball that lies in both of them.
-ALLOWED_SHARE = 1 / 1000
+ALLOWED_SHARE = 9 / 10_000
 RANGE = 1.0  # mm: replaces the tolerance range if nothing is toleranced
 MIN_DEPTH = 1e-7  # mm, and MIN_SHARE of the sizes of both bodies: smaller depths are rounding of poses and vertices
 MIN_SHARE = 1e-8
 MOTION_FACTOR = 2.0  # times the motion of raw poses: the usual motion of bodies
-SHARES = (0.4, 0.5)  # of that depth: inward offsets of the surfaces of both bodies; where edges cross, more is left over
+SHARES = (0.4, 0.6)  # of that depth: inward offsets of the surfaces of both bodies
 
 
 class Clash(NamedTuple):
