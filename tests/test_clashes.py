@@ -72,9 +72,9 @@ def test_clashes_have_the_probability_of_the_normal_distribution(results):
 def test_the_depth_of_a_clash_is_what_the_part_has_moved_beyond_the_clearance(results):
     depth = -CLEARANCE - results.measured.sel(state="corrected", measure="x").values
     clashing = results.clashes.values > 0
-    allowed = results.attrs["interference_depth"]
-    assert allowed == pytest.approx(3 * 6 * SIGMA / 2000)  # the seat keeps its fixed planes
-    assert clashing[depth > 1.01 * allowed].all() and not clashing[depth < 0.99 * allowed].any()
+    allowed, usual = results.attrs["interference_depth"], 6 * SIGMA * 9 / 10_000
+    assert allowed == pytest.approx(3 * 6 * SIGMA / 2000)  # the largest: the seat keeps its fixed planes
+    assert clashing[depth > 1.01 * usual].all() and not clashing[depth < 0.99 * usual].any()
     np.testing.assert_allclose(results.clash_depth.values[clashing], depth[clashing], atol=1.1 * allowed)
     parts = [str(part) for part in results.part.values]
     pairs = {(parts[i], parts[j]) for i, j in zip(results.clash_part.values, results.clash_other.values, strict=True) if i >= 0}

@@ -183,10 +183,6 @@ class Candidates:
             return raised.with_minima(self._pairs[k], X_RM, deviations, self._bulge, is_raw=is_raw, in_steps=in_steps)
         return raised
 
-    def slot_of(self, k: int) -> int:
-        """Return the index of pair k of the group among the pairs with changing points."""
-        return self._varying.index(k)
-
     @property
     def change(self) -> bool:
         """Whether contact places are searched at every pose."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from tolcontact import poses as pose
-from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import FREE_DEPTH, Candidates
 from tolcontact.contact.linear_step import LinearStep
@@ -43,16 +43,12 @@ class FreeSteps:
         self._relate, self._energy = relate, energy
         self._centres = np.array([np.asarray(mobility.centre, dtype=float).ravel() for mobility in group.mobilities])
 
-    def shorten(
-        self, step: LinearStep, task: Task, before: State, state: State, size: Float[Array, " n"], *, is_guarded: bool
-    ) -> Bool[Array, " n"]:
+    def shorten(self, step: LinearStep, task: Task, before: State, state: State, size: Float[Array, " n"]) -> Bool[Array, " n"]:
         """Shorten steps from `before` to `state`, of a size (n,) [mm], so that bodies stay free; return which are short (n,).
-
-        If steps are guarded, the places that separate bodies where a step would end take slots (see Guard).
 
         If a short step leaves penetration because rotations are curved, the smallest step that removes it follows.
         """
-        is_short = self._hold_back(task, before, state, size, is_guarded)
+        is_short = self._hold_back(task, before, state, size)
         rows = np.flatnonzero(is_short)
         if rows.size:
             part, held = task.take(rows), state.take(rows)
@@ -60,13 +56,11 @@ class FreeSteps:
             part = replace(part, raw=held.poses, relative=held.relative, scans=scans)
             freed = held.take(np.arange(len(rows)))
             size_of_rows, _ = step.take(part, freed, stride=STRIDE)
-            self._hold_back(part, held, freed, size_of_rows, is_guarded)
+            self._hold_back(part, held, freed, size_of_rows)
             state.poses[rows], state.relative[rows] = freed.poses, freed.relative
         return is_short
 
-    def _hold_back(
-        self, task: Task, before: State, state: State, size: Float[Array, " n"], is_guarded: bool
-    ) -> Bool[Array, " n"]:
+    def _hold_back(self, task: Task, before: State, state: State, size: Float[Array, " n"]) -> Bool[Array, " n"]:
         """Halve steps until no body penetrates another one and the objective is lower; return which are short (n,)."""
         shares = np.ones(len(task))
         rows = np.flatnonzero(np.isfinite(before.poses).all(axis=(1, 2)) & np.isfinite(state.poses).all(axis=(1, 2)))
@@ -80,10 +74,7 @@ class FreeSteps:
             # Places deeper than the motion of the bodies are on the far side of a body.
             depth = self._depths(part, state.relative[rows], depths[rows] + share * motions[rows] + TOUCHING)
             fails = depth > TOUCHING + depths[rows] * (1 - share) + SINK_SHARE * share * size[rows]
-            interferes = enters[rows] & self._candidates.interfere(state.relative[rows])
-            fails |= interferes
-            if is_guarded:
-                self._guard(state, rows[interferes])
+            fails |= enters[rows] & self._candidates.interfere(state.relative[rows])
             fails |= self._energy(part, state.take(rows)) > objective[rows]
             rows, part = rows[fails], part.take(fails)
             if not rows.size:
@@ -95,12 +86,6 @@ class FreeSteps:
         rows = rows[enters[rows] & self._candidates.interfere(state.relative[rows])]
         state.poses[rows], state.relative[rows] = before.poses[rows], before.relative[rows]
         return shares < 1
-
-    def _guard(self, state: State, rows: Int[Array, " k"]) -> None:
-        """Give the places that separate interfering bodies of some realizations a slot."""
-        for k, guard in self._candidates.guards.items() if rows.size else ():
-            slots, labels = state.slots[self._candidates.slot_of(k)], guard.labels(state.relative[rows, k])
-            slots.hold(rows[labels >= 0], labels[labels >= 0])
 
     def lift(
         self, poses: Float[Array, "n part 12"], relative: Float[Array, "n pair 12"], deviations: Float[Array, "n contributor"]

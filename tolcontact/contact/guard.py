@@ -75,11 +75,6 @@ class Guard:
             self._part(found, rows, X_RM, -apart * _direction(labels[rows]))
         return found
 
-    def labels(self, X_RM: Float[Array, "n 12"]) -> Int[Array, " n"]:
-        """Return the labels (n,) of the places that separate the bodies at X_RM; -1 where they do not interfere."""
-        way = self.ways_out(X_RM)
-        return np.where(way.widths > 0, _label(way.normals), -1)
-
     def _part(self, found: Places, rows: Int[Array, " k"], X_RM: Float[Array, "n 12"], shift: Float[Array, "k 3"]) -> None:
         """Write the place that separates bodies in some rows, which overlap once the moving one is shifted."""
         shifted = X_RM[rows]

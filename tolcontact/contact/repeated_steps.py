@@ -92,7 +92,7 @@ def repeat(
         size, scaled = _take(step, unsettled, np.flatnonzero(~asleep), kind, start.stride)
         is_short = np.zeros(len(unsettled), dtype=bool)
         if before is not None:
-            is_short = free_steps.shorten(step, unsettled.task, before, unsettled.state, size, is_guarded=start.guarded)
+            is_short = free_steps.shorten(step, unsettled.task, before, unsettled.state, size)
         rounding_counts = kind.newton or step.knows_walls or start.balances
         moves = is_short | (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
         if kind.width > 1:

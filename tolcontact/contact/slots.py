@@ -41,12 +41,6 @@ class Slots:
         """Replace the slots of some realizations."""
         self.points[rows], self.filled[rows], self.reactions[rows] = slots.points, slots.filled, slots.reactions
 
-    def hold(self, rows: Int[Array, " k"], points: Int[Array, " k"]) -> None:
-        """Hold one more of the contact `points` (k,) in each of some rows, in an empty slot."""
-        is_new = ~(self.filled[rows] & (self.points[rows] == points[:, None])).any(axis=1)
-        rows, points, empty = rows[is_new], points[is_new], self.filled[rows[is_new]].argmin(axis=1)
-        self.points[rows, empty], self.filled[rows, empty], self.reactions[rows, empty] = points, True, 0.0
-
     def reactions_of(self, points: Int[Array, "n slot"]) -> Float[Array, "n slot"]:
         """Return the reactions of some contact points (n, slot), 0 for points that have no slot."""
         matches = (points[:, :, None] == self.points[:, None, :]) & self.filled[:, None, :]

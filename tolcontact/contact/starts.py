@@ -37,4 +37,4 @@ GUARDED = (Start(guarded=True, at_answer=True), Start(guarded=True), Start(guard
 PARTED = (Start(parted=True), Start(parted=True, stride=SMALL_STRIDE))
 # Where bodies can separate in several directions, full steps alternate between these, or their rows contradict each other.
 FREE_WHERE_RAW = Start(free=True)
-FREE = (Start(free=True, at_nominal=True), FREE_WHERE_RAW, Start(free=True, guarded=True, at_nominal=True))
+FREE = (Start(free=True, at_nominal=True), FREE_WHERE_RAW)
