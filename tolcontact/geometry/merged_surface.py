@@ -77,16 +77,16 @@ def _on_edges(vertices: np.ndarray, faces: np.ndarray) -> tuple[Int[Array, " m"]
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     ends = np.asarray(mesh.face_adjacency_edges)[np.asarray(mesh.face_adjacency_angles) > SAME_TURN]
     start, along = vertices[ends[:, 0]], np.subtract(*vertices[ends[:, ::-1]].swapaxes(0, 1))
-    lengths = np.linalg.norm(along, axis=1)
-    near = cKDTree(vertices).query_ball_point(start + along / 2, lengths / 2)
-    edge = np.repeat(np.arange(len(ends)), [len(of_edge) for of_edge in near])
+    lengths, limit = np.linalg.norm(along, axis=1), ROUNDING * mesh.scale
+    tree, middles, radii = cKDTree(vertices), start + along / 2, np.maximum(lengths / 2 - limit, 0)
+    edge = np.flatnonzero(tree.query_ball_point(middles, radii, return_length=True))  # the ends are not in these balls
+    near = tree.query_ball_point(middles[edge], radii[edge])
+    edge = np.repeat(edge, [len(of_edge) for of_edge in near])
     vertex = np.concatenate([np.zeros(0, dtype=np.int64), *(np.asarray(of_edge, dtype=np.int64) for of_edge in near)])
     arms = vertices[vertex] - start[edge]
     shares = (arms * along[edge]).sum(axis=1) / np.maximum(lengths[edge], 1e-300) ** 2
     distances = np.linalg.norm(arms - shares[:, None] * along[edge], axis=1)
-    limit = ROUNDING * mesh.scale
-    lies = (distances <= limit) & (shares * lengths[edge] > limit) & ((1 - shares) * lengths[edge] > limit)
-    lies &= (ends[edge] != vertex[:, None]).all(axis=1)
+    lies = (distances <= limit) & (ends[edge] != vertex[:, None]).all(axis=1)
     edge, vertex, shares = edge[lies], vertex[lies], shares[lies]
     order = np.lexsort([-shares, edge])
     vertex, divided = vertex[order], ends[edge[order]]

@@ -4,6 +4,7 @@ No displacement puts such a vertex on all its planes once these move into the ma
 edge between them that two of its facets share; nominally this edge has no length.
 """
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import NamedTuple
@@ -16,7 +17,7 @@ from tolcontact.geometry.vertex_displacements import displacements
 
 MIN_SINGULAR = 0.05  # of the planes around a vertex: directions with a smaller singular value are left alone
 OPPOSED = 0.1  # of the motion of the planes: a vertex that lies further from one of them has to be divided
-MAX_FACETS = 10  # around a vertex that is divided
+MAX_FACETS = 8  # around a vertex that is divided
 CONSISTENT = 1e-6  # of the motion: how close a vertex comes to planes that do not oppose each other
 
 
@@ -73,10 +74,13 @@ def divided(mesh: trimesh.Trimesh, same_plane: float) -> Divided:
     count, extended = len(faces), list[int]()
     is_flat = np.asarray(mesh.face_adjacency_angles) <= same_plane
     label = list(trimesh.graph.connected_component_labels(np.asarray(mesh.face_adjacency)[is_flat], node_count=count))
-    waiting = list(np.flatnonzero(_oppose(np.array(faces), np.array(normals), len(vertices))))
+    waiting = [int(v) for v in np.flatnonzero(_oppose(np.array(faces), np.array(normals), len(vertices)))]
+    around = defaultdict[int, list[int]](list)  # the triangles around a vertex
+    for triangle, vertex in np.argwhere(np.isin(mesh.faces, waiting)):
+        around[int(mesh.faces[triangle, vertex])].append(int(triangle))
     while waiting:
         v, twin = waiting.pop(), len(vertices)
-        facets = _facets(v, vertices, faces, normals, label)
+        facets = _facets(v, around[v], vertices, faces, normals, label)
         cut = min(_cuts(facets), default=(0, 0.0, None))[2]
         if cut is None:
             continue
@@ -88,11 +92,15 @@ def divided(mesh: trimesh.Trimesh, same_plane: float) -> Divided:
             *([] if cut.first_at_end else [first]),
             *([last] if cut.last_at_end else []),
         ]
-        for triangle in (triangle for facet in moved for triangle in facet.triangles):
+        around[twin] = [triangle for facet in moved for triangle in facet.triangles]
+        around[v] = [triangle for triangle in around[v] if triangle not in around[twin]]
+        for triangle in around[twin]:
             faces[triangle] = np.where(faces[triangle] == v, twin, faces[triangle])
         for facet, at_end, ends in ((first, cut.first_at_end, (v, twin)), (last, cut.last_at_end, (twin, v))):
             triangle = facet.triangles[0]
             faces.append(np.array([ends[0], facet.end if at_end else facet.start, ends[1]]))
+            for vertex in faces[-1]:
+                around[int(vertex)].append(len(faces) - 1)
             normals.append(normals[triangle])
             label.append(label[triangle])
             extended.append(triangle if triangle < count else extended[triangle - count])
@@ -111,10 +119,14 @@ def _oppose(faces: np.ndarray, normals: np.ndarray, count: int) -> np.ndarray:
 
 
 def _facets(
-    v: int, vertices: Sequence[np.ndarray], faces: Sequence[np.ndarray], normals: Sequence[np.ndarray], label: Sequence[int]
+    v: int,
+    there: Sequence[int],
+    vertices: Sequence[np.ndarray],
+    faces: Sequence[np.ndarray],
+    normals: Sequence[np.ndarray],
+    label: Sequence[int],
 ) -> list[Facet]:
-    """Return the facets around a vertex v; none if the mesh is open there."""
-    there = np.flatnonzero((np.array(faces) == v).any(axis=1))
+    """Return the facets around a vertex v, whose triangles are `there`; none if the mesh is open there."""
     corners = [np.roll(faces[triangle], -int(np.flatnonzero(faces[triangle] == v)[0])) for triangle in there]
     following, order = {int(corner[1]): k for k, corner in enumerate(corners)}, [0]
     while (k := following.get(int(corners[order[-1]][2]), 0)) not in order:
@@ -127,7 +139,7 @@ def _facets(
     for start, end in zip(starts, [*starts[1:], *(k + len(order) for k in starts[:1])], strict=True):
         of_facet = [order[k % len(order)] for k in range(start, end)]
         ends = int(corners[of_facet[0]][1]), int(corners[of_facet[-1]][2])
-        triangles = [int(there[k]) for k in of_facet]
+        triangles = [there[k] for k in of_facet]
         facets.append(Facet(triangles, normals[triangles[0]], *ends, *(vertices[other] - vertices[v] for other in ends)))
     return facets
 

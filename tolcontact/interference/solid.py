@@ -79,7 +79,7 @@ def solid(body: trimesh.Trimesh) -> Solid | None:
     lone = np.flatnonzero(triangles_there[edge] == 1)
     neighbours = np.asarray(whole.mesh.face_adjacency)
     angles = trimesh.geometry.vector_angle(normals[neighbours])
-    sharp = (angles > SAME_PLANE) & (plane[neighbours[:, 0]] != plane[neighbours[:, 1]])
+    sharp = angles > SAME_PLANE
     return Solid(
         np.ascontiguousarray(whole.mesh.vertices, dtype=np.float64),
         np.ascontiguousarray(faces, dtype=np.int64),
