@@ -116,6 +116,26 @@ def test_warnings_do_not_depend_on_the_frame(turn):
     assert kinds(model(at=(20, 12.5, 13), turn=turn)) == ["gap"]
 
 
+@pytest.mark.parametrize("turn", [(0, 0, 0), (0.3, -1.2, 0.7)])
+@pytest.mark.parametrize(("width", "is_doubtful"), [(2, True), (20, False)])
+def test_contact_along_a_line_does_not_hold_a_rotation(turn, width, is_doubtful):
+    """The block stands on a ledge under its left edge, which is 50 mm long and, if narrow, holds it like a hinge."""
+
+    def on_a_ledge(objective):
+        a = tc.Assembly("ledge", method=tc.Method(objective=objective))
+        ledge = a.part("ledge", tc.Box(50, width, 10), fixed=True, rotation=turn)
+        block = a.part("block", tc.Box(50, 40, 10), at=Rotation.from_rotvec(turn).apply((0, 0, 10)), rotation=turn)
+        a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=2), tolerance=0.2)
+        a.contact("seat", moving=block.face("-z"), reference=ledge.face("+z"))
+        a.measure("height", block.point(50, 40, 10), along=Rotation.from_rotvec(turn).apply((0, 0, 1)), limits=(-2, 2))
+        return [text for text in warned(a) if text.startswith("[rotation]")]
+
+    texts = on_a_ledge("all points")
+    assert len(texts) == is_doubtful
+    assert all(re.search(r'part "block" .* hardly holds its rotation .* "locator stiffness"', text) for text in texts)
+    assert not on_a_ledge("locator stiffness")
+
+
 @pytest.mark.parametrize("depth", [0.05, *nightly(0.0, 0.1)])
 def test_an_overlap_within_the_tolerances_is_silent(depth):
     # The gap of a corner outside of the triangle of the feet has sigma 0.2 / 6 times about 1.5.

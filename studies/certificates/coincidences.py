@@ -31,13 +31,14 @@ ALLOWED, NOTICED = 5e-4, 1e-4  # radius of a ball in two bodies, as a share of t
 TOUCHING = 1e-6  # mm
 LIFTS = (0.0, 0.25, 0.5, 1, 2, 4)  # in tolerance ranges
 UNANSWERED = 0.1  # share of the realizations of a scene
-ON_A_LINE = 1e-3  # of the size of a body, within which its contact points lie on a line
+MIN_ARM = 0.03  # of the size of a body: root mean square distance of its contact points from the line closest to them
 STIFF = "locator stiffness"
 LISTED = 6  # wrong realizations of a scene
 CONTRADICTIONS = ("inside", "noticed", "missed", "falsely touched", "lifted off", "not told", "falsely told")
 UNCERTIFIED = ("not converged", "not assemblable", "doubtful")
 OTHERS = ("liftable", "refused", "crashed", "seconds")
-COLUMNS = ("scenes", "rows", "stiff", "certified", *CONTRADICTIONS, "undeclared", "told", *UNCERTIFIED, *OTHERS)
+COLUMNS = ("scenes", "rows", "stiff", "overlapping", "certified", *CONTRADICTIONS, "undeclared", "told")
+COLUMNS += ("without answer", *UNCERTIFIED, *OTHERS)
 
 
 @dataclass
@@ -80,12 +81,16 @@ def judged(scene: Scene, samples: int, seed: int, solver: str) -> Findings:
     after = separation_of_pairs(scene.bodies, scene.pairs, poses[touched, CORRECTED])
     told = np.concatenate([block.clashes for block in blocks]) > 0
     apart = separation_of_pairs(scene.bodies, scene.undeclared, poses[:, CORRECTED]) > 0
+    at_rest = np.tile(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), (1, len(scene.bodies), 1))
+    overlaps = ball_of_pairs(scene.bodies, scene.pairs, at_rest, 0)[0] > ALLOWED * scene.tolerance
     if program.method.minimizes.presses:  # forces also close gaps, and supports also hold
         before, after = np.zeros((2, touched.size))
     counts = {
         "rows": samples,
         "stiff": samples * is_stiff,
+        "overlapping": samples * overlaps,
         "certified": certified.size,
+        "without answer": (samples - certified.size) * (not overlaps),
         "inside": np.sum(radii > ALLOWED),
         "noticed": np.sum(radii > NOTICED),
         "missed": np.sum(radii[status[certified] == Status.UNTOUCHED] > ALLOWED),
@@ -104,9 +109,10 @@ def judged(scene: Scene, samples: int, seed: int, solver: str) -> Findings:
 
 
 def leaves_rotations_free(program: tc.Program) -> bool:
-    """Return whether the contact points of a body that moves lie on a line.
+    """Return whether the contact points of a body that moves lie on a line, or close to one.
 
-    No sum of their displacements holds the rotation about the line, so that the pose of the body is not determined.
+    A sum of their displacements does not hold the rotation about the line, or hardly, so that the pose of the body is not
+    determined, or lies far from the raw pose. The package warns of such models, and recommends the stiffness of locators.
     """
     if not program.method.minimizes.counts_points:
         return False
@@ -116,10 +122,10 @@ def leaves_rotations_free(program: tc.Program) -> bool:
         points[pair.moving if pair.reference is None else pair.reference].append(pair.P_r)
     for part, sets in points.items():
         centred = np.concatenate(sets) - np.concatenate(sets).mean(axis=0)
-        axis = np.linalg.svd(centred)[2][0]  # of the line nearest to the points
+        axis = np.linalg.svd(centred)[2][0]  # of the line closest to the points
         distances = np.linalg.norm(centred - np.outer(centred @ axis, axis), axis=1)
         body = program.nominal.parts[part]
-        if body.movers and distances.max() < ON_A_LINE * body.body.scale:
+        if body.movers and np.sqrt((distances**2).mean()) < MIN_ARM * body.body.scale:
             return True
     return False
 

@@ -10,7 +10,7 @@ from tolcontact.plausibility.declared_points import doubtful_units, far_points, 
 from tolcontact.plausibility.faces import measured_forms, partial_surfaces
 from tolcontact.plausibility.magnitudes import rotations, wide_tolerances
 from tolcontact.plausibility.measures import measure_limits, measured_reach
-from tolcontact.plausibility.pairs import coarse_pairs, pair_clearances, pair_overlaps, unsure_seats
+from tolcontact.plausibility.pairs import coarse_pairs, pair_clearances, pair_overlaps, unconstrained_rotations, unsure_seats
 from tolcontact.plausibility.trial_draws import TrialDraws
 
 KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
@@ -24,6 +24,7 @@ KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
     "overlap": (pair_overlaps, body_overlaps),
     "clash": (clashes, clashes_beyond_faces),
     "gap": (pair_clearances,),
+    "rotation": (unconstrained_rotations,),
     "limits": (measure_limits,),
     "reach": (measured_reach,),
     "friction": (unsure_seats,),

@@ -12,6 +12,7 @@ from tolcontact.statics import balances, drawn_contacts
 FAR_SIGMAS = 30.0  # of a gap: contact beyond does not act
 MIN_SHARE = 1e-5  # of a face's size: overlaps and gaps below are rounding of coordinates
 MIN_RANGE_SHARE = 0.05  # of the smallest tolerance range
+MIN_ARM = 0.03  # sizes of a part: root mean square distance of its contact points from the line closest to them
 
 
 def pair_overlaps(draws: TrialDraws) -> Iterator[str]:
@@ -70,6 +71,30 @@ def coarse_pairs(draws: TrialDraws) -> Iterator[str]:
                     f"{_place(draws, k)}: parts may be off by up to {error:.2g} mm {place}, "
                     f"{error / finest:.2g} of the smallest tolerance ({finest:.4g} mm); {advice}"
                 )
+
+
+def unconstrained_rotations(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each free part whose contact points lie close to a line, so that they hardly hold its rotation.
+
+    A rotation about that line hardly displaces them: contact may rotate the part far to save a small displacement of points.
+    """
+    method, nominal = draws.program.method, draws.program.nominal
+    if not method.minimizes.counts_points:
+        return
+    for index, part in enumerate(nominal.parts):
+        sides = [pair.P_m for pair in nominal.pairs if pair.moving == index]
+        sides += [pair.P_r for pair in nominal.pairs if pair.reference == index]
+        if not part.movers or not sides:
+            continue
+        points = np.concatenate(sides)
+        extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        arm = float(np.linalg.norm(extents[1:])) / np.sqrt(len(points))
+        if arm < MIN_ARM * part.mesh.scale:
+            yield (
+                f"{part.part.designation}: its contact points lie close to a line ({arm:.2g} mm away, root mean square; the "
+                f'part is {part.mesh.scale:.3g} mm large), so that objective "{method.objective}" hardly holds its rotation '
+                'about the line; choose objective "locator stiffness", or spread its contact points'
+            )
 
 
 def _face_pairs(draws: TrialDraws) -> Iterator[tuple[int, ContactPoints, float]]:
