@@ -23,6 +23,7 @@ from tolcontact.contact.state import State, Task, Unsettled
 STEP_TOLERANCE = 1e-9  # mm: a smaller step is the last one
 ROUNDING = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that are almost unconstrained
 NEARLY_AT_REST = 1e-3  # mm: after a smaller step, places do not stay beyond sharp edges
+MAX_IDLE = 3  # steps in a row that end where they begin, because bodies would penetrate: the next ones would, too
 CLOSED = 1e-6  # mm, and of rotation matrices: steps that return this close to an earlier pose repeat themselves
 
 
@@ -82,7 +83,7 @@ def repeat(
     progress: Progress | None = None
     if not len(task):
         return
-    asleep, last = np.zeros(len(task), dtype=bool), None
+    asleep, idle, last = np.zeros(len(task), dtype=bool), np.zeros(len(task), dtype=int), None
     for kind in _steps(candidates, start):
         asleep &= kind == last
         last = kind
@@ -93,6 +94,7 @@ def repeat(
         is_short = np.zeros(len(unsettled), dtype=bool)
         if before is not None:
             is_short = free_steps.shorten(step, unsettled.task, before, unsettled.state, size)
+            idle = np.where((unsettled.state.poses == before.poses).all(axis=(1, 2)) & is_short, idle + 1, 0)
         rounding_counts = kind.newton or step.knows_walls or start.balances
         moves = is_short | (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
         if kind.width > 1:
@@ -102,7 +104,7 @@ def repeat(
         unrest = np.minimum(size, scaled)
         residual = unsettled.state.kkt_residual
         residual[~moves] = np.maximum(residual[~moves], unrest[~moves])
-        lost = moves & limits.is_lost(unsettled.task, unsettled.state)
+        lost = moves & (limits.is_lost(unsettled.task, unsettled.state) | (idle >= MAX_IDLE))
         if kind.width > 1 and not kind.newton:
             lost |= moves & _goes_round(trail, unsettled.state)
             trail = [*trail[-1:], unsettled.state.poses.copy()]
@@ -111,7 +113,7 @@ def repeat(
         unsettled.settle(~moves)
         # Realizations that converge while steps are damped need no further damping.
         asleep = (size[moves] <= STEP_TOLERANCE) & (kind.width > 1)
-        unrest, trail = unrest[moves], [poses[moves] for poses in trail]
+        unrest, idle, trail = unrest[moves], idle[moves], [poses[moves] for poses in trail]
         progress = None if progress is None else progress.take(moves)
         if not len(unsettled):
             return
@@ -124,7 +126,7 @@ def repeat(
             ends = progress.is_over(_is_stuck(unsettled.state))
             if ends.any():
                 _end(unsettled, progress, unrest, ends)
-                asleep, unrest, progress = asleep[~ends], unrest[~ends], progress.take(~ends)
+                asleep, idle, unrest, progress = asleep[~ends], idle[~ends], unrest[~ends], progress.take(~ends)
                 trail = [poses[~ends] for poses in trail]
     _end(unsettled, progress, unrest, np.ones(len(unsettled), dtype=bool))
 
