@@ -9,7 +9,7 @@ from tolcontact.errors import OptionError
 RESOLUTIONS = ("linearized", "exact")
 REGULARIZATIONS = ("points", "identity")
 ACTIVE_SETS = ("closed", "initial")
-SEARCHES = ("fixed", "iterated", "bounded")
+SEARCHES = ("fixed", "bounded")
 # By resolution. That of one linear step is the paper's.
 USUAL_SEARCH = {"linearized": "fixed", "exact": "bounded"}
 USUAL_OBJECTIVE = {"linearized": "active points", "exact": "all points"}
@@ -64,8 +64,7 @@ class Method:
                         "closed": points that the correction itself drives into contact are constrained too
         activity        a contact point is active below this gap [mm]
         search          "bounded": faces end where they end, and touch at corners, edges and facets of both bodies, found at
-                        every pose; "fixed": contact points are projected once, in the nominal state, on planes without end;
-                        "iterated": they are projected again at the corrected pose until they no longer move (paper, 2.2).
+                        every pose; "fixed": contact points are projected once, in the nominal state, on planes without end.
                         If it is not given, "bounded" with "exact", and "fixed" with "linearized", which has no other
         near_turn       [rad] an answer that turns a part by more, from its raw pose, is doubted: tried again from other
                         starts, and never certified
@@ -134,24 +133,14 @@ class Method:
         return self.resolution == "exact"
 
     @property
-    def is_iterated(self) -> bool:
-        """Whether contact points are projected again before every step."""
-        return self.search == "iterated"
-
-    @property
     def is_bounded(self) -> bool:
         """Whether faces end, and touch at corners, edges and facets of both bodies."""
         return self.search == "bounded"
 
     @property
     def is_closed(self) -> bool:
-        """Whether points may carry that are not active in the raw state."""
-        return self.active_set == "closed"
+        """Whether all points may be active, also points that are not active in the raw state.
 
-    @property
-    def corners_suffice(self) -> bool:
-        """Whether, of points in one plane, the corners of their convex hull suffice.
-
-        They do if every point may carry, and if points do not move.
+        Of points in one plane, the corners of their convex hull then suffice.
         """
-        return self.is_closed and not self.is_iterated
+        return self.active_set == "closed"

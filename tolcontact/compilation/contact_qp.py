@@ -137,7 +137,7 @@ def contact_qp(
     current, moved, reactions = motion.poses, motion.by(linear), inputs["reactions"]
     points = row_points(system, standing, inputs)
     call = call or (FunctionCalls() if is_summed(group, method) else inline)
-    projects = method.is_iterated or bool(curved_pairs(nominal, group))
+    projects = bool(curved_pairs(nominal, group))
     if isinstance(call, FunctionCalls):
         rows, terms = summed_terms(system, points, current, reactions, call, projects=projects)
     else:

@@ -130,7 +130,8 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     Raises OptionError for a solver that cannot be used, ModelError for a user-defined measure that fails, or, if the objective
     is seating, for forces that are missing or act on parts that contact cannot move.
     """
-    _check_method(nominal, method)
+    _check_placing(nominal, method)
+    _check_springs(nominal, method)
     draws = Draws(nominal)
     with CONSTRUCTION_LOCK:  # user-defined functions run here, too, and may print
         with quiet():
@@ -275,24 +276,6 @@ def _contact_group(
     return ContactGroup(group, qp, ContactSolver(qp))
 
 
-def _check_method(nominal: Nominal, method: Method) -> None:
-    """Raise ModelError for a method that does not suit the model."""
-    for check in (_check_forms, _check_placing, _check_springs):
-        check(nominal, method)
-
-
-def _check_forms(nominal: Nominal, method: Method) -> None:
-    """Raise ModelError for a search that ignores the form of a reference face when it projects points again."""
-    faults = [
-        f'contact pair "{pair.name}": the search is "iterated", and the reference face of feature {pair.deviating[1].name} has '
-        'form; choose the search "bounded" or "fixed"'
-        for pair in nominal.pairs
-        if method.is_iterated and pair.deviating[1] is not None and pair.deviating[1].form is not None
-    ]
-    if faults:
-        raise ModelError(nominal.assembly.name, faults)
-
-
 def _check_placing(nominal: Nominal, method: Method) -> None:
     """Raise ModelError for placed parts under forces, if they are located by springs or by too many locators."""
     faults = [
@@ -307,7 +290,7 @@ def _check_placing(nominal: Nominal, method: Method) -> None:
 
 
 def _check_springs(nominal: Nominal, method: Method) -> None:
-    """Raise ModelError for a stiffness without effect, without forces that load it, or without steps that use true gaps."""
+    """Raise ModelError for a stiffness without effect, or without forces and repeated steps, which it needs."""
     faults = [
         f'locator "{part.locators.labels[index]}": it has a stiffness, but part "{part.name}" is fixed=True, so forces do not '
         "move it; leave stiffness out, or declare the part fixed=False"
@@ -316,12 +299,11 @@ def _check_springs(nominal: Nominal, method: Method) -> None:
     ]
     if faults:
         raise ModelError(nominal.assembly.name, faults)
-    if method.minimizes.presses and method.is_exact and not method.is_iterated:
+    if method.minimizes.presses and method.is_exact:
         return
     faults = [
-        f'{_compliant_name(pair)} has a stiffness, which needs the objective "seating", the resolution "exact", and a search '
-        f'that is not iterated; here they are "{method.objective}", "{method.resolution}" and "{method.search}"; choose '
-        "those, or leave stiffness out"
+        f'{_compliant_name(pair)} has a stiffness, which needs the objective "seating" and the resolution "exact"; '
+        f'here they are "{method.objective}" and "{method.resolution}"; choose those, or leave stiffness out'
         for pair in nominal.pairs
         if pair.is_springy
     ]

@@ -1,7 +1,7 @@
 """Resolve contact: move a group of parts from raw poses to poses without penetration, and rate the certainty of the answer.
 
-The linearized resolution takes one linear step. The exact one repeats them (see repeated_steps), with an iterated search
-about contact points that are projected again (see iterated_search). Realizations that end in a conflict, without an answer, or
+The linearized resolution takes one linear step. The exact one repeats them (see repeated_steps), from some starts about
+contact points that are projected again (see iterated_search). Realizations that end in a conflict, without an answer, or
 far from the raw pose are tried again from other starts.
 """
 
@@ -148,18 +148,17 @@ class ContactResolver:
 
     def _attempt(self, task: Task, state: State, start: Start) -> None:
         """Take steps from the poses of `state` to an answer, and judge it."""
-        projected = start.projected or self._method.is_iterated
-        if projected:
+        if start.projected:
             caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull parts far if nothing holds them
             search(self._step, self._limits, self._candidates, self._energy_of, task, state, start.stride, caution)
         elif self._method.is_exact:
             repeat(self._step, self._limits, self._candidates, self._free_steps, task, state, start)
         else:
             self._step.take(task, state, stride=start.stride)
-        state.searched[:] = projected
+        state.searched[:] = start.projected
         self._leave_adrift(task, state)
         scans = self._candidates.scans(
-            state.relative, task.deviations, projected=projected, earlier=task.scans, start=start, answered=state.slots
+            state.relative, task.deviations, projected=start.projected, earlier=task.scans, start=start, answered=state.slots
         )
         task = replace(task, scans=scans)
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
@@ -176,7 +175,7 @@ class ContactResolver:
         state.doubtful[:] |= self._candidates.are_apart(state) & (state.rank == 0)
         state.doubtful[:] |= self._candidates.bulge(task.scans, state.relative) & (state.rank == 0)
         state.doubtful[:] |= self._limits.lie_in_form(task, state)
-        if not projected:
+        if not start.projected:
             self._doubt_rolled(task, state)
 
     def _leave_adrift(self, task: Task, state: State) -> None:
