@@ -102,8 +102,6 @@ def test_a_method_that_does_not_exist_is_refused():
     for wrong in (
         {"regularization": "ridge"},
         {"active_set": "some"},
-        {"eta": 0.0},
-        {"activity": -1.0},
         {"search": "often"},
         {"search": "bounded", "resolution": "linearized"},
     ):

@@ -15,8 +15,8 @@ from tolcontact import poses as pose
 from tolcontact.compilation import usable_plugins
 from tolcontact.compilation.active_set import ActiveSet
 from tolcontact.compilation.plugins import Plugin
+from tolcontact.contact import acceptance
 from tolcontact.discretization import discretize
-from tolcontact.errors import OptionError
 from tolcontact.geometry.faces import patch
 from tolcontact.geometry.overlap import overlap_corners
 from tolcontact.geometry.shapes import shape
@@ -40,7 +40,7 @@ def test_a_ring_closes_where_its_angles_leave_room(wedges, solver):
     assert 40 < (excess > 0).sum() < 120
     assert ((run["status"] == Status.NOT_ASSEMBLABLE) == (excess > 0)).all()
     assert ((run["status"] == Status.RESOLVED) == (excess <= 0)).all()
-    assert largest_turn(run)[run["status"] == Status.RESOLVED].max() < SEATED.near_turn
+    assert largest_turn(run)[run["status"] == Status.RESOLVED].max() < acceptance.MAX_TURN
     left = -run["gap_min"][excess > 0, CORRECTED].min(axis=1)
     # The rim of the faces is 40 mm from the axis, the excess is told at 30.
     assert (left <= excess[excess > 0] * 40 / 30 * 1.01 + 1e-4).all() and (left > 0).all()
@@ -98,22 +98,16 @@ def test_what_a_solver_misses_another_one_answers():
 
 
 @pytest.mark.slow
-def test_far_answers_are_not_certified():
-    """The limit is the method's: at half a degree hardly any answer of a tower is near."""
-    strict = replace(ALL_POINTS, near_turn=np.radians(0.5))
+def test_far_answers_are_not_certified(monkeypatch):
+    """With a limit of half a degree, hardly any answer of a tower is near."""
     _, free = simulate(cases.model("tower"), samples=50, solver="daqp", method=ALL_POINTS)
-    _, run = simulate(cases.model("tower"), samples=50, solver="daqp", method=strict)
-    far = largest_turn(free) > strict.near_turn
+    monkeypatch.setattr(acceptance, "MAX_TURN", np.radians(0.5))
+    _, run = simulate(cases.model("tower"), samples=50, solver="daqp", method=ALL_POINTS)
+    far = largest_turn(free) > acceptance.MAX_TURN
     assert far.sum() > 5
     assert (run["status"][far] == Status.DOUBTFUL).all() and (run["starts"][far] == 5).all()
     assert (run["status"][~far] == free["status"][~far]).all()
-    assert largest_turn(run)[run["status"] == Status.RESOLVED].max() <= strict.near_turn
-
-
-@pytest.mark.parametrize("option", [{"near_turn": 0.0}, {"near_turn": 4.0}, {"near_travel": 0.0}, {"near_travel": np.inf}])
-def test_limits_that_are_none_are_refused(option):
-    with pytest.raises(OptionError, match=next(iter(option))):
-        tc.Method(**option)
+    assert largest_turn(run)[run["status"] == Status.RESOLVED].max() <= acceptance.MAX_TURN
 
 
 def errors_of_the_v(program, run):

@@ -9,6 +9,7 @@ import tolcontact as tc
 from tests import cases, referee
 from tests.helpers import PAPER, R_t, nightly, placed, simulate
 from tolcontact.compilation import usable_plugins
+from tolcontact.mechanics import objective
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 
@@ -16,9 +17,10 @@ from tolcontact.vocabulary import CORRECTED, RAW, Status
 @pytest.mark.parametrize("case", [*nightly(cases.ra1), cases.stack], ids=["ra1", "stack"])
 @pytest.mark.parametrize("regularization", ["points", "identity"])
 @pytest.mark.parametrize("active_set", ["closed", "initial"])
-def test_poses_agree_with_a_plain_qp_of_all_rows_in_another_library(case, regularization, active_set):
+def test_poses_agree_with_a_plain_qp_of_all_rows_in_another_library(case, regularization, active_set, monkeypatch):
     eta = 1e-4  # Clarabel loses digits faster than active-set solvers do where only eta holds a freedom
-    method = replace(PAPER, regularization=regularization, active_set=active_set, eta=eta)
+    monkeypatch.setattr(objective, "ETA", eta)
+    method = replace(PAPER, regularization=regularization, active_set=active_set)
     program, run = simulate(case(), samples=40, solver="daqp", method=method)
     R, t = R_t(run["poses"])
     for k in range(40):

@@ -23,6 +23,7 @@ from tolcontact.geometry.parting import Parting, parting
 from tolcontact.interference.watch import ALLOWED_SHARE
 from tolcontact.mechanics import curved_pairs
 
+ACTIVE_GAP = 1e-9  # mm: points below it are active; gaps of faces that touch nominally are zero up to rounding
 MAX_CLUSTERS = 6
 FORM_CLUSTERS = 8  # of faces with form, which touch at more places
 APART = 2.0  # times the error of planes beyond their edges: bodies under load are no further apart
@@ -246,7 +247,7 @@ class Candidates:
     ) -> RawSurvey:
         """Return the survey of raw states, for deviations (realization, contributor)."""
         scans = self.scans(relative, deviations)
-        surveys = [scan.survey(relative[:, k], deviations, self._method.activity) for k, scan in enumerate(self._all_scans)]
+        surveys = [scan.survey(relative[:, k], deviations, ACTIVE_GAP) for k, scan in enumerate(self._all_scans)]
         return RawSurvey(
             scans=scans,
             min_gap=min_gaps(scans, relative, deviations),
@@ -274,9 +275,7 @@ class Candidates:
         if self._method.is_closed:
             return [None for _ in scans]
         return [
-            None
-            if pair.is_supports or pair.round or k in self.bounded
-            else scan.gaps(relative[:, k], deviations) < self._method.activity
+            None if pair.is_supports or pair.round or k in self.bounded else scan.gaps(relative[:, k], deviations) < ACTIVE_GAP
             for k, (pair, scan) in enumerate(zip(self._pairs, scans, strict=True))
         ]
 
