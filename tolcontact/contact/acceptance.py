@@ -28,13 +28,17 @@ DEPTH_SHARE = 0.01  # of the smallest tolerance range
 
 
 class AcceptanceLimits:
-    """The limits of a method for one group of parts; `size` [mm] is the size of the largest part."""
+    """The limits of a method for one group of parts.
 
-    def __init__(self, nominal: Nominal, group: Group, method: Method, size: float) -> None:
+    size       [mm] of the largest part
+    max_turn   rotation of a part [rad], from its raw pose, beyond which an answer is doubtful
+    """
+
+    def __init__(self, nominal: Nominal, group: Group, method: Method, size: float, max_turn: float = MAX_TURN) -> None:
         self._nominal, self._pairs = nominal, group.pairs
         self._presses = method.minimizes.presses
         self._size, self._max_travel = size, MAX_TRAVEL_SIZES * size
-        self._max_turn = 8 * np.sin(MAX_TURN / 2) ** 2  # |R - S|^2 of rotations that far apart
+        self._max_turn = 8 * np.sin(max_turn / 2) ** 2  # |R - S|^2 of rotations that far apart
         self._movers = [k for k, mobility in enumerate(group.mobilities) if mobility.movers]
         self._group_pairs = [nominal.pairs[index] for index in group.pairs]
         self._max_depth = min(DEPTH_SIZES * size, DEPTH_SHARE * nominal.assembly.smallest_zone())

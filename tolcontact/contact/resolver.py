@@ -13,7 +13,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ACCURACY, ContactGroup, Program
-from tolcontact.contact.acceptance import AcceptanceLimits
+from tolcontact.contact.acceptance import MAX_TURN, AcceptanceLimits
 from tolcontact.contact.candidates import FREE_DEPTH, Candidates
 from tolcontact.contact.free_steps import FreeSteps
 from tolcontact.contact.iterated_search import search
@@ -44,7 +44,9 @@ MIN_GAIN = 1e-6  # of the objective, or mm of penetration: the gain for which an
 class ContactResolver:
     """One group of coupled parts, ready to be resolved for blocks of realizations."""
 
-    def __init__(self, program: Program, group: ContactGroup, max_rounds: int = MAX_ROUNDS) -> None:
+    def __init__(
+        self, program: Program, group: ContactGroup, *, max_rounds: int = MAX_ROUNDS, max_turn: float = MAX_TURN
+    ) -> None:
         self.parts = np.array(group.group.parts)
         self.pairs = np.array(group.group.pairs)
         self._group = group.group
@@ -55,7 +57,7 @@ class ContactResolver:
         self.contact_points = [program.nominal.pairs[index] for index in group.group.pairs]
         self._springy = [k for k, pair in enumerate(self.contact_points) if pair.is_springy]
         size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
-        self._limits = AcceptanceLimits(program.nominal, group.group, self._method, size)
+        self._limits = AcceptanceLimits(program.nominal, group.group, self._method, size, max_turn)
         self._free_steps = FreeSteps(
             group.group, self.contact_points, self._candidates, self._limits, self._relate, self._energy_of
         )
