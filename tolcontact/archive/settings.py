@@ -40,9 +40,9 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
     """Return the global attributes that determine the rows; a resumed run must agree in all but `samples`."""
     method = program.method
     return {
-        "solver": program.plugin.name,
-        "solver_options": json.dumps(program.plugin.options),
-        "solver_second": ", ".join(program.plugin.fallbacks),
+        "solver": program.solver.name,
+        "solver_options": json.dumps(program.solver.options),
+        "solver_second": ", ".join(program.solver.fallbacks),
         "solver_accuracy": ACCURACY,
         "resolution": method.resolution,
         "objective": method.objective,
