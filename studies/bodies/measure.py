@@ -110,7 +110,7 @@ def resolved_by(program: Program, functions: str) -> Program:
     for group in program.groups:
         call = FUNCTIONS[functions]()
         qp = contact_qp(program.nominal, group.group, program.gaps, program.method, group.qp.standing, call)
-        groups.append(ContactGroup(group.group, qp, ContactSolver(qp)))
+        groups.append(ContactGroup(group.group, qp, ContactSolver(qp, program.solver)))
     return replace(program, groups=tuple(groups))
 
 
