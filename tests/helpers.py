@@ -44,16 +44,16 @@ def simulate(assembly, samples=200, seed=1, block=1000, **options):
     return program, joined(simulate_blocks(program, samples=samples, seed=seed, block=block))
 
 
-def recompiled(program, *, plugin=None, standing=None):
-    """A program with another plugin, or with other points of each of its pairs that always have a row."""
-    plugin, groups = plugin or program.plugin, [group.group for group in program.groups]
+def recompiled(program, *, solver=None, standing=None):
+    """A program with another solver, or with other points of each of its pairs that always have a row."""
+    solver, groups = solver or program.solver, [group.group for group in program.groups]
     rows = [() if standing is None else [standing[pair] for pair in group.pairs] for group in groups]
     qps = [
-        contact_qp(program.nominal, group, program.gaps, program.method, plugin, points)
+        contact_qp(program.nominal, group, program.gaps, program.method, points)
         for group, points in zip(groups, rows, strict=True)
     ]
-    solved = tuple(ContactGroup(group, qp, ContactSolver(qp)) for group, qp in zip(groups, qps, strict=True))
-    return replace(program, plugin=plugin, groups=solved)
+    solved = tuple(ContactGroup(group, qp, ContactSolver(qp, solver)) for group, qp in zip(groups, qps, strict=True))
+    return replace(program, solver=solver, groups=solved)
 
 
 def joined(blocks):

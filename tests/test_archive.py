@@ -39,7 +39,7 @@ def test_it_recomputes_its_own_measures(archive):
 def test_it_follows_the_cf_conventions(archive):
     root = xr.load_dataset(archive)
     assert root.attrs["Conventions"].startswith("CF-1.")
-    assert {"title", "history", "source", "references", "solver", "seed", "eta", "regularization"} <= set(root.attrs)
+    assert {"title", "history", "source", "references", "solver", "seed", "active_set", "regularization"} <= set(root.attrs)
     assert root.realization.attrs["standard_name"] == "realization"
     assert (root.status.cf == "resolved").sum() > 100
     with netCDF4.Dataset(archive) as file:

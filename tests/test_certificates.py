@@ -12,15 +12,16 @@ from studies.certificates.scenes import scene
 from tests import cases
 from tests.helpers import ALL_POINTS, EXACT, PAPER, SEATED, SEATED_ON_POINTS, joined, nightly, recompiled, simulate
 from tolcontact import poses as pose
-from tolcontact.compilation import usable_plugins
+from tolcontact.compilation import usable_solvers
 from tolcontact.compilation.active_set import ActiveSet
-from tolcontact.compilation.plugins import Plugin
+from tolcontact.compilation.conic_plugin import Plugin
+from tolcontact.contact.acceptance import MAX_TURN
+from tolcontact.contact.resolver import ContactResolver
 from tolcontact.discretization import discretize
-from tolcontact.errors import OptionError
 from tolcontact.geometry.faces import patch
 from tolcontact.geometry.overlap import overlap_corners
 from tolcontact.geometry.shapes import shape
-from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation import simulate_block, simulate_blocks
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 SOLVERS = ("daqp", "qpoases")
@@ -40,7 +41,7 @@ def test_a_ring_closes_where_its_angles_leave_room(wedges, solver):
     assert 40 < (excess > 0).sum() < 120
     assert ((run["status"] == Status.NOT_ASSEMBLABLE) == (excess > 0)).all()
     assert ((run["status"] == Status.RESOLVED) == (excess <= 0)).all()
-    assert largest_turn(run)[run["status"] == Status.RESOLVED].max() < SEATED.near_turn
+    assert largest_turn(run)[run["status"] == Status.RESOLVED].max() < MAX_TURN
     left = -run["gap_min"][excess > 0, CORRECTED].min(axis=1)
     # The rim of the faces is 40 mm from the axis, the excess is told at 30.
     assert (left <= excess[excess > 0] * 40 / 30 * 1.01 + 1e-4).all() and (left > 0).all()
@@ -73,7 +74,7 @@ def test_a_status_does_not_hang_on_the_last_digit(seed, solver):
 
 @pytest.mark.parametrize("solver", ["osqp", "highs", "proxqp", "piqp"])
 def test_every_solver_certifies_what_the_others_do(solver):
-    if solver not in usable_plugins():
+    if solver not in usable_solvers():
         pytest.skip(f"{solver} does not come with this CasADi")
     _, reference = simulate(cases.stack(), samples=300, solver="daqp", method=PAPER)
     _, run = simulate(cases.stack(), samples=300, solver=solver, method=PAPER)
@@ -86,11 +87,11 @@ def test_what_a_solver_misses_another_one_answers():
     """A solver that stops after one iteration: the poses are those of a good one, and the archive says who answered."""
     program, good = simulate(cases.stack(), samples=100, solver="qpoases", method=PAPER)
     lazy = Plugin("daqp", {"daqp": {"iter_limit": 1}}, fallbacks=("qpoases",))
-    run = joined(simulate_blocks(recompiled(program, plugin=lazy), samples=100, seed=1))
+    run = joined(simulate_blocks(recompiled(program, solver=lazy), samples=100, seed=1))
     assert run["second_answers"].sum() > 30 and good["second_answers"].sum() == 0
     assert np.abs(run["poses"] - good["poses"]).max() < 1e-8
     assert (run["status"] == good["status"]).all()
-    unaided = recompiled(program, plugin=replace(lazy, fallbacks=()))
+    unaided = recompiled(program, solver=replace(lazy, fallbacks=()))
     alone = joined(simulate_blocks(unaided, samples=100, seed=1))
     lost = alone["status"] == Status.NOT_CONVERGED
     assert lost.sum() > 30
@@ -99,21 +100,16 @@ def test_what_a_solver_misses_another_one_answers():
 
 @pytest.mark.slow
 def test_far_answers_are_not_certified():
-    """The limit is the method's: at half a degree hardly any answer of a tower is near."""
-    strict = replace(ALL_POINTS, near_turn=np.radians(0.5))
-    _, free = simulate(cases.model("tower"), samples=50, solver="daqp", method=ALL_POINTS)
-    _, run = simulate(cases.model("tower"), samples=50, solver="daqp", method=strict)
-    far = largest_turn(free) > strict.near_turn
+    """With a limit of half a degree, hardly any answer of a tower is near."""
+    max_turn = np.radians(0.5)
+    program, free = simulate(cases.model("tower"), samples=50, solver="daqp", method=ALL_POINTS)
+    resolvers = [ContactResolver(program, group, max_turn=max_turn) for group in program.groups]
+    run = vars(simulate_block(program, free["deviations"], resolvers=resolvers))
+    far = largest_turn(free) > max_turn
     assert far.sum() > 5
     assert (run["status"][far] == Status.DOUBTFUL).all() and (run["starts"][far] == 5).all()
     assert (run["status"][~far] == free["status"][~far]).all()
-    assert largest_turn(run)[run["status"] == Status.RESOLVED].max() <= strict.near_turn
-
-
-@pytest.mark.parametrize("option", [{"near_turn": 0.0}, {"near_turn": 4.0}, {"near_travel": 0.0}, {"near_travel": np.inf}])
-def test_limits_that_are_none_are_refused(option):
-    with pytest.raises(OptionError, match=next(iter(option))):
-        tc.Method(**option)
+    assert largest_turn(run)[run["status"] == Status.RESOLVED].max() <= max_turn
 
 
 def errors_of_the_v(program, run):

@@ -83,11 +83,11 @@ def test_where_nothing_can_be_compared_the_json_says_null(tmp_path):
 
 
 def test_labels_name_whatever_methods_differ_in():
-    methods = [tc.Method(), tc.Method(eta=1e-3), tc.Method(regularization="identity")]
+    methods = [tc.Method(), tc.Method(objective="active points"), tc.Method(regularization="identity")]
     found = tc.compare(cases.ra1(), ["daqp"], samples=20, methods=methods)
     assert list(found["solver"].values) == [
-        "daqp regularization points eta 1e-06",
-        "daqp regularization points eta 0.001",
-        "daqp regularization identity eta 1e-06",
+        "daqp all points regularization points",
+        "daqp active points regularization points",
+        "daqp all points regularization identity",
     ]
     assert (found["measure_difference"].sel(extent="largest").values[1:] > 0).all()

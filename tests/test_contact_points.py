@@ -74,7 +74,7 @@ def test_points_on_curved_faces_lie_on_them_and_look_outward(solid):
 
 @pytest.mark.slow
 def test_halving_the_spacing_moves_measures_on_curved_faces_by_less_than_their_interval():
-    method = replace(ALL_POINTS, search="iterated")
+    method = replace(ALL_POINTS, search="fixed")
     runs = [simulate(cases.bar_in_a_half_pipe(spacing), samples=300, solver="daqp", method=method) for spacing in (6, 3)]
     few, many = (len(program.nominal.pairs[0].P_m) for program, _ in runs)
     assert many > 3 * few

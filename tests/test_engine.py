@@ -21,8 +21,8 @@ from tolcontact.compilation.functions.named import MIN_COMPILED_CALLS
 from tolcontact.compilation.functions.native import NativeFunction
 from tolcontact.compilation.functions.operations import OPERATIONS
 from tolcontact.compilation.functions.translation import UnknownInstructionError
-from tolcontact.compilation.plugins import plugin
 from tolcontact.compilation.quadratic_terms import is_convex
+from tolcontact.compilation.solvers import solver_choice
 from tolcontact.contact import kernel
 from tolcontact.contact.scan import PairScan, cluster_labels, pair_scan
 from tolcontact.discretization import Offsets, discretize
@@ -54,7 +54,7 @@ def test_compiled_functions_equal_interpreted_ones_to_the_last_bit(name, method)
     nominal = discretize(PLANAR[name]())
     for group in contact_groups(nominal, weighs_areas=method.is_exact):
         gaps = [gap_map(gap_matrix(pair), pair.offsets) for pair in nominal.pairs]
-        qp = contact_qp.contact_qp(nominal, group, gaps, method, plugin("daqp"))
+        qp = contact_qp.contact_qp(nominal, group, gaps, method)
         for function in (qp.assemble, qp.finish):
             inputs = [RNG.normal(size=(7, function.nnz_in(k))) for k in range(function.n_in())]
             for found, expected in zip(NativeFunction(function)(inputs), InterpretedFunction(function)(inputs)[0], strict=True):
@@ -252,7 +252,7 @@ def test_a_block_of_many_bodies_has_fewer_rows(solver, bodies, rows):
     """Its rows times the cube of its bodies, or the bodies with a solver that follows their graph, are those of 24 at most."""
     group, growth = SimpleNamespace(group=SimpleNamespace(free=range(bodies))), 1 if solver == "graph" else 3
     groups = [group] if bodies else []
-    program = SimpleNamespace(groups=groups, plugin=plugin(solver), method=SimpleNamespace(is_exact=False))
+    program = SimpleNamespace(groups=groups, solver=solver_choice(solver), method=SimpleNamespace(is_exact=False))
     block = inspect.unwrap(block_rows)(program)
     assert block == rows
     assert block * bodies**growth <= 4096 * 24**growth or block == MIN_ROWS

@@ -9,7 +9,7 @@ from tolcontact.testing import assert_gaps_recompute, assert_resolved
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("search", [*nightly("fixed"), "iterated"])
+@pytest.mark.parametrize("search", [*nightly("fixed"), "bounded"])
 @pytest.mark.parametrize("objective", sorted(OBJECTIVES))
 def test_faces_of_features_are_resolved_by_every_objective(objective, search, tmp_path):
     """A block on a table, both faces of which deviate; its supports may be left: two of them, or all if it is pressed."""

@@ -256,11 +256,6 @@ def test_contact_points_too_far_apart_for_a_form_are_refused():
     assert "correlation length of 33.3 mm; expected at most half of that" in refused(sparse)
 
 
-def test_feet_that_are_projected_again_have_no_form():
-    with pytest.raises(ModelError, match=r'contact pair "seat": the search is "iterated".*top has form'):
-        tc.build(sliding(), method=tc.Method(search="iterated"))
-
-
 def test_the_modes_of_a_form_contribute_as_one():
     program = tc.build(seat())
     assert list(dict.fromkeys(owners(program, "contributor"))) == [

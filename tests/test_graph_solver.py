@@ -10,7 +10,7 @@ import pytest
 import tolcontact as tc
 from tests.helpers import nightly
 from tolcontact.compilation.graph import GraphSolver
-from tolcontact.compilation.plugins import PLUGINS, solver
+from tolcontact.compilation.solvers import SOLVERS
 from tolcontact.simulation import simulate_blocks
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
@@ -93,7 +93,7 @@ class Problem:
         return max(np.abs(values).max(initial=0) for values in conditions)
 
     def by_plugin(self, name):
-        function = solver(PLUGINS[name], ca.Sparsity.dense(*self.H.shape), ca.Sparsity.dense(*self.A.shape))
+        function = SOLVERS[name].function(ca.Sparsity.dense(*self.H.shape), ca.Sparsity.dense(*self.A.shape))
         lower = np.append(np.full(self.size, -np.inf), np.zeros(self.slacks))
         upper = np.append(np.full(len(self.low) - self.equations, np.inf), self.low[len(self.low) - self.equations :])
         done = function(h=self.H, g=self.g, a=self.A, lba=self.low, uba=upper, lbx=lower, ubx=np.inf)

@@ -96,14 +96,14 @@ class RecordedQP(ContactQP):
 def qp_of(program, group, standing, *, is_summed):
     """The QP of a group of a program: summed over its pairs, or whole."""
     call = FunctionCalls() if is_summed else inline
-    return contact_qp(program.nominal, group, program.gaps, program.method, program.plugin, standing, call)
+    return contact_qp(program.nominal, group, program.gaps, program.method, standing, call)
 
 
 def recorded(program, samples):
     """The whole function of a program with one group, after a run."""
     group = program.groups[0].group
     recorded_qp = RecordedQP(**vars(qp_of(program, group, program.groups[0].qp.standing, is_summed=False)))
-    groups = (ContactGroup(group, recorded_qp, ContactSolver(recorded_qp)),)
+    groups = (ContactGroup(group, recorded_qp, ContactSolver(recorded_qp, program.solver)),)
     list(simulate_blocks(replace(program, groups=groups), samples=samples, seed=1, threads=1))
     return recorded_qp
 
@@ -115,7 +115,7 @@ def both_ways(model, samples, method):
         groups = []
         for group in program.groups:
             qp = qp_of(program, group.group, group.qp.standing, is_summed=is_summed)
-            groups.append(ContactGroup(group.group, qp, ContactSolver(qp)))
+            groups.append(ContactGroup(group.group, qp, ContactSolver(qp, program.solver)))
         runs.append(joined(simulate_blocks(replace(program, groups=tuple(groups)), samples=samples, seed=1)))
     return runs
 

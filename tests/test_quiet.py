@@ -13,13 +13,13 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import SEATED, nightly, run, script
 from tolcontact.analyses.farthest_pose import muted_c_stdout
-from tolcontact.compilation import usable_plugins
+from tolcontact.compilation import usable_solvers
 from tolcontact.mechanics.quiet import quiet
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "solver", ["daqp", "qpoases", *nightly(*(name for name in usable_plugins() if name not in ("daqp", "qpoases")))]
+    "solver", ["daqp", "qpoases", *nightly(*(name for name in usable_solvers() if name not in ("daqp", "qpoases")))]
 )
 @pytest.mark.parametrize("case", ["block on six", *nightly("parked")])
 def test_solvers_print_nothing(solver, case, capfd):

@@ -103,7 +103,7 @@ def test_forces_follow_from_the_archive_alone(tmp_path):
     assert [locator.stiffness for locator in rebuilt.locations[0].scheme] == [1000.0] * 4 + [None] * 3
 
 
-@pytest.mark.parametrize("choices", [{"objective": "all points"}, {"resolution": "linearized"}, {"search": "iterated"}])
+@pytest.mark.parametrize("choices", [{"objective": "all points"}, {"resolution": "linearized"}])
 def test_a_method_without_springs_is_refused(choices):
     with pytest.raises(tc.ModelError, match=r"supports of top: a support has a stiffness.*seating.*exact.*stiffness out"):
         tc.build(springy_table(1000.0), method=SEATED.with_choices(**choices))

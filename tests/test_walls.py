@@ -198,9 +198,9 @@ def test_tests_reach_no_private_name_and_change_no_module():
         "class A(B):\n    def f(self): self._write(0)",
         "from tolcontact.archive import writer\nwriter.Journal = None",
         "from tolcontact.archive import ArchiveWriter\nArchiveWriter.checkpoint_interval = 0.0",
-        "from tolcontact.compilation.plugins import PLUGINS\nPLUGINS['daqp'] = 1",
+        "from tolcontact.compilation.solvers import SOLVERS\nSOLVERS['daqp'] = 1",
         "from models import hinge\npatched.setattr(hinge, 'PLACE', 0)",
-        "from tolcontact.compilation.plugins import PLUGINS\nmonkeypatch.setitem(PLUGINS, 'daqp', 1)",
+        "from tolcontact.compilation.solvers import SOLVERS\nmonkeypatch.setitem(SOLVERS, 'daqp', 1)",
         "monkeypatch.setattr('tolcontact.statistics.rare_events.REPLICATES', 3)",
     ],
 )

@@ -67,8 +67,8 @@ def test_the_settings_of_a_run_are_its_attributes(archive):
     said = xr.load_dataset(archive).attrs
     expected = {
         "solver": "daqp", "resolution": "linearized", "objective": "active points", "weighting": "active points",
-        "regularization": "points", "eta": 1e-6, "active_set": "closed", "activity": 1e-9, "search": "fixed", "near_turn": 1.0,
-        "near_travel": 0.5, "method_from": "options", "seed": 3, "samples": 300, "kept": "all", "solver_accuracy": 1e-8,
+        "regularization": "points", "active_set": "closed", "search": "fixed",
+        "method_from": "options", "seed": 3, "samples": 300, "kept": "all", "solver_accuracy": 1e-8,
         "title": "variation simulation of stack",
     }  # fmt: skip
     assert {word: said[word] for word in expected} == expected

@@ -1,7 +1,6 @@
 """The named choices of how contact is resolved. They decide the answer, so every archive carries them."""
 
 from dataclasses import dataclass, replace
-from math import pi
 from typing import Any
 
 from tolcontact.errors import OptionError
@@ -9,7 +8,7 @@ from tolcontact.errors import OptionError
 RESOLUTIONS = ("linearized", "exact")
 REGULARIZATIONS = ("points", "identity")
 ACTIVE_SETS = ("closed", "initial")
-SEARCHES = ("fixed", "iterated", "bounded")
+SEARCHES = ("fixed", "bounded")
 # By resolution. That of one linear step is the paper's.
 USUAL_SEARCH = {"linearized": "fixed", "exact": "bounded"}
 USUAL_OBJECTIVE = {"linearized": "active points", "exact": "all points"}
@@ -58,19 +57,12 @@ class Method:
                         "linearized": a single active point holds hardly any turn of its part
         regularization  what holds the degrees of freedom that the objective leaves open. "points": eta times the squared
                         displacements of all contact points, the same in every frame; "identity": the paper's eta I, which
-                        mixes mm and rad and so depends on the origin
-        eta             weight of the regularization, dimensionless (with "identity": mm^2 per rad^2, 1 per mm^2)
-        active_set      "initial": only points below `activity` in the raw state are constrained (the paper's set);
+                        mixes mm and rad and so depends on the origin. For eta see tolcontact.mechanics.objective
+        active_set      "initial": only points that are active in the raw state are constrained (the paper's set);
                         "closed": points that the correction itself drives into contact are constrained too
-        activity        a contact point is active below this gap [mm]
         search          "bounded": faces end where they end, and touch at corners, edges and facets of both bodies, found at
-                        every pose; "fixed": contact points are projected once, in the nominal state, on planes without end;
-                        "iterated": they are projected again at the corrected pose until they no longer move (paper, 2.2).
+                        every pose; "fixed": contact points are projected once, in the nominal state, on planes without end.
                         If it is not given, "bounded" with "exact", and "fixed" with "linearized", which has no other
-        near_turn       [rad] an answer that turns a part by more, from its raw pose, is doubted: tried again from other
-                        starts, and never certified
-        near_travel     in sizes of the largest part that contact couples: an answer that moves contact points farther, from
-                        their raw places, is doubted, too, and certified only if the faces are free of penetration
 
     Every archive states all of these choices.
     """
@@ -78,12 +70,8 @@ class Method:
     resolution: str = "exact"
     objective: str = ""
     regularization: str = "points"
-    eta: float = 1e-6
     active_set: str = "closed"
-    activity: float = 1e-9
     search: str = ""
-    near_turn: float = 1.0
-    near_travel: float = 0.5
 
     def __post_init__(self) -> None:
         for choice, usual in (("search", USUAL_SEARCH), ("objective", USUAL_OBJECTIVE)):
@@ -99,14 +87,6 @@ class Method:
         for choice, names in choices.items():
             if getattr(self, choice) not in names:
                 raise OptionError(f"{choice} is {getattr(self, choice)!r}; expected one of: {', '.join(names)}")
-        if not 0 < self.eta < 1:
-            raise OptionError(f"eta is {self.eta!r}; expected a small number between 0 and 1")
-        if not 0 <= self.activity < float("inf"):
-            raise OptionError(f"activity is {self.activity!r}; expected a gap in mm, 0 or above")
-        if not 0 < self.near_turn <= pi:
-            raise OptionError(f"near_turn is {self.near_turn!r}; expected an angle in rad, above 0 and at most pi")
-        if not 0 < self.near_travel < float("inf"):
-            raise OptionError(f"near_travel is {self.near_travel!r}; expected a number of part sizes above 0")
         if self.search != "fixed" and self.resolution != "exact":
             raise OptionError(f'search is "{self.search}" with a linearized resolution; it needs resolution "exact"')
 
@@ -134,24 +114,14 @@ class Method:
         return self.resolution == "exact"
 
     @property
-    def is_iterated(self) -> bool:
-        """Whether contact points are projected again before every step."""
-        return self.search == "iterated"
-
-    @property
     def is_bounded(self) -> bool:
         """Whether faces end, and touch at corners, edges and facets of both bodies."""
         return self.search == "bounded"
 
     @property
     def is_closed(self) -> bool:
-        """Whether points may carry that are not active in the raw state."""
-        return self.active_set == "closed"
+        """Whether all points may be active, also points that are not active in the raw state.
 
-    @property
-    def corners_suffice(self) -> bool:
-        """Whether, of points in one plane, the corners of their convex hull suffice.
-
-        They do if every point may carry, and if points do not move.
+        Of points in one plane, the corners of their convex hull then suffice.
         """
-        return self.is_closed and not self.is_iterated
+        return self.active_set == "closed"

@@ -109,8 +109,8 @@ def resolved_by(program: Program, functions: str) -> Program:
     groups = []
     for group in program.groups:
         call = FUNCTIONS[functions]()
-        qp = contact_qp(program.nominal, group.group, program.gaps, program.method, program.plugin, group.qp.standing, call)
-        groups.append(ContactGroup(group.group, qp, ContactSolver(qp)))
+        qp = contact_qp(program.nominal, group.group, program.gaps, program.method, group.qp.standing, call)
+        groups.append(ContactGroup(group.group, qp, ContactSolver(qp, program.solver)))
     return replace(program, groups=tuple(groups))
 
 

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from studies.certificates.scenes import scene
 from tolcontact.compilation import Program
+from tolcontact.contact.acceptance import MAX_TURN
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
 from tolcontact.simulation import Block, simulate_blocks
 from tolcontact.testing.referee import ArchivedPoint
@@ -45,7 +46,7 @@ def contradictions(program: tc.Program, run: dict[str, np.ndarray]) -> collectio
     if method.resolution == "exact":
         found["no rotation"] += int((np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max(axis=(1, 2, 3, 4))[certified] > 1e-9).sum())
     cosine = (np.einsum("nspij,nspij->nsp", R[:, [CORRECTED]], R[:, [RAW]])[:, 0] - 1) / 2
-    found["turned"] += int((np.arccos(np.clip(cosine, -1, 1)).max(axis=1)[certified] > method.near_turn + 1e-3).sum())
+    found["turned"] += int((np.arccos(np.clip(cosine, -1, 1)).max(axis=1)[certified] > MAX_TURN + 1e-3).sum())
     # Gaps at the contact points, paper (2) to (5).
     for k, pair in enumerate(nominal.pairs):
         (R_m, t_m, h_m), (R_r, t_r, h_r) = faces(pair, R[:, CORRECTED], t[:, CORRECTED], run["deviations"])

@@ -27,8 +27,9 @@ import qpsolvers
 from scipy.optimize import nnls
 
 import tolcontact as tc
-from tolcontact.compilation import contact_qp, contact_solver, plugins
+from tolcontact.compilation import conic_plugin, contact_qp
 from tolcontact.compilation.graph import GraphSolver
+from tolcontact.compilation.solvers import SOLVERS, usable_solvers
 from tolcontact.mechanics.quiet import quiet
 from tolcontact.simulation import simulate_block
 from tolcontact.variation.draws import draw
@@ -78,20 +79,21 @@ def problems(assembly: tc.Assembly, realizations: int) -> list[Problem]:
     kept = contact_qp.standing_points  # type: ignore[attr-defined, method-assign]
     contact_qp.standing_points = lambda pair, *_: np.arange(len(pair.P_m))  # type: ignore[attr-defined, method-assign]
     found: list[Problem] = []
-    solve = contact_solver.InterpretedFunction.__call__  # type: ignore[attr-defined, method-assign]
+    solve = conic_plugin.ConicSolver.__call__
 
-    def record(self, inputs):
-        if self._solvers and not found:
-            found.extend(dict(zip("hgabc", (array[k].copy() for array in inputs), strict=True)) for k in range(len(inputs[0])))
-        return solve(self, inputs)
+    def record(self, problem, reactions, slacks):
+        if not found:
+            arrays = dict(zip("hgabc", (problem[name] for name in conic_plugin.QP), strict=True))
+            found.extend({name: values[k].copy() for name, values in arrays.items()} for k in range(len(reactions)))
+        return solve(self, problem, reactions, slacks)
 
-    contact_solver.InterpretedFunction.__call__ = record  # type: ignore[attr-defined, method-assign]
+    conic_plugin.ConicSolver.__call__ = record  # type: ignore[method-assign]
     try:
         program = tc.build(assembly, solver="daqp", method=tc.Method(resolution="linearized"))
         simulate_block(program, draw(program.nominal, seed=1, start=0, stop=realizations))
     finally:
         contact_qp.standing_points = kept  # type: ignore[attr-defined, method-assign]
-        contact_solver.InterpretedFunction.__call__ = solve  # type: ignore[attr-defined, method-assign]
+        conic_plugin.ConicSolver.__call__ = solve  # type: ignore[method-assign]
     functions = program.groups[0].qp
     h, a = functions.sparsity("h"), functions.sparsity("a")
     for one in found:
@@ -101,7 +103,7 @@ def problems(assembly: tc.Assembly, realizations: int) -> list[Problem]:
 
 
 def with_casadi(name: str, one: Problem) -> Solve:
-    options = plugins.PLUGINS[name].options if name in plugins.PLUGINS else REFUSED[name]
+    options = SOLVERS[name].options if name in SOLVERS else REFUSED[name]
     dense = {"h": ca.Sparsity.dense(*one["H"].shape), "a": ca.Sparsity.dense(*one["A"].shape)}
     with quiet():
         S = ca.conic("S", name, dense, {**options, "error_on_fail": False})
@@ -205,7 +207,7 @@ def main() -> None:
     options.add_argument("--figure", type=Path, default=HERE / "accuracy.png")
     chosen = options.parse_args()
     solvers: dict[str, tuple[Callable[[str, Problem], Solve], str]]
-    solvers = {f"CasADi {name}": (with_casadi, name) for name in (*plugins.usable_plugins(), *REFUSED)}
+    solvers = {f"CasADi {name}": (with_casadi, name) for name in (*usable_solvers(), *REFUSED)}
     solvers["graph"] = (on_graph, solvers.pop("CasADi graph")[1])
     solvers |= {f"{name} outside": (outside, name) for name in OUTSIDE}
     print("| problem | solver | ms | median error [mm] | largest | wrong, unsaid | given up | order matters [mm] |")

@@ -9,10 +9,10 @@ from tests.cases.frames import Frame
 from tests.cases.locators import parked
 
 
-def rollers(tangential: float = 6.0) -> tc.Assembly:
+def rollers(tangential: float = 6.0, sections: int = 720) -> tc.Assembly:
     """A roller that is set down beside the top (+y) of another one; their axes (z) stay parallel."""
     a = tc.Assembly("rollers")
-    shape = tc.Mesh(trimesh.creation.cylinder(radius=10, height=10, sections=720))
+    shape = tc.Mesh(trimesh.creation.cylinder(radius=10, height=10, sections=sections))
     lower = a.part("lower", shape, fixed=True)
     upper = a.part("upper", shape, at=(0, 20, 0))
     places = {

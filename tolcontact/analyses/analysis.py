@@ -173,7 +173,7 @@ class Analysis(Question):
         """The attributes of the dataset that state how its numbers were computed."""
         return {
             "seed": self.seed,
-            "solver": self.program.plugin.name,
+            "solver": self.program.solver.name,
             "resolution": self.program.method.resolution,
             "objective": self.program.method.objective,
         }

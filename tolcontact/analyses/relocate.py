@@ -147,7 +147,7 @@ class TrialPositions:
         """
         analysis, scheme = self._analysis, list(self._scheme)
         scheme[self._number] = replace(scheme[self._number], point=(point[0], point[1], point[2]))
-        solver, method = analysis.program.plugin.name, analysis.program.method
+        solver, method = analysis.program.solver.name, analysis.program.method
         nominal = discretize(self._with_locators(tuple(scheme)), presses=method.minimizes.presses)
         program = compile_program(nominal, solver, method)
         engine = Engine(program, analysis.blocks)

@@ -79,7 +79,7 @@ def _pressed(question: Question, touching: Touching) -> list[Balance]:
 
 def seated_contacts(program: Program) -> Touching | None:
     """Return the contacts at the pose of exact seating; None if there is no such pose."""
-    seated = compile_program(program.nominal, program.plugin.name, Method(resolution="exact", objective="seating"))
+    seated = compile_program(program.nominal, program.solver.name, Method(resolution="exact", objective="seating"))
     deviations = np.zeros((1, len(program.nominal.contributors)))
     (block,) = simulate_blocks(seated, samples=1, seed=0, draws=GivenDraws(deviations), block=1)
     if block.status[0] not in terms.CERTIFIED:

@@ -59,8 +59,7 @@ def model_of(results: xr.DataTree) -> Assembly:
 
 def method_of_run(results: xr.DataTree) -> Method:
     """Return the method of a run."""
-    choices: dict[str, Any] = {field.name: results.attrs[field.name] for field in fields(Method)}
-    return Method(**{name: value if isinstance(value, str) else float(value) for name, value in choices.items()})  # type: ignore[arg-type]
+    return Method(**{field.name: str(results.attrs[field.name]) for field in fields(Method)})
 
 
 class _Triangles:

@@ -40,20 +40,16 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
     """Return the global attributes that determine the rows; a resumed run must agree in all but `samples`."""
     method = program.method
     return {
-        "solver": program.plugin.name,
-        "solver_options": json.dumps(program.plugin.options),
-        "solver_second": ", ".join(program.plugin.fallbacks),
+        "solver": program.solver.name,
+        "solver_options": json.dumps(program.solver.options),
+        "solver_second": ", ".join(program.solver.fallbacks),
         "solver_accuracy": ACCURACY,
         "resolution": method.resolution,
         "objective": method.objective,
         "weighting": _weighting(program),
         "regularization": method.regularization,
-        "eta": method.eta,
         "active_set": method.active_set,
-        "activity": method.activity,
         "search": method.search,
-        "near_turn": method.near_turn,
-        "near_travel": method.near_travel,
         "method_from": _method_origin(program),
         "sampler": run.plan,
         "seed": np.int64(run.seed),

@@ -5,7 +5,8 @@
 
 from tolcontact.compilation.contact_rows import SLOTS
 from tolcontact.compilation.functions import NamedFunction
-from tolcontact.compilation.plugins import ACCURACY, usable_plugins
 from tolcontact.compilation.program import ContactGroup, Program, compile_program
+from tolcontact.compilation.solver import ACCURACY
+from tolcontact.compilation.solvers import usable_solvers
 
-__all__ = ["ACCURACY", "SLOTS", "ContactGroup", "NamedFunction", "Program", "compile_program", "usable_plugins"]
+__all__ = ["ACCURACY", "SLOTS", "ContactGroup", "NamedFunction", "Program", "compile_program", "usable_solvers"]

@@ -22,7 +22,6 @@ from tolcontact.compilation.contact_rows import contact_rows, row_points, spring
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.outcome import outcome
 from tolcontact.compilation.pair_terms import is_summed, summed_terms
-from tolcontact.compilation.plugins import Plugin
 from tolcontact.compilation.quadratic_terms import quadratic_terms
 from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import FREEDOMS, linear, published, rigid
@@ -52,7 +51,7 @@ class Evaluators(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ContactQP:
-    """The Functions of a group: `assemble` makes the QP of the inputs, `plugin` solves it, `finish` makes the outputs.
+    """The Functions of a group: `assemble` makes the QP of the inputs, a solver solves it, `finish` makes the outputs.
 
     energy       poses, raw, moments, deviations -> the objective at `poses` (realization, 1) [mm^2], or [mm] for seating
     relate       poses, deviations -> X_RM of the pairs at `poses`
@@ -63,7 +62,6 @@ class ContactQP:
     """
 
     assemble: ca.Function
-    plugin: Plugin
     finish: ca.Function
     energy: ca.Function
     relate: ca.Function
@@ -109,7 +107,6 @@ def contact_qp(
     group: Group,
     gaps: Sequence[GapMap | None],
     method: Method,
-    plugin: Plugin,
     standing: Standing = (),
     call: Call | None = None,
 ) -> ContactQP:
@@ -137,7 +134,7 @@ def contact_qp(
     current, moved, reactions = motion.poses, motion.by(linear), inputs["reactions"]
     points = row_points(system, standing, inputs)
     call = call or (FunctionCalls() if is_summed(group, method) else inline)
-    projects = method.is_iterated or bool(curved_pairs(nominal, group))
+    projects = bool(curved_pairs(nominal, group))
     if isinstance(call, FunctionCalls):
         rows, terms = summed_terms(system, points, current, reactions, call, projects=projects)
     else:
@@ -154,7 +151,6 @@ def contact_qp(
     relative = ca.vertcat(*(X.vector() for X in system.relative(current)))
     return ContactQP(
         assemble=_function("assemble", inputs, problem),
-        plugin=plugin,
         finish=_function("finish", inputs | solution, results),
         energy=_function("energy", {name: inputs[name] for name in ENERGY_INPUTS}, {"energy": pure_energy}),
         relate=_function("relate", {name: inputs[name] for name in ("poses", "deviations")}, {"relative": relative}),

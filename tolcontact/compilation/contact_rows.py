@@ -80,7 +80,7 @@ def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) ->
     """
     if gaps is None or pair.is_springy:
         return np.arange(len(pair.P_m))
-    are_few = method.corners_suffice and len(gaps.corners) <= SLOTS and pair.minima is None
+    are_few = method.is_closed and len(gaps.corners) <= SLOTS and pair.minima is None
     return gaps.corners if are_few else SLOTS
 
 

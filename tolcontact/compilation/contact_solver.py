@@ -7,75 +7,71 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.compilation.active_set import ActiveSet, band_order
 from tolcontact.compilation.contact_qp import ContactQP
-from tolcontact.compilation.functions import InterpretedFunction, flat
-from tolcontact.compilation.graph import GraphSolver, Layouts
-from tolcontact.compilation.outcome import SOLUTION
-from tolcontact.compilation.plugins import ACCURACY, PLUGINS, Plugin, solver
-from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
+from tolcontact.compilation.functions import flat
+from tolcontact.compilation.solver import ACCURACY, Solver, SolverChoice
+from tolcontact.compilation.solvers import SOLVERS
 
-QP = ("h", "g", "a", "lba", "uba")  # outputs of `assemble` that a solver needs
 MAX_DENSE_ENTRIES = 4_000_000  # of the linear systems that are solved together
 POLISHED_RESIDUAL = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is rough
 SMALL_STEP, SMALL_STEP_RESIDUAL = 1e-3, 1e-2 * ACCURACY  # mm: limits for small steps, where noise matters
-CONFLICT_SHARE = 1e-3  # of the slack that remains if rows contradict each other: a smaller residual needs no other plugin
+CONFLICT_SHARE = 1e-3  # of the slack that remains if rows contradict each other: a smaller residual needs no other solver
 
 Arrays = dict[str, Float[Array, "_ _"]]  # by name, (realization, entry)
 
 
 class ContactSolver:
-    """A solver of the QPs of a ContactQP. Threads must not share it."""
+    """The chosen solver of the QPs of a ContactQP, with its fallbacks. Threads must not share it."""
 
-    def __init__(self, qp: ContactQP) -> None:
-        self._qp = qp
+    def __init__(self, qp: ContactQP, choice: SolverChoice) -> None:
+        self._qp, self._choice = qp, choice
         self._assemble, self._finish, self._energy, self._relate = qp.evaluators
-        self._plugin = qp.plugin
         self._order = band_order(qp.sparsity("h"), qp.sparsity("a"), slacks=qp.slacks)
-        self._layouts: Layouts = {}
         self._max_dense = max(MAX_DENSE_ENTRIES // (sum(qp.sparsity("a").shape) + qp.slacks) ** 2, 1)
-        self._renew()
+        self._start_with(choice.solver(qp))
 
     def twin(self) -> "ContactSolver":
         """Return an equal solver for another thread."""
         twin = copy.copy(self)
-        twin._renew()
+        twin._start_with(self._solver.twin())
         return twin
 
     def start_over(self) -> None:
-        """Forget all previous problems: some plugins start from the previous one."""
+        """Forget all previous problems: some solvers start from the previous one."""
         if not self._is_new:
-            self._renew()
+            self._start_with(self._solver.twin())
 
-    def _renew(self) -> None:
-        self._solver = _new_solver(self._qp, self._plugin, self._layouts)
-        self._fallbacks: dict[str, _Solver] = {}
+    def _start_with(self, solver: Solver) -> None:
+        """Take a new solver, which has solved no problem yet."""
+        self._solver = solver
+        self._fallbacks: dict[str, Solver] = {}
         self._is_new = True
 
     def __call__(self, **arrays: Float[Array, "realization ..."]) -> Arrays:
         """Return the outputs of contact_qp by name, (realization, entry), for its inputs by name, (realization, ...).
 
         Further inputs are `guess` (realization, row) and `guessed_slack` (realization, pair): probable reactions and slacks,
-        which a solver may start from. A further output is `second` (realization, 1): whether another plugin had to answer.
-        Problems that this plugin fails to solve are solved without curvature, since with it they may have no minimum: by this
-        plugin, and then by others. If all fail, `residual` is infinite, and other outputs may be NaN.
+        which a solver may start from. A further output is `second` (realization, 1): whether another solver had to answer.
+        Problems that this solver fails to solve are solved without curvature, since with it they may have no minimum: by this
+        solver, and then by others. If all fail, `residual` is infinite, and other outputs may be NaN.
         """
         inputs = {name: flat(values) for name, values in arrays.items()}
         self._is_new = False
         answer = self._solved(self._solver, inputs)
         answer["second"] = np.zeros_like(answer["residual"])
         self._retry(self._solver, answer, inputs, _is_lost(answer) & (inputs["newton"][:, 0] != 0), second=0.0)
-        for name in self._plugin.fallbacks:
+        for name in self._choice.fallbacks:
             lost = _is_lost(answer)
             if not lost.any():
                 break
             if name not in self._fallbacks:
-                self._fallbacks[name] = _new_solver(self._qp, PLUGINS[name], self._layouts)
+                self._fallbacks[name] = SOLVERS[name].solver(self._qp)
             self._retry(self._fallbacks[name], answer, inputs, lost, second=1.0)
-            if PLUGINS[name].remembers:
+            if SOLVERS[name].remembers:
                 del self._fallbacks[name]
         return answer
 
     def _retry(
-        self, solver: "_Solver", answer: Arrays, inputs: Arrays, lost: Bool[Array, " realization"], *, second: float
+        self, solver: Solver, answer: Arrays, inputs: Arrays, lost: Bool[Array, " realization"], *, second: float
     ) -> None:
         """Solve the `lost` problems without curvature, and write better answers into `answer`."""
         rows = np.flatnonzero(lost)
@@ -94,13 +90,13 @@ class ContactSolver:
         """Return X_RM (realization, 12 * pair) of the group's pairs at poses, for deviations."""
         return self._relate(**arrays)["relative"]
 
-    def _solved(self, solver: "_Solver", inputs: Arrays) -> Arrays:
+    def _solved(self, solver: Solver, inputs: Arrays) -> Arrays:
         count = len(inputs["poses"])
         size = self._qp.max_batch
         parts = [self._solved_batch(solver, _of(inputs, slice(k, k + size))) for k in range(0, max(count, 1), size)]
         return parts[0] if len(parts) == 1 else {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
-    def _solved_batch(self, solver: "_Solver", inputs: Arrays) -> Arrays:
+    def _solved_batch(self, solver: Solver, inputs: Arrays) -> Arrays:
         problem = self._assemble(**inputs)
         slacks = np.ones((len(inputs["guess"]), self._qp.slacks))  # an active compliant row has a positive slack
         slacks[:, : inputs["guessed_slack"].shape[1]] = inputs["guessed_slack"]
@@ -170,51 +166,6 @@ class ContactSolver:
         if sparsity.size2() == 1:
             return columns
         return columns.reshape(len(stored), sparsity.size2(), sparsity.size1()).swapaxes(1, 2)
-
-
-class _PluginSolver:
-    """The solver of a plugin, with its own memory."""
-
-    def __init__(self, qp: ContactQP, plugin: Plugin) -> None:
-        self.remembers = plugin.remembers
-        with CONSTRUCTION_LOCK, quiet():
-            conic = solver(plugin, qp.sparsity("h"), qp.sparsity("a"), springs=qp.has_springs)
-        self._inputs = [name for name in conic.name_in() if name in QP]
-        self._results = [conic.name_out().index(name) for name in SOLUTION]
-        lower_bounds = np.zeros(conic.numel_in("g"))
-        lower_bounds[: -qp.slacks] = -np.inf
-        bounds = {"lbx": lower_bounds, "ubx": np.full(lower_bounds.shape, np.inf)}
-        # The other inputs, initial guesses, are zero: no plugin uses them.
-        fixed_inputs = {i: bounds.get(name, np.zeros(1)) for i, name in enumerate(conic.name_in()) if name not in QP}
-        with CONSTRUCTION_LOCK, quiet():
-            self._solve = InterpretedFunction(conic, fixed_inputs)
-
-    def __call__(self, problem: Arrays, reactions: np.ndarray, slacks: np.ndarray) -> tuple[Arrays, np.ndarray]:
-        """Return x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the solver failed.
-
-        A solver that starts from the previous problem is faster if similar problems follow each other. So they are sorted by
-        their probable active set: rows with `reactions` (realization, row), or in a first step violated rows.
-        """
-        inputs = [problem[name] for name in self._inputs]
-        if not self.remembers:
-            solved, failed = self._solve(inputs)
-            return {name: solved[i] for name, i in zip(SOLUTION, self._results, strict=True)}, failed
-        violated = problem["lba"][:, : reactions.shape[1]]
-        likely = np.where(reactions.any(axis=1, keepdims=True), reactions, violated) > 0
-        order = np.lexsort(np.packbits(likely, axis=1).T)
-        solved, failed = self._solve([array[order] for array in inputs])
-        back = np.argsort(order)
-        return {name: solved[i][back] for name, i in zip(SOLUTION, self._results, strict=True)}, failed[back]
-
-
-_Solver = _PluginSolver | GraphSolver
-
-
-def _new_solver(qp: ContactQP, plugin: Plugin, layouts: Layouts) -> _Solver:
-    if plugin.is_conic:
-        return _PluginSolver(qp, plugin)
-    sparsities = {name: qp.sparsity(name) for name in ("h", "g", "a", "lba")}
-    return GraphSolver(sparsities, slacks=qp.slacks, equations=qp.equations, layouts=layouts)
 
 
 def _is_rough(answer: Arrays) -> Bool[Array, " realization"]:

@@ -15,7 +15,8 @@ from tolcontact.compilation.contact_rows import MIN_SLOTS, SLOTS, standing_point
 from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.measure_accuracy import measure_accuracies
-from tolcontact.compilation.plugins import Plugin, plugin
+from tolcontact.compilation.solver import SolverChoice
+from tolcontact.compilation.solvers import solver_choice
 from tolcontact.compilation.station_program import StationProgram, station_programs
 from tolcontact.declaration.locator import FIRST_ORDER
 from tolcontact.declaration.measure import Tape
@@ -74,7 +75,7 @@ class Program(Pictured):
     nominal: Nominal
     draws: Draws
     method: Method
-    plugin: Plugin
+    solver: SolverChoice
     place: NamedFunction
     observe: NamedFunction
     gaps: tuple[GapMap | None, ...]
@@ -90,7 +91,7 @@ class Program(Pictured):
 
     def __str__(self) -> str:
         nominal, method = self.nominal, self.method
-        rows = [f"program of {nominal.assembly.name}: {self.plugin.name}, {method.resolution}, {method.objective}"]
+        rows = [f"program of {nominal.assembly.name}: {self.solver.name}, {method.resolution}, {method.objective}"]
         rows += [
             f"  part {part.name}{f' in station {part.station}' * bool(part.station)}: "
             f"{'joined' if part.carried else f'{len(part.locators)} locators'}{', free' * part.free}"
@@ -130,11 +131,12 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     Raises OptionError for a solver that cannot be used, ModelError for a user-defined measure that fails, or, if the objective
     is seating, for forces that are missing or act on parts that contact cannot move.
     """
-    _check_method(nominal, method)
+    _check_placing(nominal, method)
+    _check_springs(nominal, method)
     draws = Draws(nominal)
     with CONSTRUCTION_LOCK:  # user-defined functions run here, too, and may print
         with quiet():
-            conic_plugin = plugin(solver)
+            choice = solver_choice(solver)
         d = ca.SX.sym("deviations", len(nominal.contributors))
         raw = ca.vertcat(*(pose.vector() for pose in raw_poses(nominal, d)))
         entries = ca.SX.sym("poses", ENTRIES * len(nominal.parts))
@@ -162,14 +164,14 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             nominal=nominal,
             draws=draws,
             method=method,
-            plugin=conic_plugin,
+            solver=choice,
             place=place,
             observe=observed,
             gaps=gaps,
             round_gaps={k: NamedFunction.dense(function) for k, function in round_functions.items()},
             meetings=meetings,
             trials=trials,
-            groups=tuple(_contact_group(nominal, group, gaps, method, conic_plugin, meetings, trials) for group in groups),
+            groups=tuple(_contact_group(nominal, group, gaps, method, choice, meetings, trials) for group in groups),
             accuracies=measure_accuracies(nominal, groups, draws, place, observed),
             watch=watch.allowing(_allowed_depths(nominal, meetings, trials)),
             nominal_measures=observe(np.tile(AT_REST, len(nominal.parts)), np.zeros(d.numel()))[0].full().ravel(),
@@ -259,7 +261,7 @@ def _contact_group(
     group: Group,
     gaps: Sequence[GapMap | None],
     method: Method,
-    plugin: Plugin,
+    choice: SolverChoice,
     meetings: Mapping[int, Meeting],
     trials: Mapping[int, Trial],
 ) -> ContactGroup:
@@ -270,27 +272,8 @@ def _contact_group(
         else standing_points(nominal.pairs[k], gaps[k], method)
         for k in group.pairs
     ]
-    build = contact_qp
-    qp = build(nominal, group, gaps, method, plugin, standing)
-    return ContactGroup(group, qp, ContactSolver(qp))
-
-
-def _check_method(nominal: Nominal, method: Method) -> None:
-    """Raise ModelError for a method that does not suit the model."""
-    for check in (_check_forms, _check_placing, _check_springs):
-        check(nominal, method)
-
-
-def _check_forms(nominal: Nominal, method: Method) -> None:
-    """Raise ModelError for a search that ignores the form of a reference face when it projects points again."""
-    faults = [
-        f'contact pair "{pair.name}": the search is "iterated", and the reference face of feature {pair.deviating[1].name} has '
-        'form; choose the search "bounded" or "fixed"'
-        for pair in nominal.pairs
-        if method.is_iterated and pair.deviating[1] is not None and pair.deviating[1].form is not None
-    ]
-    if faults:
-        raise ModelError(nominal.assembly.name, faults)
+    qp = contact_qp(nominal, group, gaps, method, standing)
+    return ContactGroup(group, qp, ContactSolver(qp, choice))
 
 
 def _check_placing(nominal: Nominal, method: Method) -> None:
@@ -307,7 +290,7 @@ def _check_placing(nominal: Nominal, method: Method) -> None:
 
 
 def _check_springs(nominal: Nominal, method: Method) -> None:
-    """Raise ModelError for a stiffness without effect, without forces that load it, or without steps that use true gaps."""
+    """Raise ModelError for a stiffness without effect, or without forces and repeated steps, which it needs."""
     faults = [
         f'locator "{part.locators.labels[index]}": it has a stiffness, but part "{part.name}" is fixed=True, so forces do not '
         "move it; leave stiffness out, or declare the part fixed=False"
@@ -316,12 +299,11 @@ def _check_springs(nominal: Nominal, method: Method) -> None:
     ]
     if faults:
         raise ModelError(nominal.assembly.name, faults)
-    if method.minimizes.presses and method.is_exact and not method.is_iterated:
+    if method.minimizes.presses and method.is_exact:
         return
     faults = [
-        f'{_compliant_name(pair)} has a stiffness, which needs the objective "seating", the resolution "exact", and a search '
-        f'that is not iterated; here they are "{method.objective}", "{method.resolution}" and "{method.search}"; choose '
-        "those, or leave stiffness out"
+        f'{_compliant_name(pair)} has a stiffness, which needs the objective "seating" and the resolution "exact"; '
+        f'here they are "{method.objective}" and "{method.resolution}"; choose those, or leave stiffness out'
         for pair in nominal.pairs
         if pair.is_springy
     ]

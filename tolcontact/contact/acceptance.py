@@ -15,6 +15,10 @@ from tolcontact.interference.watch import ALLOWED_SHARE
 from tolcontact.mechanics import Group, curved_pairs
 from tolcontact.method import Method
 
+# Locators, clearances and tolerances leave a part no turn of a radian: an answer that far from its raw pose is another pose,
+# which planes without end or locators allow. A travel by half a part may lead to faces where no contact points are.
+MAX_TURN = 1.0  # rad: an answer that rotates a part by more, from its raw pose, is doubtful
+MAX_TRAVEL_SIZES = 0.5  # sizes of the largest part: if contact points moved further, the faces themselves are compared
 ADRIFT_SIZES = 10  # a part that travelled further, in sizes, has nothing to rest on
 TURN_FACTOR = 2  # times the rotation that lifts the end of a face by the distance that contact may push
 LOST_SIZES = 1e5  # no step brings a part back from further away
@@ -24,13 +28,17 @@ DEPTH_SHARE = 0.01  # of the smallest tolerance range
 
 
 class AcceptanceLimits:
-    """The limits of a method for one group of parts; `size` [mm] is the size of the largest part."""
+    """The limits of a method for one group of parts.
 
-    def __init__(self, nominal: Nominal, group: Group, method: Method, size: float) -> None:
+    size       [mm] of the largest part
+    max_turn   rotation of a part [rad], from its raw pose, beyond which an answer is doubtful
+    """
+
+    def __init__(self, nominal: Nominal, group: Group, method: Method, size: float, max_turn: float = MAX_TURN) -> None:
         self._nominal, self._pairs = nominal, group.pairs
         self._presses = method.minimizes.presses
-        self._size, self._max_travel = size, method.near_travel * size
-        self._max_turn = 8 * np.sin(method.near_turn / 2) ** 2  # |R - S|^2 of rotations that far apart
+        self._size, self._max_travel = size, MAX_TRAVEL_SIZES * size
+        self._max_turn = 8 * np.sin(max_turn / 2) ** 2  # |R - S|^2 of rotations that far apart
         self._movers = [k for k, mobility in enumerate(group.mobilities) if mobility.movers]
         self._group_pairs = [nominal.pairs[index] for index in group.pairs]
         self._max_depth = min(DEPTH_SIZES * size, DEPTH_SHARE * nominal.assembly.smallest_zone())
@@ -43,7 +51,7 @@ class AcceptanceLimits:
         self._balls = [(side.part, *_ball(side.points)) for side in group.sides]
 
     def is_near(self, task: Task, state: State) -> Bool[Array, " n"]:
-        """Return whether no part has rotated, and no contact point travelled, beyond the method's limits (n,)."""
+        """Return whether no part has rotated, and no contact point travelled, too far (n,)."""
         return ~self._is_turned(task, state) & ~self._is_far(task, state)
 
     def is_lost(self, task: Task, state: State) -> Bool[Array, " n"]:

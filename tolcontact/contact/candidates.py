@@ -23,6 +23,7 @@ from tolcontact.geometry.parting import Parting, parting
 from tolcontact.interference.watch import ALLOWED_SHARE
 from tolcontact.mechanics import curved_pairs
 
+ACTIVE_GAP = 1e-9  # mm: points below it are active; gaps of faces that touch nominally are zero up to rounding
 MAX_CLUSTERS = 6
 FORM_CLUSTERS = 8  # of faces with form, which touch at more places
 APART = 2.0  # times the error of planes beyond their edges: bodies under load are no further apart
@@ -98,13 +99,13 @@ class Candidates:
             clusters = 1 if index in program.meetings else FORM_CLUSTERS if pair.has_form else MAX_CLUSTERS
             self._all_scans.append(pair_scan(pair, gaps, tables, clusters))
             # If the paper's set of points may be active, points between the corners count, too.
-            corners = self._method.corners_suffice and index not in program.meetings
+            corners = self._method.is_closed and index not in program.meetings
             self._carrying_scans.append(pair_scan(pair, gaps, (), clusters, gaps.corners) if corners else self._all_scans[-1])
         smallest = program.nominal.assembly.smallest_zone()
         self._with_form = [k for k, pair in enumerate(self._pairs) if pair.has_form]
         self._edge_error, self._bulge = EDGE_SHARE * smallest, max(BULGE_SHARE * smallest, MIN_BULGE)
         self._allowed_bulge = max(ALLOWED_SHARE * smallest, 2 * MIN_BULGE)
-        searches = self._method.is_exact and self._method.is_closed and not self._method.is_iterated
+        searches = self._method.is_exact and self._method.is_closed
         self._with_minima = {
             k for k in self._varying if searches and np.isfinite(smallest) and self._pairs[k].minima is not None
         }
@@ -113,12 +114,9 @@ class Candidates:
         self._guards = {k: guard for k, guard in guards.items() if guard is not None}
         of_bodies = {id(guard.neighbours): k for k, guard in reversed(self._guards.items())}
         self.guards = {k: self._guards[k] for k in sorted(of_bodies.values())}
-        is_iterated = self._method.is_iterated
-        curved = curved_pairs(program.nominal, group.group) if self._method.is_exact and not is_iterated else []
+        curved = curved_pairs(program.nominal, group.group) if self._method.is_exact else []
         self.curved = [k for k in curved if k not in self.bounded]
-        sampled = [k for k, pair in enumerate(self._pairs) if pair.round is None and k not in self.bounded]
-        projected = sampled if is_iterated else self.curved
-        self._margins = {k: half_spacing(fixed(self._all_scans[k])) for k in projected}
+        self._margins = {k: half_spacing(fixed(self._all_scans[k])) for k in self.curved}
 
     def scans(
         self,
@@ -134,7 +132,7 @@ class Candidates:
         deepest: Float[Array, " realization"] | None = None,
         answered: Sequence[Slots] = (),
     ) -> list[Scan]:
-        """Return scans of the points that may be active, projected again if the method requires it.
+        """Return scans of the points that may be active.
 
         Places of bounded pairs are searched again. In steps, given the `slots` of the pairs with changing points, active places
         persist slightly beyond their edges, up to `width` times the limit for an answer, unless the realization is `at_rest`.
@@ -143,14 +141,14 @@ class Candidates:
         Parting). If it is free, places deeper than `deepest` (realization,) [mm], FREE_DEPTH by default, are on the far side of
         a body and do not count; its steps include places slightly beyond their edges, so that a corner in a valley meets both
         sides of the valley.
-        With `projected`, points against curved faces are projected, too. `earlier` are scans with the sums of heights.
+        With `projected`, points against curved faces are projected again. `earlier` are scans with the sums of heights.
         """
         scans = list(self._carrying_scans)
         for k in self._with_form:
-            if k not in self.bounded and not self._method.is_iterated:
+            if k not in self.bounded:
                 former = earlier[k] if earlier else None
                 scans[k] = self._raised(k, fixed(scans[k]), former, relative[:, k], deviations, in_steps=len(slots) > 0)
-        if projected or self._method.is_iterated:
+        if projected:
             for k in self._margins:
                 scans[k] = self.projected(k, relative[:, k])
         for k, places in (self._widened if start.free and slots else self.bounded).items():
@@ -249,10 +247,7 @@ class Candidates:
     ) -> RawSurvey:
         """Return the survey of raw states, for deviations (realization, contributor)."""
         scans = self.scans(relative, deviations)
-        surveyed = [
-            scan if self._method.is_iterated and k not in self.bounded else self._all_scans[k] for k, scan in enumerate(scans)
-        ]
-        surveys = [scan.survey(relative[:, k], deviations, self._method.activity) for k, scan in enumerate(surveyed)]
+        surveys = [scan.survey(relative[:, k], deviations, ACTIVE_GAP) for k, scan in enumerate(self._all_scans)]
         return RawSurvey(
             scans=scans,
             min_gap=min_gaps(scans, relative, deviations),
@@ -280,9 +275,7 @@ class Candidates:
         if self._method.is_closed:
             return [None for _ in scans]
         return [
-            None
-            if pair.is_supports or pair.round or k in self.bounded
-            else scan.gaps(relative[:, k], deviations) < self._method.activity
+            None if pair.is_supports or pair.round or k in self.bounded else scan.gaps(relative[:, k], deviations) < ACTIVE_GAP
             for k, (pair, scan) in enumerate(zip(self._pairs, scans, strict=True))
         ]
 

@@ -1,4 +1,4 @@
-"""Iterated search: linear steps, each about contact points that were projected again, until the poses converge.
+"""Linear steps, each about contact points that were projected again onto curved faces, until the poses converge.
 
 More than one step about the same points would let a round part roll on the planes that represent its counterpart. Linear
 rows neglect the curvature of the surfaces: steps that neither shrink nor gain are repeated with more caution, a weight on the

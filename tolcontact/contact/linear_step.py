@@ -36,7 +36,7 @@ class LinearStep:
     def __init__(self, program: Program, group: ContactGroup, max_rounds: int = MAX_ROUNDS) -> None:
         self._max_rounds = max_rounds
         self._solve = group.solve
-        self._remembers = program.plugin.remembers
+        self._remembers = program.solver.remembers
         self._max_residual = MAX_RESIDUAL * group.group.length
         self.spans = group.qp.spans
         self._slots = {k: points for k, points in enumerate(group.qp.standing) if isinstance(points, int)}

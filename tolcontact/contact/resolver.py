@@ -1,7 +1,7 @@
 """Resolve contact: move a group of parts from raw poses to poses without penetration, and rate the certainty of the answer.
 
-The linearized resolution takes one linear step. The exact one repeats them (see repeated_steps), with an iterated search
-about contact points that are projected again (see iterated_search). Realizations that end in a conflict, without an answer, or
+The linearized resolution takes one linear step. The exact one repeats them (see repeated_steps), from some starts about
+contact points that are projected again (see iterated_search). Realizations that end in a conflict, without an answer, or
 far from the raw pose are tried again from other starts.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ACCURACY, ContactGroup, Program
-from tolcontact.contact.acceptance import AcceptanceLimits
+from tolcontact.contact.acceptance import MAX_TURN, AcceptanceLimits
 from tolcontact.contact.candidates import FREE_DEPTH, Candidates
 from tolcontact.contact.free_steps import FreeSteps
 from tolcontact.contact.iterated_search import search
@@ -44,7 +44,9 @@ MIN_GAIN = 1e-6  # of the objective, or mm of penetration: the gain for which an
 class ContactResolver:
     """One group of coupled parts, ready to be resolved for blocks of realizations."""
 
-    def __init__(self, program: Program, group: ContactGroup, max_rounds: int = MAX_ROUNDS) -> None:
+    def __init__(
+        self, program: Program, group: ContactGroup, *, max_rounds: int = MAX_ROUNDS, max_turn: float = MAX_TURN
+    ) -> None:
         self.parts = np.array(group.group.parts)
         self.pairs = np.array(group.group.pairs)
         self._group = group.group
@@ -55,7 +57,7 @@ class ContactResolver:
         self.contact_points = [program.nominal.pairs[index] for index in group.group.pairs]
         self._springy = [k for k, pair in enumerate(self.contact_points) if pair.is_springy]
         size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
-        self._limits = AcceptanceLimits(program.nominal, group.group, self._method, size)
+        self._limits = AcceptanceLimits(program.nominal, group.group, self._method, size, max_turn)
         self._free_steps = FreeSteps(
             group.group, self.contact_points, self._candidates, self._limits, self._relate, self._energy_of
         )
@@ -148,18 +150,17 @@ class ContactResolver:
 
     def _attempt(self, task: Task, state: State, start: Start) -> None:
         """Take steps from the poses of `state` to an answer, and judge it."""
-        projected = start.projected or self._method.is_iterated
-        if projected:
+        if start.projected:
             caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull parts far if nothing holds them
             search(self._step, self._limits, self._candidates, self._energy_of, task, state, start.stride, caution)
         elif self._method.is_exact:
             repeat(self._step, self._limits, self._candidates, self._free_steps, task, state, start)
         else:
             self._step.take(task, state, stride=start.stride)
-        state.searched[:] = projected
+        state.searched[:] = start.projected
         self._leave_adrift(task, state)
         scans = self._candidates.scans(
-            state.relative, task.deviations, projected=projected, earlier=task.scans, start=start, answered=state.slots
+            state.relative, task.deviations, projected=start.projected, earlier=task.scans, start=start, answered=state.slots
         )
         task = replace(task, scans=scans)
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
@@ -176,7 +177,7 @@ class ContactResolver:
         state.doubtful[:] |= self._candidates.are_apart(state) & (state.rank == 0)
         state.doubtful[:] |= self._candidates.bulge(task.scans, state.relative) & (state.rank == 0)
         state.doubtful[:] |= self._limits.lie_in_form(task, state)
-        if not projected:
+        if not start.projected:
             self._doubt_rolled(task, state)
 
     def _leave_adrift(self, task: Task, state: State) -> None:

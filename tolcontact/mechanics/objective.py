@@ -17,6 +17,9 @@ from tolcontact.mechanics.placement import elongation
 from tolcontact.mechanics.pose import Pose, Vector, constant, relative
 from tolcontact.method import Method
 
+# The paper's eta of (11), the weight of the regularization: small enough not to move what the objective fixes, and large enough
+# to solve for the rest. With "points" it is dimensionless; with "identity", mm^2 per rad^2 and 1 per mm^2.
+ETA = 1e-6
 # Seating: the share of the forces that the quadratic term balances when all points have moved by the group's length. It is
 # small enough for the contacts to take nearly the whole load, and large enough for the solvers.
 SEATING_SHARE = 1e-3
@@ -96,7 +99,7 @@ _VALUES: dict[str, Callable[[GroupEquations, Sequence[Pose], ca.SX], ca.SX]] = {
 
 
 def _regularization(system: GroupEquations, poses: Sequence[Pose]) -> ca.SX:
-    return sum((system.method.eta * term for term in _REGULARIZATIONS[system.method.regularization](system, poses)), ca.SX(0))
+    return sum((ETA * term for term in _REGULARIZATIONS[system.method.regularization](system, poses)), ca.SX(0))
 
 
 def _point_energies(system: GroupEquations, poses: Sequence[Pose]) -> list[ca.SX]:

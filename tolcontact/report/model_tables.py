@@ -16,7 +16,7 @@ from tolcontact.report.table import Cell, Table
 
 Entry = dict[str, Any]
 SETTINGS = (
-    "solver", "resolution", "objective", "regularization", "eta", "active_set", "search", "method_from", "sampler", "seed",
+    "solver", "resolution", "objective", "regularization", "active_set", "search", "method_from", "sampler", "seed",
     "samples", "kept", "fields", "versions", "history", "format",
 )  # fmt: skip
 

@@ -70,7 +70,7 @@ def _scripts_by_value(nominal: Nominal) -> Iterator[None]:
 @functools.lru_cache(maxsize=MAX_CACHED)
 def pack_model(program: Program) -> Packed:
     """Return the packed model, solver name and method of a program; recent results are cached."""
-    return Packed.of((program.nominal, program.plugin.name, program.method), program.nominal)
+    return Packed.of((program.nominal, program.solver.name, program.method), program.nominal)
 
 
 def versions() -> dict[str, str]:

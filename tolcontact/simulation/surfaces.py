@@ -38,7 +38,7 @@ class Surfaces(NamedTuple):
 
 def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviations: Float[Array, "n contributor"]) -> Surfaces:
     """Return the check of every pair's faces at corrected poses (row, part, 12), for deviations (row, contributor)."""
-    nominal, fixed = program.nominal, not program.method.is_iterated
+    nominal = program.nominal
     ended = max(ENDED_SHARE * min(nominal.assembly.smallest_zone(), DEFAULT_RANGE), ON_PLANE_GAP)
     surfaces = Surfaces(*(np.full((len(poses), len(nominal.pairs)), np.nan) for _ in Surfaces._fields))
     relative = program.observe(poses=poses, deviations=deviations)["relative"].reshape(len(poses), len(nominal.pairs), 12)
@@ -51,7 +51,7 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviation
         X_RM, heights = relative[:, k], pair.heights(deviations)
         form = pair.form(deviations) if pair.has_form else None
         surfaces.penetration[:, k] = faces.depth(X_RM, heights, form)
-        if fixed and not pair.round and k not in program.meetings:  # otherwise contact points project onto the face
+        if not pair.round and k not in program.meetings:  # otherwise contact points project onto the face
             points = pose.apply(X_RM, pair.P_m)
             gaps = ((points - pair.P_r) * pair.n_r).sum(axis=2)
             raised = heights[:, None] if form is None else heights[:, None] + pair.form_heights(deviations)

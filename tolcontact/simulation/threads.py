@@ -161,14 +161,14 @@ def _available(unused: list[Resolvers], program: Program, count: int) -> list[Re
 def block_rows(program: Program) -> int:
     """Return the number of realizations in a block: a power of two, and smaller if a realization takes long.
 
-    The time of a realization grows with the number of coupled bodies, for a dense solver with its cube, and with projections
+    The time of a realization grows with the number of coupled bodies, for most solvers with its cube, and with projections
     onto curved faces. A block should take seconds at most: then it is stored, and visible as progress.
     """
     bodies = max((len(group.group.free) for group in program.groups), default=0)
     rows = BLOCK_ROWS
     if program.method.is_exact and any(curved_pairs(program.nominal, group.group) for group in program.groups):
         rows = CURVED_ROWS
-    growth = 3 if program.plugin.is_conic else 1
+    growth = program.solver.growth
     while rows > MIN_ROWS and rows * bodies**growth > BLOCK_ROWS * MAX_BODIES**growth:
         rows //= 2
     return rows

@@ -12,9 +12,9 @@ active_set_kernel     changes of the active set: rows enter and leave, slacks op
 search_kernel         the search for the active set: in all joints at once, then one by one
 hessian_kernel        the factor of H
 solve_kernel          a batch of QPs
-graph_solver          the solver, in place of a plugin of CasADi
+graph_solver          the solver, and its entry in the table of solvers
 """
 
-from tolcontact.compilation.graph.graph_solver import GraphSolver, Layouts
+from tolcontact.compilation.graph.graph_solver import GraphChoice, GraphSolver
 
-__all__ = ["GraphSolver", "Layouts"]
+__all__ = ["GraphChoice", "GraphSolver"]

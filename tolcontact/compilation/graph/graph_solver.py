@@ -6,23 +6,36 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.compilation.contact_qp import ContactQP
 from tolcontact.compilation.graph.factor_kernel import Work
 from tolcontact.compilation.graph.layout import POSITION, Layout, Storage, layout
 from tolcontact.compilation.graph.solve_kernel import solve_batch
+from tolcontact.compilation.solver import Arrays, SolverChoice
 from tolcontact.mechanics.correction import FREEDOMS
 
 FEW_BODIES, ROUNDS_OF_FEW, ROUNDS = 2, 4, 40  # rounds of all joints at once
 STEPS_PER_ROW = 4  # steps of single rows
 
-Arrays = Mapping[str, Float[Array, "_ _"]]
 Layouts = dict[bool, tuple[Layout, Storage]]  # by whether H couples bodies
+
+
+class GraphChoice(SolverChoice):
+    """The choice of the solver on the graph of bodies."""
+
+    def is_usable(self) -> bool:
+        """Return True: the solver is part of this package."""
+        return True
+
+    def solver(self, qp: ContactQP) -> "GraphSolver":
+        sparsities = {name: qp.sparsity(name) for name in ("h", "g", "a", "lba")}
+        return GraphSolver(sparsities, slacks=qp.slacks, equations=qp.equations)
 
 
 class GraphSolver:
     """A solver of QPs with the sparsities of h, g, a and lba. Threads must not share it.
 
-    The last `equations` rows are equations. The last `slacks` variables are not negative, with unit entries in h. Solvers of
-    equal QPs may share their `layouts`, which are created on demand.
+    The last `equations` rows are equations. The last `slacks` variables are not negative, with unit entries in h. Twins share
+    their `layouts`, which are created on demand.
 
     remembers   whether it starts each problem from the previous answer: never
     """
@@ -64,6 +77,10 @@ class GraphSolver:
                 for array, values in zip(results, part_results, strict=True):
                     array[rows] = values
         return answer, failed
+
+    def twin(self) -> "GraphSolver":
+        """Return an equal solver with buffers of its own."""
+        return GraphSolver(self._sparsities, slacks=self._slacks, equations=self._equations, layouts=self._layouts)
 
     def _sizes(self) -> dict[str, int]:
         rows, size = self._sparsities["a"].shape
