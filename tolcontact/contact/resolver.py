@@ -2,7 +2,7 @@
 
 The linearized resolution takes one linear step. The exact one repeats them (see repeated_steps), from some starts about
 contact points that are projected again (see iterated_search). Realizations that end in a conflict, without an answer, or
-far from the raw pose are tried again from other starts.
+far from the raw pose are tried again from other starts (see starts).
 """
 
 import copy
@@ -22,17 +22,7 @@ from tolcontact.contact.record import accumulate_starts
 from tolcontact.contact.repeated_steps import repeat
 from tolcontact.contact.scan import min_gaps, undone
 from tolcontact.contact.springs import spring_misfit
-from tolcontact.contact.starts import (
-    BALANCE,
-    FIRST,
-    FREE,
-    FREE_WHERE_RAW,
-    GUARDED,
-    OTHER_STARTS,
-    OTHER_STARTS_CURVED,
-    PARTED,
-    Start,
-)
+from tolcontact.contact.starts import FIRST, RESCUES, Start
 from tolcontact.contact.state import NO_ANSWER, Resolved, State, Task
 from tolcontact.interference import ordered
 
@@ -128,20 +118,12 @@ class ContactResolver:
         state = self._step.start(task.raw, task.relative)
         self._attempt(task, state, FIRST)
         if self._method.is_exact:
-            self._try_again(task, state, self._apart(task, survey.min_gap[touched]), FREE_WHERE_RAW)
-            self._try_other_starts(task, state)
+            self._rescue(task, state, survey.min_gap[touched])
         gap_min = np.stack([survey.min_gap, survey.min_gap], axis=1)
         gap_min[touched, 1] = state.gap_min
         stays = self._stays(task, state)
         gap_min[touched[stays], 0] = state.gap_min[stays]
         return Resolved(touched[~stays], state.take(np.flatnonzero(~stays)), gap_min, survey.active)
-
-    def _apart(self, task: Task, min_gap: Float[Array, "n pair"]) -> Int[Array, " k"]:
-        """Return the realizations (k,) whose raw bodies are apart, although the smallest gaps (n, pair) [mm] deny it."""
-        if not self._candidates.are_guarded or self._method.minimizes.presses:
-            return np.zeros(0, dtype=int)
-        rows = np.flatnonzero((min_gap < -FREE_DEPTH).any(axis=1))
-        return rows[~self._candidates.interfere(task.relative[rows])]
 
     def _stays(self, task: Task, state: State) -> Bool[Array, " n"]:
         """Return whether answers are the raw poses, without contact (n,)."""
@@ -195,31 +177,37 @@ class ContactResolver:
                 depth = -self._candidates.projected(k, relative).min_gap(relative, task.deviations[rolled])
                 state.doubtful[rolled] |= depth > self._limits.allowed(k)
 
-    def _try_other_starts(self, task: Task, state: State) -> None:
-        """Try again, from other starts, realizations that are not certified, or far from their raw pose; keep the better.
+    def _rescue(self, task: Task, state: State, raw_gap: Float[Array, "n pair"]) -> None:
+        """Try realizations again from other starts (see RESCUES), and keep the better answers.
 
-        If two starts lead to the same conflict, no third start is tried.
+        raw_gap   the smallest raw gaps (n, pair) [mm]
         """
-        if self._candidates.curved:
-            self._try_again(task, state, np.flatnonzero(state.rank == NO_ANSWER), BALANCE)
-        doubtful = np.flatnonzero(state.doubtful)
-        rows = doubtful[self._candidates.interfere(state.relative[doubtful])]
-        for start in GUARDED:
-            rows = self._try_again(task, state, rows, start)
-        rows = np.flatnonzero((state.rank > 0) | ~self._limits.is_near(task, state))
-        for start in OTHER_STARTS_CURVED if self._candidates.curved else OTHER_STARTS:
-            rows = self._try_again(task, state, rows, start)
-        rows = self._without_answer(state)
-        for start in PARTED if rows.size and self._candidates.partings else ():
-            rows = self._try_again(task, state, rows, start)
-        for start in FREE if self._candidates.are_guarded else ():
-            self._try_again(task, state, np.flatnonzero(state.rank > 0), start)
+        candidates = self._candidates
+        present = {
+            "curved": bool(candidates.curved),
+            "flat": not candidates.curved,
+            "guarded": candidates.are_guarded,
+            "convex": bool(candidates.partings),
+        }
+        for rescue in RESCUES:
+            rows = self._rows(rescue.rows, task, state, raw_gap) if present[rescue.surfaces] else np.zeros(0, dtype=int)
+            for start in rescue.starts:
+                rows = self._try_again(task, state, rows, start)
 
-    def _without_answer(self, state: State) -> Int[Array, " k"]:
-        """Return the realizations (k,) without an answer that separates the bodies; a distant answer counts as one."""
-        rows = np.flatnonzero(state.rank == NO_ANSWER)
-        is_apart = state.solved[rows] & ~self._candidates.interfere(state.relative[rows])
-        return rows[~is_apart]
+    def _rows(self, which: str, task: Task, state: State, raw_gap: Float[Array, "n pair"]) -> Int[Array, " k"]:
+        """Return the realizations (k,) of a rescue (see Rescue)."""
+        interfere = self._candidates.interfere
+        if which == "apart":
+            rows = np.flatnonzero((raw_gap < -FREE_DEPTH).any(axis=1) & (not self._method.minimizes.presses))
+            return rows[~interfere(task.relative[rows])]
+        if which == "interfere":
+            rows = np.flatnonzero(state.doubtful)
+            return rows[interfere(state.relative[rows])]
+        if which == "not separated":
+            rows = np.flatnonzero(state.rank == NO_ANSWER)
+            return rows[~state.solved[rows] | interfere(state.relative[rows])]
+        is_uncertain = state.rank == NO_ANSWER if which == "no answer" else state.rank > 0
+        return np.flatnonzero(is_uncertain | (~self._limits.is_near(task, state) if which == "uncertain or far" else False))
 
     def _try_again(self, task: Task, state: State, rows: Int[Array, " n"], start: Start) -> Int[Array, " left"]:
         """Try some realizations (n,) again and keep the better answer. Return those to be tried further (left,)."""

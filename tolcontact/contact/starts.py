@@ -1,4 +1,12 @@
-"""Where steps start, and how they keep bodies apart."""
+"""Where steps start, how they keep bodies apart, and which realizations get other starts.
+
+    raw pose, FIRST --> certified and near its raw pose -------------------> answer
+         |                                                                     ^
+         +--> the rescues, in their order: each takes the realizations         |
+              that it names, and the better answer stays ----------------------+
+
+The status follows from the answer that is left: certified, a conflict (not assemblable), doubtful, or not converged.
+"""
 
 from typing import NamedTuple
 
@@ -28,13 +36,37 @@ class Start(NamedTuple):
     free: bool = False
 
 
+class Rescue(NamedTuple):
+    """Other starts for realizations whose best answer so far is not certain. Whatever is better replaces that answer.
+
+    rows      the realizations: "apart", whose raw bodies are apart although gaps deny it; "no answer"; "interfere", with bodies
+              that interfere in their answer; "uncertain", not certified; "uncertain or far", these and certified ones far from
+              their raw pose; "not separated", without an answer, or with bodies that interfere in it
+    surfaces  which pairs the group must have: "curved" faces or only "flat" ones, bodies whose interference is tested
+              ("guarded"), or convex bodies that are parted in one direction ("convex")
+    starts    one after the other, until the answer is certified, or two of them end in the same conflict
+    """
+
+    rows: str
+    surfaces: str
+    starts: tuple[Start, ...]
+
+
 FIRST = Start()
-OTHER_STARTS = (Start(at_nominal=True), Start(stride=SMALL_STRIDE))  # if no face is curved
-OTHER_STARTS_CURVED = (Start(projected=True), Start(projected=True, at_nominal=True))
-# Planes at fixed points of a shaft leave it as it spins. If its spin is free, rounding grows until it slips through them.
-BALANCE = Start(balances=True)
-GUARDED = (Start(guarded=True, at_answer=True), Start(guarded=True), Start(guarded=True, stride=SMALL_STRIDE))
-PARTED = (Start(parted=True), Start(parted=True, stride=SMALL_STRIDE))
 # Where bodies can separate in several directions, full steps alternate between these, or their rows contradict each other.
 FREE_WHERE_RAW = Start(free=True)
-FREE = (Start(free=True, at_nominal=True), FREE_WHERE_RAW)
+RESCUES = (
+    Rescue("apart", "guarded", (FREE_WHERE_RAW,)),
+    # Planes at fixed points of a shaft leave it as it spins. If its spin is free, rounding grows until it slips through them.
+    Rescue("no answer", "curved", (Start(balances=True),)),
+    Rescue(
+        "interfere",
+        "guarded",
+        (Start(guarded=True, at_answer=True), Start(guarded=True), Start(guarded=True, stride=SMALL_STRIDE)),
+    ),
+    Rescue("uncertain or far", "curved", (Start(projected=True), Start(projected=True, at_nominal=True))),
+    Rescue("uncertain or far", "flat", (Start(at_nominal=True), Start(stride=SMALL_STRIDE))),
+    Rescue("not separated", "convex", (Start(parted=True), Start(parted=True, stride=SMALL_STRIDE))),
+    Rescue("uncertain", "guarded", (Start(free=True, at_nominal=True),)),
+    Rescue("uncertain", "guarded", (FREE_WHERE_RAW,)),
+)
