@@ -36,6 +36,30 @@ def test_a_killed_run_keeps_its_rows_and_goes_on(after, keep, tmp_path):
         assert contents(path, group).identical(contents(whole, group)), group
 
 
+def test_a_journal_that_was_damaged_is_refused_and_left_alone(tmp_path):
+    path = tmp_path / "killed.nc"
+    with start(script("run_stack", path, 12_000)) as begun:
+        for line in begun.stdout:
+            if int(line) >= 8192:
+                break
+        begun.kill()
+    rows, checkpoint = (path.with_name(f".killed.nc.{name}") for name in ("rows", "checkpoint"))
+    whole, state = rows.read_bytes(), checkpoint.read_bytes()
+    changed = bytearray(whole)
+    changed[len(changed) // 10] ^= 4
+    for data, its_state in ((changed, state), (whole[: len(whole) // 3], state), (None, state), (whole, state[:-30])):
+        rows.unlink() if data is None else rows.write_bytes(data)
+        checkpoint.write_bytes(its_state)
+        before = {file.name: file.read_bytes() for file in (path, rows, checkpoint) if file.exists()}
+        with pytest.raises(ArchiveError, match=r'is damaged: it has realizations .* delete "\.killed\.nc\.rows" and'):
+            tc.run(cases.stack(), samples=12_000, seed=3, solver="daqp", out=path, resume=True)
+        assert {file.name: file.read_bytes() for file in (path, rows, checkpoint) if file.exists()} == before
+    for file in (rows, checkpoint):
+        file.unlink()
+    with tc.run(cases.stack(), samples=200, seed=3, solver="daqp", out=path, resume=True) as results:
+        assert results.sizes["realization"] == 12_000
+
+
 @pytest.mark.parametrize("step", [60, *nightly(15)])
 def test_a_run_may_be_killed_at_any_of_its_writes(step, tmp_path):
     done = run(script("kill_at_each_write", tmp_path, step))

@@ -8,6 +8,7 @@ resumed run puts it into the archive first. (A power failure may lose more: writ
 
 import math
 import zipfile
+import zlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
@@ -17,6 +18,7 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive.rows import Row
+from tolcontact.errors import ArchiveError
 from tolcontact.replacing import remove_abandoned, replacing
 
 WRITTEN_BYTES = 1 << 24  # that the netCDF library writes together; each call takes as long as many realizations
@@ -28,6 +30,7 @@ class Checkpoint(NamedTuple):
     archive   the history of the archive: a journal belongs to one archive only
     rows      number of realizations in the archive and the journal
     size      size of the journal [bytes]
+    checksum  CRC-32 of these bytes
     samples   number of realizations that the run was started for
     sums      sums of the displacement field for each part, (state, number), over these realizations
     """
@@ -35,6 +38,7 @@ class Checkpoint(NamedTuple):
     archive: str
     rows: int
     size: int
+    checksum: int
     samples: int
     sums: list[np.ndarray]
 
@@ -45,15 +49,19 @@ class Journal:
     def __init__(self, archive: Path, kept: Sequence[Row], block: int) -> None:
         self._rows, self._checkpoint = (archive.with_name(f".{archive.name}.{name}") for name in ("rows", "checkpoint"))
         self._kept, self._block = kept, block
-        self.size = 0
+        self.size = self.checksum = 0
 
     def append(self, arrays: Iterable[np.ndarray]) -> None:
         """Append the values of a block, for each variable (realization, ...)."""
+        checksum = self.checksum
         with self._rows.open("r+b" if self.size else "wb") as file:
             file.seek(self.size)
-            file.writelines(np.ascontiguousarray(array).reshape(-1).view(np.uint8).data for array in arrays)
+            for array in arrays:
+                values = np.ascontiguousarray(array).reshape(-1).view(np.uint8).data
+                file.write(values)
+                checksum = zlib.crc32(values, checksum)
             size = file.tell()
-        self.size = size
+        self.size, self.checksum = size, checksum
 
     def write_checkpoint(self, checkpoint: Checkpoint) -> None:
         """Replace the checkpoint."""
@@ -61,16 +69,41 @@ class Journal:
             np.savez(file, *checkpoint.sums, state=checkpoint[:-1])
 
     def checkpoint(self, archive: str) -> Checkpoint | None:
-        """Return the last checkpoint of a killed run on the archive of that history; None if there is none."""
+        """Return the last checkpoint of a killed run on the archive of that history; None if there is none.
+
+        Raises ArchiveError if it is damaged, or if the journal is: some of its realizations are lost.
+        """
         try:
             with np.load(self._checkpoint) as file:
                 of_archive, *numbers = file["state"].tolist()
-                rows, size, samples = map(int, numbers)
+                rows, size, checksum, samples = map(int, numbers)
                 sums = [file[f"arr_{number}"] for number in range(len(file.files) - 1)]
-            is_valid = of_archive == archive and size <= self._rows.stat().st_size
-        except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+        except FileNotFoundError:
             return None
-        return Checkpoint(archive, rows, size, samples, sums) if is_valid else None
+        except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+            raise self._damaged(self._checkpoint) from error
+        if of_archive != archive:
+            return None
+        if self._checksum(size) != checksum:
+            raise self._damaged(self._rows)
+        return Checkpoint(archive, rows, size, checksum, samples, sums)
+
+    def _checksum(self, size: int) -> int | None:
+        """Return the CRC-32 of the first `size` bytes of the journal; None if it does not have as many."""
+        checksum = 0
+        try:
+            with self._rows.open("rb") as file:
+                while size > 0 and (values := file.read(min(size, WRITTEN_BYTES))):
+                    checksum, size = zlib.crc32(values, checksum), size - len(values)
+        except FileNotFoundError:
+            return None
+        return checksum if size == 0 else None
+
+    def _damaged(self, path: Path) -> ArchiveError:
+        return ArchiveError(
+            f'"{path}" is damaged: it has realizations of a killed run that are not in the archive yet; delete '
+            f'"{self._rows.name}" and "{self._checkpoint.name}", and resume: they are simulated again'
+        )
 
     def put_into(self, file: netCDF4.Dataset, start: int, stop: int) -> None:
         """Write the realizations `start` to `stop`, the first ones in the journal, to an archive."""
@@ -90,7 +123,7 @@ class Journal:
 
     def remove(self) -> None:
         """Remove the files."""
-        self.size = 0
+        self.size = self.checksum = 0
         remove_abandoned(self._checkpoint)
         self._checkpoint.unlink(missing_ok=True)
         self._rows.unlink(missing_ok=True)

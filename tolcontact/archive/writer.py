@@ -74,7 +74,7 @@ class ArchiveWriter:
             self.rows = self._start_row = int(file[terms.SUMMED_ROWS.name][...])
             self.samples, self._block_rows = max(run.samples, int(file.samples)), int(file.block_rows)
             sums = [file[terms.field_of(part)][terms.FIELD_SUMS.name][...] for part in self._parts]
-            self._checkpoint = Checkpoint(file.history, self.rows, 0, self.samples, sums if self.rows else [])
+            self._checkpoint = Checkpoint(file.history, self.rows, 0, 0, self.samples, sums if self.rows else [])
         self._journal = Journal(path, self.kept, self._block_rows)
 
     def _take_journal(self) -> None:
@@ -119,7 +119,11 @@ class ArchiveWriter:
     def write_checkpoint(self, sums: Sequence[np.ndarray]) -> None:
         """Write the sums of the fields (state, number) for each part so far, so that a killed run can continue."""
         self._checkpoint = self._checkpoint._replace(
-            rows=self.rows, size=self._journal.size, samples=self.samples, sums=[array.copy() for array in sums]
+            rows=self.rows,
+            size=self._journal.size,
+            checksum=self._journal.checksum,
+            samples=self.samples,
+            sums=[array.copy() for array in sums],
         )
         with _as_archive_error(self._path):
             self._journal.write_checkpoint(self._checkpoint)
