@@ -1,6 +1,7 @@
 """The choice between fixed planes and bounded faces for each pair: a trial at raw poses when the model is compiled."""
 
 import warnings
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
@@ -8,10 +9,14 @@ import numpy as np
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
+from tolcontact.compilation.functions import NamedFunction
 from tolcontact.discretization import ContactPoints, Nominal, raised_places
 from tolcontact.errors import ContactWarning, ModelError, shown
 from tolcontact.geometry.meeting import Meeting, Reach, meeting
 from tolcontact.interference import Watch
+from tolcontact.mechanics.groups import Group
+from tolcontact.method import Method
+from tolcontact.variation import Draws
 
 TRIALS = 1024  # raw poses
 TRIAL_SEED = 2_718_281_828
@@ -36,6 +41,32 @@ class Trial(NamedTuple):
     max_points: int = 0
 
 
+def bounded_pairs(
+    watch: Watch, groups: Sequence[Group], draws: Draws, place: NamedFunction, observe: NamedFunction, method: Method
+) -> tuple[dict[int, Meeting], dict[int, Trial]]:
+    """Decide by trial draws which pairs need bounded faces: return their meetings, and the trials of all pairs of faces.
+
+    Both are empty unless the search is bounded.
+    """
+    nominal = watch.nominal
+    if not nominal.pairs or not method.is_bounded:
+        return {}, {}
+    deviations = draws(seed=TRIAL_SEED, start=0, stop=TRIALS)
+    poses = place(deviations=deviations)["poses"]
+    relative = observe(poses=poses, deviations=deviations)["relative"].reshape(len(poses), len(nominal.pairs), pose.ENTRIES)
+    is_finite = np.isfinite(relative).all(axis=(1, 2))
+    relative, deviations, presses = relative[is_finite], deviations[is_finite], method.minimizes.presses
+    pushes = [push(pair, relative[:, k], deviations, presses=presses) for k, pair in enumerate(nominal.pairs)]
+    decisions = {}
+    for group in groups:
+        pushed = sum(pushes[k] for k in group.pairs)
+        for k in group.pairs:
+            room = pushed if presses else pushed - pushes[k]
+            decisions[k] = _bounded_pair(watch, k, relative[:, k], deviations, pushed=pushed, room=room)
+    meetings = {k: meeting for k, (meeting, _) in decisions.items() if meeting is not None}
+    return meetings, {k: trial for k, (_, trial) in decisions.items()}
+
+
 def push(pair: ContactPoints, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"], *, presses: bool) -> float:
     """Return how far [mm] contact of a pair may push its parts, from raw trial poses X_RM (n, 12).
 
@@ -46,7 +77,7 @@ def push(pair: ContactPoints, X_RM: Float[Array, "n 12"], deviations: Float[Arra
     return depth + (clearance(pair) if presses else 0.0)
 
 
-def bounded_pair(
+def _bounded_pair(
     watch: Watch,
     index: int,
     X_RM: Float[Array, "n 12"],

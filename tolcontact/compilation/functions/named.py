@@ -211,9 +211,13 @@ class AdaptiveFunction:
 
 
 class NamedFunction:
-    """A Function of scalar expressions for many realizations at once: the first dimension of every array."""
+    """A Function of scalar expressions for many realizations at once: the first dimension of every array.
+
+    function   the Function that is evaluated; its machine code only saves time
+    """
 
     def __init__(self, function: ca.Function) -> None:
+        self.function = function
         self._names, self._results = function.name_in(), function.name_out()
         self._evaluate = AdaptiveFunction(function)
 
