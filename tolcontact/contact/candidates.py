@@ -32,7 +32,7 @@ BULGE_SHARE = 1 / 2500  # of the same: accepted penetration of planes with form 
 MIN_BULGE = 1e-7  # mm
 OVERHANG_SHARE = 0.01  # of their radius: overhang beyond a wall at which balls and shafts that travelled far may be active
 
-FREE_DEPTH = 1e-3  # mm: the largest penetration of free bodies
+FREE_SHARE = 1e-3  # of the smallest tolerance range: the largest penetration of free bodies
 
 
 def _lies_between(labels: Int[Array, "n k"]) -> Bool[Array, "n k"]:
@@ -75,8 +75,9 @@ class Carriers(NamedTuple):
 class Candidates:
     """The contact points of a group, with X_RM of its pairs as (realization, pair, 12).
 
-    bounded   the meetings of pairs whose places are found at every pose, by their index in the group
-    guards    guards of these pairs, one for each two bodies: the guard of their first pair
+    bounded      the meetings of pairs whose places are found at every pose, by their index in the group
+    guards       guards of these pairs, one for each two bodies: the guard of their first pair
+    free_depth   [mm]: the largest penetration of free bodies
     """
 
     def __init__(self, program: Program, group: ContactGroup) -> None:
@@ -103,6 +104,7 @@ class Candidates:
             self._carrying_scans.append(pair_scan(pair, gaps, (), clusters, gaps.corners) if corners else self._all_scans[-1])
         smallest = program.nominal.assembly.smallest_zone()
         self._with_form = [k for k, pair in enumerate(self._pairs) if pair.has_form]
+        self.free_depth = FREE_SHARE * smallest
         self._edge_error, self._bulge = EDGE_SHARE * smallest, max(BULGE_SHARE * smallest, MIN_BULGE)
         self._allowed_bulge = max(ALLOWED_SHARE * smallest, 2 * MIN_BULGE)
         searches = self._method.is_exact and self._method.is_closed
@@ -138,9 +140,9 @@ class Candidates:
         persist slightly beyond their edges, up to `width` times the limit for an answer, unless the realization is `at_rest`.
         If the `start` is guarded, bodies that interfere where no place shows it get one more place (see Guard), which persists
         if it is in the `answered` slots. If it is parted, places separate convex bodies only in the best direction (see
-        Parting). If it is free, places deeper than `deepest` (realization,) [mm], FREE_DEPTH by default, are on the far side of
-        a body and do not count; its steps include places slightly beyond their edges, so that a corner in a valley meets both
-        sides of the valley.
+        Parting). If it is free, places deeper than `deepest` (realization,) [mm], `free_depth` by default, are on the far side
+        of a body and do not count; its steps include places slightly beyond their edges, so that a corner in a valley meets
+        both sides of the valley.
         With `projected`, points against curved faces are projected again. `earlier` are scans with the sums of heights.
         """
         scans = list(self._carrying_scans)
@@ -164,7 +166,7 @@ class Candidates:
             nearness, guard = NEARNESS if width == 1 else np.inf, self.guards.get(k) if start.guarded else None
             depth = self._bulge if k in self._with_minima else np.inf
             parting = self.partings.get(k) if start.parted else None
-            limits = np.full(len(relative), FREE_DEPTH) if start.free and deepest is None else deepest
+            limits = np.full(len(relative), self.free_depth) if start.free and deepest is None else deepest
             scans[k] = bounded_scan(
                 scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness, depth, guard, parting,
                 carried, limits,

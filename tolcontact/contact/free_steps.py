@@ -8,7 +8,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.acceptance import AcceptanceLimits
-from tolcontact.contact.candidates import FREE_DEPTH, Candidates
+from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.linear_step import LinearStep
 from tolcontact.contact.scan import min_gaps
 from tolcontact.contact.starts import FREE_WHERE_RAW, STRIDE
@@ -64,7 +64,7 @@ class FreeSteps:
         """Halve steps until no body penetrates another one and the objective is lower; return which are short (n,)."""
         shares = np.ones(len(task))
         rows = np.flatnonzero(np.isfinite(before.poses).all(axis=(1, 2)) & np.isfinite(state.poses).all(axis=(1, 2)))
-        depths = self._depths(task, before.relative, np.full(len(task), FREE_DEPTH))
+        depths = self._depths(task, before.relative, np.full(len(task), self._candidates.free_depth))
         enters = ~self._candidates.interfere(before.relative)
         objective = self._energy(task, before) * (1 + GAIN_SHARE)
         objective[(depths > TOUCHING) | ~enters] = np.inf

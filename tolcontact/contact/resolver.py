@@ -14,7 +14,7 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ACCURACY, ContactGroup, Program
 from tolcontact.contact.acceptance import MAX_TURN, AcceptanceLimits
-from tolcontact.contact.candidates import FREE_DEPTH, Candidates
+from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.free_steps import FreeSteps
 from tolcontact.contact.iterated_search import search
 from tolcontact.contact.linear_step import MAX_ROUNDS, PENETRATION, LinearStep
@@ -198,7 +198,7 @@ class ContactResolver:
         """Return the realizations (k,) of a rescue (see Rescue)."""
         interfere = self._candidates.interfere
         if which == "apart":
-            rows = np.flatnonzero((raw_gap < -FREE_DEPTH).any(axis=1) & (not self._method.minimizes.presses))
+            rows = np.flatnonzero((raw_gap < -self._candidates.free_depth).any(axis=1) & (not self._method.minimizes.presses))
             return rows[~interfere(task.relative[rows])]
         if which == "interfere":
             rows = np.flatnonzero(state.doubtful)
