@@ -42,8 +42,8 @@ inlined_inner = functools.partial(compiled, counts=False, inline=True, inner=Tru
 def _without_counts() -> dict[str, bool]:
     """Return Numba's option for code without reference counts, as on graphics processors; none if this version has none.
 
-    The option is not public. Without it, exact runs of models/ra1.py take 1.6 times as long with the graph solver, and 1.5 times
-    as long for models/tower.py (CPU time, Numba 0.68); linearized runs take as long as with it.
+    The option is not public. Without it, the graph solver takes 1.6 times as long for exact runs of models/ra1.py, and 1.5
+    times for models/tower.py (CPU time of a block, Numba 0.68); linearized runs of models/cells.py and ra2.py take as long.
     """
     option = {"_nrt": False}
     try:

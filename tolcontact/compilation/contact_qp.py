@@ -89,13 +89,8 @@ class ContactQP:
     @property
     def spans(self) -> list[slice]:
         """The range of rows of each pair in the group."""
-        return row_spans(self.standing)
-
-
-def row_spans(standing: Standing) -> list[slice]:
-    """Return the range of rows of each pair in the group."""
-    ends = np.cumsum([0, *(_row_count(points) for points in standing)])
-    return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
+        ends = np.cumsum([0, *(_row_count(points) for points in self.standing)])
+        return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
 
 
 def _row_count(points: np.ndarray | int) -> int:

@@ -165,7 +165,6 @@ class AdaptiveFunction:
 
     def __init__(self, function: ca.Function) -> None:
         self._function = function
-        self.sizes_out = [function.nnz_out(i) for i in range(function.n_out())]
         self.native: NativeFunction | None = None
         compiled, executed = _instructions(function)
         self._may_be_compiled = compiled <= MAX_INSTRUCTIONS
@@ -214,17 +213,12 @@ class NamedFunction:
     """A Function of scalar expressions for many realizations at once: the first dimension of every array.
 
     function   the Function that is evaluated; its machine code only saves time
+    names      the names of its inputs
     """
 
     def __init__(self, function: ca.Function) -> None:
-        self.function = function
-        self._names, self._results = function.name_in(), function.name_out()
+        self.function, self.names, self._results = function, function.name_in(), function.name_out()
         self._evaluate = AdaptiveFunction(function)
-
-    @property
-    def names(self) -> list[str]:
-        """The names of its inputs."""
-        return self._names
 
     @classmethod
     def dense(cls, function: ca.Function) -> "NamedFunction":
@@ -238,7 +232,7 @@ class NamedFunction:
 
         Arrays with other names are ignored.
         """
-        outputs = self._evaluate([flat(arrays[name]) for name in self._names])
+        outputs = self._evaluate([flat(arrays[name]) for name in self.names])
         return dict(zip(self._results, outputs, strict=True))
 
 
