@@ -1,5 +1,6 @@
-"""Fixtures of several test modules; and the shapes of arrays, which are checked in all tests but the slow ones."""
+"""Fixtures of several test modules; and the shapes of arrays, which are checked in the tests of some modules."""
 
+import gc
 import shutil
 import subprocess
 import sys
@@ -22,6 +23,20 @@ CHECKED = [
     if file.name != "__init__.py" and not file.name.endswith("kernel.py")
 ]
 install_import_hook(CHECKED, "beartype.beartype(conf=beartype.BeartypeConf(is_pep484_tower=True))")
+# Modules whose tests call the functions of these rooms in every way: flat, round and springy contact, stations, form.
+CHECKING = {
+    f"test_{name}"
+    for name in (
+        "contact", "contact_points", "engine", "ends", "floating", "form", "free_steps", "graph_solver", "interference",
+        "other_starts", "round_contact", "round_objective", "seating", "springs", "stations", "threads",
+    )
+}  # fmt: skip
+
+
+def pytest_collection_finish():
+    """Take the modules and the tests out of the garbage collector's sight: nothing frees them before the end."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_addoption(parser):
@@ -51,8 +66,9 @@ def archive(tmp_path_factory):
 
 @pytest.fixture(autouse=True)
 def shapes_are_checked(request):
-    """Checking takes half as long again where there are many small calls, so the slow tests go without."""
-    config.update("jaxtyping_disable", request.node.get_closest_marker("slow") is not None)
+    """Checking takes half as long again where there are many small calls: not in slow tests, nor in other modules."""
+    checks = request.module.__name__.rpartition(".")[2] in CHECKING and not request.node.get_closest_marker("slow")
+    config.update("jaxtyping_disable", not checks)
     yield
     config.update("jaxtyping_disable", False)
 

@@ -126,7 +126,7 @@ def told(make, **options):
     """A simulation, and what it warned of."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", tc.NominalWarning)
-        program, run = simulate(make, **options)
+        program, run = simulate(make, build=tc.build, **options)
     return program, run, [text for one in caught if (text := str(one.message)).startswith("[coarse]")]
 
 
