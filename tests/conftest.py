@@ -1,6 +1,7 @@
 """Fixtures of several test modules; and the shapes of arrays, which are checked in the tests of some modules."""
 
 import gc
+import json
 import shutil
 import subprocess
 import sys
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from jaxtyping import config, install_import_hook
+from playwright.sync_api import sync_playwright
 
 PACKAGE = Path(__file__).resolve().parents[1] / "tolcontact"
 ROOMS = (
@@ -79,6 +81,44 @@ def drawing():
     script = "import pyvista as pv; p = pv.Plotter(off_screen=True); p.add_mesh(pv.Sphere()); p.screenshot(return_img=True)"
     if subprocess.run([sys.executable, "-c", script], capture_output=True, timeout=120, check=False).returncode:
         pytest.skip("there is no OpenGL")
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """A browser for all tests of a file. It cannot stay longer: its event loop runs in this thread until it ends."""
+    if (chromium := shutil.which("chromium")) is None:
+        pytest.skip("there is no Chromium")
+    with sync_playwright() as driver:
+        options = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+        options += ["--disable-background-networking", "--disable-component-update", "--disable-sync", "--no-first-run"]
+        opened = driver.chromium.launch(executable_path=chromium, args=options)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def open_page(browser):
+    """Opens a page, of a width; what it complains of, or asks the network for, fails the test."""
+    wrong, pages = [], []
+
+    def open_(path, width=1280, drawn="#scene"):
+        opened = browser.new_page(viewport={"width": width, "height": 900})
+        pages.append(opened)
+        opened.on("console", lambda message: wrong.append(message.text))
+        opened.on("pageerror", lambda error: wrong.append(str(error)))
+        opened.on("dialog", lambda dialog: wrong.append(dialog.message))
+        opened.on(
+            "request", lambda request: request.url == path.as_uri() or request.url[:5] == "blob:" or wrong.append(request.url)
+        )
+        opened.goto(path.as_uri())
+        opened.wait_for_selector(drawn)
+        opened.wait_for_function(f"window.viewer !== undefined || {json.dumps(drawn)} !== '#scene'")
+        return opened
+
+    yield open_
+    for opened in pages:
+        opened.close()
+    assert not wrong
 
 
 READ = "-all,+dac_read_search"  # everything may be read
