@@ -32,12 +32,14 @@ def largest_turn(run):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("wedges", "solver"), [(3, "daqp"), *nightly((3, "qpoases"), (6, "daqp"))])
-def test_a_ring_closes_where_its_angles_leave_room(wedges, solver):
+@pytest.mark.parametrize(
+    ("wedges", "solver", "samples"), [(3, "daqp", 100), *nightly((3, "daqp", 400), (3, "qpoases", 400), (6, "daqp", 400))]
+)
+def test_a_ring_closes_where_its_angles_leave_room(wedges, solver, samples):
     """The excess of an impossible ring is left over, shared by the joints, to the second order of the angles."""
-    program, run = simulate(cases.hinged_ring(wedges), samples=400, solver=solver, method=SEATED)
+    program, run = simulate(cases.hinged_ring(wedges), samples=samples, solver=solver, method=SEATED)
     excess = cases.excess_of_hinged_ring(program.nominal, run["deviations"])
-    assert 40 < (excess > 0).sum() < 120
+    assert samples / 10 < (excess > 0).sum() < samples * 3 / 10
     assert ((run["status"] == Status.NOT_ASSEMBLABLE) == (excess > 0)).all()
     assert ((run["status"] == Status.RESOLVED) == (excess <= 0)).all()
     assert largest_turn(run)[run["status"] == Status.RESOLVED].max() < SEATED.near_turn
@@ -48,14 +50,14 @@ def test_a_ring_closes_where_its_angles_leave_room(wedges, solver):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("one_sided", [0, 1, 3])
-@pytest.mark.parametrize("width", [0.2, *nightly(0.02)])
-def test_a_block_that_its_locators_hold_in_a_wall_is_not_assemblable(width, one_sided):
-    runs = [simulate(cases.block_on_six(width, one_sided), samples=100, solver=s, method=SEATED)[1] for s in SOLVERS]
+@pytest.mark.parametrize(("width", "samples"), [(0.2, 40), *nightly((0.2, 100), (0.02, 100))])
+def test_a_block_that_its_locators_hold_in_a_wall_is_not_assemblable(width, samples, one_sided):
+    runs = [simulate(cases.block_on_six(width, one_sided), samples=samples, solver=s, method=SEATED)[1] for s in SOLVERS]
     for run in runs:
         assert (run["status"] == runs[0]["status"]).all()
         assert np.isin(run["status"], [Status.RESOLVED, Status.NOT_ASSEMBLABLE]).all()
         assert largest_turn(run).max() < 0.01
-    assert (runs[0]["status"] == Status.NOT_ASSEMBLABLE).sum() > 50
+    assert (runs[0]["status"] == Status.NOT_ASSEMBLABLE).sum() > samples / 2
     assert np.abs(runs[0]["poses"] - runs[1]["poses"]).max() < 1e-6
 
 
