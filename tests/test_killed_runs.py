@@ -36,7 +36,7 @@ def test_a_killed_run_keeps_its_rows_and_goes_on(after, keep, tmp_path):
         assert contents(path, group).identical(contents(whole, group)), group
 
 
-@pytest.mark.parametrize("step", [150, *nightly(15)])
+@pytest.mark.parametrize("step", [250, *nightly(15)])
 def test_a_run_may_be_killed_at_any_of_its_writes(step, tmp_path):
     done = run(script("kill_at_each_write", tmp_path, step))
     assert done.returncode == 0, done.stderr
