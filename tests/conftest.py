@@ -66,6 +66,22 @@ def archive(tmp_path_factory):
     return path
 
 
+@pytest.fixture(scope="session", autouse=True)
+def forked_reader():
+    """Archives are inspected by forks of one process, where a test does not change the environment."""
+    from tests.forked_reader import ForkedReader  # noqa: PLC0415  (the hook must be there first)
+
+    reader, run = ForkedReader(), subprocess.run
+
+    def run_or_fork(command, *arguments, **options):
+        return reader.run(command) if reader.reads(command, options) else run(command, *arguments, **options)
+
+    subprocess.run = run_or_fork
+    yield reader
+    subprocess.run = run
+    reader.close()
+
+
 @pytest.fixture(autouse=True)
 def shapes_are_checked(request):
     """Checking takes half as long again where there are many small calls: not in slow tests, nor in other modules."""

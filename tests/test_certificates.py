@@ -50,14 +50,14 @@ def test_a_ring_closes_where_its_angles_leave_room(wedges, solver, samples):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("one_sided", [0, 1, 3])
-@pytest.mark.parametrize(("width", "samples"), [(0.2, 40), *nightly((0.2, 100), (0.02, 100))])
-def test_a_block_that_its_locators_hold_in_a_wall_is_not_assemblable(width, samples, one_sided):
-    runs = [simulate(cases.block_on_six(width, one_sided), samples=samples, solver=s, method=SEATED)[1] for s in SOLVERS]
+@pytest.mark.parametrize("width", [0.2, *nightly(0.02)])
+def test_a_block_that_its_locators_hold_in_a_wall_is_not_assemblable(width, one_sided):
+    runs = [simulate(cases.block_on_six(width, one_sided), samples=100, solver=s, method=SEATED)[1] for s in SOLVERS]
     for run in runs:
         assert (run["status"] == runs[0]["status"]).all()
         assert np.isin(run["status"], [Status.RESOLVED, Status.NOT_ASSEMBLABLE]).all()
         assert largest_turn(run).max() < 0.01
-    assert (runs[0]["status"] == Status.NOT_ASSEMBLABLE).sum() > samples / 2
+    assert (runs[0]["status"] == Status.NOT_ASSEMBLABLE).sum() > 50
     assert np.abs(runs[0]["poses"] - runs[1]["poses"]).max() < 1e-6
 
 
