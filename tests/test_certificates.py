@@ -103,10 +103,10 @@ def test_what_a_solver_misses_another_one_answers():
 def test_far_answers_are_not_certified():
     """The limit is the method's: at half a degree hardly any answer of a tower is near."""
     strict = replace(ALL_POINTS, near_turn=np.radians(0.5))
-    _, free = simulate(cases.model("tower"), samples=50, solver="daqp", method=ALL_POINTS)
-    _, run = simulate(cases.model("tower"), samples=50, solver="daqp", method=strict)
+    _, free = simulate(cases.model("tower"), samples=25, solver="daqp", method=ALL_POINTS)
+    _, run = simulate(cases.model("tower"), samples=25, solver="daqp", method=strict)
     far = largest_turn(free) > strict.near_turn
-    assert far.sum() > 5
+    assert far.sum() > 2
     assert (run["status"][far] == Status.DOUBTFUL).all() and (run["starts"][far] == 5).all()
     assert (run["status"][~far] == free["status"][~far]).all()
     assert largest_turn(run)[run["status"] == Status.RESOLVED].max() <= strict.near_turn
