@@ -236,8 +236,8 @@ def test_nothing_contradicts_a_certificate(seed):
             warnings.filterwarnings("ignore", r"\[coarse\]", tc.NominalWarning)
             try:
                 program, run = simulate(assembly, samples=30, solver=solver, method=method)
-            except tc.TolcontactError:
-                return
+            except tc.TolcontactError as error:
+                pytest.skip(f"the scene is refused: {error}")
         assert not +contradictions(program, run)
         runs.append(run)
     both = np.isin(runs[0]["status"], [0, 1]) & np.isin(runs[1]["status"], [0, 1])
