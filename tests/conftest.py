@@ -1,5 +1,7 @@
-"""Fixtures of several test modules; and the shapes of arrays, which are checked in all tests but the slow ones."""
+"""Fixtures of several test modules; and the shapes of arrays, which are checked in the tests of some modules."""
 
+import gc
+import json
 import shutil
 import subprocess
 import sys
@@ -7,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from jaxtyping import config, install_import_hook
+from playwright.sync_api import sync_playwright
 
 PACKAGE = Path(__file__).resolve().parents[1] / "tolcontact"
 ROOMS = (
@@ -22,6 +25,20 @@ CHECKED = [
     if file.name != "__init__.py" and not file.name.endswith("kernel.py")
 ]
 install_import_hook(CHECKED, "beartype.beartype(conf=beartype.BeartypeConf(is_pep484_tower=True))")
+# Modules whose tests call the functions of these rooms in every way: flat, round and springy contact, stations, form.
+CHECKING = {
+    f"test_{name}"
+    for name in (
+        "contact", "contact_points", "engine", "ends", "floating", "form", "free_steps", "graph_solver", "interference",
+        "other_starts", "round_contact", "round_objective", "seating", "springs", "stations", "threads",
+    )
+}  # fmt: skip
+
+
+def pytest_collection_finish():
+    """Take the modules and the tests out of the garbage collector's sight: nothing frees them before the end."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_addoption(parser):
@@ -49,10 +66,27 @@ def archive(tmp_path_factory):
     return path
 
 
+@pytest.fixture(scope="session", autouse=True)
+def forked_reader():
+    """Archives are inspected by forks of one process, where a test does not change the environment."""
+    from tests.forked_reader import ForkedReader  # noqa: PLC0415  (the hook must be there first)
+
+    reader, run = ForkedReader(), subprocess.run
+
+    def run_or_fork(command, *arguments, **options):
+        return reader.run(command) if reader.reads(command, options) else run(command, *arguments, **options)
+
+    subprocess.run = run_or_fork
+    yield reader
+    subprocess.run = run
+    reader.close()
+
+
 @pytest.fixture(autouse=True)
 def shapes_are_checked(request):
-    """Checking takes half as long again where there are many small calls, so the slow tests go without."""
-    config.update("jaxtyping_disable", request.node.get_closest_marker("slow") is not None)
+    """Checking takes half as long again where there are many small calls: not in slow tests, nor in other modules."""
+    checks = request.module.__name__.rpartition(".")[2] in CHECKING and not request.node.get_closest_marker("slow")
+    config.update("jaxtyping_disable", not checks)
     yield
     config.update("jaxtyping_disable", False)
 
@@ -63,6 +97,44 @@ def drawing():
     script = "import pyvista as pv; p = pv.Plotter(off_screen=True); p.add_mesh(pv.Sphere()); p.screenshot(return_img=True)"
     if subprocess.run([sys.executable, "-c", script], capture_output=True, timeout=120, check=False).returncode:
         pytest.skip("there is no OpenGL")
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """A browser for all tests of a file. It cannot stay longer: its event loop runs in this thread until it ends."""
+    if (chromium := shutil.which("chromium")) is None:
+        pytest.skip("there is no Chromium")
+    with sync_playwright() as driver:
+        options = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+        options += ["--disable-background-networking", "--disable-component-update", "--disable-sync", "--no-first-run"]
+        opened = driver.chromium.launch(executable_path=chromium, args=options)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def open_page(browser):
+    """Opens a page, of a width; what it complains of, or asks the network for, fails the test."""
+    wrong, pages = [], []
+
+    def open_(path, width=1280, drawn="#scene"):
+        opened = browser.new_page(viewport={"width": width, "height": 900})
+        pages.append(opened)
+        opened.on("console", lambda message: wrong.append(message.text))
+        opened.on("pageerror", lambda error: wrong.append(str(error)))
+        opened.on("dialog", lambda dialog: wrong.append(dialog.message))
+        opened.on(
+            "request", lambda request: request.url == path.as_uri() or request.url[:5] == "blob:" or wrong.append(request.url)
+        )
+        opened.goto(path.as_uri())
+        opened.wait_for_selector(drawn)
+        opened.wait_for_function(f"window.viewer !== undefined || {json.dumps(drawn)} !== '#scene'")
+        return opened
+
+    yield open_
+    for opened in pages:
+        opened.close()
+    assert not wrong
 
 
 READ = "-all,+dac_read_search"  # everything may be read

@@ -14,10 +14,12 @@ import xarray as xr
 
 import tolcontact as tc
 from tolcontact.cli import command_line
-from tolcontact.compilation import ContactGroup
+from tolcontact.compilation import ContactGroup, compile_program
 from tolcontact.compilation.contact_qp import contact_qp
 from tolcontact.compilation.contact_solver import ContactSolver
+from tolcontact.discretization import discretize
 from tolcontact.simulation import Block, simulate_blocks
+from tolcontact.workflow.models import DEFAULT_SOLVER, assembly_of, method_of
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = ROOT / "tests" / "scripts"
@@ -38,9 +40,16 @@ def nightly(*values):
     return [pytest.param(*(value if isinstance(value, tuple) else (value,)), marks=pytest.mark.nightly) for value in values]
 
 
-def simulate(assembly, samples=200, seed=1, block=1000, **options):
+def compiled(model, *, solver=DEFAULT_SOLVER, method=None):
+    """The program of a model, as of `tc.build`, without the check of the nominal assembly, which resolves 128 realizations."""
+    assembly = assembly_of(model)
+    choice = method_of(assembly, method)
+    return compile_program(discretize(assembly, presses=choice.minimizes.presses), solver, choice)
+
+
+def simulate(model, samples=200, seed=1, block=1000, build=compiled, **options):
     """The program, and its blocks joined to one: arrays by name."""
-    program = tc.build(assembly, **options)
+    program = build(model, **options)
     return program, joined(simulate_blocks(program, samples=samples, seed=seed, block=block))
 
 

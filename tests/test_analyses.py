@@ -1,6 +1,8 @@
 """Analyses kept in archives, and what the page shows of them."""
 
 import json
+import shutil
+from pathlib import Path
 
 import netCDF4
 import numpy as np
@@ -18,11 +20,17 @@ from tolcontact.vocabulary import ANALYSES
 FAST = {"solver": "daqp", "method": PAPER}
 
 
-@pytest.fixture
-def archive(tmp_path):
-    path = tmp_path / "ra1.nc"
+@pytest.fixture(scope="module")
+def run_of_ra1(tmp_path_factory):
+    path = tmp_path_factory.mktemp("ra1") / "ra1.nc"
     tc.run(cases.ra1(), samples=300, out=path, surfaces=4, fields=64, **FAST).close()
     return path
+
+
+@pytest.fixture
+def archive(run_of_ra1, tmp_path):
+    """A copy, to be changed."""
+    return Path(shutil.copy(run_of_ra1, tmp_path))
 
 
 @pytest.mark.slow

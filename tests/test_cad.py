@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import COMMAND, ROOT, run
+from tests.helpers import ROOT, call
 from tests.step_files import assembly, step_block
 from tolcontact.cli.app import app
 from tolcontact.discretization import discretize
@@ -263,13 +263,13 @@ def test_check_and_bodies_state_sizes_along_the_same_axes(tmp_path):
     assert dict(re.findall(r"  part (.*): (.*) mm along x, y, z of the assembly, \d+ triangles", checked)) == sizes
 
 
-def test_a_wrong_body_has_a_message_that_lists_the_bodies(file):
+def test_a_wrong_body_has_a_message_that_lists_the_bodies(file, tmp_path):
     for options, message in (
         (["--body", "use 9"], "holds no body 'use 9'; it holds 5: 1. "),
         (["--body", "99"], "holds no body 99; it holds 5: 1. "),
         ([], '--body "..."'),
     ):
-        finished = run([*COMMAND, "faces", str(file), *options])
+        finished = call(tmp_path, "faces", file, *options)
         assert finished.returncode == 2
         assert message in finished.stderr and '"use 2"' in finished.stderr
 

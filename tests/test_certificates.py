@@ -33,12 +33,14 @@ def largest_turn(run):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("wedges", "solver"), [(3, "daqp"), *nightly((3, "qpoases"), (6, "daqp"))])
-def test_a_ring_closes_where_its_angles_leave_room(wedges, solver):
+@pytest.mark.parametrize(
+    ("wedges", "solver", "samples"), [(3, "daqp", 50), *nightly((3, "daqp", 400), (3, "qpoases", 400), (6, "daqp", 400))]
+)
+def test_a_ring_closes_where_its_angles_leave_room(wedges, solver, samples):
     """The excess of an impossible ring is left over, shared by the joints, to the second order of the angles."""
-    program, run = simulate(cases.hinged_ring(wedges), samples=400, solver=solver, method=SEATED)
+    program, run = simulate(cases.hinged_ring(wedges), samples=samples, solver=solver, method=SEATED)
     excess = cases.excess_of_hinged_ring(program.nominal, run["deviations"])
-    assert 40 < (excess > 0).sum() < 120
+    assert samples / 10 < (excess > 0).sum() < samples * 3 / 10
     assert ((run["status"] == Status.NOT_ASSEMBLABLE) == (excess > 0)).all()
     assert ((run["status"] == Status.RESOLVED) == (excess <= 0)).all()
     assert largest_turn(run)[run["status"] == Status.RESOLVED].max() < MAX_TURN
@@ -102,11 +104,11 @@ def test_what_a_solver_misses_another_one_answers():
 def test_far_answers_are_not_certified():
     """With a limit of half a degree, hardly any answer of a tower is near."""
     max_turn = np.radians(0.5)
-    program, free = simulate(cases.model("tower"), samples=50, solver="daqp", method=ALL_POINTS)
+    program, free = simulate(cases.model("tower"), samples=25, solver="daqp", method=ALL_POINTS)
     resolvers = [ContactResolver(program, group, max_turn=max_turn) for group in program.groups]
     run = vars(simulate_block(program, free["deviations"], resolvers=resolvers))
     far = largest_turn(free) > max_turn
-    assert far.sum() > 5
+    assert far.sum() > 2
     assert (run["status"][far] == Status.DOUBTFUL).all() and (run["starts"][far] == 5).all()
     assert (run["status"][~far] == free["status"][~far]).all()
     assert largest_turn(run)[run["status"] == Status.RESOLVED].max() <= max_turn
@@ -122,7 +124,7 @@ def told(make, **options):
     """A simulation, and what it warned of."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", tc.NominalWarning)
-        program, run = simulate(make, **options)
+        program, run = simulate(make, build=tc.build, **options)
     return program, run, [text for one in caught if (text := str(one.message)).startswith("[coarse]")]
 
 
@@ -230,8 +232,8 @@ def test_nothing_contradicts_a_certificate(seed):
             warnings.filterwarnings("ignore", r"\[coarse\]", tc.NominalWarning)
             try:
                 program, run = simulate(assembly, samples=30, solver=solver, method=method)
-            except tc.TolcontactError:
-                return
+            except tc.TolcontactError as error:
+                pytest.skip(f"the scene is refused: {error}")
         assert not +contradictions(program, run)
         runs.append(run)
     both = np.isin(runs[0]["status"], [0, 1]) & np.isin(runs[1]["status"], [0, 1])

@@ -11,7 +11,7 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import call, nightly
 from tests.test_plans import clipped
-from tests.test_report import browser, data_of, needs_browser, open_page  # noqa: F401 (fixtures)
+from tests.test_report import data_of
 from tolcontact.report import write_comparison
 from tolcontact.statistics import two_samples
 from tolcontact.statistics.sample import Sample
@@ -190,9 +190,8 @@ def test_runs_without_a_measure_in_common_are_refused(runs):
 
 
 @pytest.mark.slow
-@needs_browser
 @pytest.mark.parametrize("width", [390, *nightly(1280)])
-def test_the_page_of_a_comparison_is_read(runs, width, tmp_path, open_page):  # noqa: F811 (a fixture)
+def test_the_page_of_a_comparison_is_read(runs, width, tmp_path, open_page):
     odd = {"<img src=x onerror=alert(1)>": runs["one"], **{name: runs[name] for name in ("higher", "other")}}
     write_comparison(odd, tc.compare_runs(odd), tmp_path / "runs.html")
     opened = open_page(tmp_path / "runs.html", width, drawn=".js-plotly-plot")

@@ -8,7 +8,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.test_report import browser, data_of, needs_browser, open_page  # noqa: F401 (fixtures)
+from tests.test_report import data_of
 from tolcontact.report import write_page
 from tolcontact.statistics import touching
 from tolcontact.statistics.contact import combinations
@@ -77,8 +77,7 @@ def test_archives_without_poses_say_nothing_of_points():
 
 
 @pytest.mark.slow
-@needs_browser
-def test_the_page_shows_where_contact_is(tmp_path, open_page):  # noqa: F811 (a fixture)
+def test_the_page_shows_where_contact_is(tmp_path, open_page):
     results = tc.run(cases.ra1(), samples=200, solver="daqp", surfaces=0)
     write_page(results, tc.summarize(results), tmp_path / "ra1.html")
     opened = open_page(tmp_path / "ra1.html")

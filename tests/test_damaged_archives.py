@@ -1,6 +1,5 @@
 """Archives that were damaged, or made to mislead: one message, and nothing else happens."""
 
-import json
 import subprocess
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from models import ra1
 from tests.helpers import COMMAND, call, model_in, nightly, run, script
 from tests.hostile import HOSTILE, make
 from tolcontact import vocabulary
-from tolcontact.child import environment
 from tolcontact.errors import ArchiveError
 
 CRASHES = ("measured is text",)  # the netCDF library, so only where it is another process's
@@ -42,26 +40,15 @@ def program():
     return tc.build(ra1.assembly, solver="daqp")
 
 
-@pytest.fixture(scope="module")
-def reader():
-    """A process that runs the reader of archives in a process of its own for each file, without importing it all again."""
-    pipes = dict.fromkeys(("stdin", "stdout"), subprocess.PIPE)
-    with subprocess.Popen(script("forking_reader"), env=environment(), text=True, **pipes) as process:
-        yield process
-        process.stdin.close()
-
-
 @pytest.fixture
-def once(reader, monkeypatch):
+def once(forked_reader, monkeypatch):
     """A file that has not changed is inspected once."""
     answers = {}
 
     def answer(command, **_):
         question = (*command, Path(command[-2]).read_bytes())
         if question not in answers:
-            print(json.dumps(list(map(str, command[2:]))), file=reader.stdin, flush=True)
-            code, out, err = json.loads(reader.stdout.readline())
-            answers[question] = subprocess.CompletedProcess(command, code, out.encode("latin-1"), err.encode("latin-1"))
+            answers[question] = forked_reader.run(command)
         return answers[question]
 
     monkeypatch.setattr(subprocess, "run", answer)

@@ -9,7 +9,6 @@ from rich.console import Console
 import tolcontact as tc
 from tests import cases
 from tests.helpers import nightly
-from tests.test_report import browser, needs_browser, open_page  # noqa: F401
 from tolcontact.report import summary_text, write_page
 from tolcontact.report.html import page_of
 from tolcontact.report.table import Table
@@ -31,9 +30,8 @@ def page(archive):
 
 
 @pytest.mark.slow
-@needs_browser
 @pytest.mark.parametrize("width", [390, *nightly(1280)])
-def test_nothing_is_cut_off_and_words_are_those_of_designers(page, width, open_page):  # noqa: F811
+def test_nothing_is_cut_off_and_words_are_those_of_designers(page, width, open_page):
     opened = open_page(page, width)
     assert opened.evaluate("document.documentElement.scrollWidth") <= width
     beyond = """[...document.querySelectorAll("main *")].filter((e) => !e.closest(".wide, svg, details:not([open]), [hidden]")
@@ -46,8 +44,7 @@ def test_nothing_is_cut_off_and_words_are_those_of_designers(page, width, open_p
 
 
 @pytest.mark.slow
-@needs_browser
-def test_a_measurement_has_a_picture_limits_and_contributors(page, open_page):  # noqa: F811
+def test_a_measurement_has_a_picture_limits_and_contributors(page, open_page):
     opened = open_page(page)
     assert opened.evaluate("document.querySelector('.portrait img').naturalWidth") == 480
     notes = opened.evaluate("document.querySelector('.histogram .chart').layout.annotations.map((note) => [note.x, note.text])")
@@ -63,8 +60,7 @@ def test_a_measurement_has_a_picture_limits_and_contributors(page, open_page):  
 
 
 @pytest.mark.slow
-@needs_browser
-def test_on_paper_charts_are_as_wide_as_the_page_and_settings_unfolded(page, tmp_path, open_page):  # noqa: F811
+def test_on_paper_charts_are_as_wide_as_the_page_and_settings_unfolded(page, tmp_path, open_page):
     opened = open_page(page)
     widths = "[...document.querySelectorAll('.pictures .js-plotly-plot')].map((box) => box.layout.width ?? null)"
     opened.evaluate("window.dispatchEvent(new Event('beforeprint'))")

@@ -7,7 +7,7 @@ import trimesh
 import tolcontact as tc
 from tests import cases
 from tests.helpers import call
-from tests.test_report import ODD, browser, data_of, needs_browser, open_page  # noqa: F401 (fixtures)
+from tests.test_report import ODD, data_of
 from tolcontact.discretization import discretize
 from tolcontact.errors import ModelError
 from tolcontact.report import nominal_and_faults, write_view
@@ -171,9 +171,8 @@ SEEN = {"pattern A": [1, 1, 0, 0], "feature half": [0, 0, 1, 0]}
 
 
 @pytest.mark.slow
-@needs_browser
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
-def test_a_feature_is_found_on_its_faces(width, scheme, tmp_path, open_page):  # noqa: F811
+def test_a_feature_is_found_on_its_faces(width, scheme, tmp_path, open_page):
     a = block()
     view(a, tmp_path / "block.html")
     page = open_page(tmp_path / "block.html", width)
@@ -198,8 +197,7 @@ def test_a_feature_is_found_on_its_faces(width, scheme, tmp_path, open_page):  #
 
 
 @pytest.mark.slow
-@needs_browser
-def test_a_face_names_its_features(tmp_path, open_page):  # noqa: F811
+def test_a_face_names_its_features(tmp_path, open_page):
     a = block()
     view(a, tmp_path / "block.html")
     scene = Scene(open_page(tmp_path / "block.html"), a.parts[0])
@@ -216,8 +214,7 @@ def test_a_face_names_its_features(tmp_path, open_page):  # noqa: F811
 
 
 @pytest.mark.slow
-@needs_browser
-def test_odd_names_of_features_are_texts(tmp_path, open_page):  # noqa: F811
+def test_odd_names_of_features_are_texts(tmp_path, open_page):
     names = [ODD, "quotes \" ' \\ & é 点", "Größe </script> & <b>", "`${alert(1)}`"]
     a = tc.Assembly("odd")
     for k, name in enumerate(names):

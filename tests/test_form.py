@@ -1,5 +1,6 @@
 """Faces that are not flat: seats against a linear programme on the same heights, archives, and one field for all uses."""
 
+import copy
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
@@ -119,15 +120,20 @@ def test_a_saddle_rocks_onto_three_corners():
     assert np.abs(c).max() > 0.01
 
 
-def test_faces_of_a_seat_do_not_penetrate_each_other_between_contact_points():
+@pytest.fixture(scope="module")
+def between_points():
+    """The program of a seat, and its surfaces between contact points."""
     program, run = simulate(seat(), samples=60, solver="daqp", method=SEATED)
-    surfaces = check_surfaces(program, run["poses"][:, CORRECTED], run["deviations"])
+    return program, check_surfaces(program, run["poses"][:, CORRECTED], run["deviations"])
+
+
+def test_faces_of_a_seat_do_not_penetrate_each_other_between_contact_points(between_points):
+    _, surfaces = between_points
     assert 0 < surfaces.penetration[:, 0].max() < 1e-3
 
 
-def test_a_warning_of_penetration_gives_half_the_spacing():
-    program, run = simulate(seat(), samples=60, solver="daqp", method=SEATED)
-    surfaces = check_surfaces(program, run["poses"][:, CORRECTED], run["deviations"])
+def test_a_warning_of_penetration_gives_half_the_spacing(between_points):
+    program, surfaces = between_points[0], copy.deepcopy(between_points[1])
     surfaces.penetration[:] = 1.0
     with pytest.warns(tc.ContactWarning, match=r'pair "seat": .*; place contact points closer together, such as spacing=2.4$'):
         warn_of(program, surfaces)
@@ -180,7 +186,7 @@ def test_all_uses_of_a_face_share_one_field():
 @pytest.mark.parametrize("covariance", ["squared exponential", "matern 3/2"])
 def test_gaps_of_faces_with_form_follow_from_the_archive_alone(tmp_path, covariance):
     path = tmp_path / "seat.nc"
-    tc.run(seat(tc.Form(covariance, modes=8)), samples=40, solver="daqp", method=SEATED, out=path).close()
+    tc.run(seat(tc.Form(covariance, modes=8)), samples=12, solver="daqp", method=SEATED, out=path).close()
     assert_resolved(path)
     assert_gaps_recompute(path)
     with tc.open_archive(path) as archive:

@@ -44,7 +44,7 @@ def rectangles(frame=None):
     return rectangle(AT, BLOCK, -1), rectangle((0, 0, 10), TABLE, 1)
 
 
-def check(model, moving, reference, samples=60, **options):
+def check(model, moving, reference, samples=30, **options):
     run = tc.run(model, samples=samples, seed=3, fields="none", solver="daqp", surfaces=samples, **options)
     certified = np.isin(run.status.values, (Status.UNTOUCHED, Status.RESOLVED))
     depths = deepest(run, moving, reference)[certified]
@@ -58,14 +58,14 @@ def check(model, moving, reference, samples=60, **options):
 @pytest.mark.parametrize("spacing", [None, *nightly(1.2, 0.6)])
 @pytest.mark.parametrize(("faces", "whole"), [("block", False), ("table", False), ("table", True), ("block table", False)])
 def test_a_box_on_a_box(faces, whole, spacing):
-    check(box_on_box(faces, whole=whole, spacing=spacing), *rectangles())
+    check(box_on_box(faces, whole=whole, spacing=spacing), *rectangles(), samples=60 if spacing else 30)
 
 
 def test_a_box_on_a_box_that_stand_anywhere():
     check(box_on_box("block table", frame=TURNED), *rectangles(TURNED))
 
 
-@pytest.mark.parametrize("covariance", ["matern 5/2", "matern 3/2"])
+@pytest.mark.parametrize("covariance", ["matern 3/2", *nightly("matern 5/2")])
 def test_rougher_forms(covariance):
     check(box_on_box("block", form=tc.Form(covariance, length=15.0, modes=30)), *rectangles())
 

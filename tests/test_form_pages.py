@@ -6,7 +6,7 @@ import pytest
 import tolcontact as tc
 from tests.cases.seats import seat
 from tests.helpers import SEATED
-from tests.test_report import browser, data_of, needs_browser, open_page  # noqa: F401 (fixtures)
+from tests.test_report import data_of
 from tolcontact.report import write_page
 from tolcontact.report.html.form_scene import SingleStates
 
@@ -26,8 +26,7 @@ def test_gaps_of_a_page_are_those_of_the_archive(results):
 
 
 @pytest.mark.slow
-@needs_browser
-def test_a_page_shows_form_and_the_gap_that_is_left(results, tmp_path, open_page):  # noqa: F811 (a fixture)
+def test_a_page_shows_form_and_the_gap_that_is_left(results, tmp_path, open_page):
     write_page(results, tc.summarize(results), tmp_path / "seat.html")
     opened = open_page(tmp_path / "seat.html")
     opened.select_option("#field", "gapsLeft")

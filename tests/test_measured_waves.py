@@ -51,23 +51,30 @@ def plate(form, trough=50.0, flatness=0.0615, spacing=None):
     return a
 
 
-def form_warnings(model):
+def program_and_warnings(model, **options):
+    """The program of a model, and what the check of its nominal assembly says of measured forms."""
     with warnings.catch_warnings(record=True) as records:
         warnings.simplefilter("always")
-        program = tc.build(model)
-    return program.nominal.features[0].form, [str(record.message) for record in records if "[form]" in str(record.message)]
+        program = tc.build(model, **options)
+    return program, [str(record.message) for record in records if "[form]" in str(record.message)]
 
 
-@pytest.mark.parametrize("count", [2, 8, *nightly(6, 10)])
+def form_warnings(model):
+    program, sentences = program_and_warnings(model)
+    return program.nominal.features[0].form, sentences
+
+
+@pytest.mark.parametrize("count", [2, 4, *nightly(6, 8, 10)])
 def test_a_plate_stands_on_the_crests_of_measured_waves(count, tmp_path):
     """Crests a high lift it by a, and leave a gap of 2 a at troughs; the zone is as wide."""
     x, y = grid(1, 2)
     model = plate(write_scans(tmp_path, waves_of(count, x), x, y), trough=LENGTH / 2 / count)
-    form, sentences = form_warnings(model)
+    program, sentences = program_and_warnings(model, solver="daqp", method=SEATED)
+    form = program.nominal.features[0].form
     assert not sentences and form.left_out < 1e-5
     assert list(form.scans.values()) == pytest.approx([0.0594, 0.06, 0.0606], rel=5e-3)
     assert min(form.scales) == pytest.approx(LENGTH / (2 * np.pi * count), rel=0.1)
-    run = tc.run(model, samples=10, seed=1, solver="daqp", method=SEATED)
+    run = tc.run(program, samples=10, seed=1)
     lift, gap = run["measured"].sel(state="corrected").mean("realization").values
     assert lift == pytest.approx(AMPLITUDE, rel=0.02) and gap == pytest.approx(2 * AMPLITUDE, rel=0.02)
 

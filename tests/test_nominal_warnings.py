@@ -74,8 +74,8 @@ MISTAKES = {
     ),
     "wide zone": ({"tolerance": 30}, r'\[tolerance\] part "block" .* locator "A1": its tolerance of 30 mm .* 50 mm long'),
     "points too close": (
-        {"changes": off("A2", (2.1, 2, 0), "z")},
-        r"\[tolerance\] .* turn the part by \d+ degrees .* closest ones are 0.1 mm",
+        {"changes": off("A2", (2.25, 2, 0), "z")},
+        r"\[tolerance\] .* turn the part by \d+ degrees .* closest ones are 0.25 mm",
     ),
     "limits beside the displacement": (
         {"limits": (19, 21)},

@@ -44,7 +44,8 @@ def axis_ends(model, samples):
 
 def is_99_73(inside, count):
     low, high = binom.interval(0.9999, count, 0.9973002)
-    return low - 40 <= inside <= high + 40  # the rule's own error: 1e-4
+    error = 1e-4 * count
+    return low - error <= inside <= high + error  # the rule's own error: 1e-4
 
 
 def test_a_pattern_of_one_frame_deviates_as_features_by_themselves():

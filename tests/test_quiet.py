@@ -11,7 +11,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import SEATED, nightly, run, script
+from tests.helpers import SEATED, compiled, nightly, run, script
 from tolcontact.analyses.farthest_pose import muted_c_stdout
 from tolcontact.compilation import usable_solvers
 from tolcontact.mechanics.quiet import quiet
@@ -19,12 +19,17 @@ from tolcontact.mechanics.quiet import quiet
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "solver", ["daqp", "qpoases", *nightly(*(name for name in usable_solvers() if name not in ("daqp", "qpoases")))]
+    ("solver", "samples"),
+    [
+        ("daqp", 4),
+        ("qpoases", 40),
+        *nightly(("qpoases", 300), *((name, 4) for name in usable_solvers() if name not in ("daqp", "qpoases"))),
+    ],
 )
 @pytest.mark.parametrize("case", ["block on six", *nightly("parked")])
-def test_solvers_print_nothing(solver, case, capfd):
+def test_solvers_print_nothing(solver, samples, case, capfd):
     a = {"block on six": lambda: cases.block_on_six(1.0), "parked": cases.shaft_in_a_v}[case]()
-    tc.run(a, samples=300 if solver == "qpoases" else 4, seed=1, solver=solver, method=SEATED, surfaces=0)
+    tc.run(compiled(a, solver=solver, method=SEATED), samples=samples, seed=1, surfaces=0)
     assert capfd.readouterr() == ("", "")
 
 

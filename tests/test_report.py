@@ -4,12 +4,10 @@ import base64
 import gzip
 import json
 import re
-import shutil
 
 import numpy as np
 import pytest
 import trimesh
-from playwright.sync_api import sync_playwright
 
 import tolcontact as tc
 from tests import cases
@@ -19,7 +17,6 @@ from tolcontact.report import grouped, write_page
 from tolcontact.report.html import scene
 from tolcontact.statistics import intervals
 
-CHROMIUM = shutil.which("chromium")
 ODD = "0<img src=x onerror=alert(1)> <script>alert(2)"
 
 
@@ -132,52 +129,12 @@ def test_the_archive_that_is_kept_has_a_page(tmp_path):
     assert data_of(page_of(path, tmp_path / "bars.html"))["charts"][0]["edges"]
 
 
-needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
-
-
-@pytest.fixture(scope="module")
-def browser():
-    """A browser for all tests of a file: it takes a second to start."""
-    with sync_playwright() as driver:
-        options = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-        options += ["--disable-background-networking", "--disable-component-update", "--disable-sync", "--no-first-run"]
-        opened = driver.chromium.launch(executable_path=CHROMIUM, args=options)
-        yield opened
-        opened.close()
-
-
-@pytest.fixture
-def open_page(browser):
-    """Opens a page, of a width; what it complains of, or asks the network for, fails the test."""
-    wrong, pages = [], []
-
-    def open_(path, width=1280, drawn="#scene"):
-        opened = browser.new_page(viewport={"width": width, "height": 900})
-        pages.append(opened)
-        opened.on("console", lambda message: wrong.append(message.text))
-        opened.on("pageerror", lambda error: wrong.append(str(error)))
-        opened.on("dialog", lambda dialog: wrong.append(dialog.message))
-        opened.on(
-            "request", lambda request: request.url == path.as_uri() or request.url[:5] == "blob:" or wrong.append(request.url)
-        )
-        opened.goto(path.as_uri())
-        opened.wait_for_selector(drawn)
-        opened.wait_for_function(f"window.viewer !== undefined || {json.dumps(drawn)} !== '#scene'")
-        return opened
-
-    yield open_
-    for opened in pages:
-        opened.close()
-    assert not wrong
-
-
 def picture(page):
     """The pixels of the scene."""
     return page.evaluate("document.getElementById('scene').toDataURL()")
 
 
 @pytest.mark.slow
-@needs_browser
 @pytest.mark.parametrize("width", [1280, *nightly(390)])
 def test_the_page_is_used(archive, page, width, open_page):
     opened = open_page(page, width)
@@ -214,7 +171,6 @@ def test_the_page_is_used(archive, page, width, open_page):
 
 
 @pytest.mark.slow
-@needs_browser
 def test_a_histogram_is_read_in_the_page(archive, page, open_page):
     opened = open_page(page)
     x, y = opened.evaluate("(() => { const t = document.querySelector('.chart').data[1]; return [t.x, t.y]; })()")
@@ -225,7 +181,6 @@ def test_a_histogram_is_read_in_the_page(archive, page, open_page):
 
 
 @pytest.mark.slow
-@needs_browser
 def test_measures_are_shown_against_contributors_and_each_other(archive, page, open_page):
     opened = open_page(page)
     with tc.open_archive(archive) as results:
@@ -240,7 +195,6 @@ def test_measures_are_shown_against_contributors_and_each_other(archive, page, o
 
 
 @pytest.mark.slow
-@needs_browser
 def test_odd_names_are_texts(tmp_path, open_page):
     a = tc.Assembly("odd &amp; <b>bold</b>")
     block = a.part(ODD, tc.Mesh(trimesh.creation.box((10, 20, 10))), at=(5, 10, 5))
@@ -307,7 +261,6 @@ def test_an_unfinished_run_is_a_page_that_says_so(tmp_path):
 
 
 @pytest.mark.slow
-@needs_browser
 def test_names_of_measurements_in_one_place_do_not_cover_each_other(tmp_path, open_page):
     a = tc.Assembly("alone")
     block = a.part("block", tc.Box(10, 20, 10))

@@ -80,11 +80,15 @@ def test_a_short_peg_jams_on_its_own_rims():
 
 
 @pytest.mark.slow
-def test_a_ball_rests_in_a_cone_and_on_three_pins():
-    _, R, t = seated(cases.ball_in_a_cone())
+@pytest.mark.parametrize("name", ["cone", *nightly("fine cone")])
+def test_a_ball_rests_in_a_cone(name):
+    _, R, t = seated(round_cases.EVERY[name]())
     apex, axis = R[:, 0] @ [0, 0, -12.0] + t[:, 0], R[:, 0] @ [0, 0, 1.0]
     centre = R[:, 1] @ [0, 0, 10 * np.sqrt(2) - 12] + t[:, 1]
     assert np.abs(centre - apex - 10 * np.sqrt(2) * axis).max() < 1e-9
+
+
+def test_a_ball_rests_on_three_pins():
     _, R, t = seated(round_cases.ball_on_three_pins())
     centre = R[:, 3] @ [0, 0, np.sqrt(105.0)] + t[:, 3]
     for k, turn in enumerate(2 * np.pi * np.arange(3) / 3):
@@ -116,7 +120,7 @@ def test_archived_gaps_of_round_faces_recompute_and_the_model_runs_again(name, t
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["peg", "V", "cone", "slot"])
+@pytest.mark.parametrize("name", ["peg", "V", "cone", "slot", *nightly("fine cone")])
 def test_steps_along_walls_that_are_known_come_to_rest_soon(name):
     """Before Newton's steps begin, the ninth: gaps of round faces have their curvature from the first one on."""
     _, run = simulate(round_cases.EVERY[name](), samples=60, solver="daqp", method=SEATED)

@@ -5,7 +5,7 @@ import pytest
 
 import tolcontact as tc
 from tests.cases import stations as cases
-from tests.test_report import browser, data_of, needs_browser, open_page, unpacked  # noqa: F401 (fixtures)
+from tests.test_report import data_of, unpacked
 from tolcontact.discretization import discretize
 from tolcontact.report import write_page, write_view
 
@@ -52,8 +52,7 @@ def test_worst_cases_stand_in_their_stations(tmp_path):
 
 
 @pytest.mark.slow
-@needs_browser
-def test_the_station_is_chosen_and_a_play_goes_through_all(pages, open_page):  # noqa: F811
+def test_the_station_is_chosen_and_a_play_goes_through_all(pages, open_page):
     opened = open_page(pages / "report.html", 1280)
     visible = "window.viewer.parts.map((part) => part.group.visible)"
     assert opened.evaluate(visible) == [True, True, True]

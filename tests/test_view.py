@@ -9,7 +9,7 @@ import trimesh
 import tolcontact as tc
 from tests import cases
 from tests.helpers import call
-from tests.test_report import browser, data_of, needs_browser, open_page, picture  # noqa: F401 (fixtures)
+from tests.test_report import data_of, picture
 from tolcontact.discretization import discretize
 from tolcontact.geometry import preview
 from tolcontact.geometry.faces import patch, triangles
@@ -95,8 +95,7 @@ def test_faults_are_listed_and_sound_parts_shown(tmp_path):
 
 
 @pytest.mark.slow
-@needs_browser
-def test_faces_are_picked(tmp_path, open_page):  # noqa: F811
+def test_faces_are_picked(tmp_path, open_page):
     a = tc.Assembly("box")
     a.part("box", tc.Box(100, 50, 20))
     write_view(a, None, [], tmp_path / "box.html")
@@ -111,8 +110,7 @@ def test_faces_are_picked(tmp_path, open_page):  # noqa: F811
 
 
 @pytest.mark.slow
-@needs_browser
-def test_points_are_picked_in_the_parts_own_frame(tmp_path, open_page):  # noqa: F811
+def test_points_are_picked_in_the_parts_own_frame(tmp_path, open_page):
     a = tc.Assembly("box")
     a.part("box", tc.Box(100, 50, 20), at=(30, -20, 5), rotation=(0, 0, np.pi / 2))
     write_view(a, None, [], tmp_path / "box.html")
@@ -128,8 +126,7 @@ def test_points_are_picked_in_the_parts_own_frame(tmp_path, open_page):  # noqa:
 
 
 @pytest.mark.slow
-@needs_browser
-def test_features_are_named_where_they_are(tmp_path, open_page):  # noqa: F811
+def test_features_are_named_where_they_are(tmp_path, open_page):
     a = cases.model("lid")
     nominal = discretize(a)
     write_view(a, nominal, [], tmp_path / "lid.html")

@@ -40,23 +40,31 @@ def load(key: str) -> bytes | None:
 
 
 def store(key: str, code: bytes, max_bytes: int = MAX_BYTES) -> None:
-    """Store code under a key, if there is a cache folder that only this user can write to."""
+    """Store code under a key, if there is a cache folder that only this user can write to, and make room for it."""
+    with contextlib.suppress(OSError):
+        if write(key, code):
+            _make_room(cache_folder(), max_bytes)
+
+
+def write(key: str, data: bytes) -> bool:
+    """Store a few bytes without a look at the other files, which may take longer. Return whether they are stored."""
     with contextlib.suppress(OSError):
         folder = cache_folder()
         for each in (*reversed(folder.parents), folder):
             if not each.exists():
                 each.mkdir(mode=0o700, exist_ok=True)
         if not is_private(folder):
-            return
+            return False
         with tempfile.NamedTemporaryFile(dir=folder, delete=False) as file:
             try:
-                file.write(hashlib.blake2b(code, digest_size=_DIGEST_BYTES).digest() + code)
+                file.write(hashlib.blake2b(data, digest_size=_DIGEST_BYTES).digest() + data)
                 file.flush()
                 Path(file.name).replace(folder / key)  # at once: others see all of it or nothing
             except BaseException:
                 Path(file.name).unlink(missing_ok=True)
                 raise
-        _make_room(folder, max_bytes)
+        return True
+    return False
 
 
 def cache_folder() -> Path:

@@ -174,7 +174,7 @@ def quick_builds() -> Iterator[None]:
     def unchecked(moving_face, reference_face, P_m, *limits, is_open):
         return sample(moving_face, reference_face, P_m, *limits, is_open=True) if is_open else (P_m, None)
 
-    forgetful = types.SimpleNamespace(load=code_cache.load, store=lambda *entry: None)
+    forgetful = types.SimpleNamespace(load=code_cache.load, store=lambda *entry: None, write=lambda *entry: None)
     with (
         mock.patch.object(contact_points, "_with_curvature", unchecked),
         mock.patch.object(named, "code_cache", forgetful),

@@ -1,11 +1,14 @@
 """Two parts at random poses, whose faces are measured; and models with measurements of faces."""
 
+import functools
+
 import numpy as np
 import trimesh
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
+from tests.helpers import compiled
 from tolcontact import poses
 
 PLANE, ROUND = tc.Box(40, 30, 10), tc.Cylinder()
@@ -43,9 +46,14 @@ def motions(count=N, turn=0.05, shift=0.5, seed=1):
     return R, rng.normal(0, shift, (count, 2, 3))
 
 
+@functools.lru_cache(maxsize=4)
+def program_of(assembly, names):  # names of the measures: an assembly gets more of them
+    return compiled(assembly, solver="daqp")
+
+
 def observed(assembly, R, t):
     """Measures (n, measure) at poses, without deviations."""
-    program = tc.build(assembly, solver="daqp")
+    program = program_of(assembly, tuple(measure.name for measure in assembly.measures))
     X = poses.pose(R, t).reshape(len(R), -1)
     return program.observe(poses=X, deviations=np.zeros((len(X), len(program.nominal.contributors))))["measured"]
 

@@ -91,14 +91,14 @@ def peg_in_a_hole(clearance: float = 0.05, tolerance: float = 0.2) -> tc.Assembl
     return a
 
 
-def ball_in_a_cone(tolerance: float = 0.2) -> tc.Assembly:
+def ball_in_a_cone(tolerance: float = 0.2, sections: int = 720, subdivisions: int = 5) -> tc.Assembly:
     """A ball under its weight in a cone of 90 degrees that is off its place and askew: its centre comes to 10 sqrt 2 above."""
     a = tc.Assembly("ball")
     profile = np.array([[4, -8], [20, 8], [22, 8], [22, -10], [4, -10], [4, -8]], dtype=float)
-    shape = trimesh.creation.revolve(profile, sections=720)
+    shape = trimesh.creation.revolve(profile, sections=sections)
     shape.invert()
     seat = a.part("seat", tc.Mesh(shape), fixed=True)
-    ball = a.part("ball", tc.Mesh(trimesh.creation.icosphere(5, 10)), at=(0, 0, 10 * np.sqrt(2) - 12), fixed=False)
+    ball = a.part("ball", tc.Mesh(trimesh.creation.icosphere(subdivisions, 10)), at=(0, 0, 10 * np.sqrt(2) - 12), fixed=False)
     places = [((20, 0), "z"), ((-20, 0), "z"), ((0, 20), "z"), ((0, 0), "x"), ((0, 0), "y"), ((20, 0), "y")]
     a.locate(seat, [tc.Locator(f"L{k}", (*xy, -10), along, tolerance) for k, (xy, along) in enumerate(places)])
     a.locate(ball, parked("Z1:5,0,-8:z", "Z2:-5,0,-8:z", "Z3:0,5,-8:z", "X:-10,0,0:x", "Y1:0,-10,0:y", "Y2:3,-9,0:y"))

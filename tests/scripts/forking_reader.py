@@ -1,4 +1,7 @@
-"""Runs Python files, one for each line of standard input, in processes that are forked when the libraries are imported."""
+"""Runs Python files, one for each line of standard input, in processes that are forked when the libraries are imported.
+
+A line is a JSON list: the folder to run in, the file and its arguments.
+"""
 
 import json
 import os
@@ -11,12 +14,13 @@ import netCDF4  # noqa: F401 (imported once, for all)
 from tolcontact import vocabulary  # noqa: F401
 
 for line in sys.stdin:
-    arguments = json.loads(line)
+    folder, *arguments = json.loads(line)
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         process = os.fork()
         if process == 0:
             os.dup2(out.fileno(), 1)
             os.dup2(err.fileno(), 2)
+            os.chdir(folder)
             sys.argv = arguments
             runpy.run_path(arguments[0], run_name="__main__")
             sys.stdout.flush()

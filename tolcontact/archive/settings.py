@@ -1,6 +1,7 @@
 """The settings of a run, as the attributes of its archive state them."""
 
 import datetime
+import functools
 import json
 import platform
 from importlib.metadata import version
@@ -100,6 +101,7 @@ def declaration(program: Program) -> str:
     return json.dumps(to_document(program.nominal.assembly, program.nominal.triangles, program.tapes))
 
 
+@functools.cache  # each look-up reads the metadata of a package
 def versions() -> str:
     """Return the names and versions of the software that computes."""
     return ", ".join([f"python {platform.python_version()}", *(f"{lib} {version(lib)}" for lib in _LIBRARIES)])

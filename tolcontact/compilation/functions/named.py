@@ -145,7 +145,7 @@ class Evaluations:
 
     def store(self) -> None:
         """Store the number for later processes."""
-        code_cache.store(self._key, str(self.number).encode())
+        code_cache.write(self._key, str(self.number).encode())
 
 
 def _instructions(function: ca.Function) -> tuple[int, int]:
