@@ -3,6 +3,7 @@
 import doctest
 import io
 import re
+import types
 from pathlib import Path
 
 import pytest
@@ -47,8 +48,16 @@ def test_front_names_every_chapter_in_order():
 
 
 def test_front_names_every_public_name():
-    table = tc.__doc__.partition("## Names")[2]
-    assert set(re.findall(r"`(\w+)`", table)) == set(tc.__all__) - {"__version__"}
+    rows = re.findall(r"^\| (.*?) \| (.*?) \|$", tc.__doc__.partition("## Names")[2], re.MULTILINE)
+    named, module = {"": {"__version__"}}, ""
+    for purpose, names in rows[1:]:
+        if purpose.strip():
+            module = "".join(re.findall(r"`tc\.(\w+)`", purpose))
+        named.setdefault(module, set()).update(re.findall(r"`(\w+)`", names))
+    modules = {name for name in tc.__all__ if isinstance(getattr(tc, name), types.ModuleType)} - {"plot"}
+    assert named.pop("") | modules == set(tc.__all__)
+    assert set(named) == modules - {"declaration", "errors"}
+    assert all(names == set(getattr(tc, module).__all__) for module, names in named.items())
 
 
 def test_python_of_the_readme_runs_and_prints_its_table(tmp_path, monkeypatch, capsys):

@@ -64,10 +64,10 @@ APART = {
 ORDER = (
     "version", "errors", "interrupts", "readable", "child", "stored_coordinates", "shape_worker", "kernel",
     "vocabulary", "realizations",
-    "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "features",
+    "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "select", "geometry", "features",
     "fasteners", "pmi", "discretization", "interference", "variation", "mechanics",
     "compilation", "statics", "contact", "simulation", "plausibility", "statistics", "archive", "report", "plot", "workflow",
-    "analyses", "testing", "cli", "__init__", "__main__",
+    "io", "analyses", "testing", "cli", "__init__", "__main__",
 )  # fmt: skip
 
 

@@ -49,27 +49,23 @@ Every example in the guide is run by the tests.
 
 | purpose | `tc.` |
 |---|---|
-| declare | `Assembly`, `Box`, `Mesh`, `Pin`, `Locator`, `three_two_one`, `Tolerance`, `TitleBlock`, `degrees` |
+| declare | `Assembly`, `Part`, `Box`, `Mesh`, `Pin`, `Locator`, `three_two_one`, `Tolerance`, `TitleBlock`, `degrees` |
 | tolerance features | `Size`, `Position`, `Profile`, `LineProfile`, `Parallelism`, `Perpendicularity`, `Angularity`, |
 | | `Symmetry`, `Coaxiality`, `CircularRunout`, `TotalRunout`, `Straightness`, `Flatness`, `Roundness`, `Cylindricity`; |
-| | `Form`, `Feature`, `Pattern`, `DatumTargets`, `Variable` |
+| | `Form`, `DatumTargets`, `Variable` |
 | measure faces | `Gap`, `Flush`, `Clearance`, `LargestGap`, `MeanGap`, `AxisDistance`, `Angle`; |
-| | `Minimum`, `Maximum`, `Mean`, `Sum`, `Difference`; |
-| | `stations`, `Measurement` |
-| choose faces | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
+| | `Minimum`, `Maximum`, `Mean`, `Sum`, `Difference`; `stations` |
 | fasten | `fasten` |
-| STEP files | `bodies_in`, `faces_in`, `parts_from`, `read_pmi`, `features_from_pmi` |
-| returned by declarations | `Part`, `Face`, `Point`, `ContactPair`, `Force`, `Measure`, `Station`, `Joint` |
-| run | `run`, `build`, `check`, `compare`, `simulate`, `study`, `simulate_blocks`; `Method`, `Program` |
-| commands | `main`, `command_line` |
-| draw pictures | `plot` |
-| write models as JSON | `write_model` |
-| analyse | `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate`, `seating` |
-| read results | `summarize`, `compare_runs`, `open_archive`, `model_of`, `Status` |
-| catch | `TolcontactError` and its kinds `ModelError`, `OptionError`, `ArchiveError`, `ScriptError`, `ClusterError` |
-| warnings | `ContactWarning`, `NominalWarning` |
+| run | `main`, `run`, `build`, `check`, `compare`, `simulate`, `simulate_blocks`, `study`; `Method`, `Program` |
+| read results | `open_archive`, `summarize`, `compare_runs`, `Status`, `plot` |
+| errors and warnings | `TolcontactError` and its kinds `ModelError` and `OptionError`; `NominalWarning` |
+| choose faces, `tc.select` | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
+| analyse, `tc.analyses` | `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate`, `seating` |
+| read and write files, `tc.io` | `bodies_in`, `faces_in`, `parts_from`, `read_pmi`, `features_from_pmi`, `write_model`, `model_of` |
+| test your models, `tc.testing` | `assert_resolved`, `assert_no_clashes`, `assert_gaps_recompute`, |
+| | `assert_datums_recompute`, `assert_same_run` |
 
-`tolcontact.testing` has assertions for tests of your own models.
+`tc.declaration` has the types of everything that a declaration returns, `tc.errors` all errors and warnings.
 """
 
 from importlib import import_module

@@ -7,8 +7,7 @@ import sys
 from collections.abc import Callable
 from typing import NoReturn
 
-import tolcontact
-from tolcontact import interrupts
+from tolcontact import cli, interrupts
 
 MIN_ADDRESS_SPACE = 1_500_000_000  # bytes
 MIN_GARBAGE = 200_000  # objects: modules hold no garbage, and looking for it takes a fifth of the time of all imports
@@ -29,7 +28,7 @@ def command_line() -> None:
 
 def _imported() -> Callable[[], None]:
     try:
-        return tolcontact.command_line  # imported here, on first use
+        return cli.command_line  # imported here, on first use
     except (ImportError, MemoryError) as error:
         _refuse(f"libraries cannot be loaded ({error}); is there enough memory, and are all of them installed?")
 

@@ -31,6 +31,8 @@ from tolcontact.testing.archived_datums import tangents
 from tolcontact.testing.referee import ArchivedPair, MissingVariableError, Rows
 from tolcontact.workflow import build
 
+__all__ = ["assert_datums_recompute", "assert_gaps_recompute", "assert_no_clashes", "assert_resolved", "assert_same_run"]
+
 Results = xr.DataTree | str | Path
 NAMED_REALIZATIONS = 5  # in a message
 MAX_GAPS = 500_000  # per pass
