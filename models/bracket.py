@@ -17,16 +17,18 @@ PLACE, DRILLED = 0.9, 0.05  # tolerances: position of a hole, its size to either
 SHANK = tc.Size(BOLT, 0.0, -0.1)
 
 
-def plate(model: tc.Assembly, name: str, z: float, **fixed: bool) -> tuple[tc.Part, list[tc.Feature]]:
+def plate(model: tc.Assembly, name: str, z: float, **fixed: bool) -> tuple[tc.Part, list[tc.declaration.Feature]]:
     """Declare a bar between two eyes, with its back at a height z, and the holes in the eyes."""
     eyes = [trimesh.creation.annulus(HOLE / 2, 14, SHEET, sections=48).apply_translation((x, 0, SHEET / 2)) for x in XS]
     bar = trimesh.creation.box(bounds=[(-APART / 2 + 14, -14, 0), (APART / 2 - 14, 14, SHEET)])
     part = model.part(name, tc.Mesh(trimesh.util.concatenate([bar, *eyes])), at=(0, 0, z), **fixed)
     for letter, direction in {"A": "-z", "B": "-y"}.items():
-        part.feature(letter, part.face(direction, tc.Inside((-30, -15, -1), (30, 15, SHEET + 1))), datum=letter)
-    middle = tc.Inside((-31.1, -15, -1), (-30.9, 15, SHEET + 1))
+        part.feature(letter, part.face(direction, tc.select.Inside((-30, -15, -1), (30, 15, SHEET + 1))), datum=letter)
+    middle = tc.select.Inside((-31.1, -15, -1), (-30.9, 15, SHEET + 1))
     part.feature("C", part.face("-x", middle), datum="C")
-    walls = [part.face(tc.Cylinder(radius=HOLE / 2), tc.Inside((x - 9, -9, -1), (x + 9, 9, SHEET + 1))) for x in XS]
+    walls = [
+        part.face(tc.select.Cylinder(radius=HOLE / 2), tc.select.Inside((x - 9, -9, -1), (x + 9, 9, SHEET + 1))) for x in XS
+    ]
     tolerances = tc.Size(HOLE, DRILLED), tc.Position(PLACE, "A|B|C", rule="translation")
     return part, [part.feature(f"hole {k}", wall, *tolerances) for k, wall in enumerate(walls, start=1)]
 
@@ -42,7 +44,7 @@ def assembly() -> tc.Assembly:
     model.locate(bracket, back, floating=True)
     for number, (hole, hole_of_wall) in enumerate(zip(holes, holes_of_wall, strict=True), start=1):
         x = XS[number - 1]
-        seat = bracket.face("+z", tc.Inside((x - 15, -15, 0), (x + 15, 15, SHEET + 1)))
+        seat = bracket.face("+z", tc.select.Inside((x - 15, -15, 0), (x + 15, 15, SHEET + 1)))
         tc.fasten(model, f"bolt {number}", SHANK, through=[hole, hole_of_wall], seat=seat)
     model.force("weight", at=bracket.point(10, 0, SHEET), vector=(0, -50, 0))
     for name, x in (("left end", XS[0]), ("right end", XS[1])):

@@ -24,10 +24,10 @@ def assembly() -> tc.Assembly:
     hub = model.part("hub", tc.Box(2 * HUB, 2 * HUB, 20), at=(-HUB, -HUB, -10), fixed=True)
     place = (RING - ROLLER) * np.sin(NOMINAL), HUB + ROLLER, 0
     roller = model.part("roller", tc.Mesh(trimesh.creation.cylinder(ROLLER, 16, sections=90)), at=place)
-    bore = ring.feature("bore", ring.face(tc.Cylinder(radius=RING)), tc.Size(2 * RING, 2 * 0.0125))
+    bore = ring.feature("bore", ring.face(tc.select.Cylinder(radius=RING)), tc.Size(2 * RING, 2 * 0.0125))
     hub.feature("bottom", hub.face("-y"), datum="A")
     flat = hub.feature("flat", hub.face("+y"), tc.Profile(2 * 0.05, "A", rule="translation"))
-    barrel = roller.feature("barrel", roller.face(tc.Cylinder()), tc.Size(2 * ROLLER, 2 * 0.01))
+    barrel = roller.feature("barrel", roller.face(tc.select.Cylinder()), tc.Size(2 * ROLLER, 2 * 0.01))
     feet = [(0, 0), (5, 0), (0, 5)]
     model.locate(roller, [tc.Locator(f"Z{k}", (*foot, -8), "z", 0.0) for k, foot in enumerate(feet)], floating=True)
     model.contact("flat", moving=barrel, reference=flat)

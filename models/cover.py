@@ -38,16 +38,16 @@ def assembly() -> tc.Assembly:
     housing = model.part("housing", tc.Mesh(HERE / "housing.step"), fixed=True)
     cover = model.part("cover", tc.Mesh(HERE / "cover.step"), at=(0, 0, TOP))
     model.locate(cover, six(LENGTH / 2, WIDTH / 2, LENGTH, WIDTH), tolerance=PLACED)
-    rim = housing.face("+z", tc.Inside((0, 0, TOP - 1), (LENGTH, WIDTH, TOP)))
+    rim = housing.face("+z", tc.select.Inside((0, 0, TOP - 1), (LENGTH, WIDTH, TOP)))
     model.contact("seat", moving=cover.face("-z"), reference=rim, points=100)
     for name, (x, y) in PINS.items():
         stub = trimesh.creation.cylinder(PIN / 2, COVER, sections=180)
         pin = model.part(f"{name} pin", tc.Mesh(stub), at=(x, y, TOP + COVER / 2), fixed=True)
         model.locate(pin, six(0, 0, PIN, PIN), tolerance=INSERTED)
-        barrel = pin.feature("barrel", pin.face(tc.Cylinder(radius=PIN / 2)), tc.Size(PIN, 0.0, -0.015))
-        wall: tc.Face | tc.Feature = cover.face(tc.Near(pin, 0.2))
+        barrel = pin.feature("barrel", pin.face(tc.select.Cylinder(radius=PIN / 2)), tc.Size(PIN, 0.0, -0.015))
+        wall: tc.declaration.Face | tc.declaration.Feature = cover.face(tc.select.Near(pin, 0.2))
         if name == "round":
-            wall = cover.feature("hole", cover.face(tc.Brep((x + HOLE / 2, y, 1))), tc.Size(HOLE, 0.03))
+            wall = cover.feature("hole", cover.face(tc.select.Brep((x + HOLE / 2, y, 1))), tc.Size(HOLE, 0.03))
         model.contact(f"{name} hole", moving=wall, reference=barrel)
     for name, x, axis in (("near edge, x", 0, "x"), ("near edge, y", 0, "y"), ("far edge, y", LENGTH, "y")):
         model.measure(name, cover.point(x, WIDTH / 2, 0), along=axis, tolerance=0.3)

@@ -44,9 +44,9 @@ def opening() -> trimesh.Trimesh:
     return trimesh.util.concatenate(bars)
 
 
-def over(x: float, z: float) -> tc.Inside:
+def over(x: float, z: float) -> tc.select.Inside:
     """Choose the part of the door over the stop at (x, z)."""
-    return tc.Inside((x - STOP / 2, -1, z - STOP / 2), (x + STOP / 2, 1, z + STOP / 2))
+    return tc.select.Inside((x - STOP / 2, -1, z - STOP / 2), (x + STOP / 2, 1, z + STOP / 2))
 
 
 def assembly() -> tc.Assembly:

@@ -25,7 +25,9 @@ def ring(x: float) -> trimesh.Trimesh:
     return shape.apply_translation((x, 0, 0))
 
 
-def bored(model: tc.Assembly, name: str, xs: tuple[float, ...], plate: float, place: float, **fixed: bool) -> list[tc.Feature]:
+def bored(
+    model: tc.Assembly, name: str, xs: tuple[float, ...], plate: float, place: float, **fixed: bool
+) -> list[tc.declaration.Feature]:
     """Declare a part with a bore at each of `xs`, toleranced to its plate at a height, and to the plate's side and end."""
     slab = trimesh.creation.box(extents=(100, 60, 4)).apply_translation((0, 0, plate))
     part = model.part(name, tc.Mesh(trimesh.util.concatenate([slab, *map(ring, xs)])), **fixed)
@@ -36,7 +38,7 @@ def bored(model: tc.Assembly, name: str, xs: tuple[float, ...], plate: float, pl
     return [
         part.feature(
             f"bore {number + 1}",
-            part.face(tc.Cylinder(inner=True), tc.Inside((x - WIDTH, -PIN, -PIN), (x + WIDTH, PIN, PIN))),
+            part.face(tc.select.Cylinder(inner=True), tc.select.Inside((x - WIDTH, -PIN, -PIN), (x + WIDTH, PIN, PIN))),
             tc.Size(PIN + CLEARANCE, BORE / 2),
             tc.Position(place, "A|B|C"),
         )
@@ -52,7 +54,7 @@ def assembly(place: float = PLACE) -> tc.Assembly:
     rod = trimesh.creation.cylinder(PIN / 2, 90, sections=48)
     rod.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
     pin = model.part("pin", tc.Mesh(rod))
-    barrel = pin.feature("barrel", pin.face(tc.Cylinder()), tc.Size(PIN, SHAFT / 2))
+    barrel = pin.feature("barrel", pin.face(tc.select.Cylinder()), tc.Size(PIN, SHAFT / 2))
     model.locate(pin, [tc.Locator("end", (-45, 0, 0), "x", 0.0)], floating=True)
     model.locate(leaf, [tc.Locator("end", (-50, 0, 20), "x", 0.0), tc.Locator("closed", (0, 30, 18), "z", 0.0)], floating=True)
     for kind, bores in (("lug", lugs), ("knuckle", knuckles)):

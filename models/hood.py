@@ -21,7 +21,7 @@ LENGTH, WIDTH, SKIN = 900.0, 1200.0, 6.0
 PANEL, HINGE, STOP, HEM = 0.5, 0.3, 0.4, 0.3
 
 
-def locate(station: tc.Station, part: tc.Part, tolerance: float, on: tc.Part | None = None) -> None:
+def locate(station: tc.declaration.Station, part: tc.Part, tolerance: float, on: tc.Part | None = None) -> None:
     """Locate a part by its underside, its left side and its front."""
     scheme = tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x"), inset=5)
     station.locate(part, scheme, tolerance=tolerance, on=on)

@@ -29,7 +29,7 @@ def at_places(shape: trimesh.Trimesh) -> list[trimesh.Trimesh]:
     return [shape.copy().apply_translation((x, y, 0)) for x, y in PLACES]
 
 
-def toleranced(part: tc.Part, seat: str, level: float, radius: float, size: tc.Size) -> list[tc.Feature]:
+def toleranced(part: tc.Part, seat: str, level: float, radius: float, size: tc.Size) -> list[tc.declaration.Feature]:
     """Datums: the seat, the side and the end of the plate. To these the four cylinders."""
     part.feature("seat", part.face(seat, lambda c, n: abs(c[:, 2] - level) < 1e-6), datum="A")
     part.feature("side", part.face("-y", lambda c, n: c[:, 1] < -SIZE / 2 + 1e-6), datum="B")
@@ -37,7 +37,7 @@ def toleranced(part: tc.Part, seat: str, level: float, radius: float, size: tc.S
     return [
         part.feature(
             f"{part.name} {number + 1}",
-            part.face(tc.Cylinder(radius=radius), tc.Inside((x - 9, y - 9, -9), (x + 9, y + 9, 9))),
+            part.face(tc.select.Cylinder(radius=radius), tc.select.Inside((x - 9, y - 9, -9), (x + 9, y + 9, 9))),
             size,
             tc.Position(0.15, "A|B|C", material="M"),
         )

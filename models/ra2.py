@@ -69,11 +69,11 @@ def assembly() -> tc.Assembly:
         ],
         tolerance=5,
     )
-    floor = tc.Inside((0, -WIDTH, -1), (LENGTH, WIDTH, 1))  # not the rims of the flanges, which face upwards, too
+    floor = tc.select.Inside((0, -WIDTH, -1), (LENGTH, WIDTH, 1))  # not the rims of the flanges, which face upwards, too
     ra2.contact("web", moving=inner.face("-z"), reference=outer.face("+z", floor), points=1480)
     for name, normal in {"left": (NARROW, -1, -LEAN), "right": (NARROW, 1, -LEAN)}.items():
-        facing = outer.face(tc.Facing([-component for component in normal]))
-        ra2.contact(name, moving=inner.face(tc.Facing(normal)), reference=facing, points=760)
+        facing = outer.face(tc.select.Facing([-component for component in normal]))
+        ra2.contact(name, moving=inner.face(tc.select.Facing(normal)), reference=facing, points=760)
     x, z = FLANGE_HOLE
     ra2.measure("hole position", inner.point(x, side(x, z), z), along="x", tolerance=1)
     return ra2

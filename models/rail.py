@@ -42,7 +42,7 @@ def assembly() -> tc.Assembly:
     weld = line.station("weld")
     weld.locate(front, [*rests(front, 20, 480), *sides(front)])
     weld.locate(rear, [*rests(rear, 80, 480), *sides(rear)])
-    lap = front.face("+z", tc.Inside((LENGTH - LAP, 0, HEIGHT - 1), (LENGTH, WIDTH, HEIGHT + 1)))
+    lap = front.face("+z", tc.select.Inside((LENGTH - LAP, 0, HEIGHT - 1), (LENGTH, WIDTH, HEIGHT + 1)))
     weld.contact("lap", moving=rear.face("-z"), reference=lap)
     weld.measure("step", rear.point(0, 40, 0), to=front.point(LENGTH - LAP, 40, HEIGHT), along="z", tolerance=1)
     rail = weld.join("rail", front, rear)

@@ -32,9 +32,11 @@ def assembly() -> tc.Assembly:
     spindle = model.part("spindle", tc.Mesh(rod))
     own = {}
     for letter, (name, y) in zip("AB", SEATS.items(), strict=True):
-        where = tc.Inside((-20, y - WIDTH, -20), (20, y + WIDTH, 20))
-        own[name] = spindle.feature(name, spindle.face(tc.Cylinder(radius=SEAT / 2), where), tc.Size(SEAT, 0.005), datum=letter)
-    nose = spindle.feature("nose", spindle.face(tc.Cylinder(radius=NOSE / 2)), tc.TotalRunout(0.02, "A-B"))
+        where = tc.select.Inside((-20, y - WIDTH, -20), (20, y + WIDTH, 20))
+        own[name] = spindle.feature(
+            name, spindle.face(tc.select.Cylinder(radius=SEAT / 2), where), tc.Size(SEAT, 0.005), datum=letter
+        )
+    nose = spindle.feature("nose", spindle.face(tc.select.Cylinder(radius=NOSE / 2)), tc.TotalRunout(0.02, "A-B"))
     front = spindle.face("+y", lambda c, n: abs(c[:, 1]) < 1e-6)
     face = spindle.feature("face", front, tc.TotalRunout(0.01, "A-B"))
     rings = []
@@ -47,7 +49,7 @@ def assembly() -> tc.Assembly:
         held = [*level, *side]
         model.locate(ring, [tc.Locator(f"{d}{k}", p, d, 0.0) for k, (p, d) in enumerate(held)])
         rings.append(ring)
-        model.contact(name, moving=own[name], reference=ring.face(tc.Cylinder(inner=True)))
+        model.contact(name, moving=own[name], reference=ring.face(tc.select.Cylinder(inner=True)))
     for axis in "xz":
         drives = {f"{rings[0].name}.{axis}{k}": 1.0 for k in range(6) if f"{axis}{k}" in ("x3", "x4", "z0", "z1", "z2")}
         model.variable(f"front bore, {axis}", tc.Tolerance(0.02), drives=drives)

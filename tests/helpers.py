@@ -152,4 +152,4 @@ def contents(path, group=None):
 def model_in(path):
     """The model of an archive, which is closed again."""
     with tc.open_archive(path) as archive:
-        return tc.model_of(archive)
+        return tc.io.model_of(archive)

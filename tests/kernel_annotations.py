@@ -1,4 +1,4 @@
-"""Tolerances and dimensions of a STEP file as the CAD kernel reads them, to compare with `tc.read_pmi`. Lengths in mm.
+"""Tolerances and dimensions of a STEP file as the CAD kernel reads them, to compare with `tc.io.read_pmi`. Lengths in mm.
 
 The kernel reads less than the file states, and may crash, so it runs in a process of its own.
 """

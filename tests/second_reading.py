@@ -1,4 +1,4 @@
-"""Compare the product and manufacturing information that `tc.read_pmi` returns with what the CAD kernel reads.
+"""Compare the product and manufacturing information that `tc.io.read_pmi` returns with what the CAD kernel reads.
 
 The kernel reads less than the file states. Annotations of the same record are compared.
 """

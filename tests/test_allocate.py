@@ -31,7 +31,7 @@ def test_ranges_of_a_sum_are_those_of_lagrange():
     """min sum c / r with sum (r T / 6)^2 = s^2: r^3 is proportional to c / T^2."""
     widths, costs = np.array([0.6, 0.3, 0.9]), np.array([1.0, 4.0, 2.0])
     names = [f"p{k}.Z" for k in range(3)]
-    found = tc.allocate(
+    found = tc.analyses.allocate(
         pile(*widths), "top: ppm 2700", costs=dict(zip(names, costs.tolist(), strict=True)), samples=32_768, solver="daqp"
     )
     r = (costs / widths**2) ** (1 / 3)
@@ -46,7 +46,7 @@ def test_ranges_of_a_sum_are_those_of_lagrange():
 @pytest.mark.slow
 def test_effects_are_those_of_the_sum():
     widths = np.array([0.6, 0.3, 0.9])
-    found = tc.allocate(pile(*widths), "top: Ppk 0.5", samples=16_384, solver="daqp")
+    found = tc.analyses.allocate(pile(*widths), "top: Ppk 0.5", samples=16_384, solver="daqp")
     usual, narrow = np.sqrt((widths**2).sum()), np.sqrt((widths**2).sum() - 0.19 * widths**2)
     effects = found.effect.isel(measure=0).sel(of_effect="6 sigma")
     for k, truth in enumerate(narrow - usual):
@@ -58,7 +58,7 @@ def test_effects_are_those_of_the_sum():
 def test_ra1_costs_less_and_keeps_what_is_required_in_a_run_of_its_own():
     a = cases.ra1()
     a.measure("wide", a.parts[1].point(50, 0, 10), along="z", tolerance=12)
-    found = tc.allocate(a, "wide: ppm 10000", solver="daqp", method=PAPER, samples=4096)
+    found = tc.analyses.allocate(a, "wide: ppm 10000", solver="daqp", method=PAPER, samples=4096)
     before, after = found.cost.sum("group").values
     assert before == 12 and after < 6.5
     assert float(found.kept.sel(stage="after", interval="estimate")[0]) <= 0.01
@@ -104,7 +104,7 @@ def test_scaled_draws_are_draws_of_other_ranges():
 def test_a_fresh_run_that_misses_what_is_required_costs_no_more_than_it_must():
     """One range: 6 standard deviations of the sum are 1 / 0.9 mm. The first of the fresh runs says 0.89, by chance."""
     totals = set()
-    found = tc.allocate(
+    found = tc.analyses.allocate(
         pile(0.6, 0.3), "top: Ppk 0.9", costs={"p0.Z": 1.0}, samples=8192, seed=7, solver="daqp",
         progress=lambda _, total: totals.add(total),
     )  # fmt: skip
@@ -113,7 +113,7 @@ def test_a_fresh_run_that_misses_what_is_required_costs_no_more_than_it_must():
 
 
 def test_groups_without_a_cost_keep_their_ranges_and_a_cost_may_be_a_curve():
-    found = tc.allocate(
+    found = tc.analyses.allocate(
         pile(0.6, 0.3, 0.9), "top: Ppk 0.9", costs={"p2": lambda factor: 5 / factor**2}, by="part", samples=8192, solver="daqp"
     )
     assert found.factor.sel(group=["p0", "p1"]).values.tolist() == [1.0, 1.0]
@@ -136,15 +136,15 @@ def test_groups_without_a_cost_keep_their_ranges_and_a_cost_may_be_a_curve():
 )
 def test_what_cannot_be_allocated_is_refused(options, said):
     with pytest.raises(tc.OptionError) as refused:
-        tc.allocate(pile(0.6, 0.3), **options)
+        tc.analyses.allocate(pile(0.6, 0.3), **options)
     assert said in str(refused.value)
 
 
 def test_a_measure_without_limits_and_a_model_without_ranges_are_refused():
     with pytest.raises(tc.OptionError, match="which has no limits"):
-        tc.allocate(pile(0.6, 0.3, tolerance=None), "top: Ppk 1")
+        tc.analyses.allocate(pile(0.6, 0.3, tolerance=None), "top: Ppk 1")
     with pytest.raises(tc.OptionError, match="has no tolerance to allocate"):
-        tc.allocate(pile(0, norm(0, 0.1)), "top: Ppk 1")
+        tc.analyses.allocate(pile(0, norm(0, 0.1)), "top: Ppk 1")
 
 
 def test_the_command_prints_tables_json_and_csv(tmp_path):
@@ -169,11 +169,11 @@ def test_what_cannot_be_met_is_said_with_the_best_that_was_found(tmp_path):
     """Of N(0, s) at least 67.7 % lie outside 0.1 to 0.5, at s = 0.273; whoever asks for less has to move the nominal."""
     a = pile(0.6)
     a.measure("off", a.parts[0].point(5, 5, 10), along="z", limits=(0.1, 0.5))
-    found = tc.allocate(a, ["off: ppm 10000", "top: ppm 300000"], samples=2048, solver="daqp")
+    found = tc.analyses.allocate(a, ["off: ppm 10000", "top: ppm 300000"], samples=2048, solver="daqp")
     assert found.met.sel(requirement="off: ppm 10000") == 0
     _, lower, upper = found.kept.sel(requirement="off: ppm 10000", stage="after").values
     assert lower < 0.70 and upper > 0.675  # factors are tried in steps
-    tc.write_model(a, tmp_path / "pile.json")
+    tc.io.write_model(a, tmp_path / "pile.json")
     done = call(tmp_path, "allocate", "pile.json", "--require", "off: ppm 10000", "--samples", "1024", "--quiet")
     assert done.returncode == 1 and 'not met: "off: ppm 10000"' in done.stderr
     assert "is not met by any tolerances allowed" in " ".join(done.stdout.split()) and "the best found" in done.stdout
@@ -204,7 +204,7 @@ def supported(shift):
 @pytest.mark.parametrize("shift", [0.0, *nightly(-0.4)])
 def test_a_tolerance_that_decides_nothing_before_it_is_wider_gets_the_range_of_least_cost(shift):
     """P(x <= 0.2) is the product of two normal distributions; with a shift of -0.4, X2 decides above twice its range alone."""
-    found = tc.allocate(supported(shift), "x: ppm 2000", samples=5000, solver="daqp")
+    found = tc.analyses.allocate(supported(shift), "x: ppm 2000", samples=5000, solver="daqp")
     idle, widths = (dict(zip(found.group.values, x.values, strict=True)) for x in (found.idle, found.range.sel(stage="after")))
     assert idle == {"b.X1": 0, "b.X2": 0, "b.Y2": 1} and widths["b.Y2"] == 0.4
 
@@ -225,12 +225,14 @@ def test_groups_without_influence_keep_their_ranges_and_those_at_a_limit_are_nam
     a = pile(0.6, 0.3)
     aside = a.part("aside", tc.Box(10, 10, 10), at=(50, 0, 0))
     a.locate(aside, cases.translating(0.4))
-    found = tc.allocate(a, "top: Ppk 0.5", costs={"p0.Z": 100.0, "p1.Z": 1e-6, "aside.Z": 1.0}, samples=8192, solver="daqp")
+    found = tc.analyses.allocate(
+        a, "top: Ppk 0.5", costs={"p0.Z": 100.0, "p1.Z": 1e-6, "aside.Z": 1.0}, samples=8192, solver="daqp"
+    )
     idle, factor = (dict(zip(found.group.values, found[name].values, strict=True)) for name in ("idle", "factor"))
     assert idle["aside.Z"] == 1 and factor["aside.Z"] == 1 and not idle["p0.Z"] and not idle["p1.Z"]
     assert factor["p0.Z"] == pytest.approx(3, rel=1e-3)
     path = tmp_path / "aside.json"
-    tc.write_model(a, path)
+    tc.io.write_model(a, path)
     costs = [text for name, cost in (("p0.Z", 100), ("p1.Z", 1e-6), ("aside.Z", 1)) for text in ("--cost", f"{name}={cost}")]
     printed = call(
         tmp_path, "allocate", path, "--require", "top: Ppk 0.5", *costs, "--samples", "8192", "--solver", "daqp"

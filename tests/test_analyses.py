@@ -36,11 +36,13 @@ def archive(run_of_ra1, tmp_path):
 @pytest.mark.slow
 def test_an_archive_keeps_what_was_asked_of_its_model(archive):
     kept = {
-        "contributions": tc.contributions(cases.ra1(), samples=1024, into=archive, **FAST),
-        "sensitivities": tc.sensitivities(cases.ra1(), samples=16, into=archive, **FAST),
-        "worst_case": tc.worst_case(cases.ra1(), samples=16, into=archive, **FAST),
-        "tails": tc.tails(cases.ra1(), samples=4000, into=archive, **FAST),
-        "allocation": tc.allocate(cases.ra1(), "corner height: ppm 700000", samples=256, by="part", into=archive, **FAST),
+        "contributions": tc.analyses.contributions(cases.ra1(), samples=1024, into=archive, **FAST),
+        "sensitivities": tc.analyses.sensitivities(cases.ra1(), samples=16, into=archive, **FAST),
+        "worst_case": tc.analyses.worst_case(cases.ra1(), samples=16, into=archive, **FAST),
+        "tails": tc.analyses.tails(cases.ra1(), samples=4000, into=archive, **FAST),
+        "allocation": tc.analyses.allocate(
+            cases.ra1(), "corner height: ppm 700000", samples=256, by="part", into=archive, **FAST
+        ),
     }
     with tc.open_archive(archive) as results:
         assert results.sizes["realization"] == 300 and tc.summarize(results).attrs["realizations"] == 300
@@ -74,12 +76,12 @@ def test_a_model_without_contact_can_be_asked_as_well():
     part = a.part("plate", tc.Box(100, 50, 10))
     a.locate(part, tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x"), inset=10), tolerance=0.1)
     a.measure("corner", part.point(100, 50, 10), along="z", tolerance=0.1)
-    worst = tc.worst_case(a, samples=64, **FAST)
+    worst = tc.analyses.worst_case(a, samples=64, **FAST)
     assert np.abs(worst.worst.values - worst.bound.values).max() < 1e-3
-    assert float(tc.contributions(a, samples=256, **FAST).missed.max()) < 1e-3
-    nominal = tc.sensitivities(a, samples=4, **FAST).nominal.values[0]
+    assert float(tc.analyses.contributions(a, samples=256, **FAST).missed.max()) < 1e-3
+    nominal = tc.analyses.sensitivities(a, samples=4, **FAST).nominal.values[0]
     assert worst.bound.values[0, 0, 1] == pytest.approx(0.05 * np.abs(nominal).sum(), abs=1e-9)
-    assert tc.tails(a, samples=4000, **FAST).sizes["event"] == 1
+    assert tc.analyses.tails(a, samples=4000, **FAST).sizes["event"] == 1
 
 
 @pytest.mark.slow
@@ -91,31 +93,34 @@ def test_a_page_without_analyses_has_no_such_section(archive):
 @pytest.mark.slow
 def test_what_does_not_fit_leaves_the_archive_as_it_was(archive, tmp_path):
     before = archive.read_bytes()
-    with pytest.raises(tc.ArchiveError, match="another model"):
-        tc.sensitivities(cases.one_dimensional(0), samples=4, into=archive, **FAST)
-    with pytest.raises(tc.ArchiveError, match="does not exist"):
-        tc.sensitivities(cases.ra1(), samples=4, into=tmp_path / "none.nc", **FAST)
+    with pytest.raises(tc.errors.ArchiveError, match="another model"):
+        tc.analyses.sensitivities(cases.one_dimensional(0), samples=4, into=archive, **FAST)
+    with pytest.raises(tc.errors.ArchiveError, match="does not exist"):
+        tc.analyses.sensitivities(cases.ra1(), samples=4, into=tmp_path / "none.nc", **FAST)
     (tmp_path / "text.nc").write_text("no archive")
-    with pytest.raises(tc.ArchiveError, match=r"text\.nc"):
-        tc.sensitivities(cases.ra1(), samples=4, into=tmp_path / "text.nc", **FAST)
+    with pytest.raises(tc.errors.ArchiveError, match=r"text\.nc"):
+        tc.analyses.sensitivities(cases.ra1(), samples=4, into=tmp_path / "text.nc", **FAST)
     assert archive.read_bytes() == before
-    tc.sensitivities(cases.ra1(), samples=4, into=archive, **FAST)
+    tc.analyses.sensitivities(cases.ra1(), samples=4, into=archive, **FAST)
     once = archive.read_bytes()
-    with pytest.raises(tc.ArchiveError, match="already has statistics/sensitivities"):
-        tc.sensitivities(cases.ra1(), samples=4, into=archive, **FAST)
+    with pytest.raises(tc.errors.ArchiveError, match="already has statistics/sensitivities"):
+        tc.analyses.sensitivities(cases.ra1(), samples=4, into=archive, **FAST)
     assert archive.read_bytes() == once and not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 
 
 @pytest.mark.slow
 def test_numbers_that_were_damaged_are_not_shown(archive):
-    tc.contributions(cases.ra1(), samples=16, into=archive, **FAST)
+    tc.analyses.contributions(cases.ra1(), samples=16, into=archive, **FAST)
     content = bytearray(archive.read_bytes())
     with netCDF4.Dataset(archive) as file:
         values = file["statistics/contributions/linear"][:].tobytes()
     assert content.count(values) == 1
     content[content.index(values) + 24] ^= 1
     archive.write_bytes(content)
-    with tc.open_archive(archive) as results, pytest.raises(tc.ArchiveError, match="contributions in the archive is not what"):
+    with (
+        tc.open_archive(archive) as results,
+        pytest.raises(tc.errors.ArchiveError, match="contributions in the archive is not what"),
+    ):
         page_of(results, tc.summarize(results))
 
 
@@ -143,7 +148,7 @@ def test_the_model_of_an_archive_is_analysed_by_the_method_seed_and_solver_of_it
     path = tmp_path / "ra1.nc"
     method = tc.Method(resolution="exact", objective="all points", active_set="initial")
     tc.run(cases.ra1(), samples=4, seed=7, out=path, surfaces=0, solver="daqp", method=method).close()
-    expected = tc.sensitivities(cases.ra1(), samples=8, seed=7, solver="daqp", method=method)
+    expected = tc.analyses.sensitivities(cases.ra1(), samples=8, seed=7, solver="daqp", method=method)
     done = call(tmp_path, "sensitivities", path, "--samples", "8", "--json")
     assert done.returncode == 0, done.stderr
     found = xr.Dataset.from_dict(json.loads(done.stdout))
@@ -162,5 +167,5 @@ def test_an_archive_without_a_usable_model_is_refused_by_name(tmp_path, archive)
         (archive, "the model in .*ra1.nc. cannot be rebuilt.*approximate"),
         (tmp_path / "no.nc", "does not exist"),
     ):
-        with pytest.raises(tc.ArchiveError, match=reason):
-            tc.tails(path)
+        with pytest.raises(tc.errors.ArchiveError, match=reason):
+            tc.analyses.tails(path)

@@ -116,7 +116,7 @@ def test_a_model_without_contact_has_an_archive_too(tmp_path):
     assert tc.summarize(path)["by_status"].values.tolist() == [50, 0, 0, 0, 0]
     tc.run(a, samples=60, solver="daqp", out=path, resume=True).close()
     with tc.open_archive(path) as tree:
-        assert tree.sizes["realization"] == 60 and [part.name for part in tc.model_of(tree).parts] == ["block"]
+        assert tree.sizes["realization"] == 60 and [part.name for part in tc.io.model_of(tree).parts] == ["block"]
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from tests.test_guide import GUIDE
 from tolcontact.declaration.feature_tolerance import KINDS
 from tolcontact.features.tolerance_kinds import TOLERANCES
 
-BORE = tc.Cylinder(inner=True)
+BORE = tc.select.Cylinder(inner=True)
 
 
 def ring(declare):
@@ -65,7 +65,7 @@ CASES = {
     "limits the wrong way round": (
         lambda p: p.feature("f", p.face(BORE), tc.Size(10, -0.1, 0.1)), "the lower limit +0.1 is not below the upper one -0.1"
     ),
-    "two surfaces": (lambda p: p.feature("f", p.face(tc.Cylinder())), "shares a face with feature"),
+    "two surfaces": (lambda p: p.feature("f", p.face(tc.select.Cylinder())), "shares a face with feature"),
     "plane and cylinder": (
         lambda p: p.feature("f", p.face(lambda c, n: (n[:, 2] > 0.9) | (np.hypot(c[:, 0], c[:, 1]) < 6))),
         "spans more than one surface",

@@ -87,19 +87,19 @@ MISTAKES = {
         ['part "lid"', "inverted.stl", "inside out", "volume -50000"],
     ),
     "empty box": (
-        {"contact": GOOD["contact"].replace("'+z'", "'+z', tc.Inside((0, 0, 9), (9, 9, 8))")},
+        {"contact": GOOD["contact"].replace("'+z'", "'+z', tc.select.Inside((0, 0, 9), (9, 9, 8))")},
         ['contact pair "interface"', 'part "base"', "empty"],
     ),
     "box beside the part": (
-        {"contact": GOOD["contact"].replace("'+z'", "'+z', tc.Inside((0, 0, 90), (9, 9, 99))")},
+        {"contact": GOOD["contact"].replace("'+z'", "'+z', tc.select.Inside((0, 0, 90), (9, 9, 99))")},
         ['contact pair "interface"', "base +z", "(100, 50, 10)"],
     ),
     "B-rep face of a box": (
-        {"contact": GOOD["contact"].replace("'+z'", "tc.Brep((5, 5, 10))")},
+        {"contact": GOOD["contact"].replace("'+z'", "tc.select.Brep((5, 5, 10))")},
         ['contact pair "interface"', "not a STEP file"],
     ),
     "near a part of another assembly": (
-        {"contact": GOOD["contact"].replace("'+z'", "tc.Near(tc.Assembly('B').part('lid', tc.Box(1, 1, 1)), 1)")},
+        {"contact": GOOD["contact"].replace("'+z'", "tc.select.Near(tc.Assembly('B').part('lid', tc.Box(1, 1, 1)), 1)")},
         ['contact pair "interface"', 'unknown part "lid"'],
     ),
     "two names alike": ({"measure": 2 * GOOD["measure"]}, ['measurement "height"', "2 times"]),

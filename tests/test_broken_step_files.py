@@ -68,11 +68,11 @@ def test_broken_files_end_in_a_message_each_or_are_read(kinds, tmp_path):
     assert len(BROKEN) == 20
     for kind, path in paths.items():
         if kind not in messages:
-            assert tc.bodies_in(path), kind
+            assert tc.io.bodies_in(path), kind
 
 
 def test_a_byte_order_mark_is_named(tmp_path):
     path = tmp_path / "cover.step"
     path.write_text("\ufeff" + WHOLE, encoding="utf-8")
     with pytest.raises(OptionError, match=r'cover\.step" begins with a byte order mark.*save it as UTF-8 without'):
-        tc.bodies_in(path)
+        tc.io.bodies_in(path)

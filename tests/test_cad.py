@@ -105,7 +105,7 @@ def test_vertices_of_a_step_file_lie_on_its_surfaces_in_double_precision():
 
 
 def test_the_faces_of_a_part_say_what_they_are():
-    found = tc.faces_in(COVER)
+    found = tc.io.faces_in(COVER)
     assert [face.number for face in found] == list(range(1, 16))
     holes = [face for face in found if face.kind == "cylinder" and face.is_inner]
     assert [face.radius for face in holes] == pytest.approx([4.05] * 3, abs=1e-12)
@@ -121,15 +121,15 @@ def triangles(*criteria):
 
 
 def test_faces_are_chosen_by_number_kind_and_size():
-    assert triangles(tc.Brep(2)) == triangles(tc.Largest("plane", "+z")) == triangles(tc.Brep((60, 10, 8)))
-    holes = sorted(triangles(tc.Brep(11)) + triangles(tc.Brep(13)) + triangles(tc.Brep(15)))
-    assert triangles(tc.Cylinder(radius=4.05)) == triangles(tc.Cylinder(inner=True)) == holes
-    corners = sorted(itertools.chain(*(triangles(tc.Brep(number)) for number in (3, 4, 8, 9))))
-    assert triangles(tc.Cylinder(radius=6)) == triangles(tc.Cylinder(inner=False)) == corners
-    for wrong in (tc.Brep(16), tc.Brep(0), tc.Cylinder(radius=4.06), tc.Largest("sphere")):
+    assert triangles(tc.select.Brep(2)) == triangles(tc.select.Largest("plane", "+z")) == triangles(tc.select.Brep((60, 10, 8)))
+    holes = sorted(triangles(tc.select.Brep(11)) + triangles(tc.select.Brep(13)) + triangles(tc.select.Brep(15)))
+    assert triangles(tc.select.Cylinder(radius=4.05)) == triangles(tc.select.Cylinder(inner=True)) == holes
+    corners = sorted(itertools.chain(*(triangles(tc.select.Brep(number)) for number in (3, 4, 8, 9))))
+    assert triangles(tc.select.Cylinder(radius=6)) == triangles(tc.select.Cylinder(inner=False)) == corners
+    for wrong in (tc.select.Brep(16), tc.select.Brep(0), tc.select.Cylinder(radius=4.06), tc.select.Largest("sphere")):
         with pytest.raises(GeometryFault, match=r"face cover .*(faces 1 to 15|no such face)"):
             triangles(wrong)
-    assert "expected one of: plane" in next(tc.Largest("round").faults())
+    assert "expected one of: plane" in next(tc.select.Largest("round").faults())
 
 
 @pytest.fixture
@@ -140,7 +140,7 @@ def file(tmp_path):
 
 
 def test_bodies_of_an_assembly_have_names_places_and_sizes(file):
-    found = tc.bodies_in(file)
+    found = tc.io.bodies_in(file)
     assert [body.name for body in found] == ["use 0", "use 1", "use 1 (2)", "use 1 (3)", "use 2"]
     assert [body.number for body in found] == [1, 2, 3, 4, 5] and found[0].path == ("whole", "use 0")
     assert (
@@ -155,10 +155,10 @@ def test_bodies_of_an_assembly_have_names_places_and_sizes(file):
 @pytest.mark.slow
 def test_an_assembly_is_declared_from_its_file_alone(file):
     model = tc.Assembly("stack")
-    parts = tc.parts_from(model, file, ["use 0", "use 2"])
+    parts = tc.io.parts_from(model, file, ["use 0", "use 2"])
     assert list(parts) == ["use 0", "use 2"] == [part.name for part in model.parts]
     upper, lower = parts["use 2"], parts["use 0"]
-    scheme = tc.three_two_one(upper.face(tc.Largest("plane", "-z")), upper.face("-y"), upper.face("-x"), inset=0.5)
+    scheme = tc.three_two_one(upper.face(tc.select.Largest("plane", "-z")), upper.face("-y"), upper.face("-x"), inset=0.5)
     model.locate(upper, scheme, tolerance=0.2)
     model.locate(lower, tc.three_two_one(lower.face("-z"), lower.face("-y"), lower.face("-x"), inset=0.5), tolerance=0.1)
     model.contact("seat", moving=upper.face("-z"), reference=lower.face("+z"))
@@ -167,22 +167,22 @@ def test_an_assembly_is_declared_from_its_file_alone(file):
     assert (results["status"] <= 1).all()
     raw, corrected = (results["measured"].sel(state=state, measure="gap") for state in ("raw", "corrected"))
     assert float(raw.min()) < -0.05 and float(corrected.min()) > -0.005  # points beside each other, faces tilted
-    again = tc.run(tc.model_of(results), samples=300, seed=1, solver="daqp", surfaces=0)
+    again = tc.run(tc.io.model_of(results), samples=300, seed=1, solver="daqp", surfaces=0)
     assert np.array_equal(again["measured"].values, results["measured"].values)
-    assert len(tc.parts_from(tc.Assembly("all"), file)) == 5
+    assert len(tc.io.parts_from(tc.Assembly("all"), file)) == 5
 
 
 @pytest.mark.slow
 def test_what_a_file_does_not_hold_is_told(file, tmp_path):
     with pytest.raises(tc.ModelError, match=r'holds no body "use 9"; it holds "use 0", "use 1"'):
-        tc.parts_from(tc.Assembly("stack"), file, ["use 9"])
+        tc.io.parts_from(tc.Assembly("stack"), file, ["use 9"])
     with pytest.raises(tc.ModelError, match="does not exist"):
-        tc.parts_from(tc.Assembly("stack"), tmp_path / "none.step")
+        tc.io.parts_from(tc.Assembly("stack"), tmp_path / "none.step")
     (tmp_path / "ball.stl").write_bytes(trimesh.creation.icosphere(1).export(file_type="stl"))
     with pytest.raises(tc.OptionError, match="not a STEP file"):
-        tc.bodies_in(tmp_path / "ball.stl")
+        tc.io.bodies_in(tmp_path / "ball.stl")
     with pytest.raises(tc.OptionError, match="holds 5 bodies, but a part is one body; name one"):
-        tc.faces_in(file)
+        tc.io.faces_in(file)
     model = tc.Assembly("ball")
     model.part("ball", tc.Mesh(tmp_path / "ball.stl", body="ball"), fixed=True)
     with pytest.raises(tc.ModelError, match="only STEP files hold bodies"):
@@ -201,14 +201,17 @@ def test_a_place_that_has_only_the_kernels_label_is_called_after_its_product(tmp
     """The kernel's writer states its own labels as names."""
     path = tmp_path / "labels.step"
     path.write_text(assembly(("pin", (0, 0, 0)), ("pin", (9, 0, 0))).replace("use 0", "=>[0:1:1:2]"))
-    assert [(body.name, body.path) for body in tc.bodies_in(path)] == [("pin", ("whole", "pin")), ("use 1", ("whole", "use 1"))]
+    assert [(body.name, body.path) for body in tc.io.bodies_in(path)] == [
+        ("pin", ("whole", "pin")),
+        ("use 1", ("whole", "use 1")),
+    ]
 
 
 def test_names_that_no_part_may_have_are_changed(tmp_path):
     path = tmp_path / "odd.step"
     path.write_text(assembly(("pin", (0, 0, 0)), ("pin", (9, 0, 0))).replace("use 0", "M6/12").replace("use 1", "-x ?"))
     model = tc.Assembly("odd")
-    parts = tc.parts_from(model, path)
+    parts = tc.io.parts_from(model, path)
     assert list(parts) == ["M6_12", "body 2 -x ?"]
     assert not [fault for fault in model.faults() if "name must" in fault]
 
@@ -230,21 +233,21 @@ def test_the_command_line_lists_bodies_and_faces(file):
 def test_some_bodies_of_a_file_are_fixed(file):
     """A list of names fixes these; True or False applies to all."""
     model = tc.Assembly("stack")
-    parts = tc.parts_from(model, file, fixed=["use 0"])
+    parts = tc.io.parts_from(model, file, fixed=["use 0"])
     assert {name for name, part in parts.items() if part.fixed} == {"use 0"}
     assert {part.fixed for name, part in parts.items() if name != "use 0"} == {None}
     for fixed in (True, False, None):
-        assert {part.fixed for part in tc.parts_from(tc.Assembly("a"), file, fixed=fixed).values()} == {fixed}
-    assert {part.fixed for part in tc.parts_from(tc.Assembly("a"), file, fixed=[]).values()} == {None}
+        assert {part.fixed for part in tc.io.parts_from(tc.Assembly("a"), file, fixed=fixed).values()} == {fixed}
+    assert {part.fixed for part in tc.io.parts_from(tc.Assembly("a"), file, fixed=[]).values()} == {None}
     with pytest.raises(tc.ModelError, match='holds no body "plate"; it holds'):
-        tc.parts_from(tc.Assembly("a"), file, fixed=["plate"])
+        tc.io.parts_from(tc.Assembly("a"), file, fixed=["plate"])
     with pytest.raises(tc.ModelError, match='fixed has the body "use 0", which is not in names; add it there'):
-        tc.parts_from(tc.Assembly("a"), file, ["use 1"], fixed=["use 0"])
+        tc.io.parts_from(tc.Assembly("a"), file, ["use 1"], fixed=["use 0"])
     for wrong in ("use 0", 3, {"use 0": True}, [1]):
         with pytest.raises(TypeError, match="expected a list of the names of bodies, as in fixed="):
-            tc.parts_from(tc.Assembly("a"), file, fixed=wrong)
+            tc.io.parts_from(tc.Assembly("a"), file, fixed=wrong)
     with pytest.raises(TypeError, match=r'names is \'use 0\'; expected a list .* as in names=\["use 0"\]'):
-        tc.parts_from(tc.Assembly("a"), file, "use 0")
+        tc.io.parts_from(tc.Assembly("a"), file, "use 0")
 
 
 def test_check_and_bodies_state_sizes_along_the_same_axes(tmp_path):
@@ -253,7 +256,7 @@ def test_check_and_bodies_state_sizes_along_the_same_axes(tmp_path):
     model = tmp_path / "model.py"
     model.write_text(
         "import tolcontact as tc\n\ndef assembly():\n    model = tc.Assembly('as1')\n"
-        f"    parts = tc.parts_from(model, {str(source)!r}, fixed=True)\n"
+        f"    parts = tc.io.parts_from(model, {str(source)!r}, fixed=True)\n"
         "    model.measure('x', parts['nut_1'].point(0, 0, 0), along='x')\n    return model\n"
     )
     listed = CliRunner().invoke(app, ["bodies", str(source)]).stdout
@@ -291,19 +294,19 @@ def test_one_body_alone_stands_where_its_file_puts_it(tmp_path):
     assert shape(tc.Mesh(tmp_path / "one.step")).bounds == pytest.approx(np.array([[7, 0, 0], [12, 5, 5]]))
     assert shape(tc.Mesh(tmp_path / "one.step", body=1)).bounds == pytest.approx(np.array([[0, 0, 0], [5, 5, 5]]))
     (tmp_path / "block.step").write_text(step_block())
-    assert tc.bodies_in(tmp_path / "block.step")[0].at == (0, 0, 0)
+    assert tc.io.bodies_in(tmp_path / "block.step")[0].at == (0, 0, 0)
 
 
 @pytest.mark.slow
 def test_a_file_is_read_again_once_it_has_changed(tmp_path, monkeypatch):
     path = tmp_path / "part.step"
     path.write_text(step_block())
-    before = tc.bodies_in(path)[0].upper
+    before = tc.io.bodies_in(path)[0].upper
     monkeypatch.setattr("subprocess.Popen", None)
-    assert tc.bodies_in(path)[0].upper == before  # from memory
+    assert tc.io.bodies_in(path)[0].upper == before  # from memory
     monkeypatch.undo()
     path.write_text(assembly(("pin", (0, 0, 0)), ("pin", (9, 0, 0))))
-    assert len(tc.bodies_in(path)) == 2
+    assert len(tc.io.bodies_in(path)) == 2
 
 
 def test_a_body_that_is_mirrored_in_its_place_is_refused(tmp_path):
@@ -320,26 +323,30 @@ def test_a_body_that_is_mirrored_in_its_place_is_refused(tmp_path):
 
 @pytest.mark.slow
 def test_the_largest_round_face_is_along_an_axis_whichever_way_it_points():
-    assert triangles(tc.Largest("cylinder", "+z")) == triangles(tc.Largest("cylinder", "-z")) == triangles(tc.Brep(11))
+    assert (
+        triangles(tc.select.Largest("cylinder", "+z"))
+        == triangles(tc.select.Largest("cylinder", "-z"))
+        == triangles(tc.select.Brep(11))
+    )
     with pytest.raises(GeometryFault, match="no such face"):
-        triangles(tc.Largest("cylinder", "x"))
+        triangles(tc.select.Largest("cylinder", "x"))
 
 
 def test_wrong_bodies_and_names_are_told_and_names_do_not_steer_a_terminal(file):
     for wrong in (True, 1.5):
         assert "expected the name of a body, or its number" in " ".join(tc.Mesh(file, body=wrong).faults())
     with pytest.raises(TypeError, match="expected a list of the names"):
-        tc.parts_from(tc.Assembly("stack"), file, "use 0")
+        tc.io.parts_from(tc.Assembly("stack"), file, "use 0")
     file.write_text(file.read_text().replace("use 0", "\x1b[31m red"))
     listed = CliRunner().invoke(app, ["bodies", str(file)]).stdout
     assert "red" in listed and "\x1b" not in listed
-    assert "\x1b" not in "".join(tc.parts_from(tc.Assembly("stack"), file))
+    assert "\x1b" not in "".join(tc.io.parts_from(tc.Assembly("stack"), file))
     file.write_text(file.read_text().replace("\x1b[31m red", r"two\X\0Alines"))
     assert r"two\nlines" in CliRunner().invoke(app, ["bodies", str(file)]).stdout
 
 
 def test_the_units_of_a_file_are_stated(file):
-    assert all(body.units == "millimetre" for body in tc.bodies_in(file))
+    assert all(body.units == "millimetre" for body in tc.io.bodies_in(file))
     assert (
         CliRunner()
         .invoke(app, ["bodies", str(file)])

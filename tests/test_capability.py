@@ -230,7 +230,7 @@ def test_a_function_has_its_own_value():
 @pytest.mark.parametrize("limits", [(None, 0.5), (-0.25, 0.5), (-1, None)])
 def test_limits_come_back_from_an_archive_and_a_document(limits, tmp_path):
     a = stand(limits=limits, absolute=False)
-    tc.write_model(a, tmp_path / "stand.json")
+    tc.io.write_model(a, tmp_path / "stand.json")
     tc.run(a, samples=10, out=tmp_path / "stand.nc").close()
     with tc.open_archive(tmp_path / "stand.nc") as results:
         again = [tc.archive.model_of(results), tc.build(tmp_path / "stand.json").nominal.assembly]

@@ -141,7 +141,7 @@ def test_overlaps_that_are_meant_are_not_told(tmp_path):
     assert results.attrs["not_watched"] == "overlaps that are declared: (wall, block)"
     results.close()
     with tc.open_archive(path) as archived:
-        assert list(map(str, tc.model_of(archived).overlaps)) == ["overlap of wall, block"]
+        assert list(map(str, tc.io.model_of(archived).overlaps)) == ["overlap of wall, block"]
 
 
 def test_overlaps_survive_json(tmp_path):
@@ -203,7 +203,7 @@ def test_answers_beyond_the_chosen_faces_are_doubtful_and_say_why():
 def test_a_second_pair_at_the_wall_ends_the_doubt():
     assembly = beside_wall(table=angle_table())
     base, block = assembly.parts
-    face = base.face("+x", tc.Inside((-1, -1, 10), (1, 61, 41)))
+    face = base.face("+x", tc.select.Inside((-1, -1, 10), (1, 61, 41)))
     assembly.contact("wall", moving=block.face("-x"), reference=face)
     assert not warned(assembly)
     assert_resolved(tc.run(assembly, samples=200, seed=1, surfaces=0))

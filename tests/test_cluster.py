@@ -119,7 +119,7 @@ def test_contributions_and_sensitivities_are_those_of_one_process(client):
     a = cases.stack()
     a.correlate(["upper.A1", "middle.A1"], 0.8)
     program = tc.build(a, solver="daqp")
-    for ask in (tc.contributions, tc.sensitivities):
+    for ask in (tc.analyses.contributions, tc.analyses.sensitivities):
         assert ask(program, samples=200, client=client).identical(ask(program, samples=200))
 
 
@@ -127,13 +127,15 @@ def test_contributions_and_sensitivities_are_those_of_one_process(client):
 def test_searches_and_comparisons_are_those_of_one_process(client):
     program = tc.build(cases.ra1(), solver="daqp")
     for ask, model, options in (
-        (tc.worst_case, tc.build(cases.one_dimensional(6), solver="daqp"), {"samples": 8}),
-        (tc.tails, program, {"samples": 4000}),
-        (tc.allocate, program, {"require": "corner height: ppm 10000", "by": "part", "samples": 1024}),
+        (tc.analyses.worst_case, tc.build(cases.one_dimensional(6), solver="daqp"), {"samples": 8}),
+        (tc.analyses.tails, program, {"samples": 4000}),
+        (tc.analyses.allocate, program, {"require": "corner height: ppm 10000", "by": "part", "samples": 1024}),
     ):
         assert ask(model, client=client, **options).identical(ask(model, **options)), ask
     asked = {"between": ((20, 12.5, 0), (80, 12.5, 0)), "least": "corner height: 6 sigma", "samples": 64, "solver": "daqp"}
-    assert tc.relocate(cases.ra1(), "top.A3", client=client, **asked).identical(tc.relocate(cases.ra1(), "top.A3", **asked))
+    assert tc.analyses.relocate(cases.ra1(), "top.A3", client=client, **asked).identical(
+        tc.analyses.relocate(cases.ra1(), "top.A3", **asked)
+    )
     solvers = ["daqp", "qpoases"]
     found, expected = (tc.compare(cases.ra1(), solvers, samples=500, client=each) for each in (client, None))
     assert found.drop_vars("seconds").identical(expected.drop_vars("seconds")) and (found["seconds"] > 0).all()

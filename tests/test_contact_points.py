@@ -60,7 +60,9 @@ def test_points_on_curved_faces_lie_on_them_and_look_outward(solid):
     shell = a.part("shell", tc.Mesh(around))
     a.locate(shell, six, tolerance=0.1)
     steep = 2 if solid == "sphere" else 0.1  # of the bar the barrel only
-    inside = shell.face(lambda c, n: (np.linalg.norm(c, axis=1) < 23) & (abs(n[:, 2]) < steep), tc.Inside([-15] * 3, [15] * 3))
+    inside = shell.face(
+        lambda c, n: (np.linalg.norm(c, axis=1) < 23) & (abs(n[:, 2]) < steep), tc.select.Inside([-15] * 3, [15] * 3)
+    )
     a.contact("around", moving=inside, reference=core.face(lambda c, n: abs(n[:, 2]) < steep), points=500)
     a.measure("height", shell.point(0, 0, 0), along="z")
     (pair,) = discretize(a).pairs

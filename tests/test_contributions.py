@@ -97,7 +97,7 @@ def test_a_prediction_misses_what_it_does_not_explain():
 
 @pytest.fixture(scope="module")
 def of_ra1():
-    return tc.contributions(cases.model("ra1"), samples=4096, solver="daqp")
+    return tc.analyses.contributions(cases.model("ra1"), samples=4096, solver="daqp")
 
 
 def test_raw_indices_of_ra1_are_the_closed_form(of_ra1):
@@ -128,7 +128,7 @@ def test_linear_percentages_name_the_wrong_contributor_of_ra1(of_ra1):
 @pytest.mark.slow
 def test_fixing_a_group_removes_its_share():
     """Total of all but base.A2, another way: the variance that is left when it is fixed, on average over where."""
-    whole = tc.contributions(cases.model("ra1"), samples=2048, seed=5, solver="daqp")
+    whole = tc.analyses.contributions(cases.model("ra1"), samples=2048, seed=5, solver="daqp")
     program = tc.build(cases.model("ra1"), solver="daqp")
     column, left, f = list(program.nominal.contributors).index("base.A2"), [], []
     draws = program.draws(seed=77, start=0, stop=60 * 200)
@@ -168,7 +168,7 @@ def test_what_is_drawn_together_is_one_group():
     groups = independent_groups(program.draws, labels, np.ones(len(labels), dtype=bool))
     assert "middle.A1 + upper.A1" in groups or "upper.A1 + middle.A1" in groups
     assert sorted(k for columns in groups.values() for k in columns) == list(range(len(labels)))
-    by_part = tc.contributions(a, samples=16, solver="daqp", by="part")
+    by_part = tc.analyses.contributions(a, samples=16, solver="daqp", by="part")
     assert by_part.sizes["group"] == 2 and "bottom" in by_part["group"].values
 
 
@@ -201,7 +201,7 @@ def test_shapley_effects_divide_what_is_correlated():
     a = cases.stack()
     a.correlate(CORRELATED, MATRIX)
     program = tc.build(a, solver="daqp", method=PAPER)
-    found = tc.contributions(program, samples=4096).sel(measure="top")
+    found = tc.analyses.contributions(program, samples=4096).sel(measure="top")
     columns = [list(program.nominal.contributors).index(label) for label in (*CORRELATED, "upper.A2")]
     slopes = linear_model(program).by_deviations[0, columns]
     matrix = np.eye(4)
@@ -211,7 +211,7 @@ def test_shapley_effects_divide_what_is_correlated():
         assert abs(estimate - truth) < 1.7 * (upper - lower) / 2 + 1e-3 and truth > 0.05, label
     assert found["shapley"].sel(interval="estimate").sum("unit").values == pytest.approx([1, 1])
     assert found.sizes["unit"] == found.sizes["group"] + 2
-    assert tc.contributions(program, samples=16, by="part").sizes["unit"] == 3
+    assert tc.analyses.contributions(program, samples=16, by="part").sizes["unit"] == 3
 
 
 def test_intervals_of_shapley_effects_cover():
@@ -269,7 +269,7 @@ def test_a_model_in_which_nothing_varies_is_refused():
     a.part("block", tc.Box(10, 10, 10), fixed=True)
     a.measure("height", a.parts[0].point(0, 0, 10), along="z")
     with pytest.raises(tc.OptionError, match="nothing varies"):
-        tc.contributions(a)
+        tc.analyses.contributions(a)
 
 
 @pytest.mark.slow
@@ -277,7 +277,11 @@ def test_what_only_contact_moves_has_no_linear_percentages(tmp_path):
     """The clutch's roller floats: without contact its angle does not vary."""
     done = call(tmp_path, "contributions", cases.MODELS / "clutch.py", "--samples", "64", "--solver", "daqp")
     assert done.returncode == 0 and "nan" not in done.stdout and "without contact -, with contact" in done.stdout
-    shares = tc.contributions(cases.MODELS / "clutch.py", samples=1024, solver="daqp").isel(measure=0).sel(state="corrected")
+    shares = (
+        tc.analyses.contributions(cases.MODELS / "clutch.py", samples=1024, solver="daqp")
+        .isel(measure=0)
+        .sel(state="corrected")
+    )
     # Root sum square of CASES C7, which is nearly linear: sensitivities times a sixth of the tolerances.
     parts = np.array([11.910 * 0.1, 23.732 * 0.02, 11.821 * 0.025]) ** 2
     for label, part in zip(("hub.flat.offset", "roller.barrel.size", "ring.bore.size"), parts / parts.sum(), strict=True):
@@ -287,7 +291,7 @@ def test_what_only_contact_moves_has_no_linear_percentages(tmp_path):
 
 def test_an_option_that_cannot_act_is_refused():
     program = tc.build(cases.one_dimensional(0), solver="daqp")
-    for answer in (tc.contributions, tc.sensitivities):
+    for answer in (tc.analyses.contributions, tc.analyses.sensitivities):
         with pytest.raises(tc.OptionError, match="a Program has its solver and method"):
             answer(program, solver="daqp")
         assert answer(program, samples=16).attrs["solver"] == "daqp"
@@ -307,7 +311,7 @@ def shelf(weights, own=0.0):
 
 @pytest.mark.slow
 def test_independent_causes_of_the_same_locators_have_shares_of_their_own():
-    found = tc.contributions(shelf({"a": 1.0, "b": -0.5}), samples=2048, solver="daqp").sel(measure="height")
+    found = tc.analyses.contributions(shelf({"a": 1.0, "b": -0.5}), samples=2048, solver="daqp").sel(measure="height")
     assert found.group.values.tolist() == ["a", "b"]
     assert found.linear.values == pytest.approx([0.8, 0.2], abs=1e-6)  # exact, not of draws
     for name in ("first", "total"):
@@ -328,7 +332,7 @@ def test_minor_contributors_are_bounded_together_and_major_ones_keep_their_inter
     truth = {"raw": (shares, shares), "corrected": of_clipped(tuple(WEIGHTS**2))}
     misses, minor_shares = np.zeros(4), shares[12:].sum()
     for seed in seeds:
-        found = tc.contributions(program, samples=512, seed=seed).isel(measure=0)
+        found = tc.analyses.contributions(program, samples=512, seed=seed).isel(measure=0)
         assert found.minor.values.tolist() == [0] * 12 + [1] * 56
         assert found.attrs["realizations"] == 128 * 70 + 512 * 15
         assert abs(float(found.minor_total.sel(state="raw", interval="estimate")) / minor_shares - 1) < 0.5
@@ -343,22 +347,24 @@ def test_minor_contributors_are_bounded_together_and_major_ones_keep_their_inter
 
 def test_by_default_realizations_are_those_of_what_matters():
     program = tc.build(shelf({f"v{k}": w for k, w in enumerate(WEIGHTS)}), solver="daqp", method=PAPER)
-    found = tc.contributions(program)
+    found = tc.analyses.contributions(program)
     assert 58_000 < found.attrs["realizations"] <= 60_000 and found.attrs["base_realizations"] == (60_000 - 8960) // 15
     half_widths = np.ptp(found["total"].sel(interval=["lower", "upper"]).values, axis=-1) / 2
     assert half_widths.max() < 0.04
-    assert tc.contributions(program, samples=64).minor.sum() == 0  # too few to be screened
+    assert tc.analyses.contributions(program, samples=64).minor.sum() == 0  # too few to be screened
 
 
 @pytest.mark.slow
 def test_a_cause_and_what_varies_by_itself_stay_apart():
     """z of the middle is a + (A1 + A2 + A3) / 3 or so: each locator keeps its own share."""
-    found = tc.contributions(shelf({"a": 1.0}, own=0.3), samples=2048, solver="daqp").sel(measure="height", state="raw")
+    found = tc.analyses.contributions(shelf({"a": 1.0}, own=0.3), samples=2048, solver="daqp").sel(
+        measure="height", state="raw"
+    )
     groups = found.group.values.tolist()
     assert "a" in groups and {"block.A1", "block.A2", "block.A3"} <= set(groups)
     first = found["first"].sel(interval="estimate")
     assert float(first.sum()) == pytest.approx(1.0, abs=0.06)
-    slopes = tc.sensitivities(shelf({"a": 1.0}, own=0.3), samples=64, solver="daqp").sel(measure="height")
+    slopes = tc.analyses.sensitivities(shelf({"a": 1.0}, own=0.3), samples=64, solver="daqp").sel(measure="height")
     assert float(slopes.nominal.sel(contributor="a")) == pytest.approx(1.0, abs=1e-6)
     lifted = slopes.nominal.sel(contributor=["block.A1", "block.A2", "block.A3"])
     variance = float((lifted**2).sum()) * 0.05**2
@@ -368,7 +374,7 @@ def test_a_cause_and_what_varies_by_itself_stay_apart():
 @pytest.mark.slow
 def test_a_cause_is_stepped_with_what_it_drives():
     """height = max(0, v): the mean derivative is 1 raw, and the share of realizations above the table corrected."""
-    found = tc.sensitivities(shelf({"v": 1.0}), samples=2000, solver="daqp").sel(measure="height")
+    found = tc.analyses.sensitivities(shelf({"v": 1.0}), samples=2000, solver="daqp").sel(measure="height")
     assert found.contributor.values.tolist() == ["v"]
     raw, corrected = found.sensitivity.sel(contributor="v").values
     assert raw[0] == pytest.approx(1.0, abs=1e-6) and corrected[1] <= 0.5 <= corrected[2]

@@ -85,7 +85,7 @@ def test_a_shared_cause_drives_all_that_it_names():
     assert sample["contributor_units"].sel(contributor="warmth") == "K"
     assert sample["source"].sel(contributor=["block.top.offset", "warmth"]).values.tolist() == ["feature", "variable"]
     assert_gaps_recompute(results)
-    assert_same_run(results, tc.run(tc.model_of(results), samples=300))
+    assert_same_run(results, tc.run(tc.io.model_of(results), samples=300))
 
 
 @pytest.mark.parametrize("kind", ["frame", "dataset", "csv", "mapping"])
@@ -125,7 +125,7 @@ def test_a_population_is_in_the_archive():
     a = cases.ra1()
     a.population({"one": first, "two": -2 * first + 0.01}, {"top.A1": "one", "top.A2": "two"})
     results = tc.run(a, samples=100, surfaces=0)
-    assert_same_run(results, tc.run(tc.model_of(results), samples=100, surfaces=0))
+    assert_same_run(results, tc.run(tc.io.model_of(results), samples=100, surfaces=0))
 
 
 @pytest.mark.parametrize(

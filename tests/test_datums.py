@@ -81,7 +81,7 @@ def test_the_shift_of_the_datum_follows_from_the_tilt_and_is_measured_back():
 def test_the_association_is_in_the_model_and_its_json(tmp_path):
     model = plate("least squares")
     path = tmp_path / "plate.json"
-    tc.write_model(model, path)
+    tc.io.write_model(model, path)
     again = load_model(path)
     assert [feature.association for feature in again.features] == ["outside", "least squares", "least squares", "outside"]
     with pytest.raises(tc.ModelError, match="its association is 'best'; expected one of: outside, least squares"):
@@ -90,7 +90,7 @@ def test_the_association_is_in_the_model_and_its_json(tmp_path):
 
 def test_worst_cases_shift_the_datum_too():
     model = plate("outside")
-    found = tc.worst_case(model, samples=256)
+    found = tc.analyses.worst_case(model, samples=256)
     # Half of the zone both ways, and half of the side's zone, by which its datum lies farther out.
     for name in ("worst", "bound"):
         assert found[name].sel(measure="far", state="corrected").values == pytest.approx([-0.2, 0.05], abs=1e-6)
@@ -139,8 +139,10 @@ def test_a_datum_that_locks_directions_alone_is_not_followed_to_its_place(system
     part.feature("under", part.face("-z"), datum="A")
     part.feature("side", part.face("-y", lambda c, n: c[:, 1] < 1e-3), datum="B")
     part.feature("end", part.face("-x", lambda c, n: c[:, 0] < 1e-3), datum="C")
-    part.feature("far", part.face(tc.Largest("plane", "+y")), tc.Profile(0.3, "A|B|C"), datum="D", association="least squares")
-    hole = part.feature("hole", part.face(tc.Brep((19.05, 15.0, 1))), tc.Position(1e-6, system))
+    part.feature(
+        "far", part.face(tc.select.Largest("plane", "+y")), tc.Profile(0.3, "A|B|C"), datum="D", association="least squares"
+    )
+    hole = part.feature("hole", part.face(tc.select.Brep((19.05, 15.0, 1))), tc.Position(1e-6, system))
     model.measure("hole", hole.axis(1), along="y")
     program = tc.build(model)
     hole, deviations = program.nominal.features[-1], program.draws(seed=1, start=0, stop=100)
@@ -179,8 +181,8 @@ def test_what_refers_to_datum_targets_stands_still_if_the_targets_are_the_locato
     measured = results.measured.sel(state="raw")
     assert np.abs(measured.sel(measure=["near", "far"])).max() < 1e-5  # turns, to second order
     assert np.abs(measured.sel(measure=["near, pad", "far, pad"])).max() > 0.005
-    assert tc.model_of(results).parts[0].targets[0].points[0].position == (10, 10, 0)
-    assert_same_run(results, tc.run(tc.model_of(results), samples=300))
+    assert tc.io.model_of(results).parts[0].targets[0].points[0].position == (10, 10, 0)
+    assert_same_run(results, tc.run(tc.io.model_of(results), samples=300))
 
 
 def test_targets_give_the_plane_through_them():

@@ -81,7 +81,7 @@ def test_long_tables_of_analyses_are_folded_after_fifteen_rows(tmp_path):
     a.measure("sum", lambda poses: sum(poses.translation(part)[2] for part in a.parts[1:]), tolerance=3)
     path = tmp_path / "many.nc"
     tc.run(a, samples=50, out=path).close()
-    tc.sensitivities(a, samples=10, into=path)
+    tc.analyses.sensitivities(a, samples=10, into=path)
     with tc.open_archive(path) as results:
         page = page_of(results, tc.summarize(results))
     section = page[page.index('id="answers"') : page.index('id="assembly"')]

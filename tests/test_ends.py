@@ -163,7 +163,7 @@ def test_contact_of_planes_where_bodies_are_apart_is_measured_and_the_advice_hel
     """The check after a run looks both ways: a plate held beside a chamfer is found, and is free once faces end."""
     for method, advice in ((replace(METHOD, search="fixed"), 'leave out search="fixed"'), (PAPER, "use --resolution exact")):
         with pytest.warns(
-            tc.ContactWarning, match=f'contact pair "contact": contact was resolved where .* apart.*; .*{advice}'
+            tc.errors.ContactWarning, match=f'contact pair "contact": contact was resolved where .* apart.*; .*{advice}'
         ):
             fixed = tc.run(case("chamfer", method=method)[0], samples=200, seed=1)
         summary, told = tc.summarize(fixed), printed(tc.summarize(fixed))

@@ -78,13 +78,13 @@ def test_faces_between_which_there_is_no_gap_are_refused(faces, message):
 
 def test_between_a_shaft_and_its_bore_the_mean_is_the_clearance_and_the_largest_gap_that_of_the_far_end():
     a = tc.Assembly("pin")
-    bore = a.part("ring", ring(), fixed=True).face(tc.Cylinder(inner=True))
+    bore = a.part("ring", ring(), fixed=True).face(tc.select.Cylinder(inner=True))
     pin = a.part("shaft", shaft())
     across = [("x1", (0, 0, -10), "x"), ("x2", (0, 0, 10), "x"), ("y1", (0, 0, -10), "y"), ("y2", (0, 0, 10), "y")]
     along = [("z", (0, 0, -15), "z"), ("t", (3, 0, 0), "y")]
     a.locate(pin, [tc.Locator(*locator, 0.1) for locator in across + along])
-    a.measure("largest", tc.LargestGap(bore, pin.face(tc.Cylinder())))
-    a.measure("mean", tc.MeanGap(bore, pin.face(tc.Cylinder())))
+    a.measure("largest", tc.LargestGap(bore, pin.face(tc.select.Cylinder())))
+    a.measure("mean", tc.MeanGap(bore, pin.face(tc.select.Cylinder())))
     _, run = simulate(a, samples=20, solver="daqp")
     R, t = R_t(run["poses"][:, RAW, 1])
     # The axis of the shaft at both ends of the bore: from its wall there no way to the axis is longer than the level one.

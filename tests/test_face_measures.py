@@ -20,15 +20,15 @@ from tolcontact.shape_worker import Job, Worker
 
 def test_areas_and_boxes_are_exact():
     """The cover is a plate of 120 x 80 x 8 with corners of radius 6 and two holes of radius 4.05, one of them 4 longer."""
-    found = tc.faces_in(COVER)
+    found = tc.io.faces_in(COVER)
     plate = 120 * 80 - (4 - np.pi) * 6**2 - 2 * np.pi * 4.05**2 - 4 * 8.1
     hole = 2 * np.pi * 4.05 * 8
     exact = {2: plate, 3: 6 * np.pi / 2 * 8, 6: 108 * 8, 11: hole, 12: 4 * 8, 13: hole / 2}
     for number, expected in exact.items():
         assert found[number - 1].area == pytest.approx(expected, rel=1e-11)
-    (body,) = tc.bodies_in(COVER)
+    (body,) = tc.io.bodies_in(COVER)
     assert body.lower == pytest.approx((0, 0, 0), abs=1e-9) and body.upper == pytest.approx((120, 80, 8), abs=1e-9)
-    turned = next(body for body in tc.bodies_in(AS1) if body.name == "l-bracket_1 (2)")
+    turned = next(body for body in tc.io.bodies_in(AS1) if body.name == "l-bracket_1 (2)")
     assert max(map(abs, turned.rotation)) > 1
     assert np.subtract(turned.upper, turned.lower) == pytest.approx((50, 100, 60), abs=1e-6)
 
@@ -37,14 +37,14 @@ def test_areas_are_integrals_around_the_edges_in_the_text():
     text = Text(COVER.read_text())
     faces = [text.face(number) for number, body in sorted(text.bodies.items()) if body.startswith("ADVANCED_FACE")]
     expected = sorted(area(face)[0] for face in faces)
-    assert sorted(face.area for face in tc.faces_in(COVER)) == pytest.approx(expected, rel=1e-11)
+    assert sorted(face.area for face in tc.io.faces_in(COVER)) == pytest.approx(expected, rel=1e-11)
 
 
 def test_points_lie_on_their_faces():
     mesh = shape(tc.Mesh(COVER))
-    for face, stated in zip(tc.faces_in(COVER), mesh.metadata[STATED_FACES], strict=True):
+    for face, stated in zip(tc.io.faces_in(COVER), mesh.metadata[STATED_FACES], strict=True):
         assert abs(stated.surface.distance(np.array([face.point]))[0][0]) < 1e-12
-        assert triangles(tc.Brep(face.point)) == triangles(tc.Brep(face.number))
+        assert triangles(tc.select.Brep(face.point)) == triangles(tc.select.Brep(face.number))
 
 
 @pytest.mark.parametrize("body", ["nut_1", "plate_1"])
@@ -52,7 +52,7 @@ def test_a_listing_with_few_triangles_says_what_many_would(body):
     mesh = shape(tc.Mesh(AS1, body=body)).copy()
     mesh.metadata.pop(DESCRIPTIONS, None)
     mesh.metadata[STATED_FACES] = [replace(face, measure=None) for face in mesh.metadata[STATED_FACES]]
-    for face, drawn in zip(tc.faces_in(AS1, body), describe_faces(mesh), strict=True):
+    for face, drawn in zip(tc.io.faces_in(AS1, body), describe_faces(mesh), strict=True):
         assert (face.centre is None) == (drawn.centre is None)
         if face.centre is not None:  # beside the point
             np.testing.assert_allclose(face.centre, drawn.centre, atol=1e-9)
@@ -72,6 +72,6 @@ def test_a_face_without_triangles_keeps_its_number():
     assert cut.missing_faces == 1
     mesh = cut.part(None)
     assert set(mesh.face_attributes[BREP]) == set(range(15)) - {4}
-    for face, whole in zip(describe_faces(mesh), tc.faces_in(COVER), strict=True):
+    for face, whole in zip(describe_faces(mesh), tc.io.faces_in(COVER), strict=True):
         assert (face.number, face.area) == (whole.number, pytest.approx(whole.area))
         assert face.kind == ("general" if face.number == 5 else whole.kind)

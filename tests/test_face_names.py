@@ -43,13 +43,13 @@ def test_faces_are_chosen_by_their_names(tmp_path):
     nominal = discretize(model)
     for name, words in (("seat", ["-z"]), ("side", ["-y", "+y"]), ("wände; #12=PLANE('", ["+x"])):
         expected = sorted(itertools.chain(*(nominal.triangles(block.face(word)) for word in words)))
-        assert sorted(nominal.triangles(block.face(tc.Brep(name)))) == expected
+        assert sorted(nominal.triangles(block.face(tc.select.Brep(name)))) == expected
     with pytest.raises(
         GeometryFault, match="face block B-rep face 'lid': the part has no such face; its faces are called \"seat\""
     ):
-        nominal.triangles(block.face(tc.Brep("lid")))
-    assert "empty name" in next(tc.Brep("").faults())
-    assert [face.name for face in tc.faces_in(tmp_path / "named.step")][1::4] == ["", ""]
+        nominal.triangles(block.face(tc.select.Brep("lid")))
+    assert "empty name" in next(tc.select.Brep("").faults())
+    assert [face.name for face in tc.io.faces_in(tmp_path / "named.step")][1::4] == ["", ""]
     listed = CliRunner().invoke(app, ["faces", str(tmp_path / "named.step")]).stdout.splitlines()
     assert listed[0].startswith('1. "seat", plane, along (0, 0, -1)') and listed[1].startswith("2. plane")
 
@@ -59,7 +59,7 @@ def test_a_file_without_names_says_so():
     cover = model.part("cover", tc.Mesh(COVER), fixed=True)
     model.measure("corner", cover.point(0, 0, 0), along="z")
     with pytest.raises(GeometryFault, match="its file gives no face of it a name"):
-        discretize(model).triangles(cover.face(tc.Brep("hole")))
+        discretize(model).triangles(cover.face(tc.select.Brep("hole")))
 
 
 @pytest.mark.slow
@@ -67,13 +67,13 @@ def test_names_come_with_the_archive(tmp_path):
     model, block = one_block(tmp_path / "named.step", [f"to {way}" for way in DIRECTIONS])
     pin = model.part("pin", tc.Box(4, 4, 4), at=(3, 8, 30))
     model.locate(pin, tc.three_two_one(pin.face("-z"), pin.face("-y"), pin.face("-x"), inset=0.5), tolerance=0.2)
-    model.contact("seat", moving=pin.face("-z"), reference=block.face(tc.Brep("to +z")))
+    model.contact("seat", moving=pin.face("-z"), reference=block.face(tc.select.Brep("to +z")))
     with tc.run(model, samples=50, seed=1, out=tmp_path / "run.nc", solver="daqp") as results:
-        seat = discretize(model).triangles(block.face(tc.Brep("to +z")))
+        seat = discretize(model).triangles(block.face(tc.select.Brep("to +z")))
         (tmp_path / "named.step").unlink()
-        rebuilt = tc.model_of(results)
-        assert discretize(rebuilt).triangles(rebuilt.parts[0].face(tc.Brep("to +z"))) == seat
-        again = tc.run(tc.model_of(results), samples=50, seed=1, solver="daqp")
+        rebuilt = tc.io.model_of(results)
+        assert discretize(rebuilt).triangles(rebuilt.parts[0].face(tc.select.Brep("to +z"))) == seat
+        again = tc.run(tc.io.model_of(results), samples=50, seed=1, solver="daqp")
         assert again.measured.equals(results.measured) and again.gap_min.equals(results.gap_min)
 
 
@@ -81,16 +81,16 @@ def test_names_come_with_json(tmp_path):
     model, block = one_block(tmp_path / "named.step", DIRECTIONS)
     pin = model.part("pin", tc.Box(4, 4, 4), at=(3, 8, 30))
     model.locate(pin, tc.three_two_one(pin.face("-z"), pin.face("-y"), pin.face("-x"), inset=0.5), tolerance=0.2)
-    model.contact("seat", moving=pin.face("-z"), reference=block.face(tc.Brep("+z")))
+    model.contact("seat", moving=pin.face("-z"), reference=block.face(tc.select.Brep("+z")))
     document = written(model, tmp_path / "first.json")
     again = load_model(tmp_path / "first.json")
-    assert again.pairs[0].reference.selections == (tc.Brep("+z"),)
+    assert again.pairs[0].reference.selections == (tc.select.Brep("+z"),)
     assert written(again, tmp_path / "second.json") == document
 
 
 def names_in(path, text, *bodies):
     path.write_text(text)
-    return [[face.name for face in tc.faces_in(path, number)] for number in bodies]
+    return [[face.name for face in tc.io.faces_in(path, number)] for number in bodies]
 
 
 @pytest.mark.slow
@@ -116,7 +116,7 @@ def test_names_of_solids_that_are_alike_are_told_apart(tmp_path):
     twice.double(shell)
     twice.product("twice", [twice.add(f"MANIFOLD_SOLID_BREP('',#{shell})")])
     path.write_text(named(str(twice), DIRECTIONS))
-    found = {face.name: face.direction for face in tc.faces_in(path)}  # the kernel moves a face to the end
+    found = {face.name: face.direction for face in tc.io.faces_in(path)}  # the kernel moves a face to the end
     assert found == {name: pytest.approx(np.eye(3)["xyz".index(name[1])] * float(f"{name[0]}1")) for name in DIRECTIONS}
 
 
@@ -136,7 +136,7 @@ def test_surfaces_are_compared_in_the_units_of_the_shapes(assigned, size, tmp_pa
         made.add(inch)
     made.product("block", [made.solid((1, 1, 1), (2, 3, 4))])
     assert names_in(tmp_path / "inches.step", named(str(made), DIRECTIONS), 1) == [list(DIRECTIONS)]
-    (body,) = tc.bodies_in(tmp_path / "inches.step")
+    (body,) = tc.io.bodies_in(tmp_path / "inches.step")
     assert body.units == assigned and body.upper == pytest.approx((2 * size, 3 * size, 4 * size))
 
 
@@ -146,7 +146,7 @@ def test_faces_of_several_colours_have_their_names(tmp_path):
     made.product("painted", [made.add(f"MANIFOLD_SOLID_BREP('',#{shell})")])
     made.paint(shell, red=1.0)
     (tmp_path / "painted.step").write_text(named(str(made), DIRECTIONS))
-    assert [face.name for face in tc.faces_in(tmp_path / "painted.step")] == list(DIRECTIONS)
+    assert [face.name for face in tc.io.faces_in(tmp_path / "painted.step")] == list(DIRECTIONS)
 
 
 def test_faces_beside_a_drawing_have_their_names(tmp_path):
@@ -161,4 +161,4 @@ def test_faces_beside_a_drawing_have_their_names(tmp_path):
         shape = step.add(f"{kind}_SHAPE_REPRESENTATION('',(#{step.placement()},#{item}),#{step.context})")
         step.add(f"SHAPE_REPRESENTATION_RELATIONSHIP('','',#{part},#{shape})")
     (tmp_path / "drawn.step").write_text(counted(str(step)))
-    assert [face.name for face in tc.faces_in(tmp_path / "drawn.step")] == [f"f{number}" for number in range(6)]
+    assert [face.name for face in tc.io.faces_in(tmp_path / "drawn.step")] == [f"f{number}" for number in range(6)]

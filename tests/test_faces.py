@@ -16,7 +16,7 @@ from tolcontact.geometry.shapes import shape
 
 
 def test_a_brep_face_is_found_by_a_point_on_it():
-    hole = face_of(HOUSING, tc.Brep((19, 15, 35)))  # radius 4 about (15, 15), 12 deep
+    hole = face_of(HOUSING, tc.select.Brep((19, 15, 35)))  # radius 4 about (15, 15), 12 deep
     points, _ = trimesh.sample.sample_surface(hole.mesh, 500, seed=1)
     nearest, normals, over = hole.project(points)
     radius = np.linalg.norm(nearest[:, :2] - [15, 15], axis=1)
@@ -32,26 +32,28 @@ def test_a_brep_face_is_found_by_a_point_on_it():
 )
 def test_a_brep_face_that_is_not_clear_is_refused(at, words):
     with pytest.raises(GeometryFault, match=words):
-        face_of(HOUSING, tc.Brep(at))
+        face_of(HOUSING, tc.select.Brep(at))
     with pytest.raises(GeometryFault, match="not a STEP file"):
-        face_of(BLOCK, tc.Brep((5, 5, 30)))
+        face_of(BLOCK, tc.select.Brep((5, 5, 30)))
 
 
 def test_criteria_are_met_together():
     assert face_of(BLOCK, "+z").mesh.area == pytest.approx(200)
     assert face_of(BLOCK).mesh.area == pytest.approx(BLOCK.area)
-    assert face_of(BLOCK, "+z", tc.Inside((2, 3, 0), (7, 5, 30))).mesh.area == pytest.approx(10)
-    assert face_of(BLOCK, tc.Inside((0, 0, 15), (10, 20, 30)), lambda c, n: n[:, 2] < 0.5).mesh.area == pytest.approx(900)
-    assert face_of(BLOCK, tc.Facing((1, 1, 0), 0.8)).mesh.area == pytest.approx(200 * 3 / 2 * 3)
+    assert face_of(BLOCK, "+z", tc.select.Inside((2, 3, 0), (7, 5, 30))).mesh.area == pytest.approx(10)
+    assert face_of(BLOCK, tc.select.Inside((0, 0, 15), (10, 20, 30)), lambda c, n: n[:, 2] < 0.5).mesh.area == pytest.approx(
+        900
+    )
+    assert face_of(BLOCK, tc.select.Facing((1, 1, 0), 0.8)).mesh.area == pytest.approx(200 * 3 / 2 * 3)
     with pytest.raises(GeometryFault, match=r"nothing of it lies in that box; the part spans \(0, 0, 0\) to \(10, 20, 30\)"):
-        face_of(BLOCK, "+z", tc.Inside((0, 0, 0), (10, 20, 29)))
+        face_of(BLOCK, "+z", tc.select.Inside((0, 0, 0), (10, 20, 29)))
     with pytest.raises(GeometryFault, match="no triangles"):
         face_of(BLOCK, "+z", "-z")
 
 
 def test_a_cut_face_keeps_the_normals_of_the_whole():
     barrel = trimesh.creation.cylinder(10, 40, sections=48)
-    cut = face_of(barrel, lambda c, n: abs(n[:, 2]) < 0.1, tc.Inside((-11, -11, -3), (11, 3, 11)))
+    cut = face_of(barrel, lambda c, n: abs(n[:, 2]) < 0.1, tc.select.Inside((-11, -11, -3), (11, 3, 11)))
     points, _ = trimesh.sample.sample_surface(cut.mesh, 300, seed=1)
     nearest, normals, _ = cut.project(points)
     assert points[:, 2].min() > -3 and points[:, 1].max() < 3
@@ -64,10 +66,10 @@ def test_the_face_near_another_part_is_the_one_that_looks_at_it():
     table = a.part("table", tc.Box(50, 50, 10), at=(0, 0, -10), fixed=True)
     block = a.part("block", tc.Mesh(BLOCK), at=(30, 5, 0.2), rotation=(0, 0, np.pi / 2))
     meshes = {part: shape(part.geometry) for part in (table, block)}
-    assert patch(block.face(tc.Near(table, 0.3)), meshes).mesh.area == pytest.approx(200)
-    assert patch(table.face(tc.Near(block, 0.3)), meshes).mesh.area == pytest.approx(2500)
+    assert patch(block.face(tc.select.Near(table, 0.3)), meshes).mesh.area == pytest.approx(200)
+    assert patch(table.face(tc.select.Near(block, 0.3)), meshes).mesh.area == pytest.approx(2500)
     with pytest.raises(GeometryFault, match="no triangles"):
-        patch(block.face(tc.Near(table, 0.1)), meshes)
+        patch(block.face(tc.select.Near(table, 0.1)), meshes)
 
 
 def disc(sections=24):
@@ -98,8 +100,8 @@ def test_a_small_part_is_near_a_large_one_wherever_it_stands(at):
     plate = a.part("plate", tc.Box(1000, 700, 2), fixed=True)
     pad = a.part("pad", tc.Box(4, 4, 2), at=(*at, 2.05))
     meshes = {part: shape(part.geometry) for part in (plate, pad)}
-    assert patch(plate.face(tc.Near(pad, 0.1)), meshes).mesh.area == pytest.approx(700_000)
-    assert patch(pad.face(tc.Near(plate, 0.1)), meshes).mesh.area == pytest.approx(16)
+    assert patch(plate.face(tc.select.Near(pad, 0.1)), meshes).mesh.area == pytest.approx(700_000)
+    assert patch(pad.face(tc.select.Near(plate, 0.1)), meshes).mesh.area == pytest.approx(16)
 
 
 @pytest.mark.slow
@@ -108,7 +110,7 @@ def test_what_is_near_on_a_large_barrel_is_not_the_whole_barrel():
     barrel = a.part("barrel", tc.Mesh(trimesh.creation.cylinder(200, 10, sections=700)), fixed=True)
     block = a.part("block", tc.Box(10, 10, 10), at=(200.1, -5, -5))
     meshes = {part: shape(part.geometry) for part in (barrel, block)}
-    near = patch(barrel.face(tc.Near(block, 0.5)), meshes).mesh
+    near = patch(barrel.face(tc.select.Near(block, 0.5)), meshes).mesh
     assert near.bounds[0, 0] > 199
     assert 100 < near.area < 400
 
@@ -121,13 +123,13 @@ def test_what_is_near_on_a_ball_are_its_lowest_triangles():
     part = a.part("ball", tc.Mesh(ball))
     meshes = {part: shape(part.geometry) for part in (table, part)}
     for within in (0.55, 1.0, 3.0):
-        near = patch(part.face(tc.Near(table, within)), meshes).mesh
+        near = patch(part.face(tc.select.Near(table, within)), meshes).mesh
         heights = np.asarray(near.triangles)[:, :, 2] + 20.5
         assert heights.min(axis=1).max() <= within
         assert len(near.faces) >= (ball.triangles_center[:, 2] + 20.5 <= within).sum() and len(near.faces) > 0
         moved = a.part(f"ball {within}", tc.Mesh(ball), at=(0, 0, 30))  # the same mesh elsewhere is not near
         with pytest.raises(GeometryFault, match="no triangles"):
-            patch(moved.face(tc.Near(table, within)), meshes | {moved: meshes[part]})
+            patch(moved.face(tc.select.Near(table, within)), meshes | {moved: meshes[part]})
 
 
 @pytest.mark.parametrize("turn", [0.0, 1e-3, 0.2])

@@ -196,7 +196,7 @@ def test_a_bolted_assembly_is_rebuilt_from_its_archive_and_from_json(tmp_path):
     a = stack(shank=tc.Size(10, 0.0, -0.1))
     results = tc.run(a, samples=30, solver="daqp", keep="all")
     assert_gaps_recompute(results)
-    again = tc.model_of(results)
+    again = tc.io.model_of(results)
     assert [str(location) for location in again.locations] == [str(location) for location in a.locations]
     assert_same_run(results, tc.run(again, samples=30, solver="daqp", keep="all"))
     for part in a.parts[:2]:
@@ -204,10 +204,10 @@ def test_a_bolted_assembly_is_rebuilt_from_its_archive_and_from_json(tmp_path):
     files = {part.name: tc.Mesh(tmp_path / f"{part.name}.ply", units="mm") for part in a.parts[:2]}
     for part in a.parts[:2]:
         object.__setattr__(part, "geometry", files[part.name])
-    tc.write_model(a, tmp_path / "bolted.json")
+    tc.io.write_model(a, tmp_path / "bolted.json")
     from_json = tc.run(tmp_path / "bolted.json", samples=30, solver="daqp")
     assert np.abs(from_json.measured - results.measured).max() < 1e-4
-    assert "pin 10 x 18.5 mm with a head" in {str(part.geometry) for part in tc.model_of(from_json).parts}
+    assert "pin 10 x 18.5 mm with a head" in {str(part.geometry) for part in tc.io.model_of(from_json).parts}
 
 
 def test_a_fastener_expands_into_plain_declarations():
@@ -239,8 +239,8 @@ def test_a_part_that_stands_in_its_holes_can_be_a_fastener(head):
         pressed = hole(base, f"H{k}", (x, 0), tc.Position(0.1, "A|B|C", rule="translation"))
         dowel = a.part(f"dowel {k}", tc.Pin(10, 15, head=head), at=(x, 0, 16))
         if k:
-            dowel.feature("shank", dowel.face(tc.Cylinder(radius=5)), tc.Size(10, 0.01))
-        shank = dowel if k else dowel.face(tc.Cylinder(radius=5))
+            dowel.feature("shank", dowel.face(tc.select.Cylinder(radius=5)), tc.Size(10, 0.01))
+        shank = dowel if k else dowel.face(tc.select.Cylinder(radius=5))
         assert tc.fasten(a, f"dowel {k}", shank, through=[hole(cover, f"H{k}", (x, 0))], into=pressed) is dowel
         for axis in "xy":
             a.measure(f"{axis}{k}", pressed.axis(1), to=dowel.point(0, 0, -8), along=axis)
@@ -255,7 +255,7 @@ def test_a_part_that_stands_in_its_holes_can_be_a_fastener(head):
 def test_halves_of_holes_in_a_step_file_are_one_hole():
     """The bolt of the file stands in holes of its own size; one of 9 mm leaves the bracket 0.5 mm."""
     a = tc.Assembly("as1", method=tc.Method(objective="all points"))
-    parts = tc.parts_from(a, AS1, ["plate_1", "l-bracket_1", "bolt_1"])
+    parts = tc.io.parts_from(a, AS1, ["plate_1", "l-bracket_1", "bolt_1"])
     bracket, base = parts["l-bracket_1"], parts["plate_1"]
     corner = [tc.Locator(f"L{k}", p, n, 0.0) for k, (p, n) in enumerate([((0, 0, 0), d) for d in "xyz"])]
     turns = [
@@ -265,16 +265,16 @@ def test_halves_of_holes_in_a_step_file_are_one_hole():
     ]
     a.locate(base, [*corner, *turns])
     a.locate(bracket, [*corner, *turns], tolerance=0)
-    whole = {"through": [bracket.face(tc.Brep(13, whole=True))], "into": base.face(tc.Brep(14, whole=True))}
+    whole = {"through": [bracket.face(tc.select.Brep(13, whole=True))], "into": base.face(tc.select.Brep(14, whole=True))}
     bolt = tc.fasten(a, "bolt", parts["bolt_1"], **whole)
     assert "10 mm" not in str(bolt)
-    tc.fasten(a, "other bolt", 9, through=[bracket.face(tc.Brep(9))], into=base.face(tc.Brep(6, 7)))
+    tc.fasten(a, "other bolt", 9, through=[bracket.face(tc.select.Brep(9))], into=base.face(tc.select.Brep(6, 7)))
     a.measure("x", bracket.point(0, 0, 0), along="x")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", tc.NominalWarning)
         program = tc.build(a, solver="daqp")
     message, *others = [str(item.message) for item in caught if str(item.message).startswith("[face]")]
-    assert "other bolt in l-bracket_1" in message and "tc.Brep(9, whole=True)" in message and not others
+    assert "other bolt in l-bracket_1" in message and "tc.select.Brep(9, whole=True)" in message and not others
     assert len(program.nominal.pairs[0].P_m) == 12
     gaps = simulate_block(program, np.zeros((1, len(program.nominal.contributors)))).gap_min[0, RAW]
     assert np.abs(gaps - [0.0, 0.5]).max() < 1e-6
@@ -355,7 +355,8 @@ def test_a_fastener_that_does_not_fit_is_refused_in_one_sentence(mistake):
         "lower": hole(base, "lower", (0, 0)), "far": hole(base, "far", (20, 0)), "top": base.face("+z"),
         "upper": hole(cover, "upper", (0, 0)), "upper far": hole(cover, "upper far", (20, 0)),
         "upper seat": cover.face("+z"), "side": cover.face("+y"),
-        "rod": rod.face(tc.Cylinder()), "rod part": rod, "alien": other.part("alien", tc.Pin(1, 1)).face(tc.Cylinder()),
+        "rod": rod.face(tc.select.Cylinder()), "rod part": rod,
+        "alien": other.part("alien", tc.Pin(1, 1)).face(tc.select.Cylinder()),
     }  # fmt: skip
     arguments = {"fastener": 10, "through": ["upper"], "into": "lower", "seat": None, "pushed": None} | options
     through = [faces[name] for name in arguments.pop("through")]

@@ -57,7 +57,7 @@ def test_a_line_profile_is_that_of_the_surface_and_an_archive_has_it(tmp_path):
     offset = results["sample"].sel(contributor="block.top.offset")
     assert float(offset.deviation.std()) == pytest.approx(0.3 / 11.768, rel=0.1)
     assert str(offset.distribution.values) == "line profile 0.3 mm to A; 99.73 % inside"
-    assert_same_run(results, tc.run(tc.model_of(results), samples=500))
+    assert_same_run(results, tc.run(tc.io.model_of(results), samples=500))
 
 
 def test_opposed_planes_share_their_size_and_their_middle():
@@ -163,7 +163,7 @@ def test_one_feature_deviates_once_whatever_uses_it():
     gap, same = results.measured.values[:, 1].T
     assert np.abs(gap - same).max() < 1e-12 and gap.min() > -1e-4  # corners slide over tilted planes: second order
     assert float(results["surface"].surface_penetration.max()) < 0.05 / 2000
-    rebuilt = tc.run(tc.model_of(results), samples=2000, method=EXACT, solver="daqp")
+    rebuilt = tc.run(tc.io.model_of(results), samples=2000, method=EXACT, solver="daqp")
     assert_same_run(results, rebuilt)
 
 
@@ -203,7 +203,7 @@ def test_surfaces_are_checked_as_large_as_they_are():
     points = [(4, 0, 0), (-4, 0, 0), (0, 4, 0), (0, 0, 0), (0, 0, 0), (4, 0, 0)]
     held = [tc.Locator(f"{n}{k}", p, n.lower(), 0) for k, (n, p) in enumerate(zip("ZZZXYY", points, strict=True))]
     a.locate(pin, held)
-    a.contact("fit", moving=barrel, reference=plate.face(tc.Cylinder(radius=5)))
+    a.contact("fit", moving=barrel, reference=plate.face(tc.select.Cylinder(radius=5)))
     a.measure("x", pin.point(0, 0, 0), along="x")
     program = tc.build(a, method=EXACT)
     deviations = np.zeros((2, len(program.nominal.contributors)))
@@ -246,7 +246,9 @@ def test_a_feature_follows_the_datums_that_it_refers_to():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("hole", [tc.Brep((19.05, 15.0, 1)), tc.Cylinder(inner=True, radius=4.05)], ids=["B-rep", "kind"])
+@pytest.mark.parametrize(
+    "hole", [tc.select.Brep((19.05, 15.0, 1)), tc.select.Cylinder(inner=True, radius=4.05)], ids=["B-rep", "kind"]
+)
 def test_features_of_a_step_file_and_of_its_mesh_agree(hole):
     """The same deviations, whether the file states the cylinder or it is fitted to triangles."""
     cover = shape(tc.Mesh(cases.MODELS / "cover.step"))
@@ -258,9 +260,9 @@ def test_features_of_a_step_file_and_of_its_mesh_agree(hole):
         part.feature("under", part.face("-z"), datum="A")
         part.feature("side", part.face("-y", lambda c, n: c[:, 1] < 1e-3), datum="B")
         part.feature("end", part.face("-x", lambda c, n: c[:, 0] < 1e-3), datum="C")
-        near = tc.Inside((5, 5, -1), (25, 25, 9))
+        near = tc.select.Inside((5, 5, -1), (25, 25, 9))
         wall = part.face(
-            hole if isinstance(geometry.source, type(cases.MODELS)) else tc.Cylinder(inner=True, radius=4.05), near
+            hole if isinstance(geometry.source, type(cases.MODELS)) else tc.select.Cylinder(inner=True, radius=4.05), near
         )
         own = part.feature("hole", wall, tc.Size(8.1, 0.03), tc.Position(0.2, "A|B|C"))
         a.measure("x", own.axis(1), along="x")
@@ -291,9 +293,9 @@ def test_shapes_of_single_precision_have_the_same_freedoms(shift, turn, tmp_path
     n = trimesh.transformations.euler_matrix(*turn)[:3, 2]
     a = tc.Assembly("ring")
     part = a.part("ring", tc.Mesh(tmp_path / "ring.stl"), fixed=True)
-    part.feature("base", part.face(tc.Facing(-n)), datum="A")
-    part.feature("bore", part.face(tc.Cylinder(radius=5)), tc.Perpendicularity(0.2, "A"), datum="B")
-    part.feature("rim", part.face(tc.Cylinder(radius=20)), tc.Position(0.2, "A|B"))
+    part.feature("base", part.face(tc.select.Facing(-n)), datum="A")
+    part.feature("bore", part.face(tc.select.Cylinder(radius=5)), tc.Perpendicularity(0.2, "A"), datum="B")
+    part.feature("rim", part.face(tc.select.Cylinder(radius=20)), tc.Position(0.2, "A|B"))
     a.measure("x", part.features[-1].axis(0), along="x")
     every = Draws(discretize(a)).contributors
     assert [0.2 / each.spread for each in every] == pytest.approx([6.88] * 2 + [7.28 * np.sqrt(2)] * 4, rel=3e-3)
@@ -329,7 +331,7 @@ def test_regions_of_one_face_are_features_of_their_own():
     a = tc.Assembly("regions")
     base = a.part("base", tc.Box(100, 40, 10), fixed=True)
     base.feature("under", base.face("-z"), datum="A")
-    left, right = (tc.Inside((x, -1, 9), (x + 40, 41, 11)) for x in (0, 60))
+    left, right = (tc.select.Inside((x, -1, 9), (x + 40, 41, 11)) for x in (0, 60))
     base.feature("left", base.face("+z", left), tc.Profile(1.0, "A"))
     for name, x in (("on left", 5), ("on right", 65)):
         block = a.part(name, tc.Box(30, 30, 10), at=(x, 5, 10))

@@ -73,7 +73,7 @@ def spreads(part: tc.Part, **place: Sequence[float]) -> dict[str, float]:
     """The standard deviation of each contributor of a part, which may be moved, by its label."""
     model = tc.Assembly("spreads")
     moved = model.part(part.name, part.geometry, fixed=True, **place)
-    tc.features_from_pmi(moved)
+    tc.io.features_from_pmi(moved)
     return spreads_of(model)
 
 
@@ -88,7 +88,7 @@ def spreads_of(model: tc.Assembly) -> dict[str, float]:
 
 def test_tolerances_of_a_drawing_become_features_and_patterns(tmp_path):
     part = cover(drawing, tmp_path)
-    declared = tc.features_from_pmi(part)
+    declared = tc.io.features_from_pmi(part)
     assert sorted(map(str, part.toleranced)) == sorted(DECLARED) and part.toleranced != ()
     assert set(declared.features) == {*part.toleranced, *part.targets} and not declared.undeclared
     assert [str(targets) for targets in part.targets] == [TARGETS]
@@ -126,9 +126,9 @@ def test_a_part_that_is_turned_and_moved_has_the_same_spreads(tmp_path):
 
 def test_the_script_of_a_file_declares_the_same(tmp_path):
     part = cover(drawing, tmp_path)
-    tc.features_from_pmi(part)
+    tc.io.features_from_pmi(part)
     path = part.geometry.source
-    text = script(path, declared_file(path, tc.read_pmi(path)))
+    text = script(path, declared_file(path, tc.io.read_pmi(path)))
     namespace = {"__name__": "model"}
     exec(compile(text, "model.py", "exec"), namespace)
     model = namespace["assembly"]()
@@ -146,9 +146,9 @@ def test_the_script_of_a_file_declares_the_same(tmp_path):
 
 def test_a_second_call_declares_nothing_twice(tmp_path):
     part = cover(drawing, tmp_path)
-    tc.features_from_pmi(part)
+    tc.io.features_from_pmi(part)
     before = part.toleranced
-    again = tc.features_from_pmi(part)
+    again = tc.io.features_from_pmi(part)
     assert part.toleranced == before and again.features == ()
     reasons = {str(one.annotation).split(":")[0]: one.reason for one in again.undeclared}
     assert len(reasons) == len(again.annotations)
@@ -161,8 +161,8 @@ def test_a_second_call_declares_nothing_twice(tmp_path):
 
 def test_features_of_the_script_stay_and_can_be_datums(tmp_path):
     part = cover(drawing, tmp_path)
-    part.feature("bottom", part.face(tc.Brep(UNDER)), tc.Flatness(0.02), datum="A")
-    tc.features_from_pmi(part)
+    part.feature("bottom", part.face(tc.select.Brep(UNDER)), tc.Flatness(0.02), datum="A")
+    tc.io.features_from_pmi(part)
     assert [str(feature) for feature in part.toleranced if feature.datum == "A"] == [
         "feature bottom of cover (datum A): cover B-rep face 5; flatness 0.02"
     ]
@@ -247,13 +247,13 @@ def test_a_fit_has_the_limits_of_its_class(letters, grade, variance, size, tmp_p
     def annotate(file):
         file.fit(file.aspect(*HOLE), 8.1, letters, grade, variance)
 
-    (feature,) = tc.features_from_pmi(cover(annotate, tmp_path)).features
+    (feature,) = tc.io.features_from_pmi(cover(annotate, tmp_path)).features
     assert str(feature.tolerances[0]) == f"size {size} mm"
 
 
 def test_limits_of_a_fit_are_about_the_nominal_size_of_the_drawing(tmp_path):
     """A shape is modelled at 8.1, and its drawing says 8.09 H7."""
-    (feature,) = tc.features_from_pmi(cover(lambda file: file.fit(file.aspect(*HOLE), 8.09, "H", "7"), tmp_path)).features
+    (feature,) = tc.io.features_from_pmi(cover(lambda file: file.fit(file.aspect(*HOLE), 8.09, "H", "7"), tmp_path)).features
     assert str(feature.tolerances[0]) == "size 8.1 +0.005 -0.01 mm"
 
 
@@ -303,13 +303,13 @@ REASONS = {
 @pytest.mark.parametrize("name", REASONS)
 def test_what_features_cannot_state_has_its_reason(name, tmp_path):
     annotate, reasons = REASONS[name]
-    declared = tc.features_from_pmi(cover(annotate, tmp_path))
+    declared = tc.io.features_from_pmi(cover(annotate, tmp_path))
     assert [one.reason for one in declared.undeclared] == reasons
 
 
 def test_a_tolerance_of_several_surfaces_is_declared_in_part(tmp_path):
     part = cover(sizes, tmp_path)
-    partly = tc.features_from_pmi(part).undeclared[-1]
+    partly = tc.io.features_from_pmi(part).undeclared[-1]
     assert partly.features == ("cylinder 3", "cylinder 4", "cylinder 8", "cylinder 9")
     assert str(partly).endswith(f"declared as {', '.join(partly.features)} (plane 5: {NO_SIZE})")
 
@@ -325,7 +325,7 @@ def test_a_part_without_pmi_gets_one_message(tmp_path):
     }
     for message, geometry in parts.items():
         with pytest.raises(OptionError) as refused:
-            tc.features_from_pmi(model.part(message.split('"')[1], geometry))
+            tc.io.features_from_pmi(model.part(message.split('"')[1], geometry))
         assert message in str(refused.value) and str(refused.value).count("\n") == 0
 
 
@@ -337,7 +337,7 @@ def test_each_body_of_a_file_gets_its_features(tmp_path):
     file.tolerance("surface_profile", 0.2, file.aspect(2, 8), "A")
     file.tolerance("flatness", 0.1, file.aspect(7))
     path = file.write(tmp_path / "pair.stp")
-    declared = declared_file(path, tc.read_pmi(path))
+    declared = declared_file(path, tc.io.read_pmi(path))
     assert [[str(feature) for feature in part.toleranced] for part in declared.parts] == [
         [
             "feature A of body 1 (datum A): body 1 B-rep face 1",
@@ -358,7 +358,7 @@ def test_a_body_whose_shape_cannot_be_used_is_left_out_with_the_reason(tmp_path)
     file = Annotated(str(made))
     file.tolerance("flatness", 0.1, file.aspect(5, 7))
     path = file.write(tmp_path / "pair.stp")
-    declared = declared_file(path, tc.read_pmi(path))
+    declared = declared_file(path, tc.io.read_pmi(path))
     assert [(one.features, one.reason) for one in declared.annotations] == [
         (("plane 5",), "1 of its 2 faces are not on the part")
     ]
@@ -372,5 +372,5 @@ def test_a_file_whose_annotations_have_no_faces_has_a_reason_for_each(tmp_path):
     file.tolerance("flatness", 0.1, file.aspect())
     file.size(file.aspect(), 8.1, (-0.1, 0.1))
     path = file.write(tmp_path / "cover.stp")
-    declared = declared_file(path, tc.read_pmi(path))
+    declared = declared_file(path, tc.io.read_pmi(path))
     assert declared.parts == () and [one.reason for one in declared.annotations] == ["the file states no face for it"] * 2

@@ -42,7 +42,7 @@ def block():
     a = tc.Assembly("block")
     part = a.part("block", tc.Box(40, 30, 20), at=(5, -3, 2), rotation=TURN, fixed=True)
     part.pattern("A", part.face("+z"), part.face("+x"), datum="A")
-    part.feature("half", part.face("-y", tc.Inside((0, -1, 0), (20, 1, 20))), tc.Flatness(0.1))
+    part.feature("half", part.face("-y", tc.select.Inside((0, -1, 0), (20, 1, 20))), tc.Flatness(0.1))
     part.feature("bottom", part.face("-z"), tc.Parallelism(0.2, "A"))
     return a
 
@@ -50,7 +50,7 @@ def block():
 def test_features_of_boxes_and_meshes_have_their_triangles(tmp_path):
     a = tc.Assembly("plate and box")
     plate = a.part("plate", tc.Mesh(trimesh.creation.annulus(5, 20, 30, sections=48)), at=(300, 0, 0), fixed=True)
-    plate.feature("bore", plate.face(tc.Cylinder(inner=True)), tc.Size(10, 0.1), datum="B")
+    plate.feature("bore", plate.face(tc.select.Cylinder(inner=True)), tc.Size(10, 0.1), datum="B")
     box = a.part("box", tc.Box(10, 20, 30), at=(0, 300, 0), fixed=True)
     box.pattern("sides", box.face("+x"), box.face("+y"), datum="A")
     nominal = discretize(a, incomplete=True)
@@ -103,7 +103,7 @@ def test_a_model_may_lack_measures_and_locations(tmp_path):
 def test_a_fault_of_a_feature_is_listed_in_a_model_that_lacks_measures(tmp_path):
     a = block().replaced(measures=[])
     a.parts[0].feature("bottom again", a.parts[0].face("-z"), tc.Flatness(0.1))
-    a.parts[0].feature("wrong", a.parts[0].face(tc.Brep(7)), tc.Flatness("thin"))
+    a.parts[0].feature("wrong", a.parts[0].face(tc.select.Brep(7)), tc.Flatness("thin"))
     (entry,) = view(a, tmp_path / "first.html")["toleranced"]
     assert entry["features"][-1]["tolerances"] == ["flatness"] and not faces_of(entry["features"][-1])
     assert "expected the full width" in (tmp_path / "first.html").read_text()

@@ -135,7 +135,9 @@ def test_faces_of_a_seat_do_not_penetrate_each_other_between_contact_points(betw
 def test_a_warning_of_penetration_gives_half_the_spacing(between_points):
     program, surfaces = between_points[0], copy.deepcopy(between_points[1])
     surfaces.penetration[:] = 1.0
-    with pytest.warns(tc.ContactWarning, match=r'pair "seat": .*; place contact points closer together, such as spacing=2.4$'):
+    with pytest.warns(
+        tc.errors.ContactWarning, match=r'pair "seat": .*; place contact points closer together, such as spacing=2.4$'
+    ):
         warn_of(program, surfaces)
     pair = program.nominal.pairs[0]
     assert pair.form_spacing / 2 == pytest.approx(2.4, abs=0.05)
@@ -194,7 +196,7 @@ def test_gaps_of_faces_with_form_follow_from_the_archive_alone(tmp_path, covaria
         form = archive["contact"].to_dataset()
         assert form["form_covariance"].values.tolist() == [covariance]
         assert form["form_length"].values == pytest.approx([100 / 3])
-        assert tc.model_of(archive).features[0].tolerances[0].form == tc.Form(covariance, modes=8)
+        assert tc.io.model_of(archive).features[0].tolerances[0].form == tc.Form(covariance, modes=8)
         archive["contact"]["station_weight"].values[:] *= 1.5
         with pytest.raises(AssertionError, match="is not the smallest gap"):
             assert_gaps_recompute(archive)
@@ -273,7 +275,7 @@ def test_the_modes_of_a_form_contribute_as_one():
 
 def test_no_worst_case_of_faces_with_form_is_searched():
     with pytest.raises(tc.OptionError, match="has faces with form, in whose zone no worst case is searched"):
-        tc.worst_case(seat(), samples=256, method=SEATED, solver="daqp")
+        tc.analyses.worst_case(seat(), samples=256, method=SEATED, solver="daqp")
 
 
 def test_the_gap_of_a_station_over_a_face_with_form_counts_its_height_there():

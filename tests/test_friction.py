@@ -37,7 +37,7 @@ def seat(clamp, frame=STILL, newtons=1.0, **options):
 
 
 def critical(model):
-    return tc.seating(model).critical.to_series()
+    return tc.analyses.seating(model).critical.to_series()
 
 
 @pytest.mark.parametrize("clamp", [(-12, -5, -30), *nightly(((-4, -9, -15),))])
@@ -68,15 +68,15 @@ def with_friction(model, mu, **pairs):
 
 def test_stated_friction_is_compared_and_warned_of():
     with pytest.warns(tc.NominalWarning, match=r'\[friction\] seat "block.stop".*0\.91 of the stated.*at "plane"'):
-        result = tc.seating(with_friction(incline.assembly(), 0.4)).sel(seat="block.stop")
+        result = tc.analyses.seating(with_friction(incline.assembly(), 0.4)).sel(seat="block.stop")
     assert float(result.reserve) == pytest.approx(np.tan(np.radians(20)) / 0.4, abs=1e-6)
     assert float(result.share.sel(holder="plane")) == pytest.approx(1)
 
 
 def test_a_pair_without_friction_holds_nothing(recwarn):
-    smooth = tc.seating(with_friction(incline.assembly(), 0.3, plane=0.0)).sel(seat="block.stop")
+    smooth = tc.analyses.seating(with_friction(incline.assembly(), 0.3, plane=0.0)).sel(seat="block.stop")
     assert np.isinf([smooth.critical, smooth.reserve]).all()
-    assert float(tc.seating(with_friction(incline.assembly(), 0.3)).reserve.sel(seat="block.stop")) > 1
+    assert float(tc.analyses.seating(with_friction(incline.assembly(), 0.3)).reserve.sel(seat="block.stop")) > 1
     assert not [warning for warning in recwarn if "[friction]" in str(warning.message)]
 
 
@@ -105,17 +105,17 @@ def test_a_pin_in_a_wider_bore_lies_at_its_bottom():
     bore = a.part("ring", ring(), fixed=True)
     pin = a.part("pin", shaft())
     a.locate(pin, [tc.Locator("shoulder", (0, 0, -15), "z", 0.1, one_sided=True)], floating=True)
-    a.contact("bore", moving=pin.face(tc.Cylinder()), reference=bore.face(tc.Cylinder(inner=True)))
+    a.contact("bore", moving=pin.face(tc.select.Cylinder()), reference=bore.face(tc.select.Cylinder(inner=True)))
     a.force("weight", at=pin.point(0, 0, 0), vector=(1.2, -1.6, 0))
     a.force("push", at=pin.point(0, 0, 0), vector=(0, 0, -0.6))
     a.measure("end", pin.point(0, 0, 15), along="z")
-    result = tc.seating(a).sel(seat="pin.shoulder")
+    result = tc.analyses.seating(a).sel(seat="pin.shoulder")
     assert float(result.critical) == pytest.approx(0.6 / 2, abs=1e-6)
     assert float(result.share.sel(holder="bore")) == pytest.approx(1) and not result.attrs["open_pairs"]
 
 
 def test_friction_is_part_of_a_json_model(tmp_path):
-    tc.write_model(with_friction(incline.assembly(), 0.3, plane=0.0), tmp_path / "model.json")
+    tc.io.write_model(with_friction(incline.assembly(), 0.3, plane=0.0), tmp_path / "model.json")
     document = json.loads((tmp_path / "model.json").read_text())
     assert document["mu"] == 0.3 and document["pairs"][0]["mu"] == 0
     assert tc.build(tmp_path / "model.json").nominal.assembly.pairs[0].mu == 0
@@ -129,9 +129,9 @@ def test_friction_that_is_no_coefficient_is_refused(mu):
 
 def test_what_cannot_be_asked_is_refused():
     with pytest.raises(tc.OptionError, match="has no forces, so nothing presses"):
-        tc.seating(cases.ra1())
+        tc.analyses.seating(cases.ra1())
     with pytest.raises(tc.OptionError, match='nothing that touches holds "block" against the forces, even'):
-        tc.seating(seat((0, 0, 300)))
+        tc.analyses.seating(seat((0, 0, 300)))
 
 
 def test_the_command_prints_seats_and_what_holds_them_and_keeps_them_for_the_page(tmp_path):

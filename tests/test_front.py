@@ -30,7 +30,11 @@ def test_declarations_return_what_they_declare():
     force = a.force("push", at=above.point(5, 5, 5), vector=(0, 0, -1))
     measure = a.measure("height", above.point(5, 5, 5), along="z")
     assert (location,) == a.locations and (pair,) == a.pairs and (force,) == a.forces and (measure,) == a.measures
-    assert isinstance(pair, tc.ContactPair) and isinstance(measure, tc.Measure) and isinstance(force, tc.Force)
+    assert (
+        isinstance(pair, tc.declaration.ContactPair)
+        and isinstance(measure, tc.declaration.Measure)
+        and isinstance(force, tc.declaration.Force)
+    )
 
 
 def test_declared_things_print_as_rows():
@@ -72,9 +76,9 @@ def test_a_model_is_resolved_by_its_own_method_unless_somebody_says_otherwise(tm
         with tc.run(model, samples=20, solver="daqp", method=given) as run:
             assert (run.attrs["resolution"], run.attrs["objective"]) == (expected.resolution, expected.objective)
             assert run.attrs["method_from"] == whose
-            assert tc.model_of(run).method == ALL_POINTS
+            assert tc.io.model_of(run).method == ALL_POINTS
     with tc.run(cases.stack(), samples=20, solver="daqp") as run:
-        assert run.attrs["method_from"] == "defaults" and tc.model_of(run).method is None
+        assert run.attrs["method_from"] == "defaults" and tc.io.model_of(run).method is None
     (tmp_path / "tower.py").write_text((cases.MODELS / "tower.py").read_text())
     assert "resolution: exact" in call(tmp_path, "run", "tower.py", "--samples", "20").stdout
     linear = call(tmp_path, "run", "tower.py", "--samples", "20", "--resolution", "linearized").stdout

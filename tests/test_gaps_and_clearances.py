@@ -27,12 +27,12 @@ from tests.cases.measured import (
 WALLS = {
     "plane": (PLANE, ("+z",), (10, 12, 11.5), lambda p: p[..., 2] - 10),
     "cylinder": (shaft(), (ROUND,), (3.5, 1, 2), lambda p: np.hypot(p[..., 0], p[..., 1]) - 3),
-    "hole": (ring(), (tc.Cylinder(inner=True),), (1.5, 1, 2), lambda p: 3.2 - np.hypot(p[..., 0], p[..., 1])),
+    "hole": (ring(), (tc.select.Cylinder(inner=True),), (1.5, 1, 2), lambda p: 3.2 - np.hypot(p[..., 0], p[..., 1])),
     "sphere": (
         tc.Mesh(trimesh.creation.icosphere(3, 6.0)), (), (5, 4, 2), lambda p: np.linalg.norm(p, axis=-1) - 6,
     ),
     "cone": (
-        tc.Mesh(trimesh.creation.cone(5.0, 10.0, sections=64)), (tc.Largest("cone"),), (4, 3, 3),
+        tc.Mesh(trimesh.creation.cone(5.0, 10.0, sections=64)), (tc.select.Largest("cone"),), (4, 3, 3),
         lambda p: (2 * np.hypot(p[..., 0], p[..., 1]) - (10 - p[..., 2])) / np.sqrt(5),
     ),
 }  # fmt: skip

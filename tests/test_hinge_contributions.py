@@ -68,7 +68,7 @@ def test_contributions_of_a_hinge_are_those_of_its_lines(program):
     draws = np.random.default_rng(5).normal(size=(2, 100_000, 5)) * spreads
     mixed = [np.where(np.arange(5) == k, draws[1], draws[0]) for k in range(5)]
     values = np.stack([hangs(x) for x in (*draws, *mixed)], axis=1)
-    found = tc.contributions(program, samples=300, by="feature")
+    found = tc.analyses.contributions(program, samples=300, by="feature")
     assert int(found["by_status"].sel(status_meaning="resolved")) == 2100
     for measure, name in enumerate(found["measure"].values):
         for word, exact in zip(("first", "total"), sobol_indices(values[..., measure]), strict=True):

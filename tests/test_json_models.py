@@ -46,7 +46,7 @@ PLAIN = {
 
 
 def written(model, path):
-    tc.write_model(model, path)
+    tc.io.write_model(model, path)
     document = json.loads(path.read_text())
     Draft202012Validator(json_schema()).validate(document)
     return document
@@ -87,7 +87,7 @@ def with_everything(folder):
     ring = a.part("ring", tc.Mesh(shape, units="mm"), at=(121, 45, 32))
     held = [tc.Locator(f"Z{k}", p, (0, 0, 1), 0.2, one_sided=k == 2) for k, p in enumerate([(0, 0, 0), (5, 0, 0), (0, 5, 0)])]
     a.locate(ring, held, floating=True, on=block)
-    a.contact("beside", moving=ring.face(tc.Near(block, 9)), reference=block.face(lambda c, n: n[:, 0] > 0.9), within=9)
+    a.contact("beside", moving=ring.face(tc.select.Near(block, 9)), reference=block.face(lambda c, n: n[:, 0] > 0.9), within=9)
     a.force("weight", at=ring.point(0, 0, 3), vector=(0, 0, -2))
     a.measure("distance", ring.point(0, 0, 3), to=block.features[-1].point(100, 50, 10), along=(1, 2, 0))
     a.measure("turn", lambda poses: poses.rotation(ring)[0, 1], units="rad")
@@ -167,7 +167,7 @@ def test_a_mesh_without_a_file_cannot_be_named(tmp_path):
     ring = a.part("ring", tc.Mesh(trimesh.creation.annulus(5, 9, 6)), fixed=True)
     a.measure("x", ring.point(0, 0, 0), along="x")
     with pytest.raises(ScriptError, match='part "ring": its mesh is no file'):
-        tc.write_model(a, tmp_path / "ring.json")
+        tc.io.write_model(a, tmp_path / "ring.json")
     assert not (tmp_path / "ring.json").exists()
 
 
@@ -177,8 +177,8 @@ def test_an_archive_does_not_name_files():
     document = json.loads(str(results["model"].declaration.values))
     document["parts"][0]["geometry"] = {"file": "/etc/hostname"}
     results["model"]["declaration"] = xr.DataArray(json.dumps(document))
-    with pytest.raises(tc.ArchiveError, match="a part with a mesh, or with a box"):
-        tc.model_of(results)
+    with pytest.raises(tc.errors.ArchiveError, match="a part with a mesh, or with a box"):
+        tc.io.model_of(results)
 
 
 def test_numbers_of_numpy_are_written_as_plain_ones(tmp_path):
@@ -193,7 +193,7 @@ def test_numbers_of_numpy_are_written_as_plain_ones(tmp_path):
         return a
 
     def written(assembly, path):
-        tc.write_model(assembly, path)
+        tc.io.write_model(assembly, path)
         return json.loads(path.read_text())
 
     plain = written(model(float, lambda *values: values), tmp_path / "plain.json")

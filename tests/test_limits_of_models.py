@@ -53,7 +53,7 @@ def test_a_model_that_asks_for_too_much_is_refused_at_once(name, tmp_path):
     document, message = TOO_MUCH[name]
     (tmp_path / "m.json").write_text(json.dumps(document))
     began = time.process_time()
-    with pytest.raises((tc.ScriptError, tc.ModelError), match=message) as caught:
+    with pytest.raises((tc.errors.ScriptError, tc.ModelError), match=message) as caught:
         tc.build(tmp_path / "m.json")
     assert time.process_time() < began + 20 and len(str(caught.value)) < 1000
 
@@ -78,14 +78,14 @@ def test_names_of_parts_and_stations_are_as_long_as_those_of_groups_in_an_archiv
 
 def test_a_name_that_stands_twice_is_refused(tmp_path):
     (tmp_path / "m.json").write_text(json.dumps(PLAIN).replace('"inset": 5', '"inset": 5, "inset": 6'))
-    with pytest.raises(tc.ScriptError, match='"inset" stands twice'):
+    with pytest.raises(tc.errors.ScriptError, match='"inset" stands twice'):
         tc.build(tmp_path / "m.json")
 
 
 def test_a_huge_file_is_refused_before_it_is_read(tmp_path):
     with (tmp_path / "m.json").open("wb") as file:
         file.truncate(MAX_BYTES + 1)
-    with pytest.raises(tc.ScriptError, match=f"expected at most {MAX_BYTES}"):
+    with pytest.raises(tc.errors.ScriptError, match=f"expected at most {MAX_BYTES}"):
         tc.build(tmp_path / "m.json")
 
 

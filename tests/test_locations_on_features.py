@@ -18,9 +18,9 @@ def pin_in_a_ring(frame: Frame = STILL) -> tc.Assembly:
     a = tc.Assembly("pressed")
     ring = a.part("ring", tc.Mesh(trimesh.creation.annulus(5, 20, 10)), **frame.place(0, 0, 0), fixed=True)
     ring.feature("under", ring.face("-z"), datum="A")
-    ring.feature("rim", ring.face(tc.Cylinder(radius=20)), datum="B")
+    ring.feature("rim", ring.face(tc.select.Cylinder(radius=20)), datum="B")
     top = ring.feature("top", ring.face("+z"), tc.Profile(0.1, "A"))
-    bore = ring.feature("bore", ring.face(tc.Cylinder(inner=True)), tc.Size(10, 0.1), tc.Position(0.1, "A|B"))
+    bore = ring.feature("bore", ring.face(tc.select.Cylinder(inner=True)), tc.Size(10, 0.1), tc.Position(0.1, "A|B"))
     pin = a.part("pin", tc.Mesh(trimesh.creation.cylinder(5, 20)), **frame.place(0, 0, 5))
     sides = [tc.Locator(f"{axis}{z}", (0, 0, z), axis, 0.0) for z in (-10, 0) for axis in "xy"]
     a.locate(pin, [*sides, tc.Locator("end", (0, 0, -10), "z", 0.0), tc.Locator("turn", (5, 0, -5), "y", 0.0)], on=bore)
@@ -50,7 +50,7 @@ def test_a_pin_follows_the_axis_of_its_bore_and_a_cap_its_ground(frame):
             assert np.abs(pin - bore).max() < TILT < 0.1 * bore.std()
     assert np.abs(measured.sel(measure="cap") - measured.sel(measure="top")).max() < TILT
     assert_gaps_recompute(results)
-    again = tc.model_of(results)
+    again = tc.io.model_of(results)
     assert str(again.locations[0]) == "location of pin on bore of ring: 6 locators"
     assert_same_run(results, tc.run(again, samples=60, keep="all"))
 
@@ -65,7 +65,7 @@ def test_a_json_model_names_the_feature_that_a_part_is_on(tmp_path):
     a.measure("step", top.point(20, 0, 5), to=block.point(20, 0, 0), along="z", absolute=False)
     assert np.abs(tc.run(a, samples=20).measured).max() < TILT
     path = tmp_path / "stack.json"
-    tc.write_model(a, path)
+    tc.io.write_model(a, path)
     document = json.loads(path.read_text())
     assert document["locations"][0]["on"] == "foot" and document["locations"][0]["on_feature"] == "top"
     assert np.abs(tc.run(path, samples=20).measured).max() < TILT
@@ -78,7 +78,7 @@ def test_a_json_model_names_the_feature_that_a_part_is_on(tmp_path):
 
 def test_a_feature_that_its_part_does_not_have_is_named():
     a = pin_in_a_ring()
-    stray = tc.Feature("stray", a.parts[0], (a.parts[0].face("+z"),))
+    stray = tc.declaration.Feature("stray", a.parts[0], (a.parts[0].face("+z"),))
     a.locate(a.parts[1], [], floating=True, on=stray)
     assert any('it is on feature "stray", which is no feature of part "ring"' in fault for fault in tc.check(a))
     with pytest.raises(TypeError, match='locate "pin": on is a Face; expected a part, a feature of it, or None'):

@@ -130,7 +130,7 @@ def test_lobes_of_measured_cylinders_are_kept(tmp_path):
     a = tc.Assembly("ring")
     ring = a.part("ring", tc.Mesh(trimesh.creation.annulus(10, 20, 30, sections=96)), fixed=True)
     form = tc.Form(measured=str(tmp_path / "*.csv"))
-    bore = ring.feature("bore", ring.face(tc.Cylinder(inner=True)), tc.Cylindricity(0.05, form=form))
+    bore = ring.feature("bore", ring.face(tc.select.Cylinder(inner=True)), tc.Cylindricity(0.05, form=form))
     a.measure("wall", bore.point(10, 0, 0), along="x")
     field, sentences = form_warnings(a)
     assert not sentences and list(field.scans.values()) == pytest.approx([0.036, 0.04, 0.044], rel=0.01)

@@ -22,15 +22,15 @@ def test_what_an_error_of_gaps_does_to_measures_is_stated():
 def test_measures_at_a_kink_have_no_linear_model():
     """A minimum of equal gaps and an angle from 0 have none; a gap and a signed angle have."""
     program = tc.build(seated(), solver="daqp")
-    nominal = tc.sensitivities(program, samples=4).nominal
+    nominal = tc.analyses.sensitivities(program, samples=4).nominal
     kinked = {name for name in nominal["measure"].values if np.isnan(nominal.sel(measure=name)).any()}
     assert kinked == {"clearance", "least", "tilt"}
     assert np.isfinite(nominal.sel(measure=["gap 0", "turn"])).all()
     model = seated()
     few = model.replaced(measures=[measure for measure in model.measures if measure.name in ("clearance", "turn")])
-    bound = tc.worst_case(few, samples=16, solver="daqp").bound
+    bound = tc.analyses.worst_case(few, samples=16, solver="daqp").bound
     assert np.isinf(bound.sel(measure="clearance")).all() and np.isfinite(bound.sel(measure="turn", state="raw")).all()
-    linear = tc.contributions(program, samples=64).linear
+    linear = tc.analyses.contributions(program, samples=64).linear
     assert np.isnan(linear.sel(measure="tilt")).all() and float(linear.sel(measure="turn").sum()) == pytest.approx(1)
 
 
@@ -42,7 +42,7 @@ def test_a_minimum_away_from_its_kink_has_derivatives():
     upper, lower = (tc.Gap(block.point(0, 0, z), table.face("+z")) for z in (10, 0))
     model.measure("lower", lower)
     model.measure("least", tc.Minimum(upper, lower))
-    nominal = tc.sensitivities(model, samples=4).nominal.values
+    nominal = tc.analyses.sensitivities(model, samples=4).nominal.values
     np.testing.assert_array_equal(nominal[0], nominal[1])
     assert np.abs(nominal).max() > 0.5
 
@@ -53,10 +53,10 @@ def test_measurements_keep_in_archives_and_json(tmp_path):
     model.measure("turn", tc.Angle(hole(left), right.face("+z"), about="y"))
     model.measure("flush", tc.Flush(left.point(0, 8, 6), right.face("+z")))
     model.measure("x", tc.AxisDistance(hole(left), hole(right), along="x"))
-    model.measure("rims", tc.Clearance(left.face(tc.Cylinder(radius=9.0)), right.face(tc.Cylinder(radius=9.0))))
+    model.measure("rims", tc.Clearance(left.face(tc.select.Cylinder(radius=9.0)), right.face(tc.select.Cylinder(radius=9.0))))
     model.measure("least", tc.Minimum("distance", tc.Mean(tc.Gap(left.point(0, 8, 6), right.face("+z")), "x"), "rims"))
     results = tc.run(model, samples=20, solver="daqp", surfaces=0, out=tmp_path / "run.nc")
-    rebuilt = tc.model_of(results)
+    rebuilt = tc.io.model_of(results)
     assert [measure.of.names for measure in rebuilt.measures] == [measure.of.names for measure in model.measures]
     again = tc.run(rebuilt, samples=20, solver="daqp", surfaces=0)
     np.testing.assert_array_equal(again["measured"], results["measured"])
@@ -64,7 +64,7 @@ def test_measurements_keep_in_archives_and_json(tmp_path):
     assert results["measure_quantity"].values.tolist() == kinds
     assert results["measure_units"].values.tolist() == ["mm", "rad", "mm", "mm", "mm", "mm"]
     boxes = seated()
-    tc.write_model(boxes, tmp_path / "model.json")
+    tc.io.write_model(boxes, tmp_path / "model.json")
     entries = json.loads((tmp_path / "model.json").read_text())["measures"]
     assert entries[0]["of"]["kind"] == "clearance" and entries[-3]["of"]["measurements"][-1] == "clearance"
     found = tc.run(tmp_path / "model.json", samples=20, solver="daqp", surfaces=0)
@@ -142,7 +142,7 @@ BAD = {
         lambda m, a, b: m("x", tc.Clearance(a.face("+x"), b.face("-z"))), "do not face each other",
     ),
     "nowhere": (
-        lambda m, a, b: m("x", tc.Clearance(a.face("+z", tc.Inside((60, 30, 0), (100, 50, 20))), b.face("-z"))),
+        lambda m, a, b: m("x", tc.Clearance(a.face("+z", tc.select.Inside((60, 30, 0), (100, 50, 20))), b.face("-z"))),
         "lie nowhere over each other",
     ),
     "along": (lambda m, a, b: m("x", tc.Gap(a.point(0, 0, 0), b.face(ROUND)), along="z"), "leave out to and along"),
@@ -189,7 +189,7 @@ def refused(folder):
     ],
 )
 def test_entries_of_strangers_are_refused(tmp_path, entry, expected):
-    tc.write_model(seated(), tmp_path / "model.json")
+    tc.io.write_model(seated(), tmp_path / "model.json")
     document = json.loads((tmp_path / "model.json").read_text())
     document["measures"][1]["of"] = entry
     (tmp_path / "model.json").write_text(json.dumps(document))
@@ -197,7 +197,7 @@ def test_entries_of_strangers_are_refused(tmp_path, entry, expected):
 
 
 def test_deep_nesting_is_refused(tmp_path):
-    tc.write_model(seated(), tmp_path / "model.json")
+    tc.io.write_model(seated(), tmp_path / "model.json")
     document = json.loads((tmp_path / "model.json").read_text())
     for _ in range(100):
         document["measures"][-1]["of"] = {"kind": "sum", "measurements": [document["measures"][-1]["of"], "turn"]}

@@ -108,7 +108,7 @@ def test_a_ring_of_triangles_is_as_far_from_a_wall_as_its_tube():
 def test_a_face_that_grows_comes_nearer():
     assembly, first, second = two(tc.Box(*SIZES[0]), tc.Mesh(trimesh.creation.cylinder(3, 20, sections=48)), at=(48, 40, 5),
                                   first_at=(0, 0, 0), first_rotation=(0, 0, 0))  # fmt: skip
-    wall = second.feature("wall", second.face(tc.Cylinder()), tc.Size(6, 0.4))
+    wall = second.feature("wall", second.face(tc.select.Cylinder()), tc.Size(6, 0.4))
     assembly.measure("clearance", tc.Clearance(first.face(), wall))
     program = tc.build(assembly, solver="daqp")
     X = np.tile(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), (2, 2)).reshape(2, -1)
@@ -155,5 +155,5 @@ def test_a_clearance_of_parts_follows_from_the_poses_of_an_archive(tmp_path):
     heights = (feet @ R.swapaxes(1, 2) + t[:, None])[..., 2].min(axis=1) - SIZES[0][2]
     values = results["measured"].sel(state="raw", measure="clearance").values
     np.testing.assert_allclose(values, heights, atol=1e-9)
-    again = tc.run(tc.model_of(results), samples=200, solver="daqp", surfaces=0)
+    again = tc.run(tc.io.model_of(results), samples=200, solver="daqp", surfaces=0)
     np.testing.assert_array_equal(again["measured"], results["measured"])

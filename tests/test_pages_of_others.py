@@ -51,7 +51,7 @@ def test_nothing_is_written_through_a_planted_link(archive, tmp_path):
     for name in (".page.html.part", ".run.nc.part", ".run.nc.lock"):
         (tmp_path / name).symlink_to(treasure)
     assert call(ROOT, "report", archive, "--out", tmp_path / "page.html").returncode == 0
-    with pytest.raises(tc.ArchiveError, match="cannot be written"):
+    with pytest.raises(tc.errors.ArchiveError, match="cannot be written"):
         tc.run(cases.stack(), samples=10, solver="daqp", out=tmp_path / "run.nc")
     assert treasure.read_text() == "gold"
 

@@ -151,7 +151,7 @@ def test_the_worst_case_of_a_distance_is_the_zone_of_the_lower_frame():
     left, right = part.pattern("H", *faces, *tolerances).members
     a.measure("distance", right.axis(1), to=left.axis(1), along="x", absolute=False)
     a.measure("place", left.axis(1), along="x")
-    worst = tc.worst_case(a, samples=256)["worst"].sel(state="corrected")
+    worst = tc.analyses.worst_case(a, samples=256)["worst"].sel(state="corrected")
     assert np.abs(worst.sel(measure="distance")).values == pytest.approx([0.1, 0.1], abs=1e-6)
     assert np.abs(worst.sel(measure="place")).values == pytest.approx([0.225, 0.225], abs=1e-6)
 
@@ -214,17 +214,17 @@ def test_members_are_used_as_features_in_models_archives_and_json(tmp_path):
     results = tc.run(a, samples=200, solver="daqp", method={"resolution": "exact"}, out=tmp_path / "plug.nc")
     assert_resolved(results)
     assert_gaps_recompute(results)
-    assert_same_run(results, tc.run(tc.model_of(results), samples=200, solver="daqp", method={"resolution": "exact"}))
-    shares = tc.contributions(a, samples=64, by="feature")
+    assert_same_run(results, tc.run(tc.io.model_of(results), samples=200, solver="daqp", method={"resolution": "exact"}))
+    shares = tc.analyses.contributions(a, samples=64, by="feature")
     assert {"plate.H", "plate.H 1"} & {name for text in shares["group"].values for name in str(text).split(" + ")}
     for name in ("plate", "plug"):
         moved = next(p for p in a.parts if p.name == name)
         file = tmp_path / f"{name}.stl"
         moved.geometry.source.export(file)
         object.__setattr__(moved.geometry, "source", file)
-    tc.write_model(a, tmp_path / "plug.json")
+    tc.io.write_model(a, tmp_path / "plug.json")
     again = load_model(tmp_path / "plug.json")
-    tc.write_model(again, tmp_path / "again.json")
+    tc.io.write_model(again, tmp_path / "again.json")
     assert (tmp_path / "again.json").read_text() == (tmp_path / "plug.json").read_text()
     assert discretize(again).contributors == discretize(a).contributors
 
@@ -233,7 +233,9 @@ BAD = {
     "one member": (lambda p, f: p.pattern("H", f[0], tc.Position(0.1, "A")), "it has 1 member(s); expected two or more"),
     "no use": (lambda p, f: p.pattern("H", *f), "it has neither tolerances nor a datum letter"),
     "unlike": (
-        lambda p, f: p.pattern("H", f[0], p.face("+z", tc.Inside((-50, -30, 4.9), (50, 30, 5.1))), tc.Position(0.1, "A")),
+        lambda p, f: p.pattern(
+            "H", f[0], p.face("+z", tc.select.Inside((-50, -30, 4.9), (50, 30, 5.1))), tc.Position(0.1, "A")
+        ),
         "its member 1 is a cylinder of 8 mm, inner, and member 2 is a plane",
     ),
     "the same face": (lambda p, f: p.pattern("H", f[0], f[0], tc.Position(0.1, "A")), 'it shares a face with feature "H 1"'),

@@ -126,7 +126,7 @@ def test_a_run_by_a_plan_is_narrower_and_its_archive_says_so(name, tmp_path):
     ]
     assert (widths[1] < [0.5 * widths[0][0], 0.95 * widths[0][1]]).all()
     assert np.array_equal(kept, tc.build(cases.ra1()).draws.planned(name)(seed=2, start=0, stop=4096))
-    with pytest.raises(tc.ArchiveError, match="sampler"):
+    with pytest.raises(tc.errors.ArchiveError, match="sampler"):
         tc.run(cases.ra1(), out=tmp_path / "a.nc", resume=True, **options)
     with tc.run(cases.ra1(), plan=name, out=tmp_path / "a.nc", resume=True, **options | {"samples": 8192}) as longer:
         assert np.array_equal(longer["sample"].deviation.values[:4096], kept) and longer.sizes["realization"] == 8192

@@ -69,7 +69,7 @@ def read(tmp_path):
     def function(*data, schema=AP242 % 1):
         path = tmp_path / "part.stp"
         path.write_text(data[0] if data[0].startswith("ISO") else step(*data, schema=schema))
-        return tc.read_pmi(path)
+        return tc.io.read_pmi(path)
 
     return function
 
@@ -210,10 +210,10 @@ def test_later_editions_and_other_files_are_refused_by_name(read, tmp_path):
     ):
         (tmp_path / name).write_bytes(content)
         with pytest.raises(OptionError, match=words):
-            tc.read_pmi(tmp_path / name)
+            tc.io.read_pmi(tmp_path / name)
     for path in (tmp_path, tmp_path / "nowhere.stp", "a\0b", "/dev/zero"):
         with pytest.raises(OptionError, match=r"is not a file|cannot be opened"):
-            tc.read_pmi(path)
+            tc.io.read_pmi(path)
 
 
 HOSTILE = {
@@ -378,7 +378,7 @@ def test_a_face_that_stands_twice_has_one_number_for_both_of_its_records(tmp_pat
     copies = text[: shell.start(1)] + shell[1] + ",#90100,#90101" + text[shell.end(1) :]
     end = copies.rindex("ENDSEC;")
     path.write_text(copies[:end] + "".join(f"#{n} = ADVANCED_FACE{body};\n" for n in (90100, 90101)) + copies[end:])
-    listing = tc.faces_in(path)  # the kernel mends the solid, and the face that stands thrice is its last one
+    listing = tc.io.faces_in(path)  # the kernel mends the solid, and the face that stands thrice is its last one
     (face,) = [face for face in listing if face.copies]
     assert face.copies == 2 and "occurs 3 times in the file" in str(face)
     assert face.direction == (0, 0, 1) and face.point[2] == 8 and "times" not in str(listing[0])

@@ -42,7 +42,7 @@ def test_the_worst_case_prints_nothing(capfd):
     a.contact("interface", moving=block.face("-z"), reference=table.face("+z"))
     a.measure("height", block.point(50, 0, 10), along="z")
     a.measure("shift", block.point(0, 0, 10), along="x")
-    tc.worst_case(a, solver="daqp")
+    tc.analyses.worst_case(a, solver="daqp")
     ctypes.CDLL(None).fflush(None)
     assert capfd.readouterr() == ("", "")
 

@@ -17,7 +17,7 @@ def test_a_model_is_rebuilt_from_its_archive_and_gives_the_same_results(tmp_path
     (tmp_path / "block.stl").unlink()
     with tc.open_archive(tmp_path / "first.nc") as archive:
         first = archive.load()
-    rebuilt = tc.model_of(first)
+    rebuilt = tc.io.model_of(first)
     second = tc.run(rebuilt, samples=200, seed=2, solver="daqp")
     assert_same_run(first, second)
     assert list(first["measure_units"].values) == ["mm", "mm", "rad"]
@@ -26,7 +26,7 @@ def test_a_model_is_rebuilt_from_its_archive_and_gives_the_same_results(tmp_path
 @pytest.mark.slow
 def test_faces_of_step_files_are_rebuilt_without_the_files():
     first = tc.run(cases.model("cover"), samples=50, seed=2, solver="daqp", method=ALL_POINTS, surfaces=4)
-    rebuilt = tc.model_of(first)
+    rebuilt = tc.io.model_of(first)
     second = tc.run(rebuilt, samples=50, seed=2, solver="daqp", method=ALL_POINTS, surfaces=4)
     assert_same_run(first, second)
     assert (first["contact/moving_point"].values == second["contact/moving_point"].values).all()
@@ -37,7 +37,7 @@ def test_forces_supports_and_stiffness_are_rebuilt_and_gaps_of_supports_recomput
     path, method = tmp_path / "table.nc", replace(SEATED, search="fixed")
     with tc.run(cases.table(), samples=100, seed=2, solver="daqp", method=method, out=path) as results:
         first = results.load()
-    second = tc.run(tc.model_of(first), samples=100, seed=2, solver="daqp", method=method)
+    second = tc.run(tc.io.model_of(first), samples=100, seed=2, solver="daqp", method=method)
     assert_same_run(first, second)
     assert_gaps_recompute(path)
     root, contact = (xr.load_dataset(path, group=group) for group in (None, "contact"))

@@ -32,7 +32,7 @@ def six_sigma(A3, at, tolerance=0.1):
 
 
 def test_a_locator_goes_where_the_plane_says():
-    found = tc.relocate(plate(), "plate.A3", between=((0, 20, 0), (100, 50, 0)), least="height: 6 sigma", **FAST)
+    found = tc.analyses.relocate(plate(), "plate.A3", between=((0, 20, 0), (100, 50, 0)), least="height: 6 sigma", **FAST)
     places = [(x, y) for x in np.linspace(0, 100, 101) for y in np.linspace(20, 50, 61)]
     best = min(six_sigma(place, (100, 25)) for place in places)
     reached = found["reached"].sel(stage="after")
@@ -48,7 +48,7 @@ def test_a_locator_goes_where_the_plane_says():
 
 
 def test_fewer_are_outside_after_than_before():
-    found = tc.relocate(
+    found = tc.analyses.relocate(
         plate(tolerance=0.06), "plate.A3", between=((0, 50, 0), (100, 50, 0)), least="height: ppm", solver="daqp", samples=4096
     )
     assert found["change"].sel(interval="upper") < 0 and found["point"].sel(stage="after", axis="x") > 80
@@ -60,7 +60,7 @@ def test_fewer_are_outside_after_than_before():
 def test_with_contact_and_a_scheme_on_faces():
     """RA1: a 3-2-1 scheme becomes six locators, and nothing else changes."""
     a = cases.model("ra1")
-    found = tc.relocate(a, "base.A2", between=((50, 5, 0), (95, 5, 0)), least="corner height: 6 sigma", **FAST)
+    found = tc.analyses.relocate(a, "base.A2", between=((50, 5, 0), (95, 5, 0)), least="corner height: 6 sigma", **FAST)
     program = tc.build(a, solver="daqp")
     (block,) = tc.simulate_blocks(program, samples=2 * 4096, seed=1, start=4096, block=4096)
     estimate, lower, upper = found["reached"].sel(stage="before").values
@@ -81,7 +81,7 @@ def test_locators_of_a_scheme_stand_on_the_same_features():
     a.measure("height", part.point(100, 50, 10), along="z", tolerance=1)
     own = tc.build(a, solver="daqp").nominal.parts[0].locators
     k = own.labels.index("plate.A3")
-    found = tc.relocate(a, "plate.A3", between=((40, 40, 0), (60, 45, 0)), least="height: 6 sigma", **FAST)
+    found = tc.analyses.relocate(a, "plate.A3", between=((40, 40, 0), (60, 45, 0)), least="height: 6 sigma", **FAST)
     program = tc.build(a, solver="daqp")
     (block,) = tc.simulate_blocks(program, samples=4096 * 2, seed=1, start=4096, block=4096)
     assert float(found["reached"][0, 0]) == pytest.approx(6 * block.measured[:, 1, 0].std(ddof=1), rel=1e-6)
@@ -89,7 +89,7 @@ def test_locators_of_a_scheme_stand_on_the_same_features():
 
 
 def test_a_place_where_nothing_holds_the_part_is_passed_over():
-    found = tc.relocate(plate(), "plate.A3", between=((50, 0, 0), (50, 50, 0)), least="height: 6 sigma", **FAST)
+    found = tc.analyses.relocate(plate(), "plate.A3", between=((50, 0, 0), (50, 50, 0)), least="height: 6 sigma", **FAST)
     worst = found["tried_value"].values
     assert np.isinf(worst).any() and np.isfinite(float(found["reached"][1, 0]))
 
@@ -109,7 +109,7 @@ def test_a_place_where_nothing_holds_the_part_is_passed_over():
 def test_what_cannot_be_is_refused(changed, said):
     options = {"locator": "plate.A3", "between": ((0, 20, 0), (100, 50, 0)), "least": "height: 6 sigma", **FAST, **changed}
     with pytest.raises(tc.OptionError, match=said):
-        tc.relocate(plate(), options.pop("locator"), **options)
+        tc.analyses.relocate(plate(), options.pop("locator"), **options)
 
 
 @pytest.mark.slow

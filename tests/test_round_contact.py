@@ -68,7 +68,7 @@ def test_a_short_peg_jams_on_its_own_rims():
     a.locate(peg, [tc.Locator("Z", (0, 0, 0), "z", 0), *stops])
     for z, sign in ((4, 1.0), (-4, -1.0)):
         a.force(f"at {z}", at=peg.point(0, 0, z), vector=(sign, 3 * sign, 0))
-    a.contact("fit", moving=plate.face(tc.Cylinder(radius=5.05)), reference=peg.face(tc.Cylinder(radius=5)))
+    a.contact("fit", moving=plate.face(tc.select.Cylinder(radius=5.05)), reference=peg.face(tc.select.Cylinder(radius=5)))
     a.measure("x", peg.point(0, 0, 0), along="x")
     program, R, _ = seated(a)
     assert (
@@ -115,7 +115,7 @@ def test_archived_gaps_of_round_faces_recompute_and_the_model_runs_again(name, t
     ) as results:
         assert_resolved(results)
         assert_gaps_recompute(results, within=1e-10)
-        assert_same_run(results, tc.run(tc.model_of(results), samples=40, method=SEATED, solver="daqp", keep="all"))
+        assert_same_run(results, tc.run(tc.io.model_of(results), samples=40, method=SEATED, solver="daqp", keep="all"))
         assert float(results["surface"].surface_penetration.max()) < 1e-7
 
 
@@ -160,11 +160,11 @@ def test_a_ball_in_a_socket_lies_where_its_weight_points_to():
 def test_a_bolt_finds_the_hole_of_its_own_size_in_a_file_from_others():
     """Both of radius 5, in halves that are fitted to vertices: nothing is left but the hole's axis."""
     a = tc.Assembly("bolt", method=tc.Method(resolution="exact", objective="all points"))
-    plate = tc.parts_from(a, AS1, ["plate_1"], fixed=True)["plate_1"]
-    bolt = tc.parts_from(a, AS1, ["bolt_1"])["bolt_1"]
+    plate = tc.io.parts_from(a, AS1, ["plate_1"], fixed=True)["plate_1"]
+    bolt = tc.io.parts_from(a, AS1, ["bolt_1"])["bolt_1"]
     a.locate(bolt, round_cases.held(bolt, [(5, 0, 0), (-5, 0, 0), (0, 5, 0), (0, 0, 0), (0, 0, 0), (5, 0, 0)], 0.2))
-    hole = plate.face(tc.Cylinder(radius=5, inner=True), tc.Inside((15, 65, -1), (35, 85, 25)))
-    a.contact("hole", moving=bolt.face(tc.Cylinder(radius=5)), reference=hole)
+    hole = plate.face(tc.select.Cylinder(radius=5, inner=True), tc.select.Inside((15, 65, -1), (35, 85, 25)))
+    a.contact("hole", moving=bolt.face(tc.select.Cylinder(radius=5)), reference=hole)
     a.measure("x", bolt.point(0, 0, 0), along="x")
     with tc.run(a, samples=200, seed=1, solver="daqp") as results:
         assert_resolved(results)
@@ -179,7 +179,7 @@ def turned(frame: cases.Frame) -> tc.Assembly:
     peg = a.part("peg", tc.Mesh(trimesh.creation.cylinder(5, 20, sections=48)), **frame.place(0, 0, 0))
     places = [((20, 0, 0), "z"), ((-20, 0, 0), "z"), ((0, 20, 0), "z"), ((0, 0, 0), "x"), ((0, 0, 0), "y"), ((20, 0, 0), "y")]
     a.locate(peg, [tc.Locator(f"L{k}", p, d, 0.3) for k, (p, d) in enumerate(places)])
-    a.contact("fit", moving=peg.face(tc.Cylinder()), reference=plate.face(tc.Cylinder(radius=5.05)))
+    a.contact("fit", moving=peg.face(tc.select.Cylinder()), reference=plate.face(tc.select.Cylinder(radius=5.05)))
     a.measure("along", peg.point(0, 0, 10), along=frame.along(1, 0, 0))
     a.measure("across", peg.point(0, 0, 10), along=frame.along(0, 1, 0))
     return a
@@ -201,7 +201,7 @@ def pinned(chord):
     cover = a.part("cover", tc.Mesh(cases.MODELS / "cover.step", chord=chord), fixed=True)
     pin = a.part("pin", tc.Mesh(trimesh.creation.cylinder(4, 16, sections=30)), at=(15, 15, 4))
     a.locate(pin, round_cases.held(pin, [(4, 0, 0), (-4, 0, 0), (0, 4, 0), (0, 0, 0), (0, 0, 0), (4, 0, 0)], 0.4))
-    a.contact("hole", moving=pin.face(tc.Cylinder()), reference=cover.face(tc.Brep((19.05, 15, 1))))
+    a.contact("hole", moving=pin.face(tc.select.Cylinder()), reference=cover.face(tc.select.Brep((19.05, 15, 1))))
     a.measure("x", pin.point(0, 0, 8), along="x")
     return a
 

@@ -188,7 +188,7 @@ def test_populations_of_bores_are_measured_with_their_form(tolerances):
 def test_a_surface_and_a_locator_against_it_stand_out_by_the_form_of_a_shaft():
     a = tc.Assembly("shaft")
     pin = a.part("pin", tc.Mesh(trimesh.creation.cylinder(RADIUS, LENGTH, sections=48)))
-    barrel = pin.feature("shaft", pin.face(tc.Cylinder(inner=False)), tc.Cylindricity(0.05))
+    barrel = pin.feature("shaft", pin.face(tc.select.Cylinder(inner=False)), tc.Cylindricity(0.05))
     ends = [
         tc.Locator(f"{axis}{k}", (RADIUS * (axis == "x"), RADIUS * (axis == "y"), z), f"-{axis}", 0, on=barrel)
         for axis in "xy"

@@ -90,7 +90,7 @@ def test_a_shaft_does_not_move_along_a_floor_beside_a_wall_that_it_does_not_touc
     locators = [tc.Locator(f"{axis} {end}", (0, y, 0), axis, 0.6) for axis in "zx" for end, y in ends]
     a.locate(shaft, [*locators, tc.Locator("y", (0, 0, 0), "y", 0)], floating=True)
     for name, part, side in (("floor", floor, "+z"), ("wall", wall, "+x")):
-        a.contact(name, moving=shaft.face(tc.Cylinder()), reference=part.face(side))
+        a.contact(name, moving=shaft.face(tc.select.Cylinder()), reference=part.face(side))
     for end, y in ends:
         for axis in "xz":
             a.measure(f"{axis} {end}", shaft.point(0, y, 0), along=axis)

@@ -27,7 +27,9 @@ def test_what_is_not_a_ball_or_a_shaft_beside_a_wall_has_points():
         plate = a.part("plate", reference, fixed=True)
         moving = a.part("pin", tc.Mesh(pin))
         a.locate(moving, round_cases.held(moving, [(4, 0, 0), (-4, 0, 0), (0, 4, 0), (0, 0, 0), (0, 0, 0), (4, 0, 0)], 0.1))
-        a.contact("fit", moving=moving.face(tc.Cylinder()), reference=plate.face(tc.Cylinder(radius=5.05)), **options)
+        a.contact(
+            "fit", moving=moving.face(tc.select.Cylinder()), reference=plate.face(tc.select.Cylinder(radius=5.05)), **options
+        )
         a.measure("x", moving.point(0, 0, 0), along="x")
         (found,) = discretize(a).pairs
         return found
@@ -86,7 +88,7 @@ def test_a_ball_beside_edges_gaps_and_curves_that_are_not_known_has_points():
     assert pair_between(BALL, (), grooved(6, 1.5), (ANY,), at=(0, 0, -0.9)).round
     lying = trimesh.creation.cylinder(5, 30, sections=48)
     lying.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
-    barrel = (tc.Cylinder(),)
+    barrel = (tc.select.Cylinder(),)
     assert pair_between(lying, barrel, grooved(5.2, 1.5), (ANY,), at=(0, 0, -0.1)).round
     assert not pair_between(lying, barrel, grooved(4.9, 1.5), (ANY,), at=(0, 0, 0.1)).round
     small = grooved(4.5, 1.5)
@@ -101,7 +103,7 @@ def test_walls_that_are_not_whole_between_their_ends_are_none():
         azimuth = np.arctan2(bore.triangles_center[:, 1], bore.triangles_center[:, 0])
         apart = np.abs((azimuth[:, None] - 2 * np.pi * np.arange(gaps) / gaps + np.pi) % (2 * np.pi) - np.pi).min(axis=1)
         bore.update_faces(apart > 0.35)
-        assert bool(pair_between(pin, (tc.Cylinder(),), bore, (tc.Cylinder(radius=5.05),)).round) == is_round
+        assert bool(pair_between(pin, (tc.select.Cylinder(),), bore, (tc.select.Cylinder(radius=5.05),)).round) == is_round
 
 
 def test_faces_that_look_opposite_ways_are_two():
@@ -110,7 +112,7 @@ def test_faces_that_look_opposite_ways_are_two():
     hole.apply_translation([0, 0, -20])
     both = trimesh.util.concatenate([pin, hole])
     part = tc.Assembly("stacked").part("part", tc.Mesh(both))
-    face = patch(part.face(tc.Cylinder(radius=5)), {part: both})
+    face = patch(part.face(tc.select.Cylinder(radius=5)), {part: both})
     assert sorted(piece.is_hollow for piece in face.pieces) == [False, True]
     for k, piece in enumerate(face.pieces):
         normals = face.corner_normals[face.surface_numbers == k].mean(axis=1)
@@ -120,7 +122,7 @@ def test_faces_that_look_opposite_ways_are_two():
 def test_points_on_the_axis_of_a_hole_do_not_touch_its_wall():
     plug = trimesh.creation.cylinder(19.9, 10, sections=90)
     bore = trimesh.creation.annulus(20, 30, 20, sections=90)
-    pair = pair_between(plug, (ANY,), bore, (tc.Cylinder(radius=20),))
+    pair = pair_between(plug, (ANY,), bore, (tc.select.Cylinder(radius=20),))
     assert not pair.round and (np.hypot(pair.P_m[:, 0], pair.P_m[:, 1]) > 17).all()
 
 

@@ -108,7 +108,7 @@ def kernel(path):
 
 
 def test_the_kernel_reads_the_same_but_for_what_it_is_known_to_lose(path, kernel):
-    pmi = tc.read_pmi(path)
+    pmi = tc.io.read_pmi(path)
     reading = compare(pmi, kernel, {})
     assert [str(difference) for difference in reading.differences] == [LOST_LIMIT]
     assert (reading.tolerances, reading.dimensions, reading.unlisted) == (2, 4, ())
@@ -145,7 +145,7 @@ def test_the_kernel_s_reading_has_the_numbers_of_the_file(path, kernel):
     ],
 )
 def test_a_tolerance_that_differs_is_told(path, kernel, number, change, words):
-    pmi = tc.read_pmi(path)
+    pmi = tc.io.read_pmi(path)
     tolerances = [replace(one, **change) if k == number else one for k, one in enumerate(kernel.tolerances, 1)]
     first, *_ = compare(pmi, replace(kernel, tolerances=tuple(tolerances)), {}).differences
     face = pmi.tolerances[number - 1].face_records[0]
@@ -166,7 +166,7 @@ def test_a_tolerance_that_differs_is_told(path, kernel, number, change, words):
     ],
 )
 def test_a_dimension_that_differs_is_told(path, kernel, number, change, words):
-    pmi = tc.read_pmi(path)
+    pmi = tc.io.read_pmi(path)
     dimensions = [replace(one, **change) if k == number else one for k, one in enumerate(kernel.dimensions, 1)]
     texts = [str(difference) for difference in compare(pmi, replace(kernel, dimensions=tuple(dimensions)), {}).differences]
     face = (*pmi.dimensions[number - 1].end_face_records, 0)[0]
@@ -174,15 +174,15 @@ def test_a_dimension_that_differs_is_told(path, kernel, number, change, words):
 
 
 def test_a_lower_limit_above_the_nominal_value_agrees(path, kernel):
-    size, *others = tc.read_pmi(path).dimensions
-    pmi = replace(tc.read_pmi(path), dimensions=(replace(size, lower=10.2), *others))
+    size, *others = tc.io.read_pmi(path).dimensions
+    pmi = replace(tc.io.read_pmi(path), dimensions=(replace(size, lower=10.2), *others))
     assert [str(difference) for difference in compare(pmi, kernel, {}).differences] == [LOST_LIMIT]
 
 
 def test_words_that_the_kernel_has_not_are_no_difference(path, kernel):
-    flatness, position, unread = tc.read_pmi(path).tolerances
+    flatness, position, unread = tc.io.read_pmi(path).tolerances
     datums = (replace(position.datums[0], modifiers=("distance 5",)), position.datums[1])
-    pmi = replace(tc.read_pmi(path), tolerances=(flatness, replace(position, datums=datums, zone="within a sphere"), unread))
+    pmi = replace(tc.io.read_pmi(path), tolerances=(flatness, replace(position, datums=datums, zone="within a sphere"), unread))
     spherical = replace(kernel.tolerances[1], zone="spherical diameter")
     kernel = replace(kernel, tolerances=(kernel.tolerances[0], spherical))
     assert [str(difference) for difference in compare(pmi, kernel, {}).differences] == [LOST_LIMIT]
@@ -190,14 +190,14 @@ def test_words_that_the_kernel_has_not_are_no_difference(path, kernel):
 
 def test_faces_that_differ_have_the_numbers_of_the_listing(path, kernel):
     tolerances = (replace(kernel.tolerances[0], items=KernelItems(frozenset(), 0)), kernel.tolerances[1])
-    first, *_ = compare(tc.read_pmi(path), replace(kernel, tolerances=tolerances), faces_of_records(path)).differences
+    first, *_ = compare(tc.io.read_pmi(path), replace(kernel, tolerances=tolerances), faces_of_records(path)).differences
     assert str(first) == "tolerance 1: faces 1, kernel none"
 
 
 def test_annotations_that_only_one_reading_has_are_told(path, kernel):
-    pmi = replace(tc.read_pmi(path), tolerances=(), dimensions=())
+    pmi = replace(tc.io.read_pmi(path), tolerances=(), dimensions=())
     assert compare(pmi, kernel, {}).unlisted[:2] == ("a flatness of 0.05 mm, #90013", "a position of 0.25 mm, #90023")
-    reading = compare(tc.read_pmi(path), replace(kernel, tolerances=(), dimensions=()), {})
+    reading = compare(tc.io.read_pmi(path), replace(kernel, tolerances=(), dimensions=()), {})
     assert (reading.unread_tolerances, reading.unread_dimensions) == ((1, 2, 3), (1, 2, 3, 4))
 
 
@@ -210,9 +210,9 @@ def test_annotations_that_only_one_reading_has_are_told(path, kernel):
 )
 def test_a_kernel_that_fails_loses_nothing_but_its_reading(tmp_path, record, words):
     path = write(tmp_path / "cover.stp", record)
-    reading = second_reading(tc.read_pmi(path), path, {})
+    reading = second_reading(tc.io.read_pmi(path), path, {})
     assert reading.fault.startswith("the kernel could not read the PMI: ") and words in str(reading)
-    assert reading.differences == () and len(tc.read_pmi(path).tolerances) == 3
+    assert reading.differences == () and len(tc.io.read_pmi(path).tolerances) == 3
 
 
 def test_a_file_without_shapes_has_no_second_reading(tmp_path):

@@ -17,7 +17,7 @@ from tolcontact.simulation import simulate_block
 
 @pytest.fixture(scope="module")
 def of_ra1():
-    return tc.sensitivities(cases.model("ra1"), samples=400, solver="daqp").sel(measure="corner height")
+    return tc.analyses.sensitivities(cases.model("ra1"), samples=400, solver="daqp").sel(measure="corner height")
 
 
 def test_without_contact_they_are_those_of_the_plane_through_the_locators(of_ra1):
@@ -36,7 +36,7 @@ def test_leverage_of_locators():
     a.locate(part, tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x"), inset=10), tolerance=0.1)
     a.variable("heat", 0.1, drives={"plate.C1": 1.0})
     a.measure("corner", part.point(100, 50, 10), along="z")
-    found = tc.sensitivities(a, samples=2, solver="daqp")["leverage"]
+    found = tc.analyses.sensitivities(a, samples=2, solver="daqp")["leverage"]
     assert np.isnan(found.sel(contributor="heat")) and float(found.sel(contributor="plate.C1")) == pytest.approx(1, abs=1e-6)
     own = tc.build(a, solver="daqp").nominal.parts[0].locators
     twists = np.linalg.inv(np.hstack([own.directions, np.cross(own.points, own.directions)]))  # columns: t, w for each locator
@@ -57,7 +57,7 @@ def test_with_contact_they_are_those_of_the_plane_below(of_ra1):
 
 def test_one_dimensional_contact_is_followed_in_half_of_the_realizations():
     """CASES C1: the derivative of max(0, g) is 0 or 1, each in half of the draws."""
-    found = tc.sensitivities(cases.one_dimensional(0), samples=2000, solver="daqp").isel(measure=0)
+    found = tc.analyses.sensitivities(cases.one_dimensional(0), samples=2000, solver="daqp").isel(measure=0)
     of = found.sel(contributor="block.Z")
     estimate, lower, upper = of["sensitivity"].sel(state="corrected").values
     assert lower < 0.5 < upper and upper - lower < 0.05 and estimate == pytest.approx(0.5, abs=0.03)
@@ -72,7 +72,7 @@ def test_intervals_cover():
     """500 repeats of 100 realizations: the mean derivative of max(0, g) is 0.5."""
     program, inside = tc.build(cases.one_dimensional(0), solver="daqp"), 0
     for seed in range(500):
-        found = tc.sensitivities(program, samples=100, seed=seed).isel(measure=0)
+        found = tc.analyses.sensitivities(program, samples=100, seed=seed).isel(measure=0)
         _, lower, upper = found["sensitivity"].sel(state="corrected", contributor="block.Z").values
         inside += lower <= 0.5 <= upper
     assert 460 <= inside <= 490
@@ -80,7 +80,7 @@ def test_intervals_cover():
 
 def test_a_clutch_follows_its_drawing_as_its_formula_says():
     """CASES C7: (-11.910, -23.732, 11.821) degrees a mm; roller and ring vary in diameter. Means differ in the second order."""
-    found = tc.sensitivities(cases.model("clutch"), samples=200, solver="daqp").isel(measure=0).sel(state="corrected")
+    found = tc.analyses.sensitivities(cases.model("clutch"), samples=200, solver="daqp").isel(measure=0).sel(state="corrected")
     expected = {"hub.flat.offset": -11.910, "roller.barrel.size": -23.732 / 2, "ring.bore.size": 11.821 / 2}
     for label, slope in expected.items():
         estimate, lower, upper = found["sensitivity"].sel(contributor=label).values
@@ -91,7 +91,7 @@ def test_a_clutch_follows_its_drawing_as_its_formula_says():
 def test_they_are_differences_of_the_engine():
     a = cases.model("lid")
     program = tc.build(a, solver="daqp", method=a.method)
-    found = tc.sensitivities(program, samples=6, seed=4)
+    found = tc.analyses.sensitivities(program, samples=6, seed=4)
     own = program.draws(seed=4, start=0, stop=6)
     for label in found["contributor"].values[::9]:
         column, step = list(program.nominal.contributors).index(label), float(found["step"].sel(contributor=label))
@@ -131,6 +131,6 @@ def test_what_does_nothing_has_no_kinks():
     """Rounding of a solver is no kink: the lid's height above its base follows nothing."""
     a = cases.one_dimensional(0)
     a.measure("aside", a.parts[1].point(5, 5, 10), along="x")
-    found = tc.sensitivities(a, samples=200, solver="daqp")
+    found = tc.analyses.sensitivities(a, samples=200, solver="daqp")
     assert float(found["changing"].sel(contributor="block.Z", interval="estimate")) < 0.05
     assert np.abs(found["sensitivity"].sel(measure="aside").values).max() < 1e-6

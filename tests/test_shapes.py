@@ -111,7 +111,7 @@ def test_meshes_without_an_outside_are_refused(kind):
 
 def test_coincident_triangles_that_look_opposite_ways_are_refused_where_they_are_chosen():
     assert face_of(sheets(), "+x").mesh.area > 0
-    assert face_of(sheets(), "+z", tc.Inside((0, 0, -1), (9, 9, 1))).mesh.area == pytest.approx(81)
+    assert face_of(sheets(), "+z", tc.select.Inside((0, 0, -1), (9, 9, 1))).mesh.area == pytest.approx(81)
     with pytest.raises(GeometryFault, match="2 pairs of coincident triangles point opposite ways"):
         face_of(sheets(), lambda c, n: abs(n[:, 2]) > 0.5)
 

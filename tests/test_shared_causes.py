@@ -37,7 +37,7 @@ def labels_of(model):
 
 
 def test_a_cause_that_is_all_that_varies_has_the_derivative_of_what_it_drives():
-    found = tc.sensitivities(shelf({"v": 1.0}), samples=2000, solver="daqp")
+    found = tc.analyses.sensitivities(shelf({"v": 1.0}), samples=2000, solver="daqp")
     assert found["contributor"].values.tolist() == ["v"] and float(found["step"][0]) == pytest.approx(0.001, rel=0.02)
     own = found.sel(measure="height", contributor="v")
     assert float(own["nominal"]) == pytest.approx(1, abs=1e-9)
@@ -49,7 +49,7 @@ def test_a_cause_that_is_all_that_varies_has_the_derivative_of_what_it_drives():
 
 
 def test_independent_causes_of_the_same_locators_have_their_own_shares():
-    found = tc.contributions(shelf({"a": 1.0, "b": 0.5}), samples=4096, solver="daqp").sel(measure="height")
+    found = tc.analyses.contributions(shelf({"a": 1.0, "b": 0.5}), samples=4096, solver="daqp").sel(measure="height")
     assert found["group"].values.tolist() == ["a", "b"] and not found.sizes["unit"]
     assert found["linear"].values == pytest.approx([0.8, 0.2], abs=1e-9)
     truths = {"raw": [[0.8, 0.2]] * 2, "corrected": of_clipped()}
@@ -60,7 +60,7 @@ def test_independent_causes_of_the_same_locators_have_their_own_shares():
                 assert abs(estimate - share) < 1.7 * (upper - lower) / 2 + 1e-3 and upper - lower < 0.15, (state, word, group)
     missed = found["missed"].sel(interval="estimate")
     assert float(missed.sel(state="raw")) < 1e-9 and float(missed.sel(state="corrected")) > 0.5
-    by_part = tc.contributions(shelf({"a": 1.0, "b": 0.5}, tolerance=0.3), samples=64, solver="daqp", by="part")
+    by_part = tc.analyses.contributions(shelf({"a": 1.0, "b": 0.5}, tolerance=0.3), samples=64, solver="daqp", by="part")
     assert by_part["group"].values.tolist() == ["block", "a", "b"]
 
 
@@ -72,13 +72,13 @@ def test_a_driven_locator_has_the_share_of_its_own_variation():
     a.variable("heat", tc.Tolerance(5, "uniform"), drives={"block.X": -0.02, "block.Y1": 0.01, "block.Y2": 0.01}, units="K")
     a.measure("along", block.point(0, 0, 0), along="x")
     a.measure("across", block.point(0, 0, 0), along="y")
-    slopes = tc.sensitivities(a, samples=16, solver="daqp").sel(state="raw", interval="estimate")
+    slopes = tc.analyses.sensitivities(a, samples=16, solver="daqp").sel(state="raw", interval="estimate")
     assert slopes["contributor"].values.tolist() == ["block.X", "heat"]
     expected = np.array([[1, -0.02], [0, 0.01]])  # (measure, contributor)
     assert slopes["nominal"].values == pytest.approx(expected, abs=1e-9)
     assert slopes["sensitivity"].values == pytest.approx(expected, abs=1e-9)
     assert slopes["step"].values == pytest.approx([0.01 * 0.3 / 6, 0.01 * 5 / np.sqrt(12)], rel=0.02)
-    shares = tc.contributions(a, samples=2048, solver="daqp")
+    shares = tc.analyses.contributions(a, samples=2048, solver="daqp")
     assert shares["group"].values.tolist() == ["block.X", "heat"]
     parts = np.array([(0.3 / 6) ** 2, (0.02 * 5) ** 2 / 12])
     truth = np.array([parts / parts.sum(), [0, 1]])
@@ -92,7 +92,7 @@ def test_a_derivative_is_the_sum_over_what_is_driven_also_with_negative_weights(
     weights = np.array([1.0, -0.5, -2.0])
     a = shelf({}, tolerance=0.3)
     a.variable("warp", 0.2, drives=dict(zip((f"block.{support}" for support in SUPPORTS), weights, strict=True)))
-    found = tc.sensitivities(a, samples=64, solver="daqp").sel(measure="height")
+    found = tc.analyses.sensitivities(a, samples=64, solver="daqp").sel(measure="height")
     supports = [f"block.{support}" for support in SUPPORTS]
     points = tc.build(a, solver="daqp").nominal.parts[1].locators.points
     expected = plane_weights(points[:3, :2], np.array([50, 25]))
@@ -106,7 +106,7 @@ def test_a_derivative_is_the_sum_over_what_is_driven_also_with_negative_weights(
 def test_correlated_causes_are_one_group_with_a_shapley_effect_each():
     a = shelf({"a": 1.0, "b": 0.5})
     a.correlate(["a", "b"], 0.6)
-    found = tc.contributions(a, samples=4096, solver="daqp").sel(measure="height")
+    found = tc.analyses.contributions(a, samples=4096, solver="daqp").sel(measure="height")
     assert found["group"].values.tolist() == ["a + b"] and found["unit"].values.tolist() == ["a", "b"]
     assert found["linear"].values == pytest.approx([1.0])
     for unit, truth in zip("ab", of_normal([1, 0.5], [[1, 0.6], [0.6, 1]]), strict=True):
@@ -118,11 +118,11 @@ def test_correlated_causes_are_one_group_with_a_shapley_effect_each():
 def test_a_cause_that_drives_a_feature():
     a = toleranced.block_with("top", tc.Profile(0.3, "A", rule="translation"))
     a.variable("warmth", 20, drives={"block.top.offset": 0.01}, units="K")
-    slopes = tc.sensitivities(a, samples=16, solver="daqp").sel(measure="middle")
+    slopes = tc.analyses.sensitivities(a, samples=16, solver="daqp").sel(measure="middle")
     assert slopes["contributor"].values.tolist() == ["block.top.offset", "warmth"]
     assert slopes["nominal"].values == pytest.approx([1, 0.01], abs=1e-9)
     parts = np.array([0.3**2, (0.01 * 20) ** 2])
-    shares = tc.contributions(a, samples=64, solver="daqp", by="feature").sel(measure="middle")
+    shares = tc.analyses.contributions(a, samples=64, solver="daqp", by="feature").sel(measure="middle")
     assert shares["group"].values.tolist() == ["block.top", "warmth"]
     assert shares["linear"].values == pytest.approx(parts / parts.sum(), rel=1e-3)
 
@@ -159,7 +159,7 @@ def test_groups_are_named_after_what_varies():
         a.part("still", tc.Box(10, 10, 10)), tc.three_two_one(*(a.parts[-1].face(f"-{axis}") for axis in "zyx")), tolerance=0
     )
     a.correlate(["still.A1", "upper.A1"], 0.8)
-    groups = tc.contributions(a, samples=16, solver="daqp")["group"].values.tolist()
+    groups = tc.analyses.contributions(a, samples=16, solver="daqp")["group"].values.tolist()
     assert "upper.A1" in groups and not any("still" in group for group in groups)
 
 
@@ -182,5 +182,5 @@ def test_variances_are_those_of_the_quantiles(tolerance):
 def test_a_distribution_without_a_variance_has_that_of_its_draws():
     a = shelf({"a": 1.0})
     a.variable("b", stats.cauchy(0, 1e-4), drives={f"block.{support}": 1.0 for support in SUPPORTS})
-    linear = tc.contributions(a, samples=16, solver="daqp")["linear"].sel(measure="height").values
+    linear = tc.analyses.contributions(a, samples=16, solver="daqp")["linear"].sel(measure="height").values
     assert (linear > 0).all() and linear.sum() == pytest.approx(1)

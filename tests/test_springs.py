@@ -99,7 +99,7 @@ def test_forces_follow_from_the_archive_alone(tmp_path):
         forces = stiffness * np.maximum(-gaps, 0)
         assert tree["reaction"].values[:, 0] == pytest.approx(forces.sum(axis=1), rel=1e-6)
         assert forces.sum(axis=1) == pytest.approx(LOAD, rel=1e-5)
-        rebuilt = tc.model_of(tree)
+        rebuilt = tc.io.model_of(tree)
     assert [locator.stiffness for locator in rebuilt.locations[0].scheme] == [1000.0] * 4 + [None] * 3
 
 

@@ -80,7 +80,7 @@ def test_forces_follow_from_the_archive_alone(tmp_path):
         forces = stiffness * (sample["deviation"].values[:, :3] - heights)
         assert tree["reaction"].sel(pair=["bar.S0", "bar.S2"]).values == pytest.approx(forces[:, [0, 2]], abs=1e-5)
         assert forces[:, [0, 2]].sum(axis=1) + np.maximum(forces[:, 1], 0) == pytest.approx(LOAD, rel=1e-6)
-        rebuilt = tc.model_of(tree)
+        rebuilt = tc.io.model_of(tree)
     assert [locator.stiffness for locator in rebuilt.locations[0].scheme] == [*STIFFNESS, None, None, None, None]
 
 

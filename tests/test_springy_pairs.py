@@ -76,7 +76,7 @@ def test_a_block_lifts_off_its_pad_as_a_layer_without_tension_says(tmp_path):
         assert forces.sum(axis=1) == pytest.approx(tree["reaction"].values[:, 0], rel=1e-6)
         assert forces.sum(axis=1) == pytest.approx(LOAD, rel=1e-6)
         heights = tree["measured"].sel(state="corrected").values
-        rebuilt = tc.model_of(tree)
+        rebuilt = tc.io.model_of(tree)
     assert (tc.summarize(path)["penetration"] == 0).all()  # what gives way does not penetrate
     assert stiffness.sum() == pytest.approx(STIFFNESS)
     assert rebuilt.pairs[0].stiffness == STIFFNESS
@@ -109,7 +109,7 @@ def shaft_on_a_plane(**choices):
     shaft = model.part("shaft", tc.Pin(20, 100), at=(150, 50, 30), rotation=(0, np.pi / 2, 0))
     places = {"A": ((0, 0, 0), "y"), "B": ((0, 0, -100), "y"), "C": ((0, 0, 0), "z"), "D": ((0, 10, -50), "x")}
     model.locate(shaft, [tc.Locator(name, p, n, 1e-3) for name, (p, n) in places.items()], floating=True)
-    model.contact("line", moving=shaft.face(tc.Cylinder(radius=10)), reference=base.face("+z"), stiffness=500, **choices)
+    model.contact("line", moving=shaft.face(tc.select.Cylinder(radius=10)), reference=base.face("+z"), stiffness=500, **choices)
     model.force("load", at=shaft.point(0, 0, -30), vector=(0, 0, -LOAD))
     for end in (0, -100):
         model.measure(f"height at {end}", shaft.point(0, 0, end), along="z")

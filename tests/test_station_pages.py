@@ -35,7 +35,7 @@ def test_worst_cases_stand_in_their_stations(tmp_path):
     """The scene of a station has the poses of worst cases: those that give the measure again, of the last station too."""
     path, model = tmp_path / "rail.nc", cases.rail()
     tc.run(model, samples=20, seed=1, solver="daqp", surfaces=0, out=path).close()
-    worst = tc.worst_case(model, samples=64, solver="daqp", into=path)
+    worst = tc.analyses.worst_case(model, samples=64, solver="daqp", into=path)
     with tc.open_archive(path) as tree:
         write_page(tree, tc.summarize(tree), tmp_path / "report.html")
     scenes = data_of((tmp_path / "report.html").read_text(encoding="utf-8"))["scene"]["stations"]

@@ -50,11 +50,11 @@ def test_an_archive_holds_every_station(archive):
 
 def test_its_model_is_rebuilt_also_from_json(archive, tmp_path):
     with tc.open_archive(archive) as results:
-        rebuilt = tc.model_of(results)
+        rebuilt = tc.io.model_of(results)
         assert [station.name for station in rebuilt.stations] == ["weld", "check"]
         assert_same_run(tc.run(rebuilt, samples=5000, seed=3, solver="daqp", surfaces=8), results)
     model = cases.rail()
-    tc.write_model(model, tmp_path / "rail.json")
+    tc.io.write_model(model, tmp_path / "rail.json")
     runs = [tc.run(declared, samples=50, solver="daqp", surfaces=0) for declared in (model, tmp_path / "rail.json")]
     assert_same_run(*runs)
 

@@ -39,7 +39,7 @@ SEVERAL = {
 def test_a_step_file_of_several_bodies_is_refused_with_their_list(kind, tmp_path):
     content, expected = SEVERAL[kind]
     said = refusal(tmp_path / "many.step", content)
-    assert "holds 2 bodies" in said and "or declare all with tc.parts_from" in said
+    assert "holds 2 bodies" in said and "or declare all with tc.io.parts_from" in said
     for words in expected:
         assert words in said
 
@@ -145,7 +145,7 @@ def test_coloured_faces_of_a_step_file_are_still_faces(tmp_path):
     part = tc.Assembly("painted").part("block", tc.Mesh(tmp_path / "painted.step"))
     meshes = {part: shape(part.geometry)}
     for at, area in (((5, 10, 0), 200), ((5, 10, 30), 200), ((0, 10, 15), 600), ((5, 0, 15), 300)):
-        assert patch(part.face(tc.Brep(at)), meshes).mesh.area == pytest.approx(area)
+        assert patch(part.face(tc.select.Brep(at)), meshes).mesh.area == pytest.approx(area)
 
 
 def test_a_face_that_stands_twice_counts_once(tmp_path, caplog):
@@ -156,7 +156,7 @@ def test_a_face_that_stands_twice_counts_once(tmp_path, caplog):
     (tmp_path / "twice.step").write_text(str(made))
     with caplog.at_level("INFO"):
         mesh = shape(tc.Mesh(tmp_path / "twice.step"))
-    assert mesh.is_watertight and mesh.volume == pytest.approx(6000) and len(tc.faces_in(tmp_path / "twice.step")) == 6
+    assert mesh.is_watertight and mesh.volume == pytest.approx(6000) and len(tc.io.faces_in(tmp_path / "twice.step")) == 6
     assert "2 triangles that stand twice are left out" in caplog.text
 
 

@@ -89,7 +89,7 @@ def test_a_pin_without_clearance_fits_as_its_fitted_cylinder_does(at, tmp_path):
     rows = [((5, 0, 0), 2), ((-5, 0, 0), 2), ((0, 5, 0), 2), ((0, 0, 0), 1), ((5, 0, 0), 1), ((0, 0, 0), 0)]
     locators = [tc.Locator(f"L{k}", tuple(R @ p + at), tuple(R[:, axis])) for k, (p, axis) in enumerate(rows)]
     a.locate(pin, locators, tolerance=0.1)
-    a.contact("fit", moving=pin.face(tc.Cylinder()), reference=plate.face(tc.Cylinder(inner=True, radius=5)))
+    a.contact("fit", moving=pin.face(tc.select.Cylinder()), reference=plate.face(tc.select.Cylinder(inner=True, radius=5)))
     a.measure("place", pin.point(*at), along="z", tolerance=1)
     run = tc.run(a, keep="all", **QUICK)
     assert_resolved(run)
@@ -118,7 +118,7 @@ def test_exact_coordinates_have_no_error():
 def test_a_model_from_an_archive_has_the_error_of_its_files(tmp_path):
     tc.run(stored_case("key", tmp_path), **QUICK, out=tmp_path / "first.nc")
     with tc.open_archive(tmp_path / "first.nc") as first:
-        again = tc.run(tc.model_of(first), **QUICK)
+        again = tc.run(tc.io.model_of(first), **QUICK)
         assert again["contact"].coordinate_error.item() == first["contact"].coordinate_error.item() > 0
         assert again.measured.values == pytest.approx(first.measured.values, abs=1e-9)
 

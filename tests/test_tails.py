@@ -140,7 +140,7 @@ def limited(limit):
 
 @pytest.mark.slow
 def test_a_limit_far_out_is_exceeded_as_often_as_the_closed_form_says():
-    found = tc.tails(limited(4.5), samples=8000, seed=2, solver="daqp", method=PAPER)
+    found = tc.analyses.tails(limited(4.5), samples=8000, seed=2, solver="daqp", method=PAPER)
     assert found.event.values.tolist() == ["kept outside limits"]
     estimate, lower, upper = found.probability.values[0]
     assert lower < stats.norm.sf(4.5) < upper and upper - lower < 4 * estimate
@@ -156,7 +156,7 @@ def test_ra1_as_a_run_counts_it(method, samples):
     options = {"solver": "daqp", "method": method}
     counted = tc.summarize(tc.run(a, samples=samples, seed=5, keep="measures", fields="none", surfaces=0, **options))
     _, low, high = counted.statistic_value.sel(measure="far", state="corrected", statistic="above limit").values
-    found = tc.tails(a, samples=6000, **options)
+    found = tc.analyses.tails(a, samples=6000, **options)
     _, lower, upper = found.probability.sel(event="far outside limits").values
     assert lower < high and low < upper and 0 < high < 1e-3
 
@@ -180,7 +180,7 @@ def test_a_limit_at_a_stop_hides_nothing(limits):
     """CASES C1: the height max(0, g), g ~ N(0, 1), is never below 0, and how seldom it is above 4 does not depend on that."""
     a = cases.one_dimensional(0)
     a.measure("kept", a.parts[1].point(5, 5, 10), along="z", limits=limits)
-    found = tc.tails(a, samples=8000, seed=2, solver="daqp", method=PAPER)
+    found = tc.analyses.tails(a, samples=8000, seed=2, solver="daqp", method=PAPER)
     estimate, lower, upper = found.probability.values[0]
     assert found.stop.values.tolist() == [1]
     if limits[1] is None:
@@ -191,21 +191,21 @@ def test_a_limit_at_a_stop_hides_nothing(limits):
 
 def test_what_has_no_rare_event_is_refused():
     with pytest.raises(tc.OptionError, match="no measurement has limits"):
-        tc.tails(cases.one_dimensional(0), method=PAPER)
+        tc.analyses.tails(cases.one_dimensional(0), method=PAPER)
     with pytest.raises(tc.OptionError, match="samples is 100;"):
-        tc.tails(limited(4), samples=100)
+        tc.analyses.tails(limited(4), samples=100)
     still = tc.Assembly("still")
     part = still.part("part", tc.Box(1, 2, 3), fixed=True)
     still.measure("corner", part.point(0, 0, 0), along="x", tolerance=1)
     with pytest.raises(tc.OptionError, match="nothing varies"):
-        tc.tails(still)
+        tc.analyses.tails(still)
 
 
 @pytest.mark.slow
 def test_measured_parts_and_correlations_are_drawn_as_in_a_run():
     a = limited(2.5)
     a.population(pd.DataFrame({"z": np.linspace(-3, 3, 200)}), {"block.Z": "z"})
-    _, lower, upper = tc.tails(a, samples=8000, solver="daqp").probability.values[0]
+    _, lower, upper = tc.analyses.tails(a, samples=8000, solver="daqp").probability.values[0]
     assert lower <= (np.linspace(-3, 3, 200) > 2.5).mean() <= upper
 
 

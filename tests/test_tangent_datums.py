@@ -167,19 +167,19 @@ def test_archives_state_the_planes_and_recompute_them(tmp_path):
 
 
 def test_a_model_of_json_has_the_same_datums(tmp_path):
-    tc.write_model(plate(), tmp_path / "plate.json")
+    tc.io.write_model(plate(), tmp_path / "plate.json")
     assert_same_run(tc.run(load_model(tmp_path / "plate.json"), samples=8), tc.run(plate(), samples=8))
 
 
 def test_contributions_count_a_plane_with_the_form_that_it_follows():
     program = tc.build(plate())
-    found = tc.contributions(program, samples=64).sel(measure="height", state="raw")
+    found = tc.analyses.contributions(program, samples=64).sel(measure="height", state="raw")
     name = "plate.foot.form + plate.top.datum A of A: offset + plate.top.datum A of A: tilt x + plate.top.datum A of A: tilt y"
     assert name in found["group"].values
     assert float(found["linear"].sum()) == pytest.approx(1)
     assert float(found["total"].sel(group=name, interval="estimate")) > 0.5
     with pytest.raises(tc.OptionError, match="has faces with form"):
-        tc.worst_case(program, samples=256)
+        tc.analyses.worst_case(program, samples=256)
 
 
 def test_features_that_refer_to_one_datum_share_its_plane(program):

@@ -23,7 +23,7 @@ def titled(block):
 
 def test_an_archive_holds_the_block_and_the_page_shows_it(tmp_path):
     with tc.run(titled(BLOCK), samples=20, solver="daqp", out=tmp_path / "a.nc") as results:
-        assert title_block_of(results.attrs) == BLOCK == tc.model_of(results).title_block
+        assert title_block_of(results.attrs) == BLOCK == tc.io.model_of(results).title_block
         page = page_of(results, tc.summarize(results))
         other = page_of(results, tc.summarize(results), tc.TitleBlock(title="Other"))
     assert "<h1>Lid &lt;A&amp;B&gt;</h1>" in page
@@ -36,7 +36,7 @@ def test_an_archive_without_a_block_has_none():
     assert title_block_of({"title": "variation simulation of x"}) == tc.TitleBlock()
     results = tc.run(cases.stack(), samples=20, solver="daqp")
     assert not [name for name in results.attrs if name.startswith("document_")]
-    assert tc.model_of(results).title_block is None
+    assert tc.io.model_of(results).title_block is None
 
 
 def test_a_changed_block_does_not_keep_a_run_from_being_resumed(tmp_path):
@@ -99,5 +99,5 @@ def test_json_models_have_blocks(tmp_path):
     (tmp_path / "a.json").write_text(document)
     assert read_json(tmp_path / "a.json").title_block == tc.TitleBlock(title="T", date="today")
     (tmp_path / "b.json").write_text(document.replace('"date"', '"dates"'))
-    with pytest.raises(tc.ScriptError, match="title_block"):
+    with pytest.raises(tc.errors.ScriptError, match="title_block"):
         read_json(tmp_path / "b.json")

@@ -73,7 +73,7 @@ def plates(name, turn=None, overhang=False, **choice):
     base, top = a.part("base", tc.Mesh(lower), fixed=True), a.part("plate", tc.Mesh(upper))
     six = zip("ABCDEF", R.apply(POINTS) + t, R.apply(DIRECTIONS), strict=True)
     a.locate(top, [tc.Locator(label, tuple(p), tuple(n)) for label, p, n in six], tolerance=1)
-    down, up = (tc.Facing(tuple(R.apply((0, 0, z)))) for z in (-1, 1))
+    down, up = (tc.select.Facing(tuple(R.apply((0, 0, z)))) for z in (-1, 1))
     a.contact("seat", moving=top.face(down), reference=base.face(up), **choice)
     a.measure("height", top.point(*(R.apply((8, 5, 0)) + t)), along=tuple(R.apply((0, 0, 1))), tolerance=1)
     return a

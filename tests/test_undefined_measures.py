@@ -36,18 +36,20 @@ def block_with(function, **limits):
 )
 def test_what_is_no_number_for_some_combinations_has_no_worst_case(function):
     with pytest.raises(tc.OptionError, match='"block": measurement "function": not a finite number for some combinations'):
-        tc.worst_case(block_with(function), samples=16)
+        tc.analyses.worst_case(block_with(function), samples=16)
 
 
 def test_a_measure_of_any_combination_has_its_worst_case():
-    worst = tc.worst_case(block_with(lambda x: casadi.sqrt(0.4 + x)), samples=16).worst.sel(measure="function", state="raw")
+    worst = tc.analyses.worst_case(block_with(lambda x: casadi.sqrt(0.4 + x)), samples=16).worst.sel(
+        measure="function", state="raw"
+    )
     assert worst.values == pytest.approx(np.sqrt([0.1, 0.7]), rel=1e-6)
 
 
 def test_the_probability_of_what_is_no_number_is_not_stated():
     """As the statistics of a run, where a value that is not a number is neither inside nor outside."""
     model = block_with(casadi.log, limits=(None, -2.0))
-    found = tc.tails(model, seed=2)
+    found = tc.analyses.tails(model, seed=2)
     assert np.isnan(found.probability.sel(event="function outside limits").values).all()
     exact = stats.norm.sf(4.5)
     lower, upper = found.probability.sel(event="place outside limits").values[1:]
@@ -58,7 +60,7 @@ def test_the_probability_of_what_is_no_number_is_not_stated():
 
 def test_a_measure_that_is_a_number_but_for_negligible_deviations_has_its_probability():
     """Inflated deviations lead to where it is none: 9 standard deviations from nominal."""
-    found = tc.tails(block_with(lambda x: casadi.sqrt(0.9 + x), limits=(None, np.sqrt(1.35))), seed=2)
+    found = tc.analyses.tails(block_with(lambda x: casadi.sqrt(0.9 + x), limits=(None, np.sqrt(1.35))), seed=2)
     estimate, lower, upper = found.probability.sel(event="function outside limits").values
     assert lower <= stats.norm.sf(4.5) <= upper < 2 * estimate
 

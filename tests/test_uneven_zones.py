@@ -63,7 +63,7 @@ def test_widened_zones_keep_their_middle():
 
 
 def test_the_worst_case_is_an_end_of_an_uneven_zone():
-    worst = tc.worst_case(toleranced.block_with("top", tc.Profile(0.3, "A", outside=UPPER)))
+    worst = tc.analyses.worst_case(toleranced.block_with("top", tc.Profile(0.3, "A", outside=UPPER)))
     assert worst.worst.sel(state="raw").values == pytest.approx(np.tile([LOWER, UPPER], (3, 1)), abs=1e-6)
 
 
@@ -77,7 +77,7 @@ def test_a_worst_case_lies_in_an_uneven_zone_and_in_the_narrower_one_within_it()
     top, end = block.pattern("faces", block.face("+z"), block.face("+x"), *profiles).members
     a.measure("top", top.point(50, 25, 30), along="z")
     a.measure("end", end.point(100, 25, 15), along="x")
-    worst = tc.worst_case(a, samples=64).worst.sel(state="raw").values
+    worst = tc.analyses.worst_case(a, samples=64).worst.sel(state="raw").values
     assert worst == pytest.approx(np.array([[0.0, 0.05], [0.0, 0.3]]), abs=1e-6)
 
 

@@ -45,7 +45,7 @@ def test_words_choose_the_face_that_they_are_of(name):
     assert len(found.snippets) == len(found.descriptions) >= 4
     for face, words in zip(found.descriptions, found.snippets, strict=True):
         own = np.flatnonzero(found.face_of == face.number - 1)
-        if "tc.Inside" in words:  # boxes cut: what they leave has the same area
+        if "tc.select.Inside" in words:  # boxes cut: what they leave has the same area
             mesh = shape(part.geometry)
             area = patch(eval(f"part.{words}", {"part": part, "tc": tc}), {part: mesh}).mesh.area
             assert area == pytest.approx(mesh.area_faces[own].sum(), rel=1e-4)
@@ -67,7 +67,9 @@ def test_the_command_shows_models_step_files_and_archives(tmp_path):
         done = call(tmp_path, "view", what, "--out", tmp_path / "page.html")
         assert (done.returncode, done.stdout) == (0, f"page: {tmp_path / 'page.html'}\n"), done.stderr
         parts = data_of((tmp_path / "page.html").read_text())["scene"]["parts"]
-        assert all(face["snippet"].startswith("face(tc.Brep((") for face in parts[-1]["described"]) or what.suffix == ".py"
+        assert (
+            all(face["snippet"].startswith("face(tc.select.Brep((") for face in parts[-1]["described"]) or what.suffix == ".py"
+        )
     tc.run(cases.stack(), samples=10, solver="daqp", out=tmp_path / "stack.nc").close()
     done = call(tmp_path, "view", tmp_path / "stack.nc", "--out", tmp_path / "run.html")
     assert done.returncode == 0 and "Contact and certificates" in (tmp_path / "run.html").read_text()

@@ -64,8 +64,8 @@ APART = {
 ORDER = (
     "version", "errors", "interrupts", "readable", "child", "stored_coordinates", "shape_worker", "kernel",
     "vocabulary", "realizations",
-    "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "select", "geometry", "features",
-    "fasteners", "pmi", "discretization", "interference", "variation", "mechanics",
+    "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "select", "geometry",
+    "features", "fasteners", "pmi", "discretization", "interference", "variation", "mechanics",
     "compilation", "statics", "contact", "simulation", "plausibility", "statistics", "archive", "report", "plot", "workflow",
     "io", "analyses", "testing", "cli", "__init__", "__main__",
 )  # fmt: skip

@@ -25,61 +25,65 @@ HALVES = [(6, 7), (8, 9), (10, 11), (12, 13), (14, 15), (16, 17)]  # of the plat
 def plate_with(*selections, **toleranced):
     model = tc.Assembly("plate")
     plate = model.part("plate", tc.Mesh(AS1, body="plate_1"), fixed=True)
-    plate.feature("top", plate.face(tc.Brep(1)), datum="A")
+    plate.feature("top", plate.face(tc.select.Brep(1)), datum="A")
     feature = plate.feature("hole", plate.face(*selections), tc.Size(10, 0.1, -0.1), tc.Position(0.2, "A"))
     model.measure("corner", of=plate.point(0, 0, 0), along="z")
     return model, plate, feature
 
 
 def chosen(selection):
-    model, plate, _ = plate_with(tc.Brep(6, whole=True))
+    model, plate, _ = plate_with(tc.select.Brep(6, whole=True))
     return list(discretize(model).triangles(plate.face(selection)))
 
 
 def test_a_union_has_the_triangles_of_all_its_faces():
-    apart = [set(chosen(tc.Brep(number))) for number in (3, 7, 12)]
-    assert set(chosen(tc.Brep(3, 7, 12))) == set.union(*apart) and sum(map(len, apart)) == len(set.union(*apart))
+    apart = [set(chosen(tc.select.Brep(number))) for number in (3, 7, 12)]
+    assert set(chosen(tc.select.Brep(3, 7, 12))) == set.union(*apart) and sum(map(len, apart)) == len(set.union(*apart))
     assert (
-        chosen(tc.Brep(3) | tc.Brep(7, 12)) == chosen(tc.Brep(12, 3, 7)) == chosen(tc.Brep(12, 7) | tc.Brep((180, 100, 13.33)))
+        chosen(tc.select.Brep(3) | tc.select.Brep(7, 12))
+        == chosen(tc.select.Brep(12, 3, 7))
+        == chosen(tc.select.Brep(12, 7) | tc.select.Brep((180, 100, 13.33)))
     )
     with pytest.raises(TypeError, match="whole for both, or for none"):
-        tc.Brep(3) | tc.Brep(6, whole=True)
-    assert tc.Brep(np.int64(3), np.array([1.0, 2.0, 3.0])).which == (3, (1.0, 2.0, 3.0))
-    assert "need numbers" in next(tc.Brep().faults())
+        tc.select.Brep(3) | tc.select.Brep(6, whole=True)
+    assert tc.select.Brep(np.int64(3), np.array([1.0, 2.0, 3.0])).which == (3, (1.0, 2.0, 3.0))
+    assert "need numbers" in next(tc.select.Brep().faults())
 
 
 def test_halves_of_a_hole_are_one_surface_by_each_of_their_numbers():
-    faces = tc.faces_in(AS1, "plate_1")
+    faces = tc.io.faces_in(AS1, "plate_1")
     assert [face.whole for face in faces] == [(), (), (), (), (), *(pair for pair in HALVES for _ in pair), ()]
     assert "one surface with 7" in str(faces[5])
     for pair in HALVES:
-        both = chosen(tc.Brep(*pair))
+        both = chosen(tc.select.Brep(*pair))
         point = faces[pair[0] - 1].point
-        assert all(chosen(tc.Brep(which, whole=True)) == both for which in (*pair, point))
-    assert chosen(tc.Brep(1, whole=True)) == chosen(tc.Brep(1))
+        assert all(chosen(tc.select.Brep(which, whole=True)) == both for which in (*pair, point))
+    assert chosen(tc.select.Brep(1, whole=True)) == chosen(tc.select.Brep(1))
 
 
 def test_a_feature_on_half_a_hole_is_doubted_and_a_whole_one_has_its_axis():
     with pytest.warns(
-        tc.NominalWarning, match=r'\[face\] .*"hole".*1 of the 2 faces of one cylinder.*tc.Brep\(6, whole=True\)'
+        tc.NominalWarning, match=r'\[face\] .*"hole".*1 of the 2 faces of one cylinder.*tc.select.Brep\(6, whole=True\)'
     ):
-        tc.build(plate_with(tc.Brep(6))[0])
+        tc.build(plate_with(tc.select.Brep(6))[0])
     with warnings.catch_warnings():
         warnings.filterwarnings("error", r"\[face\]")
-        whole = tc.build(plate_with(tc.Brep(7, whole=True))[0]).nominal
-        tc.build(plate_with(tc.Brep(6, 7))[0])
-        tc.build(plate_with(tc.Brep(6), tc.Inside((0, 0, 2), (200, 200, 18)))[0])  # a part of the hole is what was asked for
+        whole = tc.build(plate_with(tc.select.Brep(7, whole=True))[0]).nominal
+        tc.build(plate_with(tc.select.Brep(6, 7))[0])
+        tc.build(
+            plate_with(tc.select.Brep(6), tc.select.Inside((0, 0, 2), (200, 200, 18)))[0]
+        )  # a part of the hole is what was asked for
     hole = next(nominal for nominal in whole.features if nominal.feature.name == "hole")
     assert np.allclose(hole.geometry.centre[:2], [47.5, 75 + 7.5 * 3**0.5], atol=1e-5)
     with pytest.raises(tc.ModelError, match="spans more than one surface"):
-        discretize(plate_with(tc.Brep(6, 8, whole=True))[0])
+        discretize(plate_with(tc.select.Brep(6, 8, whole=True))[0])
 
 
 def test_unions_and_whole_surfaces_come_with_json(tmp_path):
-    model, _, _ = plate_with(tc.Brep(6, (47.46, 82.99, 6.667), whole=True))
+    model, _, _ = plate_with(tc.select.Brep(6, (47.46, 82.99, 6.667), whole=True))
     document = written(model, tmp_path / "first.json")
     again = load_model(tmp_path / "first.json")
-    assert again.parts[0].features[1].faces[0].selections == (tc.Brep(6, (47.46, 82.99, 6.667), whole=True),)
+    assert again.parts[0].features[1].faces[0].selections == (tc.select.Brep(6, (47.46, 82.99, 6.667), whole=True),)
     assert written(again, tmp_path / "second.json") == document
     text = (tmp_path / "first.json").read_text()
     for wrong in ('"all"', '"any ones"'):
@@ -171,14 +175,14 @@ WHOLES = {  # radii of whole cylinders, and numbers of their faces
 @pytest.mark.parametrize("name", [*COMMON, *nightly(*(name for name in WHOLES if name not in COMMON))])
 def test_faces_of_one_cylinder_are_whole_and_others_are_not(name, tmp_path):
     path = written_step(tmp_path, name)
-    faces = [face for face in tc.faces_in(path) if face.kind == "cylinder"]
+    faces = [face for face in tc.io.faces_in(path) if face.kind == "cylinder"]
     wholes = {face.whole or (face.number,) for face in faces}
     radius = {face.number: face.radius for face in faces}
     assert sorted((round(radius[whole[0]]), len(whole)) for whole in wholes) == WHOLES[name]
     for whole in wholes:
         model = tc.Assembly(name)
         part = model.part("body", tc.Mesh(path), fixed=True)
-        part.feature("round", part.face(tc.Brep(whole[0])), tc.Size(2 * radius[whole[0]], 0.1))
+        part.feature("round", part.face(tc.select.Brep(whole[0])), tc.Size(2 * radius[whole[0]], 0.1))
         model.measure("nothing", part.point(0, 0, 0), along="z")
         with warnings.catch_warnings(record=True) as records:
             warnings.simplefilter("always", tc.NominalWarning)
@@ -191,7 +195,7 @@ def test_faces_of_one_cylinder_are_whole_and_others_are_not(name, tmp_path):
 @pytest.mark.slow
 def test_slots_and_patterns_of_made_holes_are_listed_and_others_are_not(tmp_path):
     path = written_step(tmp_path, "drilled plate")  # quarters of cylinders; the two slots have walls in the same planes
-    faces = tc.faces_in(path)
+    faces = tc.io.faces_in(path)
     slots, patterns = ({getattr(face, word) for face in faces} - {()} for word in ("slot", "pattern"))
     places = {tuple(sorted({round(faces[n - 1].centre[0]) for n in slot if faces[n - 1].centre})) for slot in slots}
     assert places == {(50, 65), (80, 95)} and {len(slot) for slot in slots} == {2 + 2 * 2}
@@ -203,28 +207,28 @@ def test_slots_and_patterns_of_made_holes_are_listed_and_others_are_not(tmp_path
 
 def test_holes_by_hand_are_the_patterns_of_an_assembly():
     for body, count in {"plate_1": 6, "l-bracket_1": 3, "nut_1": 0}.items():
-        faces = tc.faces_in(AS1, body)
+        faces = tc.io.faces_in(AS1, body)
         patterns = {face.pattern for face in faces} - {()}
         assert not any(face.slot for face in faces)
         assert [len(pattern) for pattern in patterns] == [2 * count] * (count > 0)
-    assert chosen(tc.Brep(9, whole="pattern")) == chosen(tc.Brep(*range(6, 18)))
+    assert chosen(tc.select.Brep(9, whole="pattern")) == chosen(tc.select.Brep(*range(6, 18)))
 
 
 def test_a_slot_is_chosen_by_any_of_its_faces():
     part = tc.Assembly("cover").part("cover", tc.Mesh(MODELS / "cover.step"))
     meshes = {part: shape(part.geometry)}
     slot = [12, 13, 14, 15]
-    selections = [tc.Brep(*slot), *(tc.Brep(number, whole="slot") for number in slot)]
+    selections = [tc.select.Brep(*slot), *(tc.select.Brep(number, whole="slot") for number in slot)]
     masks = {tuple(triangles(part.face(selection), meshes)) for selection in selections}
     assert len(masks) == 1
     image = preview(part)
     for number in slot:
         (snippet,) = image.groups[number - 1]
         assert tuple(triangles(eval(f"part.{snippet}", {"part": part, "tc": tc}), meshes)) in masks
-    assert str(part.face(tc.Brep(12, whole="slot"))) == "cover slot of B-rep face 12"
+    assert str(part.face(tc.select.Brep(12, whole="slot"))) == "cover slot of B-rep face 12"
     with pytest.raises(GeometryFault, match=r"face 1 belongs to no slot; slot, radius 4.05 mm, faces 12, 13, 14, 15: tc"):
-        triangles(part.face(tc.Brep(1, whole="slot")), meshes)
-    assert "expected True, False, 'slot' or 'pattern'" in next(tc.Brep(1, whole="pocket").faults())
+        triangles(part.face(tc.select.Brep(1, whole="slot")), meshes)
+    assert "expected True, False, 'slot' or 'pattern'" in next(tc.select.Brep(1, whole="pocket").faults())
 
 
 def test_a_pattern_comes_with_json(tmp_path):
@@ -233,7 +237,7 @@ def test_a_pattern_comes_with_json(tmp_path):
     pin = model.part("pin", tc.Pin(9.8, 20, False), at=(25, 75, 20))
     places = [((0, 0, 0), "x"), ((0, 0, 0), "y"), ((0, 0, 0), "z"), ((9, 0, 0), "y"), ((9, 0, 0), "z"), ((0, 9, 0), "z")]
     model.locate(pin, [tc.Locator(f"L{k}", *place, 0.1) for k, place in enumerate(places)])
-    holes = plate.face(tc.Brep(6, (23.54, 79.78, 6.667), whole="pattern"))
+    holes = plate.face(tc.select.Brep(6, (23.54, 79.78, 6.667), whole="pattern"))
     model.contact("pin in the holes", moving=pin.face(), reference=holes)
     model.measure("height", pin.point(0, 0, 0), along="z")
     written(model, tmp_path / "pattern.json")
@@ -242,5 +246,5 @@ def test_a_pattern_comes_with_json(tmp_path):
 
 def test_the_list_states_axes_slots_and_patterns():
     lines = CliRunner().invoke(app, ["faces", str(MODELS / "cover.step")]).stdout.splitlines()
-    assert lines[-1] == 'slot, radius 4.05 mm, faces 12, 13, 14, 15: tc.Brep(12, whole="slot")'
+    assert lines[-1] == 'slot, radius 4.05 mm, faces 12, 13, 14, 15: tc.select.Brep(12, whole="slot")'
     assert "axis through (106.7483, 65.97129, 5.333333), along (0, 0, -1)" in lines[14]

@@ -79,7 +79,7 @@ def small_ra1(**method):
 @pytest.mark.parametrize("resolution", [*nightly("linearized"), "exact"])
 def test_searches_reach_the_bound_where_the_optimality_conditions_are_known(resolution):
     """Two methods that share no code: searches on the engine, and a mixed-integer program; 2e-5 mm are of second order."""
-    found = tc.worst_case(small_ra1(objective="all points", resolution=resolution), samples=512, solver="daqp")
+    found = tc.analyses.worst_case(small_ra1(objective="all points", resolution=resolution), samples=512, solver="daqp")
     assert values(found) == pytest.approx(values(found, of="bound"), abs=3e-5)
     assert values(found, state="raw") == pytest.approx(values(found, state="raw", of="bound"), abs=1e-5)
     assert values(found)[1] - values(found)[0] > 0.03
@@ -87,7 +87,7 @@ def test_searches_reach_the_bound_where_the_optimality_conditions_are_known(reso
 
 @pytest.mark.slow
 def test_contact_alone_keeps_no_part_down():
-    found = tc.worst_case(small_ra1(), samples=512, solver="daqp", method=PAPER)
+    found = tc.analyses.worst_case(small_ra1(), samples=512, solver="daqp", method=PAPER)
     least, largest = values(found, of="bound")
     assert values(found)[0] == pytest.approx(least, abs=3e-5) and math.isinf(largest)
     assert values(found)[1] > values(found, of="random")[1] and values(found)[0] < values(found, of="random")[0]
@@ -202,10 +202,10 @@ def test_a_zone_grows_with_the_size_that_it_is_left():
     a = tc.Assembly("ring")
     ring = a.part("ring", tc.Mesh(trimesh.creation.annulus(5, 20, 10, sections=64)), fixed=True)
     ring.feature("under", ring.face("-z"), datum="A")
-    ring.feature("rim", ring.face(tc.Cylinder(radius=20)), datum="B")
+    ring.feature("rim", ring.face(tc.select.Cylinder(radius=20)), datum="B")
     hole = ring.feature(
         "hole",
-        ring.face(tc.Cylinder(radius=5)),
+        ring.face(tc.select.Cylinder(radius=5)),
         tc.Size(10, 0.2, -0.2),
         tc.Position(0.1, "A|B", material="M", rule="translation"),
     )
@@ -286,9 +286,9 @@ def test_nothing_that_varies_is_refused():
     part = a.part("part", tc.Box(1, 2, 3), fixed=True)
     a.measure("corner", part.point(0, 0, 0), along="x")
     with pytest.raises(tc.OptionError, match="nothing varies"):
-        tc.worst_case(a)
+        tc.analyses.worst_case(a)
     with pytest.raises(tc.OptionError, match="samples is 1"):
-        tc.worst_case(a, samples=1)
+        tc.analyses.worst_case(a, samples=1)
 
 
 @pytest.mark.slow

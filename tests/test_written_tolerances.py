@@ -80,7 +80,7 @@ def test_unequal_limits_shift_the_mean(distribution):
 
 def test_worst_cases_are_the_limits():
     """All of A1, A2 and A3 at a limit lift the middle of the block to that limit."""
-    worst = tc.worst_case(block("+0.4/-0.2"), samples=64).worst.sel(state="raw", measure="height")
+    worst = tc.analyses.worst_case(block("+0.4/-0.2"), samples=64).worst.sel(state="raw", measure="height")
     assert worst.values == pytest.approx([-0.2, 0.4], abs=1e-9)
 
 
@@ -177,7 +177,7 @@ def test_a_measure_has_limits_around_its_nominal_value():
     results = tc.run(block(0.2, tolerance="+0.1/-0.05", absolute=True), samples=100, surfaces=0)
     summary = tc.summarize(results)
     assert (float(summary.measure_lower[0]), float(summary.measure_upper[0])) == pytest.approx((9.95, 10.1))
-    assert tc.model_of(results).measures[0].tolerance == (-0.05, 0.1)
+    assert tc.io.model_of(results).measures[0].tolerance == (-0.05, 0.1)
 
 
 @pytest.mark.parametrize("wrong", ["H7", "abc", "±0.1 inch", (0.1, -0.1), (0.1, 0.1), 0, "0", -1, True, {}])
@@ -202,7 +202,7 @@ def test_units_of_a_measure_are_those_of_its_tolerance():
 
 
 def test_models_as_data_take_the_same_texts(tmp_path):
-    tc.write_model(toleranced.block_with("width", tc.Size(50, "h7")), tmp_path / "block.json")
+    tc.io.write_model(toleranced.block_with("width", tc.Size(50, "h7")), tmp_path / "block.json")
     document = json.loads((tmp_path / "block.json").read_text())
     size = document["parts"][0]["features"][2]["tolerances"][0]
     assert (size["upper"], size["lower"], size["tolerance_class"]) == (0.0, -0.025, "h7")
@@ -228,7 +228,7 @@ def test_models_as_data_take_the_same_texts(tmp_path):
 def test_models_with_written_tolerances_come_back_from_json(tmp_path):
     model = block("+0.1/-0.05", tolerance="+0.3/-0.1")
     model.variable("heat", "±20", drives={"block.A1": 0.001}, units="K")
-    tc.write_model(model, tmp_path / "model.json")
+    tc.io.write_model(model, tmp_path / "model.json")
     copy = load_model(tmp_path / "model.json")
     assert str(copy) == str(model)
     assert copy.locations[0].tolerance == tc.Tolerance(0.15, shift=0.025)
@@ -238,5 +238,5 @@ def test_models_with_written_tolerances_come_back_from_json(tmp_path):
 def test_numbers_of_numpy_are_numbers(number, tmp_path):
     model = block(number, tolerance=number)
     assert tc.check(model) == ()
-    tc.write_model(model, tmp_path / "model.json")
+    tc.io.write_model(model, tmp_path / "model.json")
     assert load_model(tmp_path / "model.json").locations[0].tolerance.range == number

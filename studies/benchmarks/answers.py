@@ -91,7 +91,7 @@ def within(value: float, tolerance: float) -> Estimate:
 
 def critical_friction(model: tc.Assembly, seat: str) -> Estimate:
     """Return the least coefficient of friction that can hold a part short of a seat."""
-    return within(float(tc.seating(model).critical.sel(seat=seat)), 1e-6)
+    return within(float(tc.analyses.seating(model).critical.sel(seat=seat)), 1e-6)
 
 
 def of_analysis(estimate: Any) -> Estimate:
@@ -103,7 +103,7 @@ def of_analysis(estimate: Any) -> Estimate:
 
 def of_tails(model: tc.Assembly, event: str, samples: int, **method: Any) -> Answers:
     """Return the probability of a rare event, its 95 % interval widened to 99.9 % in logarithms."""
-    tails = tc.tails(model, samples=samples, seed=SEED, solver="daqp", method=method or None).sel(event=event)
+    tails = tc.analyses.tails(model, samples=samples, seed=SEED, solver="daqp", method=method or None).sel(event=event)
     value, lower, upper = np.log(np.maximum(tails.probability.values, 1e-300))
     times = Z / Z_OF_ANALYSES
     bounds = value, value - times * (value - lower), value + times * (upper - value)

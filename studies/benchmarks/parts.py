@@ -83,18 +83,18 @@ def pins_and_slots(*, off: Any, tilt: Any, pin: float, slot: float, places: Any)
     return model
 
 
-def ring(model: tc.Assembly, radius: float, height: float, feature: str, *tolerances: Any) -> tc.Feature:
+def ring(model: tc.Assembly, radius: float, height: float, feature: str, *tolerances: Any) -> tc.declaration.Feature:
     """Return a toleranced bore or rim of a fixed ring about z, its lower plane datum A and the other cylinder datum B."""
     shape = trimesh.creation.annulus(radius, 4 * radius, height, sections=48)
     part = model.part("ring", tc.Mesh(shape), fixed=True)
     part.feature("bottom", part.face("-z"), datum="A")
-    bore, rim = part.face(tc.Cylinder(inner=True)), part.face(tc.Cylinder(inner=False))
+    bore, rim = part.face(tc.select.Cylinder(inner=True)), part.face(tc.select.Cylinder(inner=False))
     face, other_face = (bore, rim) if feature == "bore" else (rim, bore)
     part.feature("other", other_face, datum="B")
     return part.feature(feature, face, *tolerances)
 
 
-def block(model: tc.Assembly, size: tuple[float, float, float], *tolerances: Any) -> tc.Feature:
+def block(model: tc.Assembly, size: tuple[float, float, float], *tolerances: Any) -> tc.declaration.Feature:
     """Return the toleranced top of a fixed block, its lower plane datum A, a side datum B and an end datum C."""
     part = model.part("block", tc.Box(*size), fixed=True)
     for letter, direction in (("A", "-z"), ("B", "-y"), ("C", "-x")):

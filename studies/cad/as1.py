@@ -20,20 +20,20 @@ PLACED = 0.4
 
 def assembly() -> tc.Assembly:
     model = tc.Assembly("as1", method=tc.Method(resolution="exact", objective="all points"))
-    fixed = tc.parts_from(model, FILE, [body.name for body in tc.bodies_in(FILE) if body.name not in MOVING], fixed=True)
-    near, far, far_nut, near_nut = tc.parts_from(model, FILE, MOVING).values()
-    top = fixed["plate_1"].face(tc.Largest("plane", "+z"))
+    fixed = tc.io.parts_from(model, FILE, [body.name for body in tc.io.bodies_in(FILE) if body.name not in MOVING], fixed=True)
+    near, far, far_nut, near_nut = tc.io.parts_from(model, FILE, MOVING).values()
+    top = fixed["plate_1"].face(tc.select.Largest("plane", "+z"))
     bolts = [part for name, part in fixed.items() if name.startswith("bolt")]  # as thick as their holes, as the file has them
     for bracket in (near, far):
         model.may_overlap(bracket, fixed["rod_1"], *bolts)
-        foot, back = bracket.face(tc.Largest("plane", "-y")), bracket.face(tc.Largest("plane", "-x"))
+        foot, back = bracket.face(tc.select.Largest("plane", "-y")), bracket.face(tc.select.Largest("plane", "-x"))
         model.locate(bracket, tc.three_two_one(foot, back, bracket.face("-z"), inset=5), tolerance=PLACED)
         model.contact(f"foot of {bracket.name}", moving=foot, reference=top)
     for nut, bracket, side in ((far_nut, far, "-z"), (near_nut, near, "+z")):
-        bearing = nut.face(tc.Largest("plane", side))
+        bearing = nut.face(tc.select.Largest("plane", side))
         model.may_overlap(nut, fixed["rod_1"])  # its thread
         model.locate(nut, tc.three_two_one(bearing, nut.face("-y"), nut.face("-x"), inset=2), tolerance=PLACED)
-        model.contact(f"{nut.name} on {bracket.name}", moving=bearing, reference=bracket.face(tc.Largest("plane", "-x")))
+        model.contact(f"{nut.name} on {bracket.name}", moving=bearing, reference=bracket.face(tc.select.Largest("plane", "-x")))
     model.measure("gap of the feet", near.point(50, 5, 50), to=far.point(50, 5, 50), along="x", tolerance=1)
     model.measure("flush of the tops", near.point(5, 60, 50), to=far.point(5, 60, 50), along="z", tolerance=1)
     model.measure("between the nuts", near_nut.point(10, 7.5, 3), to=far_nut.point(10, 7.5, 0), along="x", tolerance=1)

@@ -128,7 +128,7 @@ def assembly(case: Case, folder: Path, name: str) -> tuple[tc.Assembly, Declared
     """Return the model of a case, what became of its PMI, and standard deviations by hand."""
     model = tc.Assembly(name, method=tc.Method(objective="seating"))
     part = model.part(name, tc.Mesh(folder / case.file, body=case.body, chord=0.05))
-    declared = tc.features_from_pmi(part)
+    declared = tc.io.features_from_pmi(part)
     letters = {feature.datum: feature for feature in part.features}
     opposite = case.face.translate(str.maketrans("+-", "-+"))
     locators = [tc.Locator(label, point, along, on=letters[letter]) for label, letter, point, along in case.locators]
@@ -167,7 +167,7 @@ def _report(name: str, case: Case, arguments: argparse.Namespace) -> None:
     statuses = {status.name: int((rows.status == status).sum()) for status in tc.Status if (rows.status == status).any()}
     print(f"{arguments.samples} realizations, {time.process_time() - start:.1f} s CPU, {statuses}")
     start = time.process_time()
-    shares = tc.contributions(program, samples=arguments.base)
+    shares = tc.analyses.contributions(program, samples=arguments.base)
     print(f"contributions of {shares.attrs['realizations']} realizations, {time.process_time() - start:.1f} s CPU")
     print("| measure | 6 sigma raw | 6 sigma corrected | by hand | contributors |\n|---|---:|---:|---:|---|")
     for measure in rows.measure.values.tolist():

@@ -54,7 +54,7 @@ def row_of(declared: DeclaredFile, seconds: float) -> dict[str, float]:
     )
     sizes = [one for one in sizes if isinstance(one.annotation, Dimension) and one.annotation.kind == "size"]
     toleranced = [feature for part in declared.parts for feature in part.toleranced]
-    patterns = sum(isinstance(feature, tc.Pattern) for feature in toleranced)
+    patterns = sum(isinstance(feature, tc.declaration.Pattern) for feature in toleranced)
     counts = (
         len(tolerances), sum(bool(one.annotation.face_records) for one in tolerances),
         sum(not one.reason for one in tolerances), sum(bool(one.reason and one.features) for one in tolerances),
@@ -95,7 +95,7 @@ def main() -> None:
     for path in sorted(arguments.folder.glob("*.st*p")):
         start = time.process_time() + resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         try:
-            pmi = tc.read_pmi(path)
+            pmi = tc.io.read_pmi(path)
             if pmi.is_empty:
                 print(f"| {path.name} |{' |' * len(COLUMNS)} it states no PMI as AP242 does |", flush=True)
                 continue

@@ -13,7 +13,7 @@ from tests.second_reading import second_reading
 
 def counts(path: Path) -> tuple[Counter[str], list[str]]:
     """Return the counts of a file's row, and its differences in words."""
-    pmi = tc.read_pmi(path)
+    pmi = tc.io.read_pmi(path)
     reading = second_reading(pmi, path, {})
     unread = {"tolerance": reading.unread_tolerances, "dimension": reading.unread_dimensions}
     row: Counter[str] = Counter({"only the kernel": len(reading.unlisted)})

@@ -37,7 +37,7 @@ LISTED = 6  # wrong realizations of a scene
 CONTRADICTIONS = ("inside", "noticed", "missed", "falsely touched", "lifted off", "not told", "falsely told")
 UNCERTIFIED = ("not converged", "not assemblable", "doubtful")
 OTHERS = ("liftable", "refused", "crashed", "seconds")
-COLUMNS = ("scenes", "rows", "stiff", "overlapping", "certified", *CONTRADICTIONS, "undeclared", "told")
+COLUMNS: tuple[str, ...] = ("scenes", "rows", "stiff", "overlapping", "certified", *CONTRADICTIONS, "undeclared", "told")
 COLUMNS += ("without answer", *UNCERTIFIED, *OTHERS)
 
 

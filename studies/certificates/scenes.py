@@ -69,7 +69,7 @@ def tolerance(part: tc.Part, kind: str, mesh: trimesh.Trimesh, width: float, rng
         for name, face in (("top", "+z"), ("foot", "-z")):
             part.feature(name, part.face(face), tc.Perpendicularity(width, "A|B"))
     else:
-        round_face = part.face(tc.Cylinder()) if kind == "cylinder" else part.face()
+        round_face = part.face(tc.select.Cylinder()) if kind == "cylinder" else part.face()
         diameter = float(mesh.bounds[1][2] - mesh.bounds[0][2])
         part.feature("skin", round_face, tc.Size(diameter, width, -width))
 

@@ -169,7 +169,7 @@ def found_by_score(name, samples, seed):
 
 
 def found_by_model(program, event, samples, seed):
-    tails = tc.tails(program, samples=samples, seed=seed).sel(event=event)
+    tails = tc.analyses.tails(program, samples=samples, seed=seed).sel(event=event)
     return (*tails.probability.values, float(tails.disagreement), int(tails.simulated))
 
 

@@ -36,7 +36,7 @@ def everything_of_boxes() -> tc.Assembly:
     places |= {"B2": ((45, 0, 5), "y"), "C": ((0, 10, 5), "x")}
     six = [tc.Locator(name, *place) for name, place in places.items()]
     a.locate(top, six, tolerance=stats.beta(2, b=3, loc=-0.5, scale=1), on=base)
-    upper = base.face("+z", tc.Inside((0, 0, 9), (90, 50, 11)))
+    upper = base.face("+z", tc.select.Inside((0, 0, 9), (90, 50, 11)))
     a.contact("interface", moving=top.face(range(12)), reference=upper, points="vertices", within=2)
     a.measure("height", top.point(50, 0, 10), along="z", tolerance=1)
     a.measure("gap", base.point(0, 0, 10), to=top.point(0, 0, 0), along=(0, 0.6, 0.8))

@@ -31,11 +31,11 @@ def plate(a: tc.Assembly, name: str, level: int, holes: Mapping[Place, float], f
     return part
 
 
-def hole(part: tc.Part, name: str, place: Place, *tolerances) -> tc.Feature:
+def hole(part: tc.Part, name: str, place: Place, *tolerances) -> tc.declaration.Feature:
     """Declare the hole at a place, with its tolerances."""
     x, y = place
-    box = tc.Inside((x - 8, y - 8, -1), (x + 8, y + 8, THICKNESS + 1))
-    return part.feature(name, part.face(tc.Cylinder(inner=True), box), *tolerances)
+    box = tc.select.Inside((x - 8, y - 8, -1), (x + 8, y + 8, THICKNESS + 1))
+    return part.feature(name, part.face(tc.select.Cylinder(inner=True), box), *tolerances)
 
 
 def placed(width: float, rule: str = "translation") -> GeometricTolerance:

@@ -14,7 +14,7 @@ def fasteners(is_fixed: bool, pull: float) -> tc.Assembly:
     Holes at least material: supports 11.5 and position 1.0 of fixed fasteners, else 11 in plate and supports, and 1.0 in both.
     """
     a = tc.Assembly("fasteners", method=SEATED)
-    axes: dict[str, tuple[tc.Point, tc.Point]] = {}
+    axes: dict[str, tuple[tc.declaration.Point, tc.declaration.Point]] = {}
     hole = 11.5 if is_fixed else 11.0
     of_plate = trimesh.creation.box(extents=(3 * LENGTH, 40, 4)).apply_translation((0, 0, -20))
     bolts = [
@@ -29,7 +29,7 @@ def fasteners(is_fixed: bool, pull: float) -> tc.Assembly:
         x = side * LENGTH / 2
         on_plate = plate.feature(
             f"{name} hole" if not is_fixed else f"{name} thread",
-            plate.face(tc.Cylinder(inner=not is_fixed), lambda c, n, x=x: (abs(c[:, 0] - x) < 6) & (c[:, 2] > -10)),
+            plate.face(tc.select.Cylinder(inner=not is_fixed), lambda c, n, x=x: (abs(c[:, 0] - x) < 6) & (c[:, 2] > -10)),
             tc.Position(0.5 if is_fixed else 1.0, "A|B|C", rule="translation"),
         )
         ring = trimesh.creation.annulus(hole / 2, 15, 8).apply_translation((0, 0, 4))
@@ -40,7 +40,7 @@ def fasteners(is_fixed: bool, pull: float) -> tc.Assembly:
         support.feature("under", support.face("-z", lambda c, n: c[:, 2] > 15), datum="A")
         support.feature("end", support.face("-y", lambda c, n: c[:, 2] > 15), datum="B")
         bore = support.feature(
-            "hole", support.face(tc.Cylinder(radius=hole / 2, inner=True)), tc.Position(1.0, "A|B|C", rule="translation")
+            "hole", support.face(tc.select.Cylinder(radius=hole / 2, inner=True)), tc.Position(1.0, "A|B|C", rule="translation")
         )
         axes[name] = on_plate.axis(0), bore.axis(0)
         held = [*flat_feet(0.0), tc.Locator("Y", (0, 0, 0), "y", 0), tc.Locator("turn", (15, 0, 0), "y", 0)]
@@ -52,8 +52,8 @@ def fasteners(is_fixed: bool, pull: float) -> tc.Assembly:
         bolt = a.part(f"{name} bolt", tc.Mesh(trimesh.creation.cylinder(5, 24)), at=(x, 0, 0))
         upright = [*flat_feet(-12.0), tc.Locator("Y", (0, 0, 0), "y", 0), tc.Locator("turn", (5, 0, 0), "y", 0)]
         a.locate(bolt, upright, floating=True)
-        a.contact(f"{name} bolt in plate", moving=bolt.face(tc.Cylinder()), reference=on_plate)
-        a.contact(f"{name} fit", moving=bore, reference=bolt.face(tc.Cylinder()))
+        a.contact(f"{name} bolt in plate", moving=bolt.face(tc.select.Cylinder()), reference=on_plate)
+        a.contact(f"{name} fit", moving=bore, reference=bolt.face(tc.select.Cylinder()))
     left, right = (part for part in a.parts if part.name in ("left", "right"))
     faces = left.point(ARM, 0, 20), right.point(-ARM, 0, 20)
     a.measure("distance", faces[0], to=faces[1], along="x")

@@ -23,7 +23,7 @@ def shaft_in_a_bore(
     inner = RADIUS + clearance
     ring = a.part("ring", tc.Mesh(trimesh.creation.annulus(inner, 20, LENGTH, sections=96)), fixed=True)
     pin = a.part("pin", tc.Mesh(trimesh.creation.cylinder(RADIUS, LENGTH, sections=96)), fixed=False)
-    hole = ring.feature("bore", ring.face(tc.Cylinder(radius=inner)), *([bore] if bore else []))
+    hole = ring.feature("bore", ring.face(tc.select.Cylinder(radius=inner)), *([bore] if bore else []))
     barrel = pin.feature("shaft", pin.face(BARREL), *([shaft] if shaft else []))
     a.contact("fit", moving=barrel, reference=hole)
     stops = parked("X1:-10,0,18:x", "X2:-10,0,-18:x", "Y1:0,-10,18:y", "Y2:0,-10,-18:y")

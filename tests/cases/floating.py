@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests.cases.frames import STILL, Frame
 
-BARREL, BORE = tc.Cylinder(inner=False), tc.Cylinder(inner=True)
+BARREL, BORE = tc.select.Cylinder(inner=False), tc.select.Cylinder(inner=True)
 SEATED = tc.Method(resolution="exact", objective="seating")
 
 
@@ -48,7 +48,7 @@ def floating_peg_in_a_hole(clearance: float = 0.1, sections: int = 48) -> tc.Ass
     a = tc.Assembly("peg", method=SEATED)
     plate = a.part("plate", tc.Mesh(trimesh.creation.annulus(5 + clearance / 2, 20, 10, sections=sections)), fixed=True)
     plate.feature("under", plate.face("-z"), datum="A")
-    plate.feature("rim", plate.face(tc.Cylinder(radius=20)), datum="B")
+    plate.feature("rim", plate.face(tc.select.Cylinder(radius=20)), datum="B")
     bore = plate.feature(
         "bore", plate.face(BORE), tc.Size(10 + clearance, 0.03, -0.03), tc.Position(0.2, "A|B", rule="translation")
     )
@@ -116,11 +116,11 @@ def lid_on_studs(
         said = tc.Position(position, "A|B|C", rule="translation")
         bore = lid.feature(
             f"H{k}",
-            lid.face(tc.Cylinder(radius=4 + clearance / 2, inner=True), near),
+            lid.face(tc.select.Cylinder(radius=4 + clearance / 2, inner=True), near),
             tc.Size(8 + clearance, sizes),
             tc.Position(position, "A|B|C", rule="translation", **hole),
         )
-        stud = base.feature(f"S{k}", base.face(tc.Cylinder(radius=4), near), said)
+        stud = base.feature(f"S{k}", base.face(tc.select.Cylinder(radius=4), near), said)
         a.contact(f"fit {k}", moving=bore, reference=stud)
     if seating:
         a.force("push", at=lid.point(0, 0, 0), vector=(3, 0, 0))

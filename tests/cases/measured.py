@@ -11,7 +11,7 @@ import tolcontact as tc
 from tests.helpers import compiled
 from tolcontact import poses
 
-PLANE, ROUND = tc.Box(40, 30, 10), tc.Cylinder()
+PLANE, ROUND = tc.Box(40, 30, 10), tc.select.Cylinder()
 N = 50
 
 
@@ -24,7 +24,7 @@ def ring(hole=3.2, outer=9.0, height=12.0):
 
 
 def hole(part, radius=3.2):
-    return part.face(tc.Cylinder(inner=True, radius=radius))
+    return part.face(tc.select.Cylinder(inner=True, radius=radius))
 
 
 def two(first, second, *, at=(0, 0, 0), rotation=(0, 0, 0), first_at=(5, -3, 7), first_rotation=(0.3, -0.2, 0.5)):
@@ -96,7 +96,7 @@ def drilled():
     rings = [model.part(name, ring(), at=at) for name, at in (("left", (0, 0, 0)), ("right", (30, 0, 0)))]
     for part in rings:
         lower = part.feature("A", part.face("-z"), datum="A")
-        rim = part.feature("B", part.face(tc.Cylinder(radius=9.0)), datum="B")
+        rim = part.feature("B", part.face(tc.select.Cylinder(radius=9.0)), datum="B")
         part.feature("H", hole(part), tc.Size(6.4, 0.1), tc.Position(0.2, "A|B"))
         part.feature("top", part.face("+z"), tc.Profile(0.3, "A"))
         scheme = [tc.Locator(f"A{k}", (x, y, -6), "z", 0.1) for k, (x, y) in enumerate([(8, 0), (-8, 0), (0, 8)])]

@@ -10,7 +10,7 @@ import tolcontact as tc
 from tests.cases.locators import parked
 from tests.cases.round_bodies import ball_in_a_cone, peg_in_a_hole, shaft_in_a_v
 
-BARREL = tc.Cylinder(inner=False)
+BARREL = tc.select.Cylinder(inner=False)
 
 
 def held(part, points, tolerance):
@@ -33,7 +33,7 @@ def jammed_peg(clearance: float = 0.05, length: float = 10.0, sections: int = 48
     a.locate(peg, [tc.Locator("Z", (0, 0, 0), "z", 0), *stops])
     for name, z, sign in (("above", length, 1.0), ("below", -length, -1.0)):
         a.force(name, at=peg.point(0, 0, z), vector=(2 * sign, -1 * sign, 0))
-    a.contact("fit", moving=peg.face(BARREL), reference=plate.face(tc.Cylinder(radius=5 + clearance, inner=True)))
+    a.contact("fit", moving=peg.face(BARREL), reference=plate.face(tc.select.Cylinder(radius=5 + clearance, inner=True)))
     a.measure("top", peg.point(0, 0, length), along="x", tolerance=tolerance)
     return a
 

@@ -31,7 +31,7 @@ def rail() -> tc.Assembly:
     weld = line.station("weld")
     weld.locate(a, supported(a, 10, 90), tolerance=0)
     weld.locate(b, supported(b, 50, 90), tolerance=0)
-    weld.contact("lap", moving=b.face("-z"), reference=a.face("+z", tc.Inside((60, 0, 9), (100, 20, 11))), points=40)
+    weld.contact("lap", moving=b.face("-z"), reference=a.face("+z", tc.select.Inside((60, 0, 9), (100, 20, 11))), points=40)
     weld.measure("step", b.point(0, 10, 0), to=a.point(60, 10, 10), along="z")
     joint = weld.join("ab", a, b)
     check = line.station("check")
@@ -89,6 +89,6 @@ def pins(first: tc.Part, last: tc.Part) -> list[tc.Locator]:
     ]
 
 
-def distance(start: tc.Point, end: tc.Point) -> Callable[[Any], ca.SX]:
+def distance(start: tc.declaration.Point, end: tc.declaration.Point) -> Callable[[Any], ca.SX]:
     """The distance of two points, wherever their parts stand."""
     return lambda poses: ca.norm_2(poses.position(end) - poses.position(start))

@@ -101,7 +101,9 @@ def stored_case(name, folder: Path | None, suffix="stl", *, seed=1, at=FAR, face
     a.locate(moving, locators, tolerance=0.1)
     if faces:
         for k, n in enumerate(np.array(scene.normals, dtype=float) @ R.T):
-            a.contact(f"{name} {k}", moving=moving.face(tc.Facing(tuple(n))), reference=block.face(tc.Facing(tuple(-n))))
+            a.contact(
+                f"{name} {k}", moving=moving.face(tc.select.Facing(tuple(n))), reference=block.face(tc.select.Facing(tuple(-n)))
+            )
     else:
         a.contact(name, moving=moving.face(), reference=block.face())
     a.measure("height", moving.point(*(R @ (0, 0, 3) + at)), along=tuple(R[:, 2]), tolerance=1)

@@ -8,7 +8,7 @@ from tests.cases.frames import STILL, Frame
 from tests.cases.round_contact import BARREL
 from tolcontact.declaration import GeometricTolerance
 
-BORE = tc.Cylinder(inner=True)
+BORE = tc.select.Cylinder(inner=True)
 
 
 def block_with(feature: str, *tolerances, frame: Frame = STILL, **datums) -> tc.Assembly:

@@ -4,4 +4,4 @@ import sys
 
 import tolcontact as tc
 
-tc.model_of(tc.open_archive(sys.argv[1]))
+tc.io.model_of(tc.open_archive(sys.argv[1]))

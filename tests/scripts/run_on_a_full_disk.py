@@ -9,6 +9,6 @@ from tests import cases
 resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
 try:
     tc.run(cases.stack(), samples=20_000, seed=3, solver="daqp", out=sys.argv[1])
-except tc.ArchiveError as error:
+except tc.errors.ArchiveError as error:
     assert "cannot be written" in str(error), error
     sys.exit(7)

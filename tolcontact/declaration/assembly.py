@@ -58,7 +58,7 @@ class Assembly(Declarations, Pictured, Checked):
 
     The methods only record declarations; `faults()` lists everything that is wrong with them. `method` states how contact in
     this model is resolved; a run may state another one. `title_block` heads its reports. `mu` is the coefficient of friction of
-    all contacts; `tc.seating` uses it. Raises TypeError for an argument of a wrong type.
+    all contacts; `tc.analyses.seating` uses it. Raises TypeError for an argument of a wrong type.
     """
 
     checks: ClassVar = {"mu": FRICTION}

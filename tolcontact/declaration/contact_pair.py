@@ -28,7 +28,7 @@ class ContactPair(Declaration):
     spacing   [mm] largest distance from the face to the nearest contact point, in place of a number of points
     within    [mm] a point takes part if the reference face is this near in the nominal assembly; by default a tenth of the
               diagonal of the moving part
-    mu        coefficient of friction for tc.seating and tc.check; contact is resolved without friction. By default the
+    mu        coefficient of friction for tc.analyses.seating and tc.check; contact is resolved without friction. By default the
               coefficient of the assembly
     stiffness [N/mm] the force that presses the faces into each other evenly by 1 mm, under the objective "seating". Each point
               is a spring with its share of the area, and pushes only; round faces share it by their balls

@@ -118,7 +118,7 @@ class Part(Declaration):
         """Return the triangles of this part that meet every criterion; without any, the whole surface.
 
         A criterion is a direction ("+x" to "-z": all triangles whose outward normal points there in the part's own
-        frame), `tc.Facing`, `tc.Inside` a box, `tc.Near` another part, `tc.Cylinder`, `tc.Largest`, `tc.Brep` (a face of a
+        frame), one of `tc.select` (`Facing`, `Inside` a box, `Near` another part, `Cylinder`, `Largest`, `Brep`: a face of a
         STEP file), the indices of triangles, or a function `(centres, normals) -> mask` of arrays (triangle, 3) [mm, -].
         """
         return Face(self, tuple(map(criterion, selections)))

@@ -35,7 +35,7 @@ class Facing(Readable):
         if not is_finite(self.axis):
             yield (
                 f'unknown face "{self.direction}"; expected one of {", ".join(DIRECTIONS)}, a criterion such as '
-                "tc.Inside(...), triangle indices, or a function of centres and normals"
+                "tc.select.Inside(...), triangle indices, or a function of centres and normals"
             )
         if not (is_length(self.angle) and 0 < self.angle < math.pi):
             yield f"angle is {self.angle!r}; expected radians between 0 and pi"
@@ -55,7 +55,7 @@ class Triangles(Readable):
     def faults(self) -> Iterator[str]:
         if not all(hasattr(index, "__index__") and not isinstance(index, bool) for index in self.indices):
             yield (
-                "triangle indices must be whole numbers; for another direction use tc.Facing((x, y, z)), for a mask "
+                "triangle indices must be whole numbers; for another direction use tc.select.Facing((x, y, z)), for a mask "
                 "a function of centres and normals, or np.flatnonzero(mask)"
             )
 
@@ -218,6 +218,6 @@ def criterion(choice: Any) -> Selection:
         return Triangles(tuple(choice))
     except TypeError as error:
         raise TypeError(
-            f'a face cannot be chosen by {choice!r}; expected a direction ("+x" to "-z"), a criterion such as tc.Facing(...), '
-            "triangle indices, or a function of centres and normals"
+            f'a face cannot be chosen by {choice!r}; expected a direction ("+x" to "-z"), a criterion such as '
+            "tc.select.Facing(...), triangle indices, or a function of centres and normals"
         ) from error

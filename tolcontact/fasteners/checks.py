@@ -12,7 +12,7 @@ def check_types(scene: Any, name: str, fastener: Any, through: Any, into: Any, s
     """Raise TypeError for an argument of a wrong type."""
     kinds: Any = Part | Face | Feature | Size | int | float
     face: Any = Face | Feature
-    hole = "the wall of a hole: part.face(tc.Cylinder(...)), or a feature"
+    hole = "the wall of a hole: part.face(tc.select.Cylinder(...)), or a feature"
     arguments = [
         ("the first argument", scene, Assembly | Station, "an assembly, or one of its stations"),
         ("fastener", fastener, kinds, "a diameter in mm, a tc.Size, a part, or the face of its shank"),

@@ -15,7 +15,7 @@ GENERAL = "general"  # kind of a face without an analytic surface
 class FaceInFile(Readable):
     """A face of a body, in the body's own frame.
 
-    number      from 1 in the file's order, for `tc.Brep`
+    number      from 1 in the file's order, for `tc.select.Brep`
     kind        plane, cylinder, cone, sphere, torus, or "general"
     point       a point on the face [mm]
     direction   outward normal of a plane; axis of a cylinder, cone or torus; otherwise None
@@ -74,7 +74,7 @@ def group_lines(faces: Sequence[FaceInFile]) -> Iterator[str]:
     for word in FACE_GROUPS:
         for group in dict.fromkeys(getattr(face, word) for face in faces):
             if group:
-                yield f'{_title(word, group, faces)}: tc.Brep({group[0]}, whole="{word}")'
+                yield f'{_title(word, group, faces)}: tc.select.Brep({group[0]}, whole="{word}")'
 
 
 def _title(word: str, group: tuple[int, ...], faces: Sequence[FaceInFile]) -> str:

@@ -59,20 +59,20 @@ def _snippet(mesh: trimesh.Trimesh, face_of: np.ndarray, face: FaceInFile) -> st
     if BREP in mesh.face_attributes:
         return _brep_snippet(face, "whole=True" if face.whole else "")
     if face.kind == "cylinder" and face.radius is not None:
-        return f"face(tc.Cylinder(radius={face.radius:.6g}, inner={face.is_inner}))"
+        return f"face(tc.select.Cylinder(radius={face.radius:.6g}, inner={face.is_inner}))"
     mask = face_of == face.number - 1
     if face.kind == "plane" and face.direction is not None:
         normal = np.array(face.direction)
         axis = int(np.argmax(np.abs(normal)))
         is_axis = abs(normal[axis]) > 1 - MARGIN
-        direction = f'"{"+-"[int(normal[axis] < 0)]}{"xyz"[axis]}"' if is_axis else f"tc.Facing({_vector(normal)})"
+        direction = f'"{"+-"[int(normal[axis] < 0)]}{"xyz"[axis]}"' if is_axis else f"tc.select.Facing({_vector(normal)})"
         is_facing = np.asarray(mesh.face_normals) @ normal >= np.cos(FACE_ANGLE)
         return f"face({direction})" if (is_facing == mask).all() else f"face({direction}, {_box(mesh, mask)})"
     return f"face({_box(mesh, mask)})"
 
 
 def _brep_snippet(face: FaceInFile, option: str) -> str:
-    return f"face(tc.Brep({', '.join(filter(None, [_vector(np.array(face.point)), option]))}))"
+    return f"face(tc.select.Brep({', '.join(filter(None, [_vector(np.array(face.point)), option]))}))"
 
 
 def _group_snippets(face: FaceInFile) -> Iterator[str]:
@@ -84,7 +84,7 @@ def _group_snippets(face: FaceInFile) -> Iterator[str]:
 def _box(mesh: trimesh.Trimesh, mask: np.ndarray) -> str:
     """Return code for the box, with a small margin, around the triangles of a mask (triangle,)."""
     corners, margin = np.asarray(mesh.vertices)[mesh.faces[mask]].reshape(-1, 3), MARGIN * mesh.scale
-    return f"tc.Inside({_vector(corners.min(axis=0) - margin)}, {_vector(corners.max(axis=0) + margin)})"
+    return f"tc.select.Inside({_vector(corners.min(axis=0) - margin)}, {_vector(corners.max(axis=0) + margin)})"
 
 
 def _vector(x: np.ndarray) -> str:

@@ -137,7 +137,7 @@ def parts_from(
     Raises ModelError if the file cannot be read, or has no body of a name; TypeError if `names` or `fixed` is one text.
     """
     if not isinstance(model, Assembly):
-        raise TypeError(f'model is a {type(model).__name__}; expected an assembly, as in tc.parts_from(model, "file.stp")')
+        raise TypeError(f'model is a {type(model).__name__}; expected an assembly, as in tc.io.parts_from(model, "file.stp")')
     selected_names = None if names is None else _names("names", names)
     fixed_names = [] if fixed is None or isinstance(fixed, bool) else _names("fixed", fixed)
     try:

@@ -51,7 +51,7 @@ def _doubts(face: Face, meshes: Meshes) -> Iterator[str]:
             count, kind = len(chosen.intersection(description.whole)), description.kind
             yield (
                 f"{count} of the {len(description.whole)} faces of one {kind}; for all of them: "
-                f"tc.Brep({description.number}, whole=True)"
+                f"tc.select.Brep({description.number}, whole=True)"
             )
 
 

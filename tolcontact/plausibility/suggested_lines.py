@@ -72,7 +72,7 @@ def face_line(part: NominalPart, triangle: int) -> str:
         stated, names = faces[number], [face.name for face in faces]
         face = f'"{stated.name}"' if stated.name and names.count(stated.name) == 1 else str(number + 1)
         whole = "" if stated.surface is None or isinstance(stated.surface, Plane) else ", whole=True"
-        return f"{variable}.face(tc.Brep({face}{whole}))"
+        return f"{variable}.face(tc.select.Brep({face}{whole}))"
     for side in DIRECTIONS:
         if normal @ np.array(direction(side)) > 1 - SAME_DIRECTION:
             return f'{variable}.face("{side}")'

@@ -102,7 +102,7 @@ def _face(face: Face) -> str:
 
 def _brep(selection: Any) -> str:
     assert isinstance(selection, Brep)
-    return f"tc.Brep({', '.join(map(_text, selection.which))})"
+    return f"tc.select.Brep({', '.join(map(_text, selection.which))})"
 
 
 def _source(tolerance: Size | GeometricTolerance) -> str:

@@ -43,16 +43,18 @@ def assembly(is_fixed=True, pull=3.0):
         sides = [tc.Locator("Y", (0, 0, 0), "y", 0.0), tc.Locator("turn", (15, 0, 0), "y", 0.0)]
         model.locate(support, [*feet, *sides], floating=True)
         model.force(f"pull {name}", at=support.point(0, 0, 0), vector=(side * pull, 0, 0))
-        pin = anchor.face(tc.Cylinder(radius=N.bolt / 2)) if is_fixed else None
-        bore = support.face(tc.Cylinder(radius=hole / 2, inner=True))
+        pin = anchor.face(tc.select.Cylinder(radius=N.bolt / 2)) if is_fixed else None
+        bore = support.face(tc.select.Cylinder(radius=hole / 2, inner=True))
         if pin is None:
             bolt = model.part(f"{name} bolt", tc.Mesh(trimesh.creation.cylinder(N.bolt / 2, 24)), at=(x, 0, -4))
             upright = [tc.Locator(f"Z{k}", (px, py, -12), "z", 0.0) for k, (px, py) in enumerate([(5, 0), (-5, 0), (0, 5)])]
             model.locate(
                 bolt, [*upright, tc.Locator("Y", (0, 0, 0), "y", 0.0), tc.Locator("turn", (5, 0, 0), "y", 0.0)], floating=True
             )
-            pin = bolt.face(tc.Cylinder())
-            model.contact(f"{name} in plate", moving=pin, reference=anchor.face(tc.Cylinder(radius=hole / 2, inner=True)))
+            pin = bolt.face(tc.select.Cylinder())
+            model.contact(
+                f"{name} in plate", moving=pin, reference=anchor.face(tc.select.Cylinder(radius=hole / 2, inner=True))
+            )
         model.contact(f"{name} fit", moving=bore, reference=pin)
         # The hole's own place in its support moves the face against the hole.
         model.variable(f"{name} hole", N.position, drives={f"{name} place.S": 1.0})
@@ -65,7 +67,7 @@ def answers():
     estimates, count = [], 0
     for is_fixed in (True, False):
         for end, pull in ((0, -3.0), (1, 3.0)):
-            extremes = tc.worst_case(assembly(is_fixed, pull), solver="daqp")
+            extremes = tc.analyses.worst_case(assembly(is_fixed, pull), solver="daqp")
             estimates.append(an.within(extremes.worst.sel(measure="distance", state="corrected").values[end], 1e-6))
             count += int(extremes.by_status.sum())
     return an.Answers(estimates, count)

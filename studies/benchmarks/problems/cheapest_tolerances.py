@@ -40,7 +40,9 @@ def assembly():
 def answers():
     names = [f"part{k}.S" for k in (1, 2, 3)]
     costs = dict(zip(names, N.costs, strict=True))
-    allocation = tc.allocate(assembly(), f"height: ppm {PPM}", costs=costs, samples=32_768, seed=an.SEED, solver="daqp")
+    allocation = tc.analyses.allocate(
+        assembly(), f"height: ppm {PPM}", costs=costs, samples=32_768, seed=an.SEED, solver="daqp"
+    )
     cost = float(allocation.cost.sel(stage="after").sum())
     ranges = allocation.range.sel(stage="after", group=names).values
     # It simulates a search of unknown length, so no number of realizations is stated.

@@ -47,7 +47,7 @@ def assembly():
 
 def answers():
     labels = ["a.S", "c.S", "e.S"]
-    slopes = tc.sensitivities(assembly(), samples=100, solver="daqp").sel(measure="angle")
-    linear = tc.contributions(assembly(), samples=256, solver="daqp").sel(measure="angle")
+    slopes = tc.analyses.sensitivities(assembly(), samples=100, solver="daqp").sel(measure="angle")
+    linear = tc.analyses.contributions(assembly(), samples=256, solver="daqp").sel(measure="angle")
     values = [*slopes.nominal.sel(contributor=labels).values, *linear.linear.sel(group=labels).values]
     return an.Answers([an.within(value, 1e-5) for value in values], int(slopes.by_status.sum() + linear.by_status.sum()))

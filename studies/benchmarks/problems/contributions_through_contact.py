@@ -48,7 +48,7 @@ def assembly():
 
 
 def answers():
-    contributions = tc.contributions(assembly(), samples=8192, seed=an.SEED, solver="daqp").sel(
+    contributions = tc.analyses.contributions(assembly(), samples=8192, seed=an.SEED, solver="daqp").sel(
         measure="height", group="carrier.S"
     )
     indices = [an.of_analysis(contributions[kind].sel(state="corrected")) for kind in ("first", "total")]

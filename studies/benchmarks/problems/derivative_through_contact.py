@@ -36,7 +36,7 @@ def assembly():
 
 
 def answers():
-    sensitivities = tc.sensitivities(assembly(), samples=10_000, seed=an.SEED, solver="daqp").sel(
+    sensitivities = tc.analyses.sensitivities(assembly(), samples=10_000, seed=an.SEED, solver="daqp").sel(
         measure="height", contributor="v"
     )
     raw, corrected = (an.of_analysis(sensitivities.sensitivity.sel(state=state)) for state in ("raw", "corrected"))

@@ -52,10 +52,10 @@ def assembly():
     housing = model.part("housing", tc.Mesh(FILE), fixed=True)
     for letter, direction, corner in (("A", "-z", (113, 73, 0.1)), ("B", "-y", (113, 0.1, 40)), ("C", "-x", (0.1, 73, 40))):
         low = [-0.1 if high == 0.1 else 0.0 for high in corner]
-        housing.feature(letter, housing.face(direction, tc.Inside(low, corner)), datum=letter)
+        housing.feature(letter, housing.face(direction, tc.select.Inside(low, corner)), datum=letter)
     faces = []
     for k, (x, y) in enumerate(((N.x1, N.y1), (N.x2, N.y2))):
-        walls = tc.Cylinder(radius=N.diameter / 2, inner=True), tc.Inside((x - 5, y - 5, 0), (x + 5, y + 5, 50))
+        walls = tc.select.Cylinder(radius=N.diameter / 2, inner=True), tc.select.Inside((x - 5, y - 5, 0), (x + 5, y + 5, 50))
         faces.append(housing.face(*walls))
         housing.feature(f"hole {k}", faces[k], tc.Position(N.t, "A|B|C", rule="translation"))
     model.measure("distance", tc.AxisDistance(faces[0], faces[1], across=(0, 0, 1)))

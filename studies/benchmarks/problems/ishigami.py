@@ -54,7 +54,7 @@ def assembly():
 
 
 def answers():
-    contributions = tc.contributions(assembly(), samples=16_384, seed=an.SEED, solver="daqp").sel(
+    contributions = tc.analyses.contributions(assembly(), samples=16_384, seed=an.SEED, solver="daqp").sel(
         measure="f", state="corrected"
     )
     groups = [f"{name}.S" for name in ("x1", "x2", "x3")]

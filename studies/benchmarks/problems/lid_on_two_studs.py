@@ -53,7 +53,7 @@ def plate(model, name, bodies, face, z, outside, **fixed):
     return part, [
         part.feature(
             f"{name} {k}",
-            part.face(face, tc.Inside((x - 9, -9, -9), (x + 9, 9, 9))),
+            part.face(face, tc.select.Inside((x - 9, -9, -9), (x + 9, 9, 9))),
             tc.Position(zone, "A|B|C", rule="translation"),
         )
         for k, x in enumerate((0, N.length))
@@ -64,8 +64,8 @@ def assembly():
     model = tc.Assembly("lid on two studs", method=tc.Method(resolution="exact", objective="seating"))
     rings = [trimesh.creation.annulus(N.hole / 2, 6, 4, sections=32).apply_translation((x, 0, 0)) for x in (0, N.length)]
     studs = [trimesh.creation.cylinder(N.stud / 2, 8, sections=32).apply_translation((x, 0, 0)) for x in (0, N.length)]
-    lid, bores = plate(model, "lid", rings, tc.Cylinder(radius=N.hole / 2, inner=True), 2, "-z")
-    _, pins = plate(model, "base", studs, tc.Cylinder(), -6, "+z", fixed=True)
+    lid, bores = plate(model, "lid", rings, tc.select.Cylinder(radius=N.hole / 2, inner=True), 2, "-z")
+    _, pins = plate(model, "base", studs, tc.select.Cylinder(), -6, "+z", fixed=True)
     feet = [tc.Locator(f"Z{k}", (x, y, 2), "z", 0.0) for k, (x, y) in enumerate([(5, 0), (-5, 0), (0, 5)])]
     model.locate(lid, feet, floating=True)
     for k, (bore, pin) in enumerate(zip(bores, pins, strict=True)):

@@ -47,13 +47,13 @@ def step_file():
 def assembly():
     model = tc.Assembly("CTC 01")
     part = model.part("part", tc.Mesh(step_file()), fixed=True)
-    tc.features_from_pmi(part)
+    tc.io.features_from_pmi(part)
     model.measure("place", part.point(0, 0, 0), along="z")
     return model
 
 
 def answers():
-    tolerances = tc.read_pmi(step_file()).tolerances
+    tolerances = tc.io.read_pmi(step_file()).tolerances
     results = an.simulated(assembly(), 20_000, keep="all")
     deviations = results["sample"].deviation
     (label,) = [name for name in deviations.contributor.values if "cylinder 53" in name and name.endswith("size")]

@@ -34,9 +34,9 @@ def check():
 def assembly():
     model = tc.Assembly("peg in hole", method=tc.Method(resolution="exact", objective="seating"))
     plate = model.part("plate", tc.Mesh(trimesh.creation.annulus(N.hole / 2, 20, 10, sections=48)), fixed=True)
-    bore = plate.feature("bore", plate.face(tc.Cylinder(inner=True)), tc.Size(N.hole, N.th / 2))
+    bore = plate.feature("bore", plate.face(tc.select.Cylinder(inner=True)), tc.Size(N.hole, N.th / 2))
     peg = model.part("peg", tc.Mesh(trimesh.creation.cylinder(N.d / 2, 20, sections=48)))
-    barrel = peg.feature("barrel", peg.face(tc.Cylinder()), tc.Size(N.d, N.td / 2))
+    barrel = peg.feature("barrel", peg.face(tc.select.Cylinder()), tc.Size(N.d, N.td / 2))
     feet = [tc.Locator(f"Z{k}", (x, y, -10), "z", 0.0) for k, (x, y) in enumerate([(5, 0), (-5, 0), (0, 5)])]
     model.locate(peg, feet, floating=True)
     model.contact("fit", moving=barrel, reference=bore)

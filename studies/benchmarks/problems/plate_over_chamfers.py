@@ -41,7 +41,7 @@ def assembly():
         tc.Locator("X", (0, 25, 0), "x", N.t),
     ]
     model.locate(plate, [*feet, *sides])
-    model.contact("clearance", moving=plate.face("-z"), reference=block.face(tc.Near(plate, 2)))
+    model.contact("clearance", moving=plate.face("-z"), reference=block.face(tc.select.Near(plate, 2)))
     model.measure("height", plate.point(N.plate / 2, 25, 0), along="z")
     return model
 

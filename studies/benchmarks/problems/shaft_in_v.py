@@ -37,7 +37,7 @@ def assembly():
     shape = trimesh.creation.cylinder(radius=N.r, height=60, sections=48)
     shape.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
     shaft = model.part("shaft", tc.Mesh(shape), at=(0, 0, N.r * np.sqrt(2)))
-    barrel = shaft.feature("barrel", shaft.face(tc.Cylinder()), tc.Size(2 * N.r, N.td / 2))
+    barrel = shaft.feature("barrel", shaft.face(tc.select.Cylinder()), tc.Size(2 * N.r, N.td / 2))
     model.locate(shaft, [tc.Locator("Y", (0, -30, 0), "y", 0.0)], floating=True)
     model.force("weight", at=shaft.point(0, 0, 0), vector=(0, 0, -10))
     for name, turn in (("left", -np.pi / 4), ("right", np.pi / 4)):

@@ -44,7 +44,7 @@ def assembly():
     weld, check = line.station("weld"), line.station("check")
     weld.locate(a, rests(a, 10, 90), tolerance=0)
     weld.locate(b, rests(b, 50, 90), tolerance=0)
-    weld.contact("lap", moving=b.face("-z"), reference=a.face("+z", tc.Inside((60, 0, 9), (100, 20, 11))))
+    weld.contact("lap", moving=b.face("-z"), reference=a.face("+z", tc.select.Inside((60, 0, 9), (100, 20, 11))))
     weld.measure("step", a.point(60, 10, 10), to=b.point(0, 10, 0), along="z")
     pins = {"P1": a.point(N.x1, 5, 0), "P2": a.point(N.x1, 15, 0), "P3": b.point(N.x2 - 60, 10, 0)}
     check.locate(weld.join("AB", a, b), [*(tc.Locator(k, p, "z") for k, p in pins.items()), *stops(a)], tolerance=0)

@@ -55,6 +55,6 @@ def assembly():
 
 
 def answers():
-    extremes = tc.worst_case(assembly(), solver="daqp")
+    extremes = tc.analyses.worst_case(assembly(), solver="daqp")
     ends = extremes.worst.sel(measure="x", state="corrected").values
     return an.Answers([an.within(end, 1e-6) for end in ends], int(extremes.by_status.sum()))

@@ -99,7 +99,7 @@ class Product:
                 raise GeometryFault(
                     f'"{self.path}" holds {len(self.bodies)} bodies, but a part is one body; name one, '
                     'tc.Mesh(..., body="...") or --body "...", '
-                    f"or declare all with tc.parts_from: {listed(self.bodies)}"
+                    f"or declare all with tc.io.parts_from: {listed(self.bodies)}"
                 )
             return self.bodies[0]
         number = (
