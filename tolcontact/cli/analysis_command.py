@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-import tolcontact
+from tolcontact import analyses
 from tolcontact.archive import open_archive
 from tolcontact.cli import app as common
 from tolcontact.cli.analyses import COMMANDS, REQUIRED, AnalysisCommand
@@ -29,7 +29,7 @@ SHARED = {  # options of analyses, with their defaults, and the argument of an a
 
 def register(command: AnalysisCommand) -> None:
     """Add a command to the application."""
-    parameters = inspect.signature(getattr(tolcontact, command.analysis)).parameters
+    parameters = inspect.signature(getattr(analyses, command.analysis)).parameters
     options = {
         "context": (typer.Context, REQUIRED),
         "model": (common.AnalysedModel, REQUIRED),
@@ -70,7 +70,7 @@ def _run(
         method = common.method_choices(resolution=resolution, objective=objective)
         shared = {"method": method, "client": client, "progress": show}
         arguments |= {name: value for name, value in shared.items() if name in parameters}
-        dataset = getattr(tolcontact, command.analysis)(model, **arguments)
+        dataset = getattr(analyses, command.analysis)(model, **arguments)
     if as_json:
         print_data(dataset)
     elif as_csv:

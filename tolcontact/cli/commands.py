@@ -37,7 +37,7 @@ COMMANDS = {
     ),
     "faces": (
         "step_files",
-        "List the faces of a body of a STEP file: numbers (tc.select.Brep), kinds, axes, radii, areas; slots and hole patterns.",
+        "List the faces of a body of a STEP file: numbers (tc.select.Brep), kinds, axes, radii, areas, slots, hole patterns.",
     ),
 }
 

@@ -37,7 +37,7 @@ def bodies(file: StepFile, as_json: AsJson = False) -> None:
 
 @app.command(epilog=examples("faces parts.stp --body lid"))
 def faces(file: StepFile, body: Body = None, as_json: AsJson = False) -> None:
-    """List the faces of a body of a STEP file: numbers (tc.select.Brep), kinds, axes, radii, areas; slots and hole patterns."""
+    """List the faces of a body of a STEP file: numbers (tc.select.Brep), kinds, axes, radii, areas, slots, hole patterns."""
     with waiting(f"reading {file}"):
         listing = faces_in(file, int(body) if body is not None and body.isdigit() else body)
     if as_json:
