@@ -48,9 +48,9 @@ def test_front_names_every_chapter_in_order():
 
 
 def test_front_names_every_public_name():
-    rows = re.findall(r"^\| (.*?) \| (.*?) \|$", tc.__doc__.partition("## Names")[2], re.MULTILINE)
+    rows = re.findall(r"^\|(.*?)\|(.*?)\|$", tc.__doc__.partition("## Names")[2], re.MULTILINE)
     named, module = {"": {"__version__"}}, ""
-    for purpose, names in rows[1:]:
+    for purpose, names in rows[2:]:
         if purpose.strip():
             module = "".join(re.findall(r"`tc\.(\w+)`", purpose))
         named.setdefault(module, set()).update(re.findall(r"`(\w+)`", names))
