@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tolcontact as tc
-from tests.helpers import nightly
+from tests.helpers import nightly, run, script
 from tolcontact.compilation.graph import GraphSolver
 from tolcontact.compilation.solvers import SOLVERS
 from tolcontact.simulation import simulate_blocks
@@ -195,6 +195,12 @@ def test_equations_that_repeat_each_other_hold():
     problem.A[-1], problem.low[-1] = problem.A[-2], problem.low[-2]
     answer = problem.solved()
     assert problem.residual(answer) < tolerance(answer)
+
+
+def test_no_row_is_active_without_a_position(monkeypatch):
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    done = run(script("solve_full_joint"))
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("kind", [{}, {"coupled": True}, {"equations": 3}])

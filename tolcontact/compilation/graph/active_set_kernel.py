@@ -21,6 +21,7 @@ from tolcontact.compilation.graph.factor_kernel import (
     add_row,
     append,
     dependence,
+    has_position,
     product,
     remove,
     set_row,
@@ -244,9 +245,9 @@ def _advance(layout, work, length):  # type: ignore[no-untyped-def]
 
 @inlined_inner
 def enter_joints(layout, work, deepest):  # type: ignore[no-untyped-def]
-    """Activate the most violated row of each joint, unless a row of the joint has just left."""
+    """Activate the most violated row of each joint with a position left, unless a row of the joint has just left."""
     for j in range(deepest.size):
-        if deepest[j] >= 0 and not work.joints[j, CHANGED]:
+        if deepest[j] >= 0 and not work.joints[j, CHANGED] and has_position(layout, work, j):
             append(layout, work, deepest[j])
 
 
@@ -267,6 +268,8 @@ def step_towards(layout, work, target, growth):  # type: ignore[no-untyped-def]
     growth += min(step, whole)
     if whole <= step:
         if target < rows:
+            if not has_position(layout, work, layout.rows[target, JOINT]):
+                return STUCK, growth
             append(layout, work, target)
             work.positions[MULTIPLIER, work.position[target]] = growth
         else:

@@ -90,8 +90,14 @@ def set_row(blocks, slopes, row, weight, vectors):  # type: ignore[no-untyped-de
 
 
 @inlined_inner
+def has_position(layout, work, j):  # type: ignore[no-untyped-def]
+    """Return whether one more row of joint j can be active. More rows than positions are dependent, up to rounding."""
+    return layout.joints[j, POSITION] + work.joints[j, COUNT] < layout.joints[j + 1, POSITION]
+
+
+@inlined_inner
 def append(layout, work, row):  # type: ignore[no-untyped-def]
-    """Activate a row, after the other active rows of its joint."""
+    """Activate a row, after the other active rows of its joint, which must have a position left."""
     j = layout.rows[row, JOINT]
     position = layout.joints[j, POSITION] + work.joints[j, COUNT]
     work.active[position], work.position[row] = row, position

@@ -13,6 +13,7 @@ from tolcontact.compilation.graph.factor_kernel import (
     VALUE,
     Y,
     append,
+    has_position,
 )
 from tolcontact.compilation.graph.hessian_kernel import from_unit, load_hessian, rows_to_unit, vectors_to_unit
 from tolcontact.compilation.graph.layout import JOINT, POSITION, ROW, SLACK, SOURCE
@@ -51,8 +52,7 @@ def _start(layout, work, reactions, slacks, k):  # type: ignore[no-untyped-def]
         work.joints[j, OPEN] = slack >= 0 and slacks[k, slack] > 0
     for row in range(layout.rows.shape[0]):
         j, source = layout.rows[row, JOINT], layout.rows[row, SOURCE]
-        has_position = layout.joints[j, POSITION] + work.joints[j, COUNT] < layout.joints[j + 1, POSITION]
-        if layout.joints[j, SLACK] < 0 or (reactions[k, source] > 0 and has_position):
+        if layout.joints[j, SLACK] < 0 or (reactions[k, source] > 0 and has_position(layout, work, j)):
             append(layout, work, row)
 
 
