@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 from jaxtyping import config, install_import_hook
-from playwright.sync_api import sync_playwright
 
 PACKAGE = Path(__file__).resolve().parents[1] / "tolcontact"
 ROOMS = (
@@ -104,6 +103,8 @@ def browser():
     """A browser for all tests of a file. It cannot stay longer: its event loop runs in this thread until it ends."""
     if (chromium := shutil.which("chromium")) is None:
         pytest.skip("there is no Chromium")
+    from playwright.sync_api import sync_playwright  # noqa: PLC0415  (no other test needs it)
+
     with sync_playwright() as driver:
         options = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
         options += ["--disable-background-networking", "--disable-component-update", "--disable-sync", "--no-first-run"]

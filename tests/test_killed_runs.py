@@ -47,7 +47,13 @@ def test_a_journal_that_was_damaged_is_refused_and_left_alone(tmp_path):
     whole, state = rows.read_bytes(), checkpoint.read_bytes()
     changed = bytearray(whole)
     changed[len(changed) // 10] ^= 4
-    for data, its_state in ((changed, state), (whole[: len(whole) // 3], state), (None, state), (whole, state[:-30])):
+    for data, its_state in (
+        (changed, state),
+        (whole[: len(whole) // 3], state),
+        (None, state),
+        (whole, state[:-30]),
+        (whole, b""),
+    ):
         rows.unlink() if data is None else rows.write_bytes(data)
         checkpoint.write_bytes(its_state)
         before = {file.name: file.read_bytes() for file in (path, rows, checkpoint) if file.exists()}

@@ -1,6 +1,7 @@
 """The site: guide, gallery, and the problems of the benchmarks with their answers."""
 
 import re
+import types
 
 import pytest
 
@@ -18,7 +19,11 @@ def test_the_site_is_built(tmp_path, drawing):
     build(tmp_path, 50, some, problems(["worst_clutch", "lobed_shaft_in_a_bore"]))
     assert len(models()) == 14
     front = (tmp_path / "reference" / "tolcontact.html").read_text()
-    assert all(f'id="{name}"' in front for name in tc.__all__ if name not in ("__version__", "plot"))
+    assert all(
+        f'id="{name}"' in front
+        for name in tc.__all__
+        if name != "__version__" and not isinstance(getattr(tc, name), types.ModuleType)
+    )
     for chapter in CHAPTERS:
         title = (GUIDE / f"{chapter}.md").read_text(encoding="utf-8").partition("\n")[0].removeprefix("# ")
         assert f">{title}" in (tmp_path / "reference" / "tolcontact" / f"{chapter}.html").read_text()

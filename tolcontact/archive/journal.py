@@ -80,7 +80,7 @@ class Journal:
                 sums = [file[f"arr_{number}"] for number in range(len(file.files) - 1)]
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        except (OSError, EOFError, RuntimeError, ValueError, KeyError, zipfile.BadZipFile) as error:
             raise self._damaged(self._checkpoint) from error
         if of_archive != archive:
             return None

@@ -23,7 +23,7 @@ class AnalysisCommand:
     """A command for one analysis of a model.
 
     purpose    its line in the list of commands, and the beginning of its help text
-    analysis   the name of its function in `tolcontact`
+    analysis   the name of its function in `tolcontact.analyses`
     samples    the meaning of the number of samples, for the help text; empty for an analysis without simulations
     frame      function that makes the data frame for --csv
     options    specific options by parameter: their typer annotations, and defaults

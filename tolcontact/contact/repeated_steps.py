@@ -23,7 +23,7 @@ from tolcontact.contact.state import State, Task, Unsettled
 STEP_TOLERANCE = 1e-9  # mm: a smaller step is the last one
 ROUNDING = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that are almost unconstrained
 NEARLY_AT_REST = 1e-3  # mm: after a smaller step, places do not stay beyond sharp edges
-MAX_IDLE = 3  # steps in a row that end where they begin, because bodies would penetrate: the next ones would, too
+MAX_IDLE = 3  # steps in a row that end where they begin, because bodies would penetrate: the next ones hardly ever differ
 CLOSED = 1e-6  # mm, and of rotation matrices: steps that return this close to an earlier pose repeat themselves
 
 
@@ -78,7 +78,10 @@ def repeat(
     state: State,
     start: Start,
 ) -> None:
-    """Take steps from `state` until they converge, as `start` specifies; without convergence only a conflict is an answer."""
+    """Take steps from `state` until they converge, as `start` specifies.
+
+    Without convergence only a conflict is an answer, unless free steps no longer move.
+    """
     unsettled, trail = Unsettled(task, state), list[np.ndarray]()
     progress: Progress | None = None
     if not len(task):

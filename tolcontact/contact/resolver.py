@@ -182,17 +182,18 @@ class ContactResolver:
 
         raw_gap   the smallest raw gaps (n, pair) [mm]
         """
-        candidates = self._candidates
-        present = {
-            "curved": bool(candidates.curved),
-            "flat": not candidates.curved,
-            "guarded": candidates.are_guarded,
-            "convex": bool(candidates.partings),
-        }
         for rescue in RESCUES:
-            rows = self._rows(rescue.rows, task, state, raw_gap) if present[rescue.surfaces] else np.zeros(0, dtype=int)
-            for start in rescue.starts:
-                rows = self._try_again(task, state, rows, start)
+            rows = self._rows(rescue.rows, task, state, raw_gap)
+            if rows.size and self._has(rescue.surfaces):
+                for start in rescue.starts:
+                    rows = self._try_again(task, state, rows, start)
+
+    def _has(self, surfaces: str) -> bool:
+        """Return whether the group has the surfaces of a rescue. Partings take long to compute, and are only asked for here."""
+        candidates = self._candidates
+        if surfaces == "convex":
+            return bool(candidates.partings)
+        return candidates.are_guarded if surfaces == "guarded" else bool(candidates.curved) == (surfaces == "curved")
 
     def _rows(self, which: str, task: Task, state: State, raw_gap: Float[Array, "n pair"]) -> Int[Array, " k"]:
         """Return the realizations (k,) of a rescue (see Rescue)."""

@@ -77,24 +77,24 @@ def unconstrained_rotations(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence for each free part whose contact points lie close to a line, so that they hardly hold its rotation.
 
     A rotation about that line hardly displaces them: contact may rotate the part far to save a small displacement of points.
+    The points of parts that it carries count as its own, and a contact point of a ball counts as the ball.
     """
-    method, nominal = draws.program.method, draws.program.nominal
-    if not method.minimizes.counts_points:
-        return
-    for index, part in enumerate(nominal.parts):
-        sides = [pair.P_m for pair in nominal.pairs if pair.moving == index]
-        sides += [pair.P_r for pair in nominal.pairs if pair.reference == index]
-        if not part.movers or not sides:
-            continue
-        points = np.concatenate(sides)
-        extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-        arm = float(np.linalg.norm(extents[1:])) / np.sqrt(len(points))
-        if arm < MIN_ARM * part.mesh.scale:
-            yield (
-                f"{part.part.designation}: its contact points lie close to a line ({arm:.2g} mm away, root mean square; the "
-                f'part is {part.mesh.scale:.3g} mm large), so that objective "{method.objective}" hardly holds its rotation '
-                'about the line; choose objective "locator stiffness", or spread its contact points'
-            )
+    method, parts = draws.program.method, draws.program.nominal.parts
+    for group in (compiled.group for compiled in draws.program.groups) if method.minimizes.counts_points else ():
+        for mover, index in enumerate(group.free):
+            moved = [side for side in group.sides if mover in group.mobilities[side.part].movers[-1:]]
+            if not moved:
+                continue
+            points = np.concatenate([side.spread_points for side in moved])
+            size = max(parts[number].mesh.scale for number in {index, *(group.parts[side.part] for side in moved)})
+            extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+            arm = float(np.linalg.norm(extents[1:])) / np.sqrt(len(points))
+            if arm < MIN_ARM * size:
+                yield (
+                    f"{parts[index].part.designation}: its contact points lie close to a line ({arm:.2g} mm away, root mean "
+                    f'square; it is {size:.3g} mm large), so that objective "{method.objective}" hardly holds its rotation '
+                    'about the line; choose objective "locator stiffness", or spread its contact points'
+                )
 
 
 def _face_pairs(draws: TrialDraws) -> Iterator[tuple[int, ContactPoints, float]]:
