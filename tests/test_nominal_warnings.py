@@ -136,6 +136,36 @@ def test_contact_along_a_line_does_not_hold_a_rotation(turn, width, is_doubtful)
     assert not on_a_ledge("locator stiffness")
 
 
+def test_a_ball_that_touches_at_a_point_is_held_by_its_radius():
+    a = tc.Assembly("rest")
+    plate = a.part("plate", tc.Box(100, 100, 10), fixed=True)
+    ball = a.part("ball", tc.Mesh(trimesh.creation.icosphere(3, 10.0)), at=(50, 50, 20))
+    places = {"x": ((0, 0, 0), "x"), "y": ((0, 0, 0), "y"), "z": ((0, 0, 0), "z")}
+    places |= {"about x": ((0, 10, 0), "z"), "about y": ((10, 0, 0), "z"), "about z": ((10, 0, 0), "y")}
+    a.locate(ball, [tc.Locator(name, point, direction, 0.2) for name, (point, direction) in places.items()])
+    a.contact("rest", moving=ball.face(), reference=plate.face("+z"))
+    a.measure("height", ball.point(0, 0, 10), along="z", limits=(-1, 1))
+    assert "rotation" not in kinds(a)
+
+
+def test_joined_parts_hold_each_other_where_each_touches_along_a_line():
+    line = tc.Assembly("bridge")
+    rails = [line.part(f"rail {k}", tc.Box(2, 40, 10), at=(x, 0, -10), fixed=True) for k, x in enumerate((0, 98))]
+    halves = [line.part(f"half {k}", tc.Box(50, 40, 10), at=(x, 0, 0)) for k, x in enumerate((0, 50))]
+    weld = line.station("weld")
+    for half in halves:
+        scheme = tc.three_two_one(half.face("-z"), half.face("-y"), half.face("-x"), inset=5)
+        weld.locate(half, scheme, tolerance=0.2)
+    bridge = weld.join("bridge", *halves)
+    put = line.station("put")
+    scheme = tc.three_two_one(halves[0].face("-z"), halves[0].face("-y"), halves[0].face("-x"), inset=5)
+    put.locate(bridge, scheme, tolerance=0.2)
+    for rail, half in zip(rails, halves, strict=True):
+        put.contact(f"seat of {half.name}", moving=half.face("-z"), reference=rail.face("+z"))
+    put.measure("height", halves[1].point(50, 40, 10), along="z", limits=(-2, 2))
+    assert "rotation" not in kinds(line)
+
+
 @pytest.mark.parametrize("depth", [0.05, *nightly(0.0, 0.1)])
 def test_an_overlap_within_the_tolerances_is_silent(depth):
     # The gap of a corner outside of the triangle of the feet has sigma 0.2 / 6 times about 1.5.
