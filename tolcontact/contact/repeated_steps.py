@@ -78,10 +78,7 @@ def repeat(
     state: State,
     start: Start,
 ) -> None:
-    """Take steps from `state` until they converge, as `start` specifies.
-
-    Without convergence only a conflict is an answer, unless free steps no longer move.
-    """
+    """Take steps from `state` until they converge, as `start` specifies, or until they end in a conflict or no longer move."""
     unsettled, trail = Unsettled(task, state), list[np.ndarray]()
     progress: Progress | None = None
     if not len(task):
