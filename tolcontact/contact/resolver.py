@@ -191,15 +191,16 @@ class ContactResolver:
     def _has(self, surfaces: str) -> bool:
         """Return whether the group has the surfaces of a rescue. Partings take long to compute, and are only asked for here."""
         candidates = self._candidates
-        if surfaces == "convex":
-            return bool(candidates.partings)
-        return candidates.are_guarded if surfaces == "guarded" else bool(candidates.curved) == (surfaces == "curved")
+        if surfaces in ("curved", "flat"):
+            return bool(candidates.curved) == (surfaces == "curved")
+        return surfaces == "any" or (bool(candidates.partings) if surfaces == "convex" else candidates.are_guarded)
 
     def _rows(self, which: str, task: Task, state: State, raw_gap: Float[Array, "n pair"]) -> Int[Array, " k"]:
         """Return the realizations (k,) of a rescue (see Rescue)."""
         interfere = self._candidates.interfere
         if which == "apart":
-            rows = np.flatnonzero((raw_gap < -self._candidates.free_depth).any(axis=1) & (not self._method.minimizes.presses))
+            is_tested = self._candidates.are_guarded and not self._method.minimizes.presses
+            rows = np.flatnonzero((raw_gap < -self._candidates.free_depth).any(axis=1) & is_tested)
             return rows[~interfere(task.relative[rows])]
         if which == "interfere":
             rows = np.flatnonzero(state.doubtful)

@@ -42,8 +42,8 @@ class Rescue(NamedTuple):
     rows      the realizations: "apart", whose raw bodies are apart although gaps deny it; "no answer"; "interfere", with bodies
               that interfere in their answer; "uncertain", not certified; "uncertain or far", these and certified ones far from
               their raw pose; "not separated", without an answer, or with bodies that interfere in it
-    surfaces  which pairs the group must have: "curved" faces or only "flat" ones, bodies whose interference is tested
-              ("guarded"), or convex bodies that are parted in one direction ("convex")
+    surfaces  which pairs the group must have: "any", "curved" faces or only "flat" ones, no pair of bounded faces whose bodies
+              are not tested for interference ("guarded"), or convex bodies that are parted in one direction ("convex")
     starts    one after the other, until the answer is certified, or two of them end in the same conflict
     """
 
@@ -61,7 +61,7 @@ RESCUES = (
     Rescue("no answer", "curved", (Start(balances=True),)),
     Rescue(
         "interfere",
-        "guarded",
+        "any",
         (Start(guarded=True, at_answer=True), Start(guarded=True), Start(guarded=True, stride=SMALL_STRIDE)),
     ),
     Rescue("uncertain or far", "curved", (Start(projected=True), Start(projected=True, at_nominal=True))),
