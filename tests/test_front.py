@@ -22,6 +22,23 @@ def test_every_public_name_is_there_and_the_version_is_the_projects(tmp_path):
     assert (done.returncode, done.stdout) == (0, f"tolcontact {project['version']}\n")
 
 
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("Facing", "has no name Facing; it is tc.select.Facing"),
+        ("read_pmi", "it is tc.io.read_pmi"),
+        ("tails", "it is tc.analyses.tails"),
+        ("ArchiveError", "it is tc.errors.ArchiveError"),
+        ("Postion", 'no name Postion; the nearest name is "Position"'),
+        ("qqq", "has no name qqq$"),
+    ],
+)
+def test_a_name_that_is_elsewhere_is_told_with_its_place(name, message):
+    with pytest.raises(AttributeError, match=message):
+        getattr(tc, name)
+    assert not hasattr(tc, "__wrapped__")
+
+
 def test_declarations_return_what_they_declare():
     a = tc.Assembly("handles")
     below, above = a.part("below", tc.Box(20, 20, 5), fixed=True), a.part("above", tc.Box(10, 10, 5), at=(5, 5, 5))

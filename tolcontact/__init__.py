@@ -70,9 +70,12 @@ Every example in the guide is run by the tests.
 """
 
 from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
 
 import lazy_loader
 
+from tolcontact.errors import nearest_name
 from tolcontact.readable import Pictured
 
 
@@ -83,4 +86,17 @@ def _picture(thing: object) -> str:
 
 Pictured.picture = staticmethod(_picture)
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_public_name, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_MODULES = ("select", "analyses", "io", "testing", "declaration", "errors")
+
+
+def __getattr__(name: str) -> Any:
+    """Return a public name, which is imported when it is first asked for. Raises AttributeError, which says where it is."""
+    try:
+        return _public_name(name)
+    except AttributeError:
+        if name.startswith("_") or find_spec(f"{__name__}.{name}"):  # nobody's mistake: a module that is about to be imported
+            raise
+    places = [module for module in _MODULES if name in dir(_public_name(module))]
+    where = f"; it is tc.{places[0]}.{name}" if places else nearest_name(name, __all__)
+    raise AttributeError(f"tolcontact has no name {name}{where}")
