@@ -98,3 +98,31 @@ def test_a_shaft_whose_spin_nothing_holds_comes_to_rest_in_a_lobed_bore():
     clearances = ((pair.P_m - pair.P_r) * pair.n_r).sum(axis=1) - pair.offsets.heights(run["deviations"], everywhere)
     lowest = [linprog([0, 1], A_ub=-pair.n_r[:, :2], b_ub=c, bounds=[(None, None)] * 2).fun for c in clearances]
     assert run["measured"][:, CORRECTED, 0] == pytest.approx(np.array(lowest), abs=1e-9)
+
+
+def plates_with_a_cap(x, y):
+    """Plate in plate, whose answers need guards, and a cap on the inner plate, at x, y, whose underside varies."""
+    a = cases.model("ra2")
+    inner = a.parts[1]
+    cap = a.part("cap", tc.Box(20, 20, 10), at=(x, y, 2))
+    cap.feature("under", cap.face("-z"), tc.Profile(0.02))
+    a.locate(cap, tc.three_two_one(cap.face("-z"), cap.face("-y"), cap.face("-x"), inset=2), tolerance=1)
+    web = tc.select.Inside((0, -25, 1), (100, 25, 3))
+    a.contact("cap", moving=cap.face("-z"), reference=inner.face("+z", web))
+    return a
+
+
+@pytest.mark.slow
+def test_interfering_answers_are_rescued_though_other_bodies_of_the_group_grow_where_they_touch():
+    """The cap overhangs a hole, so that its pair is bounded, and has no guard since it grows."""
+    _, run = simulate(plates_with_a_cap(20, -4), samples=200, seed=7, solver="daqp", method=EXACT)
+    assert (run["status"] == Status.RESOLVED).all()
+
+
+@pytest.mark.slow
+def test_a_cap_on_the_middle_of_the_web_is_seen_apart_from_the_outer_plate():
+    """One of the half-spaces between them excludes no triangle that another one does not exclude by more."""
+    a = plates_with_a_cap(40, -10)
+    program = tc.build(a, solver="daqp", method=EXACT)
+    poses = program.place(deviations=np.zeros((1, len(program.nominal.contributors))))["poses"].reshape(1, 3, 12)
+    assert not list(program.watch.clashes(poses, np.zeros((1, len(program.nominal.contributors)))))

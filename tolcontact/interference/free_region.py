@@ -147,7 +147,7 @@ def _bounds(outer: InsetBody, constraint: Constraint, triangles: np.ndarray) -> 
     """
     corners = outer.corners[triangles]
     heights = np.einsum("mi,mci->mc", constraint.directions[triangles], corners) - constraint.offsets[triangles, None]
-    slopes = outer.slopes(constraint.directions, triangles).reshape(heights.size, -1)
+    slopes = outer.slopes(constraint.directions, triangles).reshape(heights.size, len(outer.body.columns))
     unit = ROUNDED * np.maximum(np.abs(slopes).max(axis=0, initial=0.0), 1e-300)
     rounded, group = np.unique(np.round(slopes / unit), axis=0, return_inverse=True)
     bounds = np.full(len(rounded), np.inf)
