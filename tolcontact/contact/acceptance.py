@@ -15,8 +15,8 @@ from tolcontact.interference.watch import ALLOWED_SHARE
 from tolcontact.mechanics import Group, curved_pairs
 from tolcontact.method import Method
 
-# Locators, clearances and tolerances leave a part no turn of a radian: an answer that far from its raw pose is another pose,
-# which planes without end or locators allow. A travel by half a part may lead to faces where no contact points are.
+# Locators, clearances and tolerances rotate a part by far less than a radian: an answer that far from its raw pose is another
+# pose, which planes without end or locators allow. A travel by half a part may lead to faces where no contact points are.
 MAX_TURN = 1.0  # rad: an answer that rotates a part by more, from its raw pose, is doubtful
 MAX_TRAVEL_SIZES = 0.5  # sizes of the largest part: if contact points moved further, the faces themselves are compared
 ADRIFT_SIZES = 10  # a part that travelled further, in sizes, has nothing to rest on

@@ -212,7 +212,7 @@ class ContactResolver:
         return np.flatnonzero(is_uncertain | (~self._limits.is_near(task, state) if which == "uncertain or far" else False))
 
     def _try_again(self, task: Task, state: State, rows: Int[Array, " n"], start: Start) -> Int[Array, " left"]:
-        """Try some realizations (n,) again and keep the better answer. Return those to be tried further (left,)."""
+        """Try some realizations (n,) again and keep the better answer. Return which need further starts (left,)."""
         if not rows.size:
             return rows
         part = task.take(rows)

@@ -37,7 +37,7 @@ class Start(NamedTuple):
 
 
 class Rescue(NamedTuple):
-    """Other starts for realizations whose best answer so far is not certain. Whatever is better replaces that answer.
+    """Other starts for realizations whose best answer so far is not certain. A better answer replaces it.
 
     rows      the realizations: "apart", whose raw bodies are apart although gaps deny it; "no answer"; "interfere", with bodies
               that interfere in their answer; "uncertain", not certified; "uncertain or far", these and certified ones far from
