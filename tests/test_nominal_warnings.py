@@ -148,6 +148,17 @@ def test_a_ball_that_touches_at_a_point_is_held_by_its_radius():
     assert "rotation" not in kinds(a)
 
 
+def test_a_thin_shaft_may_spin():
+    a = tc.Assembly("trough")
+    floor = a.part("floor", tc.Box(60, 200, 5), at=(-30, 0, -5), fixed=True)
+    shaft = a.part("shaft", tc.Pin(4, 200), at=(0, 0, 2), rotation=(-math.pi / 2, 0, 0))
+    ends = [tc.Locator(f"{axis} {y}", (0, 0, y), axis, 0.2) for axis in "xy" for y in (5, 195)]
+    a.locate(shaft, [*ends, tc.Locator("z", (0, 0, 0), "z", 0)], floating=True)
+    a.contact("rest", moving=shaft.face(tc.select.Cylinder()), reference=floor.face("+z"))
+    a.measure("height", shaft.point(0, 0, 0), along="z", limits=(-1, 1))
+    assert "rotation" not in kinds(a)
+
+
 def test_joined_parts_hold_each_other_where_each_touches_along_a_line():
     line = tc.Assembly("bridge")
     rails = [line.part(f"rail {k}", tc.Box(2, 40, 10), at=(x, 0, -10), fixed=True) for k, x in enumerate((0, 98))]

@@ -77,13 +77,14 @@ def unconstrained_rotations(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence for each free part whose contact points lie close to a line, so that they hardly hold its rotation.
 
     A rotation about that line hardly displaces them: contact may rotate the part far to save a small displacement of points.
-    The points of parts that it carries count as its own, and a contact point of a ball counts as the ball.
+    The points of parts that it carries count as its own, and a contact point of a ball counts as the ball. Round faces alone do
+    not rotate a part about their axis, since their normals pass through it.
     """
-    method, parts = draws.program.method, draws.program.nominal.parts
+    method, parts, pairs = draws.program.method, draws.program.nominal.parts, draws.program.nominal.pairs
     for group in (compiled.group for compiled in draws.program.groups) if method.minimizes.counts_points else ():
         for mover, index in enumerate(group.free):
             moved = [side for side in group.sides if mover in group.mobilities[side.part].movers[-1:]]
-            if not moved:
+            if all(pairs[group.pairs[side.pair]].round for side in moved):
                 continue
             points = np.concatenate([side.spread_points for side in moved])
             size = max(parts[number].mesh.scale for number in {index, *(group.parts[side.part] for side in moved)})
