@@ -72,7 +72,7 @@ def build(folder: Path, samples: int, scripts: Sequence[Path], chosen: Sequence[
     """Write the pages of these models and problems into a folder, which is created if it is missing."""
     folder.mkdir(parents=True, exist_ok=True)
     pdoc.render.configure(show_source=False)
-    for analysis in tc.analyses.__all__:  # a module has the name of its function, until the function is asked for
+    for analysis in dir(tc.analyses):  # a module has the name of its function, until the function is asked for
         getattr(tc.analyses, analysis)
     pdoc.pdoc(*REFERENCE, output_directory=folder / "reference")
     pages.write(folder / "benchmarks", chosen)
