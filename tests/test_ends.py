@@ -119,7 +119,8 @@ def test_the_frame_does_not_matter(name="rib"):  # whose contact points are the 
     assert np.allclose(*lengths, atol=1e-6)
 
 
-@pytest.mark.parametrize("seed", [2, 4, 8, *nightly(0, 6, *range(10, 24, 2))])
+# In scene 38 bodies penetrate by a thousandth of the tolerance range at an edge, where the complete test sees them apart.
+@pytest.mark.parametrize("seed", [2, 4, 8, 38, *nightly(0, 6, *range(10, 24, 2))])
 def test_random_bodies(seed):
     assembly, bodies = scene(seed)
     assert_right(assembly, bodies, 4, seed)

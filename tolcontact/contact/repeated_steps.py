@@ -94,7 +94,8 @@ def repeat(
         is_short = np.zeros(len(unsettled), dtype=bool)
         if before is not None:
             is_short = free_steps.shorten(step, unsettled.task, before, unsettled.state, size)
-            idle = np.where((unsettled.state.poses == before.poses).all(axis=(1, 2)) & is_short, idle + 1, 0)
+            stays = limits.displacement(before.poses, unsettled.state.poses) <= STEP_TOLERANCE
+            idle = np.where(stays & is_short, idle + 1, 0)
         rounding_counts = kind.newton or step.knows_walls or start.balances
         moves = is_short | (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
         if kind.width > 1:
