@@ -72,7 +72,8 @@ class Guard:
         self._part(found, np.arange(len(X_RM)), X_RM, np.zeros((len(X_RM), 3)))
         for apart in APART * sum(self.neighbours.insets):
             rows = np.flatnonzero((found.labels[:, 0] < 0) & (labels >= 0))
-            self._part(found, rows, X_RM, -apart * _direction(labels[rows]))
+            if rows.size:
+                self._part(found, rows, X_RM, -apart * _direction(labels[rows]))
         return found
 
     def _part(self, found: Places, rows: Int[Array, " k"], X_RM: Float[Array, "n 12"], shift: Float[Array, "k 3"]) -> None:
