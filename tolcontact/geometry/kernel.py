@@ -25,6 +25,7 @@ CORNER_ON_FACET, FACET_ON_CORNER, EDGE_ON_EDGE = 0, 1, 2  # the moving body come
 MARGIN = 1e-9  # of the size: largest distance outside an edge at which a contact point counts
 MAX_TILT_SINE = 0.2  # largest sine of the tilt of a normal out of the cone of a corner or an edge
 MIN_CROSSING = 1e-3  # rad: edges of facing planes that cross at a smaller angle meet at their corners
+IN_PLANE = 1e-6  # sine of the largest angle between a plane and its edges
 PARALLEL = 1e-6  # rad: edges at a smaller angle have no common normal
 MIN_SLANT, MAX_SLANT = 1.02, 1.5  # range of lengths where the slope of a gap between rims counts, not the plane's normal
 INSIDE = 1e-9  # mm: contact points that are no deeper count as touching
@@ -50,22 +51,31 @@ class Body(NamedTuple):
 
 
 @inlined_uncounted
-def _tilt_sine(body, corner, n):  # type: ignore[no-untyped-def]
-    """Return the sine of the largest angle of edges at a corner above the plane across n."""
+def _tilt_sine(body, corner, n, normal):  # type: ignore[no-untyped-def]
+    """Return the sine of the largest angle of edges at a corner above the plane across n.
+
+    Only edges in the plane of a `normal` count, or all edges if it is 0: where a wall rises from a plane, the plane ends at the
+    wall, and its corner there bounds what another plane shares with it, although the wall's edge rises above both.
+    """
     tilt_sine = 0.0
     for j in range(body.cones[corner], body.cones[corner + 1]):
-        tilt_sine = max(tilt_sine, dot(row(body.directions, j), n))
+        if abs(dot(row(body.directions, j), normal)) < IN_PLANE:
+            tilt_sine = max(tilt_sine, dot(row(body.directions, j), n))
     return tilt_sine
 
 
 @inlined_uncounted
-def corner_on_facet(A, B, index_A, index_B, plane, spare, reach, X, x):  # type: ignore[no-untyped-def]
-    """Return gap, point, projection and normal of a corner, now at x, of the moving body on a facet of the reference body."""
+def corner_on_facet(A, B, index_A, index_B, flat, plane, spare, reach, X, x):  # type: ignore[no-untyped-def]
+    """Return gap, point, projection and normal of a corner, now at x, of the moving body on a facet of the reference body.
+
+    flat   the facet of the moving body in the plane that faces the reference body's
+    """
     n = row(B.normals, index_B)
     height = dot(n, minus(x, row_of(B.facets, index_B, 0)))
     if not (-reach[0] <= height <= reach[1]) or (plane < 0 and not is_over(B.facets, B.inward, index_B, x, spare)):
         return NOWHERE
-    if _tilt_sine(A, index_A, scaled(-1.0, turn_back(X, n))) > MAX_TILT_SINE:
+    own = ORIGIN if plane < 0 else row(A.normals, flat)
+    if _tilt_sine(A, index_A, scaled(-1.0, turn_back(X, n)), own) > MAX_TILT_SINE:
         return NOWHERE
     if plane < 0 and height < -INSIDE and not is_inside(B.triangles, x):
         return NOWHERE
@@ -82,16 +92,16 @@ def facet_on_corner(A, B, index_A, index_B, flat, plane, spare, reach, X, y):  #
     down = row(A.normals, index_A)
     if plane < 0:
         d = scaled(-1.0, down)
-        n = turn(X, d)
+        n, own = turn(X, d), ORIGIN
     else:
-        n = row(B.normals, flat)
+        n = own = row(B.normals, flat)
         d = turn_back(X, n)
     fall = dot(d, down)
     height = -dot(down, minus(y, row_of(A.facets, index_A, 0))) / fall
     if not (fall < -0.5 and -reach[0] <= height <= reach[1]):
         return NOWHERE
     place = along(y, height, d)
-    if (plane < 0 and not is_over(A.facets, A.inward, index_A, place, spare)) or _tilt_sine(B, index_B, n) > MAX_TILT_SINE:
+    if (plane < 0 and not is_over(A.facets, A.inward, index_A, place, spare)) or _tilt_sine(B, index_B, n, own) > MAX_TILT_SINE:
         return NOWHERE
     if plane < 0 and height < -INSIDE and not is_inside(A.triangles, y):
         return NOWHERE

@@ -292,9 +292,12 @@ def _on_facets(
         starts = corners.cones[block.start : block.stop + 1]
         slopes = corners.directions[starts[0] : starts[-1]] @ facets.normals.T
         fits = np.minimum.reduceat(slopes, starts[:-1] - starts[0], axis=0) >= -tilt_sine
-        corner, facet = np.nonzero(fits & overlaps(corners.vertices[block], corners.vertices[block], *boxes))
+        corner, facet = np.nonzero(overlaps(corners.vertices[block], corners.vertices[block], *boxes))
+        fits = fits[corner, facet]
         corner += block.start
         plane = facing[corners.vertex_planes[corner], facets.facet_planes[facet][:, None]].max(axis=1, initial=-1)
+        fits |= plane >= 0
+        corner, facet, plane = corner[fits], facet[fits], plane[fits]
         # The facets of a facing plane count as one.
         keys = corner * (len(facets.facets) + facing.size) + np.where(plane >= 0, plane, -1 - facet)
         _, distinct = np.unique(keys, return_index=True)

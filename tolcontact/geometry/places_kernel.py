@@ -118,13 +118,13 @@ def _place(A, B, candidates, s, slack, reach, X, moved):  # type: ignore[no-unty
     """Return gap, point, projection and normal of candidate s, which may lie `slack` [mm] outside edges."""
     corners, lines, back = moved
     kind, index_A, index_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
-    flat = 0 if plane < 0 else candidates.facing[plane, 1]
+    flat = 0 if plane < 0 else candidates.facing[plane, 0 if kind == CORNER_ON_FACET else 1]
     if kind == EDGE_ON_EDGE:
         return edge_on_edge(
             A, B, index_A, index_B, flat, plane, slack, reach, X, row_of(lines, index_A, 0), row_of(lines, index_A, 1)
         )
     if kind == CORNER_ON_FACET:
-        results = corner_on_facet(A, B, index_A, index_B, plane, slack, reach, X, row(corners, index_A))
+        results = corner_on_facet(A, B, index_A, index_B, flat, plane, slack, reach, X, row(corners, index_A))
         is_over = plane < 0 or results[0] == np.inf or _is_over_plane(candidates, plane, 1, row(corners, index_A), slack)
     else:
         results = facet_on_corner(A, B, index_A, index_B, flat, plane, slack, reach, X, row(back, index_B))
