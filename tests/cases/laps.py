@@ -36,6 +36,7 @@ CASES = {
     "low step": (*on_step(0.5), 4.0),
     "step": (*on_step(3), 4.0),
     "two walls": (((0, 10, 0), (30, 40, 8)), [FLOOR, WALL], 1.0),
+    "wall shorter than the box": (((0, -5, 0), (30, 35, 8)), [((-10, 0, -10), (50, 30, 0)), ((-10, 0, -10), (0, 30, 20))], 1.0),
     "three walls": (((0, 0, 0), (30, 25, 8)), [FLOOR, WALL, SIDE], 1.0),
 }
 
