@@ -12,7 +12,7 @@ from tolcontact.archive.form_values import form_sizes, form_values
 from tolcontact.archive.rows import Row, kept_rows
 from tolcontact.archive.settings import Run, declaration, now, run_settings, versions, watch_settings
 from tolcontact.archive.stored_rows import empty_checks
-from tolcontact.archive.variables import add, add_all, define, labels_of_rows, units_of_rows
+from tolcontact.archive.variables import Definitions, define, labels_of_rows, units_of_rows
 from tolcontact.compilation import Program
 from tolcontact.declaration import Mesh
 from tolcontact.discretization import Nominal, NominalPart
@@ -44,24 +44,25 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
             **(nominal.assembly.title_block.attributes if nominal.assembly.title_block else {}),
         }
     )
-    rows = kept_rows(nominal, run.keep)
-    _write_labels(file, nominal)
-    _write_stations(file, nominal, rows)
-    _write_rows(file, program, rows)
-    _write_measures(file, program)
-    _write_model(file.createGroup("model"), nominal, declaration(program))
-    _write_contact(file.createGroup("contact"), program)
-    _write_sample(file.createGroup("sample"), program, deviations=Row("sample", terms.DEVIATION) in rows)
+    new, rows = Definitions(), kept_rows(nominal, run.keep)
+    _write_labels(new, file, nominal)
+    _write_stations(new, file, nominal, rows)
+    _write_rows(new, file, program, rows)
+    _write_measures(new, file, program)
+    _write_model(new, file.createGroup("model"), nominal, declaration(program))
+    _write_contact(new, file.createGroup("contact"), program)
+    _write_sample(new, file.createGroup("sample"), program, deviations=Row("sample", terms.DEVIATION) in rows)
     file["contact"].createDimension(terms.BOUND, 2)
-    add_all(file["contact"], empty_touching(file["contact"].dimensions[terms.POINT].size))
+    new.add_all(file["contact"], empty_touching(file["contact"].dimensions[terms.POINT].size))
     checked = file.createGroup("surface")
     checked.createDimension(terms.CHECKED, run.surfaces)
-    add_all(checked, empty_checks(run.surfaces, len(nominal.pairs)))
+    new.add_all(checked, empty_checks(run.surfaces, len(nominal.pairs)))
     for part, numbers in zip(nominal.last_parts, sums, strict=True):
-        _write_field(file.createGroup(terms.field_of(part.name)), part, numbers)
+        _write_field(new, file.createGroup(terms.field_of(part.name)), part, numbers)
+    new.write()
 
 
-def _write_labels(file: netCDF4.Dataset, nominal: Nominal) -> None:
+def _write_labels(new: Definitions, file: netCDF4.Dataset, nominal: Nominal) -> None:
     """Write the dimensions of the root and their labels."""
     labels = labels_of_rows(nominal)
     file.createDimension(terms.REALIZATION, None)
@@ -69,53 +70,53 @@ def _write_labels(file: netCDF4.Dataset, nominal: Nominal) -> None:
         file.createDimension(name, len(values))
     for coordinate in terms.COORDINATES:
         if coordinate.name in labels:
-            add(file, coordinate, labels[coordinate.name])
+            new.add(file, coordinate, labels[coordinate.name])
         else:
             define(file, coordinate)
 
 
-def _write_rows(file: netCDF4.Dataset, program: Program, rows: Sequence[Row]) -> None:
+def _write_rows(new: Definitions, file: netCDF4.Dataset, program: Program, rows: Sequence[Row]) -> None:
     """Define the variables of realizations, without values."""
     for variable in terms.ROWS:
         if Row("", variable) in rows:
             define(file, variable)
     for variable, units in units_of_rows(program).items():
         file[variable.name].units = units
-    add(file, terms.SUMMED_ROWS, 0)
+    new.add(file, terms.SUMMED_ROWS, 0)
 
 
-def _write_stations(file: netCDF4.Dataset, nominal: Nominal, rows: Sequence[Row]) -> None:
+def _write_stations(new: Definitions, file: netCDF4.Dataset, nominal: Nominal, rows: Sequence[Row]) -> None:
     """Write the station of each measure, pair and part, and define the variables of each station; nothing without stations."""
     if not nominal.scenes:
         return
-    add(file, terms.MEASURE_STATION, [measure.station for measure in nominal.measures])
-    add(file, terms.PAIR_STATION, [nominal.parts[pair.moving].station for pair in nominal.pairs])
-    add(file, terms.PART_STATION, [part.station for part in nominal.last_parts])
+    new.add(file, terms.MEASURE_STATION, [measure.station for measure in nominal.measures])
+    new.add(file, terms.PAIR_STATION, [nominal.parts[pair.moving].station for pair in nominal.pairs])
+    new.add(file, terms.PART_STATION, [part.station for part in nominal.last_parts])
     for scene in nominal.scenes:
         path = terms.station_group(scene.station)
         group = file.createGroup(path)
         group.setncattr("station", scene.station)
         group.createDimension(terms.STATION_PART, len(scene.assembly.parts))
-        add(group, terms.STATION_PART_LABEL, [part.name for part in scene.assembly.parts])
+        new.add(group, terms.STATION_PART_LABEL, [part.name for part in scene.assembly.parts])
         for row in rows:
             if row.group == path:
                 define(group, row.variable)
 
 
-def _write_measures(file: netCDF4.Dataset, program: Program) -> None:
+def _write_measures(new: Definitions, file: netCDF4.Dataset, program: Program) -> None:
     measures = program.nominal.measures
-    add(file, terms.MEASURE_NOMINAL, program.nominal_measures)
-    add(file, terms.MEASURE_TOLERANCE, [np.nan if measure.width is None else measure.width for measure in measures])
+    new.add(file, terms.MEASURE_NOMINAL, program.nominal_measures)
+    new.add(file, terms.MEASURE_TOLERANCE, [np.nan if measure.width is None else measure.width for measure in measures])
     bounds = np.array([m.bounds(nominal) for m, nominal in zip(measures, program.nominal_measures, strict=True)])
     bounds = np.where(np.isfinite(bounds), bounds, np.nan).reshape(-1, 2)
-    add(file, terms.LOWER_LIMIT, bounds[:, 0])
-    add(file, terms.UPPER_LIMIT, bounds[:, 1])
-    add(file, terms.MEASURE_ACCURACY, program.accuracies)
-    add(file, terms.QUANTITY, [measure.quantity for measure in measures])
-    add(file, terms.MEASURE_UNITS, [measure.units for measure in measures])
+    new.add(file, terms.LOWER_LIMIT, bounds[:, 0])
+    new.add(file, terms.UPPER_LIMIT, bounds[:, 1])
+    new.add(file, terms.MEASURE_ACCURACY, program.accuracies)
+    new.add(file, terms.QUANTITY, [measure.quantity for measure in measures])
+    new.add(file, terms.MEASURE_UNITS, [measure.units for measure in measures])
 
 
-def _write_field(group: netCDF4.Group, part: NominalPart, numbers: int) -> None:
+def _write_field(new: Definitions, group: netCDF4.Group, part: NominalPart, numbers: int) -> None:
     """Write the surface of a part, and lay out its displacement field and its sums."""
     group.setncattr("part", part.name)
     sizes = {
@@ -128,12 +129,12 @@ def _write_field(group: netCDF4.Group, part: NominalPart, numbers: int) -> None:
     }
     for name, size in sizes.items():
         group.createDimension(name, size)
-    add(group, terms.COMPONENT_LABEL, terms.COMPONENTS)
-    add(group, terms.FIELD_VERTICES, part.vertices)
-    add(group, terms.FIELD_FACES, part.faces)
-    add(group, terms.BOUND_LABEL, terms.BOUNDS)
-    add_all(group, empty_field(len(part.vertices)))
-    add(group, terms.FIELD_SUMS, np.full([len(terms.STATES), numbers], np.nan))
+    new.add(group, terms.COMPONENT_LABEL, terms.COMPONENTS)
+    new.add(group, terms.FIELD_VERTICES, part.vertices)
+    new.add(group, terms.FIELD_FACES, part.faces)
+    new.add(group, terms.BOUND_LABEL, terms.BOUNDS)
+    new.add_all(group, empty_field(len(part.vertices)))
+    new.add(group, terms.FIELD_SUMS, np.full([len(terms.STATES), numbers], np.nan))
 
 
 def empty_field(vertices: int) -> dict[ArchiveVariable, Any]:
@@ -156,14 +157,14 @@ def empty_touching(points: int) -> dict[ArchiveVariable, Any]:
     }
 
 
-def _write_model(group: netCDF4.Group, nominal: Nominal, document: str) -> None:
-    add(group, terms.DECLARATION, document)
+def _write_model(new: Definitions, group: netCDF4.Group, nominal: Nominal, document: str) -> None:
+    new.add(group, terms.DECLARATION, document)
     lines = [(number, line) for number, lines in enumerate(nominal.lines) for line in lines]
     if lines:
         group.createDimension(terms.MEASURE_LINE, len(lines))
         group.createDimension(terms.LINE_END, 2)
-        add(group, terms.MEASURE_OF_LINE, [number for number, _ in lines])
-        add(group, terms.LINE_ENDS, np.array([line for _, line in lines]))
+        new.add(group, terms.MEASURE_OF_LINE, [number for number, _ in lines])
+        new.add(group, terms.LINE_ENDS, np.array([line for _, line in lines]))
     for part in nominal.last_parts:
         if isinstance(part.part.geometry, Mesh):
             mesh = group.createGroup(f"mesh/{terms.group_of(part.name)}")
@@ -171,21 +172,21 @@ def _write_model(group: netCDF4.Group, nominal: Nominal, document: str) -> None:
             mesh.createDimension(terms.VERTEX, len(part.mesh.vertices))
             mesh.createDimension(terms.FACE, len(part.mesh.faces))
             mesh.createDimension(terms.CORNER, 3)
-            add(mesh, terms.MESH_VERTICES, part.mesh.vertices)
-            add(mesh, terms.MESH_FACES, part.mesh.faces)
+            new.add(mesh, terms.MESH_VERTICES, part.mesh.vertices)
+            new.add(mesh, terms.MESH_FACES, part.mesh.faces)
             if COORDINATE_SPACING in part.mesh.metadata:
-                add(mesh, terms.COORDINATE_SPACING, coordinate_spacing(part.mesh))
+                new.add(mesh, terms.COORDINATE_SPACING, coordinate_spacing(part.mesh))
             surfaces = known_surfaces(part.mesh)
             if surfaces is not None:
                 mesh.createDimension(terms.BREP_FACE, len(surfaces[1]))
-                add(mesh, terms.BREP_OF_FACE, surfaces[0])
+                new.add(mesh, terms.BREP_OF_FACE, surfaces[0])
                 arrays = surface_arrays(surfaces[1])
-                add_all(mesh, {variable: arrays[name] for name, variable in terms.OF_BREP_FACE.items()})
+                new.add_all(mesh, {variable: arrays[name] for name, variable in terms.OF_BREP_FACE.items()})
                 if surfaces[2]:
-                    add(mesh, terms.NAME_OF_BREP_FACE, surfaces[2])
+                    new.add(mesh, terms.NAME_OF_BREP_FACE, surfaces[2])
 
 
-def _write_contact(group: netCDF4.Group, program: Program) -> None:
+def _write_contact(new: Definitions, group: netCDF4.Group, program: Program) -> None:
     nominal = program.nominal
     group.createDimension(terms.POINT, sum(len(pair.P_m) for pair in nominal.pairs))
     if any(pair.round for pair in nominal.pairs):
@@ -200,7 +201,7 @@ def _write_contact(group: netCDF4.Group, program: Program) -> None:
         }
         for name, size in sizes.items():
             group.createDimension(name, size)
-    add_all(group, contact_values(program))
+    new.add_all(group, contact_values(program))
 
 
 def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
@@ -281,27 +282,27 @@ def _round_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
     }
 
 
-def _write_sample(group: netCDF4.Group, program: Program, *, deviations: bool) -> None:
+def _write_sample(new: Definitions, group: netCDF4.Group, program: Program, *, deviations: bool) -> None:
     nominal, contributors = program.nominal, program.draws.contributors
     group.createDimension(terms.CONTRIBUTOR, len(contributors))
     group.createDimension(terms.LOCATOR, len(nominal.locators))
     if deviations:
         define(group, terms.DEVIATION)
-    add(group, terms.CONTRIBUTOR_LABEL, [contributor.label for contributor in contributors])
-    add(group, terms.CONTRIBUTOR_SOURCE, [contributor.source for contributor in contributors])
-    add(group, terms.CONTRIBUTOR_UNITS, [contributor.units for contributor in contributors])
-    add(group, terms.TOLERANCE_RANGE, [contributor.range for contributor in contributors])
-    add(group, terms.DISTRIBUTION, [contributor.description for contributor in contributors])
-    add(group, terms.MEAN_SHIFT, [contributor.mean_shift for contributor in contributors])
+    new.add(group, terms.CONTRIBUTOR_LABEL, [contributor.label for contributor in contributors])
+    new.add(group, terms.CONTRIBUTOR_SOURCE, [contributor.source for contributor in contributors])
+    new.add(group, terms.CONTRIBUTOR_UNITS, [contributor.units for contributor in contributors])
+    new.add(group, terms.TOLERANCE_RANGE, [contributor.range for contributor in contributors])
+    new.add(group, terms.DISTRIBUTION, [contributor.description for contributor in contributors])
+    new.add(group, terms.MEAN_SHIFT, [contributor.mean_shift for contributor in contributors])
     locators = nominal.locators
-    add(group, terms.LOCATOR_LABEL, locators.labels)
-    add(group, terms.STIFFNESS, locators.stiffness)
-    add(group, terms.ONE_SIDED, locators.one_sided)
-    add(group, terms.LOCATOR_POINT, locators.points)
-    add(group, terms.LOCATOR_DIRECTION, locators.directions)
-    add(group, terms.FACE_OF_LOCATOR, _numbers(nominal, locators.faces))
+    new.add(group, terms.LOCATOR_LABEL, locators.labels)
+    new.add(group, terms.STIFFNESS, locators.stiffness)
+    new.add(group, terms.ONE_SIDED, locators.one_sided)
+    new.add(group, terms.LOCATOR_POINT, locators.points)
+    new.add(group, terms.LOCATOR_DIRECTION, locators.directions)
+    new.add(group, terms.FACE_OF_LOCATOR, _numbers(nominal, locators.faces))
     if any(locators.grounds):
-        add(group, terms.GROUND_OF_LOCATOR, _numbers(nominal, locators.grounds))
+        new.add(group, terms.GROUND_OF_LOCATOR, _numbers(nominal, locators.grounds))
 
 
 def _numbers(nominal: Nominal, faces: Sequence[FaceDeviation | None]) -> list[int]:
