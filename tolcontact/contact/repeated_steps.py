@@ -93,7 +93,7 @@ def repeat(
         size, scaled = _take(step, unsettled, np.flatnonzero(~asleep), kind, start.stride)
         is_short = np.zeros(len(unsettled), dtype=bool)
         if before is not None:
-            is_short = free_steps.shorten(step, unsettled.task, before, unsettled.state, size)
+            is_short = free_steps.shorten(step, unsettled.task, before, unsettled.state, size) & (size > STEP_TOLERANCE)
             stays = limits.displacement(before.poses, unsettled.state.poses) <= STEP_TOLERANCE
             idle = np.where(stays & is_short, idle + 1, 0)
         rounding_counts = kind.newton or step.knows_walls or start.balances
