@@ -155,7 +155,7 @@ class Candidates:
         if projected:
             for k in self._margins:
                 scans[k] = self.projected(k, relative[:, k])
-        for k, places in (self._widened if start.free and slots else self.bounded).items():
+        for k, places in (self.bounded if not start.free else self._widened if slots else self._free).items():
             kept, error = (slots[self._varying.index(k)].labels, width * self._edge_error) if slots else (None, 0.0)
             carrying = slots or (answered if start.guarded else ())
             carried = carrying[self._varying.index(k)].labels if carrying else None
@@ -205,9 +205,14 @@ class Candidates:
         return found
 
     @cached_property
+    def _free(self) -> dict[int, Meeting]:
+        """The meetings of bounded pairs, of free bodies."""
+        return {k: places.of_free_bodies() for k, places in self.bounded.items()}
+
+    @cached_property
     def _widened(self) -> dict[int, Meeting]:
-        """The meetings of bounded pairs, with places that count slightly beyond their edges."""
-        return {k: places.widened(self._edge_error) for k, places in self.bounded.items()}
+        """The meetings of bounded pairs, of free bodies, with places that count slightly beyond their edges."""
+        return {k: places.of_free_bodies(self._edge_error) for k, places in self.bounded.items()}
 
     @property
     def are_guarded(self) -> bool:

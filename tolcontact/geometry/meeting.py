@@ -9,7 +9,7 @@ plane, since the common normal of two rims can tilt without limit as they become
 
 A body that rests on another one with its end only is nominally behind the side of the other body, by the length of the
 overlap. If it penetrates, its corners are also behind that side, although it did not penetrate through it. Such contact points
-do not count where a neighbouring corner is already held by another facet.
+do not count where a neighbouring corner is already held by another facet. Free bodies have no such points.
 """
 
 import itertools
@@ -99,6 +99,7 @@ class Meeting:
     reach    bounds on the displacement of the bodies from their nominal poses
     size     [mm] of the larger face
     overhang [mm]: largest distance outside its edges at which a contact point counts
+    is_free  whether bodies are free, so that no contact point is behind another one
     """
 
     moving: Polyhedron
@@ -107,13 +108,14 @@ class Meeting:
     reach: Reach
     size: float
     overhang: float = field(default=0.0, kw_only=True)
+    is_free: bool = field(default=False, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.candidates.kinds)
 
-    def widened(self, overhang: float) -> "Meeting":
-        """Return the same candidates, which count up to `overhang` [mm] outside their edges."""
-        return replace(self, overhang=overhang)
+    def of_free_bodies(self, overhang: float = 0.0) -> "Meeting":
+        """Return the same candidates for bodies that are free; they count up to `overhang` [mm] outside their edges."""
+        return replace(self, overhang=overhang, is_free=True)
 
     @property
     def kinds(self) -> Int[Array, " c"]:
@@ -128,7 +130,7 @@ class Meeting:
             return None
         travel, tilt = EXTENSION_FACTOR * self.reach.travel, EXTENSION_FACTOR * (self.reach.tilt + TILT_MARGIN)
         extended = _meeting(self.moving, self.reference, self.reach._replace(travel=travel, tilt=tilt), self.size)
-        return None if extended is None else extended.widened(self.overhang)
+        return None if extended is None else replace(extended, overhang=self.overhang, is_free=self.is_free)
 
     @property
     def turn(self) -> float:
@@ -209,7 +211,7 @@ class Meeting:
         )
         places_kernel.find(
             *self._bodies, self.candidates,
-            np.array([self.reach.depth, self.reach.height, _passed(self.reach, self.size)]),
+            np.array([self.reach.depth, self.reach.height, np.inf if self.is_free else _passed(self.reach, self.size)]),
             kernel.MARGIN * self.size + self.overhang,
             np.array([error, self.reach.depth, nearness, self.overhang]),
             np.ascontiguousarray(X_RM), retained, DIRECTIONS, *places,
