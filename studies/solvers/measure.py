@@ -27,7 +27,7 @@ import qpsolvers
 from scipy.optimize import nnls
 
 import tolcontact as tc
-from tolcontact.compilation import conic_plugin, contact_qp
+from tolcontact.compilation import conic_plugin, program as compilation
 from tolcontact.compilation.graph import GraphSolver
 from tolcontact.compilation.solvers import SOLVERS, usable_solvers
 from tolcontact.mechanics.quiet import quiet
@@ -76,8 +76,8 @@ def models() -> dict[str, tc.Assembly]:
 
 def problems(assembly: tc.Assembly, realizations: int) -> list[Problem]:
     """Return the QPs of the first linear step, with a row for every contact point of the first group."""
-    kept = contact_qp.standing_points  # type: ignore[attr-defined, method-assign]
-    contact_qp.standing_points = lambda pair, *_: np.arange(len(pair.P_m))  # type: ignore[attr-defined, method-assign]
+    kept = compilation.standing_points  # type: ignore[attr-defined, method-assign]
+    compilation.standing_points = lambda pair, *_: np.arange(len(pair.P_m))  # type: ignore[attr-defined, method-assign]
     found: list[Problem] = []
     solve = conic_plugin.ConicSolver.__call__
 
@@ -92,7 +92,7 @@ def problems(assembly: tc.Assembly, realizations: int) -> list[Problem]:
         program = tc.build(assembly, solver="daqp", method=tc.Method(resolution="linearized"))
         simulate_block(program, draw(program.nominal, seed=1, start=0, stop=realizations))
     finally:
-        contact_qp.standing_points = kept  # type: ignore[attr-defined, method-assign]
+        compilation.standing_points = kept  # type: ignore[attr-defined, method-assign]
         conic_plugin.ConicSolver.__call__ = solve  # type: ignore[method-assign]
     functions = program.groups[0].qp
     h, a = functions.sparsity("h"), functions.sparsity("a")
