@@ -95,15 +95,14 @@ def repeat(
         if before is not None:
             is_short = free_steps.shorten(step, unsettled.task, before, unsettled.state, size) & (size > STEP_TOLERANCE)
             stays = limits.displacement(before.poses, unsettled.state.poses) <= STEP_TOLERANCE
-            idle = np.where(stays & is_short, idle + 1, 0)
+            idle = np.where(is_short & stays, idle + 1, 0)
         rounding_counts = kind.newton or step.knows_walls or start.balances
         moves = is_short | (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
         if kind.width > 1:
             moves |= ~candidates.hold(unsettled.task, unsettled.state, start)
         # The smaller size counts: steps are large in unconstrained freedoms, and in the norm of the objective if
         # Newton's curvature is stiff.
-        unrest = np.minimum(size, scaled)
-        residual = unsettled.state.kkt_residual
+        unrest, residual = np.minimum(size, scaled), unsettled.state.kkt_residual
         residual[~moves] = np.maximum(residual[~moves], unrest[~moves])
         lost = moves & (limits.is_lost(unsettled.task, unsettled.state) | (idle >= MAX_IDLE))
         if kind.width > 1 and not kind.newton:
