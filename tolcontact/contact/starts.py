@@ -11,6 +11,7 @@ The status follows from the answer that is left: certified, a conflict (not asse
 from typing import NamedTuple
 
 STRIDE, SMALL_STRIDE = 0.5, 0.05  # rad: the largest rotation of a part in one step; linear rows lose accuracy long before
+SHORT_STRIDES = 0.01, 0.002  # rad: steps that follow a path
 
 
 class Start(NamedTuple):
@@ -68,5 +69,15 @@ RESCUES = (
     Rescue("uncertain or far", "flat", (Start(at_nominal=True), Start(stride=SMALL_STRIDE))),
     Rescue("not separated", "convex", (Start(parted=True), Start(parted=True, stride=SMALL_STRIDE))),
     Rescue("uncertain", "guarded", (Start(free=True, at_nominal=True),)),
-    Rescue("uncertain", "guarded", (FREE_WHERE_RAW,)),
+    # Steps of free bodies may end between two sets of places. The path of short steps from the first answer often avoids this.
+    Rescue(
+        "uncertain",
+        "guarded",
+        (
+            FREE_WHERE_RAW,
+            Start(free=True, at_answer=True),
+            *(Start(guarded=True, at_answer=True, stride=stride) for stride in SHORT_STRIDES),
+            Start(guarded=True, stride=SHORT_STRIDES[0]),
+        ),
+    ),
 )

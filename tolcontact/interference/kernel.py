@@ -269,11 +269,11 @@ def _passes_facet(side, f, p, q, start, end, shares, senses):  # type: ignore[no
 
 
 @uncounted
-def _passes_listed(side, f, p, q, shares, senses):  # type: ignore[no-untyped-def]
-    """Return whether the segment from p to q passes a facet, or any other one near it if the facet is not flat."""
-    start, end = _heights(side, f, p, q)
-    if start * end > 0.0 or start == end:
-        return False
+def _passes_listed(side, f, p, q, start, end, shares, senses):  # type: ignore[no-untyped-def]
+    """Return whether the segment from p to q passes a facet, or any other one near it if the facet is not flat.
+
+    start, end   heights of p and q over its plane, which have opposite signs
+    """
     first, last = side.first_members[f], side.first_members[f + 1]
     if last - first > MANY:
         if side.facets[f, 9] == side.facets[f, 9]:
@@ -304,7 +304,11 @@ def _passes_any(owner, target, X, is_forward, motion, shares, senses):  # type: 
         for m in range(owner.starts[j], owner.starts[j + 1]):
             if owner.reaches[m] > motion:
                 break
-            if _passes_listed(target, owner.listed[m], p, q, shares, senses):
+            # Here, since a call takes much longer than this.
+            start, end = _heights(target, owner.listed[m], p, q)
+            if start * end > 0.0 or start == end:
+                continue
+            if _passes_listed(target, owner.listed[m], p, q, start, end, shares, senses):
                 return True
     return False
 
