@@ -7,7 +7,7 @@ from studies.certificates.coincidences import judged, quick_builds
 from studies.certificates.placements import scene
 
 SAMPLES = 12
-# Checks of the shapes of all arrays take several times as long as the rest: two realizations reach every function of these steps.
+# Shape checks take several times as long as the rest, so that only two realizations of some scenes have them.
 CHECKED_SAMPLES = 2
 LONG = [("keys", 66, SAMPLES), ("combs", 39, SAMPLES), ("keys", 110344, 20)]
 
