@@ -105,14 +105,12 @@ def test_far_answers_are_not_certified():
     """With a limit of half a degree, hardly any answer of a tower is near."""
     max_turn = np.radians(0.5)
     program, free = simulate(cases.model("tower"), samples=25, solver="daqp", method=ALL_POINTS)
-    far = largest_turn(free) > max_turn
-    assert far.sum() > 8
-    # Each far realization is tried from all starts: a third of them, and all others.
-    rows = np.sort(np.concatenate([np.flatnonzero(~far), np.flatnonzero(far)[::3]]))
     resolvers = [ContactResolver(program, group, max_turn=max_turn) for group in program.groups]
-    run, far = vars(simulate_block(program, free["deviations"][rows], resolvers=resolvers)), far[rows]
+    run = vars(simulate_block(program, free["deviations"], resolvers=resolvers))
+    far = largest_turn(free) > max_turn
+    assert far.sum() > 2
     assert (run["status"][far] == Status.DOUBTFUL).all() and (run["starts"][far] == 5).all()
-    assert (run["status"][~far] == free["status"][rows][~far]).all()
+    assert (run["status"][~far] == free["status"][~far]).all()
     assert largest_turn(run)[run["status"] == Status.RESOLVED].max() <= max_turn
 
 
