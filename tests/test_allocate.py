@@ -15,11 +15,11 @@ from tests.helpers import PAPER, call, nightly
 
 
 def pile(*ranges, tolerance=1.0):
-    """Blocks on each other whose heights add up: the top is the sum of independent deviations."""
+    """Blocks, each located on the one below and never near it: the top is the sum of independent deviations."""
     a = tc.Assembly("pile")
     below = None
     for k, width in enumerate(ranges):
-        part = a.part(f"p{k}", tc.Box(10, 10, 10), at=(0, 0, 10 * k))
+        part = a.part(f"p{k}", tc.Box(10, 10, 10), at=(0, 0, 20 * k))
         a.locate(part, cases.translating(width), on=below)
         below = part
     a.measure("top", below.point(5, 5, 10), along="z", tolerance=tolerance)

@@ -120,34 +120,39 @@ def errors_of_the_v(program, run):
     return run["measured"][:, CORRECTED, 0] - (left + right) / np.sqrt(2)
 
 
-def told(make, **options):
-    """A simulation, and what it warned of."""
+def built(model):
+    """A program whose contact points stay where they are, and the warnings of its build about coarse points."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", tc.NominalWarning)
-        program, run = simulate(make, build=tc.build, **options)
-    return program, run, [text for one in caught if (text := str(one.message)).startswith("[coarse]")]
+        program = tc.build(model, solver="daqp", method=SEATED_ON_POINTS)
+    return program, [text for one in caught if (text := str(one.message)).startswith("[coarse]")]
+
+
+@pytest.fixture(scope="module")
+def shaft_on_points():
+    """A shaft whose round faces are overruled by a number of points, and the warnings about them."""
+    return built(cases.shaft_in_a_v(720, points=200))
 
 
 @pytest.mark.slow
-def test_a_shaft_on_sampled_points_is_off_and_a_warning_says_by_how_much():
-    """Of round faces that were overruled by a number of points."""
-    program, run, warned = told(cases.shaft_in_a_v(1000, points=200), samples=100, solver="daqp", method=SEATED_ON_POINTS)
+def test_a_shaft_on_sampled_points_is_off_and_a_warning_says_by_how_much(shaft_on_points):
+    program, warned = shaft_on_points
+    run = joined(simulate_blocks(program, samples=100, seed=1))
     assert np.abs(errors_of_the_v(program, run)).max() > 0.01
     assert len(warned) == 2 and "between its contact points" in warned[0] and 'contact pair "left wall"' in warned[0]
-    program, run, warned = told(cases.shaft_in_a_v(64), samples=100, solver="daqp", method=SEATED_ON_POINTS)
+    program, warned = built(cases.shaft_in_a_v(64))
+    run = joined(simulate_blocks(program, samples=100, seed=1))
     assert np.abs(errors_of_the_v(program, run)).max() < 1e-9 and not warned
 
 
 @pytest.mark.slow
-def test_surfaces_are_checked_between_contact_points(tmp_path):
+def test_surfaces_are_checked_between_contact_points(shaft_on_points, tmp_path):
     """A shaft on few points sinks into the walls; the archive says how deep, and the true answer agrees."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", r"\[coarse\]")
-        program = tc.build(cases.shaft_in_a_v(720, points=200), solver="daqp", method=SEATED_ON_POINTS)
-        with tc.run(program, samples=60, out=tmp_path / "v.nc", surfaces=20) as results:
-            surface, summary = results["surface"].to_dataset().load(), tc.summarize(results)
-            corrected = results.to_dataset().sel(state="corrected")[["rotation", "translation"]].load()
-        again = tc.run(program, samples=60, keep="measures", surfaces=20)
+    program, _ = shaft_on_points
+    with tc.run(program, samples=60, out=tmp_path / "v.nc", surfaces=20) as results:
+        surface, summary = results["surface"].to_dataset().load(), tc.summarize(results)
+        corrected = results.to_dataset().sel(state="corrected")[["rotation", "translation"]].load()
+    again = tc.run(program, samples=60, keep="measures", surfaces=20)
     rows = surface["realization_checked"].values
     assert len(set(rows)) == 20 and (np.diff(rows) > 0).all() and rows.min() >= 0 and rows.max() < 60
     # The round shaft, from the poses: how deep its ends lie under the planes of the walls.

@@ -76,7 +76,7 @@ def test_long_tables_of_analyses_are_folded_after_fifteen_rows(tmp_path):
     block = a.part("block", tc.Box(60, 40, 10))
     a.locate(block, cases.translating(0.1))
     for number in range(20):
-        part = a.part(f"p{number}", tc.Box(5, 5, 5))
+        part = a.part(f"p{number}", tc.Box(5, 5, 5), at=(10 * number, 50, 0))
         a.locate(part, tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x")), tolerance=0.1, on=block)
     a.measure("sum", lambda poses: sum(poses.translation(part)[2] for part in a.parts[1:]), tolerance=3)
     path = tmp_path / "many.nc"

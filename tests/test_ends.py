@@ -1,5 +1,6 @@
 """Bodies touch as they end: no contact beside a face, none missed at tips and edges, judged by exact distances of polyhedra."""
 
+import functools
 import io
 from dataclasses import replace
 
@@ -13,13 +14,28 @@ import tolcontact as tc
 from models import tower
 from studies.certificates.ends import METHOD, Convex, judged, piece, scene, separation
 from tests.cases.ends import CASES, case, whole_case
-from tests.helpers import PAPER, compiled, nightly, simulate
+from tests.helpers import PAPER, compiled, joined, nightly, simulate
 from tolcontact import poses as pose
+from tolcontact.compilation import compile_program
 from tolcontact.contact import ContactResolver
+from tolcontact.discretization import discretize
 from tolcontact.geometry.meeting import Reach, meeting
 from tolcontact.geometry.surface import Surface
 from tolcontact.report import summary_text
-from tolcontact.simulation.block import simulate_block
+from tolcontact.simulation import simulate_block, simulate_blocks
+
+
+@functools.cache
+def nominal_case(name):
+    """The nominal assembly of a case, which is the same for all methods that press no parts, and the pieces of its bodies."""
+    assembly, bodies = case(name)
+    return discretize(assembly), bodies
+
+
+def program_of(name, method=METHOD, solver="daqp"):
+    assert not method.minimizes.presses
+    return compile_program(nominal_case(name)[0], solver, method)
+
 
 FAULTS = ("false contact", "missed contact", "lifted off", "inside")
 
@@ -59,8 +75,8 @@ def printed(summary):
     return console.export_text()
 
 
-def assert_right(assembly, bodies, samples, seed=1, solver="daqp", doubted=0):
-    counts, _ = judged(assembly, bodies, samples, seed, solver)
+def assert_right(model, bodies, samples, seed=1, solver="daqp", doubted=0):
+    counts, _ = judged(model, bodies, samples, seed, solver)
     assert {name: counts[name] for name in FAULTS} == dict.fromkeys(FAULTS, 0)
     assert counts["certified"] >= samples - doubted
     return counts
@@ -69,7 +85,7 @@ def assert_right(assembly, bodies, samples, seed=1, solver="daqp", doubted=0):
 @pytest.mark.parametrize("samples", [30, *nightly(60)])
 @pytest.mark.parametrize("name", CASES)
 def test_every_certificate_holds_for_the_bodies(name, samples):
-    assert_right(*case(name), samples=samples)
+    assert_right(program_of(name), nominal_case(name)[1], samples=samples, solver=None)
 
 
 @pytest.mark.parametrize("name", ["dovetail", "pin at a rim", *nightly("nut over a washer")])
@@ -81,29 +97,31 @@ def test_no_certificate_of_whole_bodies_is_wrong(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["cone", *nightly("crossing roofs", "needles, tilted")])
 def test_another_solver_certifies_the_same(name):
-    assert_right(*case(name), samples=40, solver="qpoases")
+    assert_right(program_of(name, solver="qpoases"), nominal_case(name)[1], samples=40, solver=None)
 
 
 def test_fixed_planes_would_have_been_wrong():
     """The judge finds what it is there for: planes that do not end hold a plate beside a chamfer, and let a tip sink in."""
-    method = replace(METHOD, search="fixed")
-    chamfer, _ = judged(*case("chamfer", method=method), 60, 1, "daqp")
-    tip, _ = judged(*case("cone", method=method), 60, 1, "daqp")
+    programs = {name: program_of(name, replace(METHOD, search="fixed")) for name in ("chamfer", "cone")}
+    chamfer, tip = (judged(program, nominal_case(name)[1], 60, 1, None)[0] for name, program in programs.items())
     assert chamfer["false contact"] > 10
     assert tip["inside"] > 10
 
 
 @pytest.mark.parametrize("selection", [None, lambda c, n: n[:, 2] > 0.9])
 def test_a_plate_that_slides_clear_of_a_chamfered_block_is_never_touched(selection):
-    assembly, _ = case("chamfer without clearance")
-    if selection is not None:
-        block, plate = assembly.parts
-        assembly.contact("top alone", moving=plate.face("-z"), reference=block.face(selection))
-    run = tc.run(assembly, samples=300, seed=2, surfaces=0, fields="none")
+    if selection is None:
+        model = program_of("chamfer without clearance", solver="qpoases")
+    else:
+        model, _ = case("chamfer without clearance")
+        block, plate = model.parts
+        model.contact("top alone", moving=plate.face("-z"), reference=block.face(selection))
+    run = tc.run(model, samples=300, seed=2, surfaces=0, fields="none")
     assert (run.status == 0).all()
     assert np.array_equal(run.measured.sel(state="raw"), run.measured.sel(state="corrected"))
 
 
+@pytest.mark.slow
 def test_few_points_over_a_rib_lose_nothing():
     """Three points in a row: about their line the plate may turn far, at no cost to the objective; that is not certified."""
     assert_right(*case("rib", points=20), samples=60, doubted=2)
@@ -183,7 +201,7 @@ def test_contact_of_planes_where_bodies_are_apart_is_measured_and_the_advice_hel
         with pytest.warns(
             tc.errors.ContactWarning, match=f'contact pair "contact": contact was resolved where .* apart.*; .*{advice}'
         ):
-            fixed = tc.run(case("chamfer", method=method)[0], samples=200, seed=1)
+            fixed = tc.run(program_of("chamfer", method, solver="qpoases"), samples=200, seed=1)
         summary, told = tc.summarize(fixed), printed(tc.summarize(fixed))
         assert 0.05 < float(summary.false_contact.max()) < 0.4
         assert 'contact pair "contact": points lie up to' in told and advice in told
@@ -193,7 +211,7 @@ def test_contact_of_planes_where_bodies_are_apart_is_measured_and_the_advice_hel
         assert share == (fixed["surface"].false_contact.values[at_random] > 0.006).mean()
         assert 0 < float(summary.contacts_ended) <= float(summary.contacts)
         assert f"{float(summary.contacts_ended):.0f} of {float(summary.contacts):.0f} touching contact points" in told
-    bounded = tc.run(case("chamfer")[0], samples=200, seed=1)
+    bounded = tc.run(program_of("chamfer", solver="qpoases"), samples=200, seed=1)
     assert np.isnan(tc.summarize(bounded).false_contact).all()
     assert "apart" not in printed(tc.summarize(bounded))
 
@@ -221,15 +239,17 @@ def test_contact_of_faces_that_do_not_end_is_not_called_false():
     assert float(tc.summarize(run).false_contact.max()) == 0
 
 
+@pytest.mark.slow
 def test_a_turn_that_contact_barely_holds_is_doubted():
     """The points over a steep cone lie in nearly one place: of few of them that are active, the plate may turn over the tip."""
-    program, run = simulate(case("steep cone", method=tc.Method(objective="active points"))[0], samples=200, solver="daqp")
+    program = program_of("steep cone", tc.Method(objective="active points"))
+    run = joined(simulate_blocks(program, samples=200, seed=1))
     (places,) = program.meetings.values()
     turns = pose.turn(run["poses"][:, 1, 1], run["poses"][:, 0, 1])
     certified = np.isin(run["status"], [tc.Status.UNTOUCHED, tc.Status.RESOLVED])
     assert (turns > 0.7).sum() > 10 and turns[certified].max() < 2 * places.turn < 0.3
     assert (run["status"][~certified] == tc.Status.DOUBTFUL).all()
-    _, run = simulate(case("steep cone", method=tc.Method())[0], samples=200, solver="daqp")
+    run = joined(simulate_blocks(program_of("steep cone", tc.Method()), samples=200, seed=1))
     assert run["status"].max() == tc.Status.RESOLVED
 
 
@@ -273,6 +293,7 @@ def test_answers_do_not_depend_on_which_of_two_near_places_carries():
     assert graph.poses == pytest.approx(daqp.poses, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blocks", [24, *nightly(48)])
 def test_rounds_of_a_step_do_not_grow_with_the_bodies(blocks):
     """Which places wait beside a deeper one hangs on how far deviations move a pair, not on the length of the chain."""

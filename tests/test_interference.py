@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
+from tests.helpers import compiled
 from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.interference import Neighbours, deviating_solid, solid
@@ -186,7 +187,7 @@ def radii(run, bodies, part="upper"):
 @pytest.mark.parametrize("start", [-10, -12])
 def test_a_ridge_that_ends_below_a_plate_is_in_no_certified_plate(start):
     model, bodies = set_down(PLATE, [(start, 0, 0), *ROOF[1:]])
-    depths = radii(simulated(tc.build(model, solver="daqp"), 150), bodies)
+    depths = radii(simulated(compiled(model, solver="daqp"), 150), bodies)
     assert len(depths) == 150 and np.nanmax(depths) < 1e-6
 
 
@@ -197,7 +198,7 @@ def test_a_ridge_that_ends_below_a_plate_is_in_no_certified_plate(start):
 )
 def test_a_kind_of_place_that_the_search_lacks_is_noticed(kind, moving, fixed, monkeypatch):
     model, bodies = set_down(moving, fixed)
-    program = tc.build(model, solver="daqp")
+    program = compiled(model, solver="daqp")
     meeting = program.meetings[0]
     lacking = LackingMeeting(**{field.name: getattr(meeting, field.name) for field in fields(Meeting)}, lacks=kind)
     program = replace(program, meetings={0: lacking})

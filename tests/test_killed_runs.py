@@ -14,15 +14,27 @@ from tolcontact.errors import ArchiveError
 pytestmark = pytest.mark.slow
 
 
+@pytest.fixture(scope="module")
+def program():
+    return tc.build(cases.stack(), solver="daqp")
+
+
+@pytest.fixture(scope="module")
+def whole(program, tmp_path_factory):
+    """The archive of a run of 20 000 realizations that nothing ended."""
+    path = tmp_path_factory.mktemp("whole") / "whole.nc"
+    tc.run(program, samples=20_000, seed=3, out=path).close()
+    return path
+
+
 @pytest.mark.parametrize(("after", "keep"), [(4096, "all"), *nightly((12_000, "measures"))])
-def test_a_killed_run_keeps_its_rows_and_goes_on(after, keep, tmp_path):
+def test_a_killed_run_keeps_its_rows_and_goes_on(after, keep, program, whole, tmp_path):
     path = tmp_path / "killed.nc"
     with start(script("run_stack", path, 20_000, "--keep", keep)) as begun:
         for line in begun.stdout:
             if int(line) >= after:
                 break
         begun.kill()
-    program = tc.build(cases.stack(), solver="daqp")
     row_bytes = bytes_of_rows(program.nominal, keep, 1) - 8  # without the number of the realization
     written = path.with_name(".killed.nc.rows").stat().st_size / row_bytes
     assert after <= written < 20_000
@@ -30,13 +42,14 @@ def test_a_killed_run_keeps_its_rows_and_goes_on(after, keep, tmp_path):
     with xr.open_dataset(path) as resumed:
         at = int(re.search(r"resumed after (\d+) realizations", resumed.attrs["history"]).group(1))
         assert at % 4096 == 0 and at <= written
-    whole = tmp_path / "whole.nc"
-    tc.run(cases.stack(), samples=20_000, seed=3, solver="daqp", out=whole, keep=keep).close()
+    if keep != "all":
+        whole = tmp_path / "whole.nc"
+        tc.run(program, samples=20_000, seed=3, out=whole, keep=keep).close()
     for group in (None, "sample", "contact", "field/middle"):
         assert contents(path, group).identical(contents(whole, group)), group
 
 
-def test_a_journal_that_was_damaged_is_refused_and_left_alone(tmp_path):
+def test_a_journal_that_was_damaged_is_refused_and_left_alone(program, tmp_path):
     path = tmp_path / "killed.nc"
     with start(script("run_stack", path, 12_000)) as begun:
         for line in begun.stdout:
@@ -58,11 +71,11 @@ def test_a_journal_that_was_damaged_is_refused_and_left_alone(tmp_path):
         checkpoint.write_bytes(its_state)
         before = {file.name: file.read_bytes() for file in (path, rows, checkpoint) if file.exists()}
         with pytest.raises(ArchiveError, match=r'is damaged: it has realizations .* delete "\.killed\.nc\.rows" and'):
-            tc.run(cases.stack(), samples=12_000, seed=3, solver="daqp", out=path, resume=True)
+            tc.run(program, samples=12_000, seed=3, out=path, resume=True)
         assert {file.name: file.read_bytes() for file in (path, rows, checkpoint) if file.exists()} == before
     for file in (rows, checkpoint):
         file.unlink()
-    with tc.run(cases.stack(), samples=200, seed=3, solver="daqp", out=path, resume=True) as results:
+    with tc.run(program, samples=200, seed=3, out=path, resume=True) as results:
         assert results.sizes["realization"] == 12_000
 
 
@@ -73,12 +86,12 @@ def test_a_run_may_be_killed_at_any_of_its_writes(step, tmp_path):
 
 
 @pytest.mark.parametrize("how", ["resume", *nightly("overwrite")])
-def test_an_archive_is_not_taken_from_the_run_that_writes_it(how, tmp_path):
+def test_an_archive_is_not_taken_from_the_run_that_writes_it(how, program, tmp_path):
     path = tmp_path / "live.nc"
     with start(script("run_stack", path, 1000, "--step")) as begun:
         begun.stdout.readline()
         with pytest.raises(ArchiveError, match="being written by another run"):
-            tc.run(cases.stack(), samples=1000, seed=3, solver="daqp", out=path, **{how: True})
+            tc.run(program, samples=1000, seed=3, out=path, **{how: True})
         done = finish(begun, "go on\n")
     assert done.returncode == 0
     with tc.open_archive(path) as tree:
@@ -86,11 +99,9 @@ def test_an_archive_is_not_taken_from_the_run_that_writes_it(how, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["live.nc"]
 
 
-def test_a_full_disk_is_told_and_the_run_goes_on_when_there_is_room(tmp_path):
+def test_a_full_disk_is_told_and_the_run_goes_on_when_there_is_room(program, whole, tmp_path):
     path = tmp_path / "full.nc"
     assert run(script("run_on_a_full_disk", path)).returncode == 7
-    tc.run(cases.stack(), samples=20_000, seed=3, solver="daqp", out=path, resume=True).close()
-    whole = tmp_path / "whole.nc"
-    tc.run(cases.stack(), samples=20_000, seed=3, solver="daqp", out=whole).close()
+    tc.run(program, samples=20_000, seed=3, out=path, resume=True).close()
     assert contents(path).identical(contents(whole))
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["full.nc", "whole.nc"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["full.nc"]

@@ -5,6 +5,7 @@ import pytest
 
 import tolcontact as tc
 from tests.cases import stations as cases
+from tests.helpers import compiled
 from tolcontact.simulation import simulate_block
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
@@ -12,7 +13,7 @@ SIGMA = 0.1
 
 
 def simulated(line, samples=300, solver="daqp", **options):
-    program = tc.build(line, solver=solver, **options)
+    program = compiled(line, solver=solver, **options)
     return program, next(iter(tc.simulate_blocks(program, samples=samples, seed=1)))
 
 
@@ -115,7 +116,7 @@ def whole(objective):
 
 @pytest.mark.parametrize("objective", ["all points", "active points", "locator stiffness"])
 def test_a_joint_moves_as_one_part_of_its_shape_does(objective):
-    single, joint = (tc.build(model, solver="daqp") for model in whole(objective))
+    single, joint = (compiled(model, solver="daqp") for model in whole(objective))
     d = single.draws(seed=1, start=0, stop=100)
     deviations = np.zeros((100, len(joint.nominal.contributors)))
     deviations[:, -6:] = d

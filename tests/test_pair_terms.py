@@ -1,5 +1,6 @@
 """A QP whose terms are summed over its pairs, in Functions that are called, is the QP of the whole group."""
 
+import functools
 from dataclasses import dataclass, field, replace
 from itertools import product
 
@@ -8,7 +9,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import EXACT, PAPER, ROOT, joined, nightly, simulate
+from tests.helpers import EXACT, PAPER, ROOT, compiled, joined, nightly, simulate
 from tolcontact.compilation import ContactGroup
 from tolcontact.compilation.calls import FunctionCalls, inline
 from tolcontact.compilation.contact_qp import ENERGY_INPUTS, ContactQP, Evaluators, contact_qp
@@ -110,7 +111,7 @@ def recorded(program, samples):
 
 def both_ways(model, samples, method):
     """Runs of a model by the functions of whole groups, and by sums over pairs."""
-    program, runs = tc.build(model, solver="daqp", method=method), []
+    program, runs = compiled(model, solver="daqp", method=method), []
     for is_summed in (False, True):
         groups = []
         for group in program.groups:
@@ -147,7 +148,7 @@ def test_sums_over_pairs_give_what_the_whole_function_gives(name, method):
 )  # fmt: skip
 def test_summed_functions_equal_the_functions_of_the_whole(name, objective):
     model = pressed(3, name) if name.endswith(("faces", "locators")) else cases.model(name)
-    program = tc.build(model, solver="daqp", method={"objective": objective})
+    program = compiled(model, solver="daqp", method={"objective": objective})
     whole = recorded(program, 8)
     group = program.groups[0].group
     summed = qp_of(program, group, whole.standing, is_summed=True)
@@ -183,17 +184,22 @@ def called(qp):
     return [function.name() for function in qp.assemble.find_functions(0)]
 
 
+@functools.cache
+def called_for_tower(blocks):
+    return called(compiled(tower(blocks)).groups[0].qp)
+
+
 def test_functions_are_shared_by_bodies_however_many():
-    names = [called(tc.build(tower(blocks)).groups[0].qp) for blocks in (6, 9)]
+    names = [called_for_tower(blocks) for blocks in (6, 9)]
     assert names[0] == names[1]
     assert names[0].count("pair_terms") == 2  # a joint with the ground, and one between two blocks
     # The first three joints differ, since the second block is located on the first one.
-    names = [called(tc.build(pressed(blocks, "springy faces")).groups[0].qp) for blocks in (6, 9)]
+    names = [called(compiled(pressed(blocks, "springy faces")).groups[0].qp) for blocks in (6, 9)]
     assert names[0].count("pair_terms") == names[1].count("pair_terms") == 4
 
 
 def test_few_bodies_have_one_function():
-    assert not called(tc.build(tower(5)).groups[0].qp)
-    assert called(tc.build(tower(6)).groups[0].qp)
+    assert not called_for_tower(5)
+    assert called_for_tower(6)
     by_origin = tc.Method(objective="all points", regularization="identity")
-    assert not called(tc.build(tower(6), method=by_origin).groups[0].qp)
+    assert not called(compiled(tower(6), method=by_origin).groups[0].qp)

@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests.cases import MODELS, stations as cases
+from tests.helpers import compiled
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import ModelError
 
@@ -14,7 +15,7 @@ HALF_NORMAL_MEAN, HALF_NORMAL_VARIANCE = np.sqrt(0.5 / np.pi), (1 - 1 / np.pi) /
 
 
 def measured(model, samples=400, seed=1, **options):
-    program = tc.build(model, solver="daqp", **options)
+    program = compiled(model, solver="daqp", **options)
     values = np.concatenate([block.measured for block in tc.simulate_blocks(program, samples=samples, seed=seed, threads=1)])
     return {measure.name: values[:, :, k] for k, measure in enumerate(program.nominal.measures)}
 
@@ -55,7 +56,7 @@ def test_three_parts_in_two_stations():
 
 @pytest.mark.parametrize("width", [0.5, 2.0, 10.0])
 def test_poses_are_handed_over_as_a_computation_outside_the_package_composes_them(width):
-    program = tc.build(cases.three_stations(width, contact=False), solver="daqp")
+    program = compiled(cases.three_stations(width, contact=False), solver="daqp")
     block = next(iter(tc.simulate_blocks(program, samples=500, seed=3)))
     nominal, poses = program.nominal, block.poses[:, 0].reshape(500, -1, 12)
     R, t = {}, {}
@@ -156,7 +157,7 @@ def test_a_fixture_is_a_part_with_locators_and_features_of_its_own():
     check.locate(ab, [*pins, *cases.held(a)], tolerance=0.006, on=top)
     check.measure("end", b.point(90, 10, 10), along="z")
     check.measure("top", top.point(150, 10, 10), along="z")
-    program = tc.build(line, solver="daqp")
+    program = compiled(line, solver="daqp")
     block = next(iter(tc.simulate_blocks(program, samples=500, seed=1)))
     end, under = block.measured[:, 0].T
     pin = block.deviations[:, program.nominal.contributors.index("check.ab.A3")]
