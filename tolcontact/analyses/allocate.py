@@ -11,8 +11,7 @@ import scipy
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Progress
-from tolcontact.analyses.grouping import owners
+from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Progress, owners
 from tolcontact.analyses.requirement import MIN_DECISIVE, Requirement
 from tolcontact.analyses.scaled_trials import STEP, ChangedRows, ScaledTrials, Trial, effect_samples, narrowing_effects
 from tolcontact.compilation import Program

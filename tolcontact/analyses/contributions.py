@@ -15,9 +15,8 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import Analysis, Engine, Progress
+from tolcontact.analyses.analysis import Analysis, Engine, Progress, independent_groups, owners
 from tolcontact.analyses.designs import MixedDraws, ReleasedDraws
-from tolcontact.analyses.grouping import independent_groups, owners
 from tolcontact.analyses.linear_model import total_derivatives
 from tolcontact.compilation import Program
 from tolcontact.simulation import Block

@@ -18,8 +18,8 @@ from tolcontact.limits import Limits
 from tolcontact.statistics import intervals, two_samples
 from tolcontact.statistics.capability import share_outside
 from tolcontact.statistics.intervals import Estimate
+from tolcontact.statistics.measure_statistics import StatisticRequest
 from tolcontact.statistics.sample import Sample
-from tolcontact.statistics.statistic_request import StatisticRequest
 from tolcontact.workflow.models import DEFAULT_SOLVER, Choice, Model
 
 GRID_POINTS = {1: 9, 2: 5, 3: 4}  # trial positions along each side, by the number of sides

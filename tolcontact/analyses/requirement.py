@@ -10,8 +10,8 @@ from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
 from tolcontact.statistics.capability import by_percentiles, share_outside
 from tolcontact.statistics.intervals import Estimate
+from tolcontact.statistics.measure_statistics import VALUE, StatisticRequest
 from tolcontact.statistics.sample import Sample
-from tolcontact.statistics.statistic_request import VALUE, StatisticRequest
 from tolcontact.vocabulary import PPK, PPM
 
 TAIL, HEAD = 0.00135, 0.99865

@@ -7,8 +7,7 @@ import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.datum_values import datum_sizes, datum_values
-from tolcontact.archive.form_values import form_sizes, form_values
+from tolcontact.archive.form_values import datum_sizes, datum_values, form_sizes, form_values
 from tolcontact.archive.rows import Row, kept_rows
 from tolcontact.archive.settings import Run, declaration, now, run_settings, versions, watch_settings
 from tolcontact.archive.stored_rows import empty_checks

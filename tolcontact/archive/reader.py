@@ -11,7 +11,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive.inspection import check_archive
-from tolcontact.archive.netcdf_library import small_caches
+from tolcontact.archive.variables import small_caches
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.document import from_document
 from tolcontact.errors import ArchiveError

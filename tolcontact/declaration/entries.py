@@ -17,7 +17,6 @@ from tolcontact.declaration.contact_pair import ContactPair, Force
 from tolcontact.declaration.dependence import Correlation, Population, Variable
 from tolcontact.declaration.face_entries import FREE_DIRECTION, MEASURED, UNIT_VECTOR, Writing, feature_named
 from tolcontact.declaration.feature_tolerance import KINDS, GeometricTolerance
-from tolcontact.declaration.form import Form
 from tolcontact.declaration.geometry import Box, Mesh, Pin
 from tolcontact.declaration.joint import Joint, Overlap
 from tolcontact.declaration.locator import USUAL_STIFFNESS, Location, Locator, ThreeTwoOne
@@ -26,7 +25,7 @@ from tolcontact.declaration.part import DatumTargets, Face, Feature, Part, Patte
 from tolcontact.declaration.place import Place
 from tolcontact.declaration.record import Field, Record
 from tolcontact.declaration.sequence import Station
-from tolcontact.declaration.size import Size
+from tolcontact.declaration.size import Form, Size
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
 from tolcontact.method import ACTIVE_SETS, OBJECTIVES, REGULARIZATIONS, RESOLUTIONS, SEARCHES, Method

@@ -6,7 +6,7 @@ from dataclasses import KW_ONLY, dataclass
 from typing import Any, ClassVar
 
 from tolcontact.declaration.checks import LENGTH, LENGTH_OR_0, TRUTH, Check, Checked, direction_faults, one_of
-from tolcontact.declaration.form import Form
+from tolcontact.declaration.size import Form
 from tolcontact.declaration.values import Vector, direction as _direction, is_length
 from tolcontact.readable import Readable
 

@@ -10,8 +10,7 @@ from tolcontact.declaration import Assembly, Cylinder, Face, Feature, Part, Pin,
 from tolcontact.declaration.part import face_of
 from tolcontact.declaration.values import script_line
 from tolcontact.errors import GeometryFault, ModelError
-from tolcontact.fasteners.checks import check_types, reference_faults, station_faults
-from tolcontact.fasteners.fit import INTO, SEAT, Fit, made_fit, part_fit
+from tolcontact.fasteners.fit import INTO, SEAT, Fit, check_types, made_fit, part_fit, reference_faults, station_faults
 from tolcontact.fasteners.location import DIGITS, in_part, locate
 from tolcontact.fasteners.placed_faces import PlacedCylinder, placed_cylinder, placed_plane
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from tolcontact.declaration.form import Form
+from tolcontact.declaration.size import Form
 from tolcontact.errors import GeometryFault
 from tolcontact.features.associated_features import AssociatedSurface, displacement_terms
 from tolcontact.features.covariances import Lengths

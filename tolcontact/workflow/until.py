@@ -10,7 +10,7 @@ from tolcontact.archive import open_unchecked
 from tolcontact.compilation import Program
 from tolcontact.simulation import block_rows
 from tolcontact.statistics import STATISTICS, estimate_of
-from tolcontact.statistics.statistic_request import HALF_WIDTH, StatisticRequest
+from tolcontact.statistics.measure_statistics import HALF_WIDTH, StatisticRequest
 from tolcontact.vocabulary import OUTSIDE, PPM
 
 MIN_GROWTH, MAX_GROWTH = 1.25, 16.0
