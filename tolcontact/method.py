@@ -1,14 +1,18 @@
 """The named choices of how contact is resolved. They decide the answer, so every archive carries them."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal, get_args
 
 from tolcontact.errors import OptionError
 
-RESOLUTIONS = ("linearized", "exact")
-REGULARIZATIONS = ("points", "identity")
-ACTIVE_SETS = ("closed", "initial")
-SEARCHES = ("fixed", "bounded")
+# A text from elsewhere has no literal type: it is checked when it is used.
+Resolution = Literal["linearized", "exact"]
+ObjectiveName = Literal["active points", "all points", "locator stiffness", "seating"]
+Regularization = Literal["points", "identity"]
+ActiveSet = Literal["closed", "initial"]
+Search = Literal["fixed", "bounded"]
+Solver = Literal["qpoases", "osqp", "daqp", "graph", "piqp", "highs", "proxqp"] | str  # see `compilation/solvers.py`
+RESOLUTIONS, REGULARIZATIONS, ACTIVE_SETS, SEARCHES = map(get_args, (Resolution, Regularization, ActiveSet, Search))
 # By resolution. That of one linear step is the paper's.
 USUAL_SEARCH = {"linearized": "fixed", "exact": "bounded"}
 USUAL_OBJECTIVE = {"linearized": "active points", "exact": "all points"}
@@ -25,14 +29,14 @@ class Objective:
                      a force has to be declared
     """
 
-    name: str
+    name: ObjectiveName
     reaction_units: str
     counts_points: bool = False
     counts_all: bool = False
     presses: bool = False
 
 
-OBJECTIVES = {
+OBJECTIVES: dict[str, Objective] = {
     objective.name: objective
     for objective in (
         Objective("active points", "mm", counts_points=True),
@@ -67,11 +71,11 @@ class Method:
     Every archive states all of these choices.
     """
 
-    resolution: str = "exact"
-    objective: str = ""
-    regularization: str = "points"
-    active_set: str = "closed"
-    search: str = ""
+    resolution: Resolution | str = "exact"
+    objective: ObjectiveName | str = ""
+    regularization: Regularization = "points"
+    active_set: ActiveSet = "closed"
+    search: Search | Literal[""] = ""
 
     def __post_init__(self) -> None:
         for choice, usual in (("search", USUAL_SEARCH), ("objective", USUAL_OBJECTIVE)):

@@ -279,7 +279,7 @@ def _bounds(contributor: Freedom) -> tuple[float, float]:
     tolerance: Tolerance = contributor.tolerance
     if tolerance.range is not None:
         return tolerance.shift - tolerance.range / 2, tolerance.shift + tolerance.range / 2
-    ends = tolerance.distribution.support()
-    quantiles = tolerance.distribution.ppf([TAIL, 1 - TAIL])
+    ends = tolerance.frozen.support()
+    quantiles = tolerance.frozen.ppf([TAIL, 1 - TAIL])
     lower, upper = (float(end if np.isfinite(end) else q) for end, q in zip(ends, quantiles, strict=True))
     return tolerance.shift + lower, tolerance.shift + upper

@@ -13,6 +13,7 @@ from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.features.freedoms import FORM
+from tolcontact.method import Solver
 from tolcontact.simulation import Block, block_rows, outcomes
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
 from tolcontact.simulation.threads import Sampler
@@ -97,7 +98,7 @@ class Question:
     """
 
     def __init__(
-        self, record: terms.AnalysisRecord, model: Model | Program, *, solver: str | None, method: Choice | None,
+        self, record: terms.AnalysisRecord, model: Model | Program, *, solver: Solver | None, method: Choice | None,
         into: str | Path | None,
     ) -> None:  # fmt: skip
         self.record, self.program, self._into = record, program_of(model, solver, method), into
@@ -164,7 +165,7 @@ class Analysis(Question):
     """A question that is answered by simulations. All options are checked before anything is simulated."""
 
     def __init__(
-        self, record: terms.AnalysisRecord, model: Model | Program, *, samples: int, seed: int, solver: str | None,
+        self, record: terms.AnalysisRecord, model: Model | Program, *, samples: int, seed: int, solver: Solver | None,
         method: Choice | None, into: str | Path | None, client: Any, progress: Progress | None,
     ) -> None:  # fmt: skip
         check_counts(samples=samples, seed=seed)

@@ -59,7 +59,8 @@ def model_of(results: xr.DataTree) -> Assembly:
 
 def method_of_run(results: xr.DataTree) -> Method:
     """Return the method of a run."""
-    return Method(**{field.name: str(results.attrs[field.name]) for field in fields(Method)})
+    choices: dict[str, Any] = {field.name: str(results.attrs[field.name]) for field in fields(Method)}
+    return Method(**choices)
 
 
 class _Triangles:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from tolcontact.declaration.checks import FRICTION, LENGTH, STIFFNESS, Check, Declaration, text_type, whole_number
 from tolcontact.declaration.part import Face, Part, Point
@@ -38,7 +38,7 @@ class ContactPair(Declaration):
     moving: Face
     reference: Face
     name: str
-    points: int | str | None = None
+    points: int | Literal["vertices"] | None = None
     spacing: float | None = None
     within: float | None = None
     declared_at: str = ""

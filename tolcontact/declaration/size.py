@@ -3,16 +3,17 @@
 import contextlib
 from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, ClassVar
+from typing import ClassVar, Literal, get_args
 
 from tolcontact.declaration.checks import LENGTH, Checked, one_of, whole_number
-from tolcontact.declaration.tolerance import Tolerance
+from tolcontact.declaration.tolerance import Distribution, Tolerance
 from tolcontact.declaration.tolerance_class import tolerance_class
 from tolcontact.declaration.values import is_length
 from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
 
-MOVES = ("both", "first", "second")
-COVARIANCES = ("squared exponential", "matern 5/2", "matern 3/2")
+Moves = Literal["both", "first", "second"]
+Covariance = Literal["squared exponential", "matern 5/2", "matern 3/2"]
+MOVES, COVARIANCES = get_args(Moves), get_args(Covariance)
 MAX_MODES = 200
 MIN_LOBES, MAX_LOBES = 2, 12  # one lobe displaces a section
 
@@ -37,8 +38,8 @@ class Size(Checked):
     _: KW_ONLY
     cp: float | None = None
     cpk: float | None = None
-    moves: str = "both"
-    distribution: Any = "normal"
+    moves: Moves = "both"
+    distribution: Distribution = "normal"
     tolerance_class: str = ""
 
     def __post_init__(self) -> None:
@@ -115,7 +116,7 @@ class Form(Checked):
                  scatter of points about a smooth form; waves too short for the points or for 1280 stations are refused
     """
 
-    covariance: str = "squared exponential"
+    covariance: Covariance = "squared exponential"
     length: float | None = None
     modes: int = 20
     lobes: int | None = None

@@ -1,7 +1,7 @@
 """Pictures of assemblies and displacement fields by pyvista, which also draws without a display."""
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -38,7 +38,7 @@ def assembly(
     source: xr.DataTree | Assembly,
     *,
     realization: int | None = None,
-    state: str = "corrected",
+    state: terms.StateName = "corrected",
     marks: bool = True,
     opacity: float = 1.0,
     plotter: Any = None,
@@ -65,10 +65,10 @@ def assembly(
 
 def field(
     results: xr.DataTree,
-    statistic: str = "6 sigma",
+    statistic: Literal["mean", "6 sigma"] = "6 sigma",
     *,
-    component: str = "magnitude",
-    state: str = "corrected",
+    component: terms.ComponentName = "magnitude",
+    state: terms.StateName = "corrected",
     limits: tuple[float, float] | None = None,
     plotter: Any = None,
 ) -> Any:

@@ -27,7 +27,7 @@ def histogram(
     results: xr.DataTree,
     measure: str | None = None,
     *,
-    states: Sequence[str] = terms.STATES,
+    states: Sequence[terms.StateName] = terms.STATES,
     bins: int = BINS,
     axes: Axes | None = None,
 ) -> Axes:

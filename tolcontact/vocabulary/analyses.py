@@ -1,7 +1,7 @@
 """Records of analyses: the variables of their datasets; and the words of terminal, page, pictures and spreadsheet."""
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 from tolcontact.vocabulary.archive import GAP_MIN, KKT_RESIDUAL, MEASURED, ROTATION, STATION_POSES, STATUS, TRANSLATION
 from tolcontact.vocabulary.labels import (
@@ -19,7 +19,8 @@ from tolcontact.vocabulary.labels import (
 from tolcontact.vocabulary.summary import ESTIMATE, INTERVAL, OUTSIDE
 
 ANALYSES_GROUP = "statistics"  # the group of an archive that holds a group for each analysis
-GROUP, GROUPED_BY, UNIT = "group", ("contributor", "feature", "part"), "unit"
+GroupedBy = Literal["contributor", "feature", "part"]
+GROUP, GROUPED_BY, UNIT = "group", get_args(GroupedBy), "unit"
 CONTACT, CONTACT_STATES = "contact", ("untouched", "touched")
 END, ENDS, SENSES = "end", ("least", "largest"), (-1, 1)
 CASE = "case"  # a corrected worst case as a realization, with the variables that archives have of realizations

@@ -14,9 +14,10 @@ import xarray as xr
 from tolcontact.archive import ArchiveWriter, Run, locked_archive, open_archive, open_unchecked
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
+from tolcontact.method import Solver
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses, warn_of
-from tolcontact.vocabulary import FIELD_CHOICES, KEPT, MONTE_CARLO, PLANS
+from tolcontact.vocabulary import FIELD_CHOICES, KEPT, PLANS, FieldChoice, Kept, Plan
 from tolcontact.workflow.accessor import Results
 from tolcontact.workflow.forecast import announce
 from tolcontact.workflow.models import Choice, Model, check_counts, check_program, program_of
@@ -39,15 +40,15 @@ def run(
     *,
     samples: int = 1000,
     seed: int = 1,
-    solver: str | None = None,
+    solver: Solver | None = None,
     method: Choice | None = None,
     out: str | Path | None = None,
     overwrite: bool = False,
     resume: bool = False,
-    keep: str = "all",
+    keep: Kept = "all",
     surfaces: int = SURFACES,
-    fields: int | str = "some",
-    plan: str = MONTE_CARLO,
+    fields: int | FieldChoice = "some",
+    plan: Plan = "monte-carlo",
     until: str | None = None,
     client: Any = None,
     progress: RunProgress | None = None,
