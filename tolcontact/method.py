@@ -1,4 +1,4 @@
-"""The named choices of how contact is resolved. They decide the answer, so every archive carries them."""
+"""The named choices of how contact is resolved. They decide the answer, so every archive states them."""
 
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
@@ -22,7 +22,7 @@ USUAL_OBJECTIVE = {"linearized": "active points", "exact": "all points"}
 class Objective:
     """What a corrected pose minimizes, with everything that depends on this choice but its energy.
 
-    reaction_units   of what the rows of contact points carry
+    reaction_units   of the reactions at contact points
     counts_points    it sums up displacements of contact points,
     counts_all       of all of them, not only of those that are active in the raw state
     presses          forces press the parts: every realization moves, two-sided locators hold unless they have a stiffness, and

@@ -89,18 +89,18 @@ def datum_values(program: Program) -> dict[ArchiveVariable, Any]:
         return {}
     faces = {int(face.form_columns[0]): k for k, face in enumerate(program.nominal.faces) if face.form is not None}
     count = len(program.nominal.contributors)
-    columns, leaning = np.full((len(planes), COORDINATES), -1), np.zeros((len(planes), COORDINATES, count))
+    columns, residuals = np.full((len(planes), COORDINATES), -1), np.zeros((len(planes), COORDINATES, count))
     free = np.zeros((len(planes), COORDINATES, COORDINATES))
     for number, plane in enumerate(planes):
         columns[number, list(plane.coordinates)] = plane.columns
-        leaning[number, :, : plane.residuals.shape[1]] = plane.residuals
+        residuals[number, :, : plane.residuals.shape[1]] = plane.residuals
         free[number, :, : plane.free.shape[1]] = plane.free
     touched = {faces[plane.datum.form_columns.start]: plane for plane in planes}
     places = [program.nominal.faces[face].form for face in touched]
     return {
         terms.TANGENT_FACE: [faces[plane.datum.form_columns.start] for plane in planes],
         terms.TANGENT_CONTRIBUTOR: columns,
-        terms.TANGENT_LEANING: leaning,
+        terms.TANGENT_RESIDUAL: residuals,
         terms.TANGENT_FREE: free,
         terms.FACE_OF_TANGENT_PLACE: np.concatenate([np.full(len(plane.heights), k) for k, plane in touched.items()]),
         terms.TANGENT_PLACE_AT: np.vstack([form.places for form in places if form is not None]),

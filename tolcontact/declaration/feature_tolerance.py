@@ -78,7 +78,7 @@ class ToleranceKind(Readable):
 
     @property
     def name(self) -> str:
-        """Its name in scripts."""
+        """The name in scripts."""
         return "".join(word.capitalize() for word in self.kind.replace("-", "").split())
 
     def __str__(self) -> str:

@@ -24,7 +24,7 @@ from tolcontact.discretization.contact_points import contact_points, support_pai
 from tolcontact.discretization.locators import FACES_OF_SCHEME, Locators, NominalPart, scheme_locators
 from tolcontact.discretization.measurements import nominal_measurements
 from tolcontact.discretization.nominal import ContactPoints, Nominal
-from tolcontact.discretization.scenes import Scene, carried, scenes_of
+from tolcontact.discretization.scenes import Scene, joint_indices, scenes_of
 from tolcontact.errors import GeometryFault, ModelError, designation
 from tolcontact.features import Features, Placement, datum_order
 from tolcontact.features.freedoms import DATUM
@@ -74,7 +74,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
         parts = [
             replace(
                 _on_features(part, scene.assembly.location_of(part.part), features, meshes, placements, faults),
-                carried=carried(scenes, scene, part.part),
+                carried=joint_indices(scenes, scene, part.part),
             )
             for (scene, _), part in zip(entries, parts, strict=True)
             if part is not None

@@ -74,7 +74,7 @@ TANGENT_CONTRIBUTOR = variable(
     "number of the contributor that is the offset or a tilt of the plane, from the datum by least squares, counted from 0; -1: "
     "it makes no difference",
 )
-TANGENT_LEANING = variable(
+TANGENT_RESIDUAL = variable(
     "f8 tangent_leaning(tangent, plane_coordinate, contributor)",
     "offset and tilts of the face from the least-squares datum per unit deviation",
 )
@@ -91,7 +91,7 @@ TANGENT_HEIGHT = variable(
     "f8 tangent_height(tangent_place, plane_coordinate)", "height of a plane at the place, for an offset or a tilt of 1 mm", "1"
 )
 TANGENTS = (
-    TANGENT_FACE, TANGENT_CONTRIBUTOR, TANGENT_LEANING, TANGENT_FREE, FACE_OF_TANGENT_PLACE, TANGENT_PLACE_AT, TANGENT_HEIGHT,
+    TANGENT_FACE, TANGENT_CONTRIBUTOR, TANGENT_RESIDUAL, TANGENT_FREE, FACE_OF_TANGENT_PLACE, TANGENT_PLACE_AT, TANGENT_HEIGHT,
 )  # fmt: skip
 
 
