@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tolcontact.mechanics.displacement import moment_table, moments_about
-from tolcontact.mechanics.pose import congruent
+from tolcontact.mechanics.symmetric_products import congruent
 
 
 @pytest.mark.parametrize("share", [1.0, 0.4])

@@ -12,8 +12,16 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Progress, owners
-from tolcontact.analyses.requirement import MIN_DECISIVE, Requirement
-from tolcontact.analyses.scaled_trials import STEP, ChangedRows, ScaledTrials, Trial, effect_samples, narrowing_effects
+from tolcontact.analyses.scaled_trials import (
+    MIN_DECISIVE,
+    STEP,
+    ChangedRows,
+    Requirement,
+    ScaledTrials,
+    Trial,
+    effect_samples,
+    narrowing_effects,
+)
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.method import Solver

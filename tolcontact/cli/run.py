@@ -18,8 +18,7 @@ from tolcontact.statistics import Summary
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.accessor import summarize
 from tolcontact.workflow.models import DEFAULT_SOLVER
-from tolcontact.workflow.runs import SURFACES, write_run
-from tolcontact.workflow.until import Target
+from tolcontact.workflow.runs import SURFACES, Target, write_run
 
 Until = Annotated[
     str | None,

@@ -4,7 +4,7 @@
 """
 
 from tolcontact.declaration.assembly import Assembly
-from tolcontact.declaration.contact_pair import ContactPair, Force
+from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overlap
 from tolcontact.declaration.dependence import Correlation, Population, Variable
 from tolcontact.declaration.feature_tolerance import (
     Angularity,
@@ -24,7 +24,6 @@ from tolcontact.declaration.feature_tolerance import (
     TotalRunout,
 )
 from tolcontact.declaration.geometry import Box, Geometry, Mesh, Pin
-from tolcontact.declaration.joint import Joint, Overlap
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import (

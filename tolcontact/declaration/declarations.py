@@ -3,8 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, TypeVar
 
-from tolcontact.declaration.contact_pair import ContactPair, Force
-from tolcontact.declaration.joint import Joint
+from tolcontact.declaration.contact_pair import ContactPair, Force, Joint
 from tolcontact.declaration.locator import Location, Locator, Placing, ThreeTwoOne
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import Measurement

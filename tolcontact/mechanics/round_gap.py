@@ -8,8 +8,9 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.discretization import RoundPoint, RoundPoints
-from tolcontact.mechanics.pose import ENTRIES, Pose, congruent, pose_of
+from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
 from tolcontact.mechanics.round_terms import Terms, round_terms
+from tolcontact.mechanics.symmetric_products import congruent
 
 TOLERANCE = 1e-9
 ROUNDING = 1e-14  # of the distance from the origin: error of a point that is computed on an axis
