@@ -6,7 +6,6 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.compilation import Program
-from tolcontact.features import DatumShift
 from tolcontact.features.associated_features import TERMS
 from tolcontact.geometry.analytic_surfaces import surface_arrays
 from tolcontact.vocabulary import ArchiveVariable
@@ -14,29 +13,17 @@ from tolcontact.vocabulary import ArchiveVariable
 COORDINATES = 3  # of a plane
 
 
-def form_sizes(program: Program) -> dict[str, int]:
-    """Return the dimensions of the forms of faces; none if no face has form."""
-    forms = [face.form for face in program.nominal.faces if face.form is not None]
-    if not forms:
-        return {}
-    return {
-        terms.FORM_STATION: sum(len(form.stations) for form in forms),
-        terms.FORM_MODE: max(form.modes for form in forms),
-        terms.FORM_TERM: TERMS,
-    }
-
-
 def form_values(program: Program) -> dict[ArchiveVariable, Any]:
     """Return the forms of faces; none if no face has form."""
-    faces, sizes = program.nominal.faces, form_sizes(program)
-    if not sizes:
+    faces, contributors = program.nominal.faces, program.draws.contributors
+    with_form = [(number, face, face.form) for number, face in enumerate(faces) if face.form is not None]
+    if not with_form:
         return {}
-    modes, contributors = sizes[terms.FORM_MODE], program.draws.contributors
+    modes = max(form.modes for _, _, form in with_form)
     numbers = {variable: np.full(len(faces), np.nan) for variable in NUMBERS}
     columns, removed = np.full((len(faces), modes), -1), np.zeros((len(faces), modes, TERMS))
     surfaces = [None if face.form is None else face.form.associated.surface for face in faces]
     weights = []
-    with_form = [(number, face, face.form) for number, face in enumerate(faces) if face.form is not None]
     for number, face, form in with_form:
         spread = np.nan if form.spreads is not None else contributors[face.form_columns[0]].spread
         width = program.draws.mean_widths[face.name]
@@ -65,27 +52,10 @@ NUMBERS = (
 )  # fmt: skip
 
 
-def tangents(program: Program) -> list[DatumShift]:
-    """Return the shifts of the planes that touch datum features with form."""
-    return [shift for pattern in program.nominal.patterns for shift in pattern.shifts if shift.form is not None]
-
-
-def datum_sizes(program: Program) -> dict[str, int]:
-    """Return the dimensions of these planes; none if there are none."""
-    planes = tangents(program)
-    if not planes:
-        return {}
-    places = {plane.datum.form_columns.start: len(plane.heights) for plane in planes}
-    return {
-        terms.TANGENT: len(planes), terms.TANGENT_PLACE: sum(places.values()),
-        terms.COORDINATE: COORDINATES, terms.TANGENT_FREEDOM: COORDINATES,
-    }  # fmt: skip
-
-
 def datum_values(program: Program) -> dict[ArchiveVariable, Any]:
-    """Return these planes and the places that they may touch; none if there are none."""
-    planes, sizes = tangents(program), datum_sizes(program)
-    if not sizes:
+    """Return the planes that touch datum features with form, and the places that they may touch; none if there are none."""
+    planes = [shift for pattern in program.nominal.patterns for shift in pattern.shifts if shift.form is not None]
+    if not planes:
         return {}
     faces = {int(face.form_columns[0]): k for k, face in enumerate(program.nominal.faces) if face.form is not None}
     count = len(program.nominal.contributors)

@@ -4,6 +4,7 @@ import contextlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Literal
 
 import netCDF4
@@ -45,18 +46,16 @@ def small_caches() -> Iterator[None]:
         netCDF4.set_chunk_cache(*usual)
 
 
-def define(group: netCDF4.Dataset, variable: ArchiveVariable) -> netCDF4.Variable:
-    """Define a variable of numbers, without values. The library compares its checksums when it reads."""
+def define(group: netCDF4.Dataset, variable: ArchiveVariable, shape: Sequence[int] = ()) -> netCDF4.Variable:
+    """Define a variable of numbers, without values, and missing dimensions by its shape. Checksums are compared on reading."""
     options: dict[str, Any] = {"fletcher32": True}
+    _create_dimensions(group, variable, shape)
     if terms.REALIZATION in variable.dims:
         # netCDF's own choice, one row per chunk, reads some fifty times slower.
         fixed = [max(len(_dimension(group, dim)), 1) for dim in variable.dims[1:]]
         options["chunksizes"] = [_chunk_rows(np.dtype(variable.kind).itemsize * math.prod(fixed)), *fixed]
     created = group.createVariable(variable.name, variable.kind, variable.dims, **options)
-    attributes = variable.all_attributes
-    if "flag_values" in attributes:
-        attributes["flag_values"] = np.array(attributes["flag_values"], dtype=variable.kind)
-    created.setncatts(attributes)
+    created.setncatts(attributes_of(variable))
     return created
 
 
@@ -68,11 +67,17 @@ def _chunk_rows(width: int) -> int:
     return rows
 
 
-def _dimension(group: netCDF4.Dataset, name: str) -> netCDF4.Dimension:
-    """Return a dimension of the group, or of the groups above it."""
+def _dimension(group: netCDF4.Dataset, name: str) -> netCDF4.Dimension | None:
+    """Return a dimension of the group, or of the groups above it; None if there is none."""
     if name in group.dimensions or group.parent is None:
-        return group.dimensions[name]
+        return group.dimensions.get(name)
     return _dimension(group.parent, name)
+
+
+def _create_dimensions(group: netCDF4.Dataset, variable: ArchiveVariable, shape: Sequence[int]) -> None:
+    for name, size in zip(variable.dims, shape, strict=False):
+        if _dimension(group, name) is None:
+            group.createDimension(name, size)
 
 
 class Definitions:
@@ -86,12 +91,14 @@ class Definitions:
         self._values: list[tuple[netCDF4.Variable, np.ndarray]] = []
 
     def add(self, group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
-        """Define a variable in a group that has the dimensions, and keep its values."""
+        """Define a variable in a group, with the dimensions that the group does not have, and keep its values."""
         if variable.kind is not str:
-            self._values.append((define(group, variable), np.asarray(values)))
+            array = np.asarray(values)
+            self._values.append((define(group, variable, array.shape), array))
             return
         # The netCDF library crashes if text of variable length is read through two open handles, so it is stored as characters.
         text = np.char.encode(np.array(values, dtype=str), "utf-8")
+        _create_dimensions(group, variable, text.shape)
         length = group.createDimension(f"{variable.name}_length", max(text.dtype.itemsize, 1))
         created = group.createVariable(variable.name, "S1", (*variable.dims, length.name), fletcher32=True)
         created.setncatts({**variable.all_attributes, "_Encoding": "utf-8"})
@@ -146,12 +153,11 @@ def units_of_rows(program: Program) -> dict[ArchiveVariable, str]:
     }
 
 
-def attributes_of(variable: ArchiveVariable, program: Program) -> dict[str, Any]:
-    """Return the attributes of a variable of realizations, for a model."""
+def attributes_of(variable: ArchiveVariable, units: Mapping[ArchiveVariable, str] = MappingProxyType({})) -> dict[str, Any]:
+    """Return the attributes of a variable; `units` are those that depend on the model."""
     attributes = variable.all_attributes
     if "flag_values" in attributes:
         attributes["flag_values"] = np.array(attributes["flag_values"], dtype=variable.kind)
-    units = units_of_rows(program)
     return attributes | ({"units": units[variable]} if variable in units else {})
 
 
@@ -159,9 +165,9 @@ def labelled(program: Program, values: Mapping[ArchiveVariable, Any], attributes
     """Return arrays of any kind as variables of realizations, with the labels and attributes of an archive."""
     texts = {**labels_of_rows(program.nominal), terms.CONTRIBUTOR: program.nominal.contributors}
     labels: dict[str, Any] = {name: np.array(list(names), dtype=object) for name, names in texts.items()}  # text of any length
-    labels[terms.REALIZATION] = pd.RangeIndex(len(values[terms.STATUS]))
+    labels[terms.REALIZATION], units = pd.RangeIndex(len(values[terms.STATUS])), units_of_rows(program)
     return xr.Dataset(
-        {variable.name: (variable.dims, array, attributes_of(variable, program)) for variable, array in values.items()},
+        {variable.name: (variable.dims, array, attributes_of(variable, units)) for variable, array in values.items()},
         {label.name: label.entry(labels[label.name]) for label in (*terms.COORDINATES, terms.CONTRIBUTOR_LABEL)},
         attributes,
     )
