@@ -105,7 +105,6 @@ SENSITIVITIES = AnalysisRecord(
         _by_status(),
     ),
 )
-_EXTREME = (MEASURE, STATE, END)
 WORST_CASE = AnalysisRecord(
     "worst_case",
     "worst cases of the measurements of {assembly}",

@@ -16,7 +16,7 @@ AXES = COMPONENTS[:3]
 
 REALIZATION, STATE, PART, PAIR, MEASURE = "realization", "state", "part", "pair", "measure"
 AXIS, BODY_AXIS, POINT, LOCATOR = "axis", "body_axis", "point", "locator"
-VERTEX, FACE, CORNER, COMPONENT, BOUND = "vertex", "face", "corner", "component", "bound"
+FACE, CORNER, COMPONENT, BOUND = "face", "corner", "component", "bound"
 CONTRIBUTOR, FEATURE_FACE, FREEDOM = "contributor", "feature_face", "freedom"
 NUMBER, CHECKED = "number", "checked"
 BLOCK_ROWS = 4096  # realizations of a block at most: they are simulated together

@@ -66,7 +66,7 @@ FEATURE_FACES = (
 )  # fmt: skip
 
 
-TANGENT, TANGENT_PLACE, COORDINATE, TANGENT_FREEDOM = "tangent", "tangent_place", "plane_coordinate", "tangent_freedom"
+TANGENT = "tangent"
 
 TANGENT_FACE = variable("i4 tangent_face(tangent)", "number of the feature's face that a plane touches, counted from 0")
 TANGENT_CONTRIBUTOR = variable(
@@ -94,8 +94,6 @@ TANGENTS = (
     TANGENT_FACE, TANGENT_CONTRIBUTOR, TANGENT_RESIDUAL, TANGENT_FREE, FACE_OF_TANGENT_PLACE, TANGENT_PLACE_AT, TANGENT_HEIGHT,
 )  # fmt: skip
 
-
-FORM_STATION, FORM_MODE, FORM_TERM = "form_station", "form_mode", "form_term"
 
 FORM_COVARIANCE = variable(
     "str form_covariance(feature_face)", "covariance of the form of a feature's face, by distance; empty: it keeps its shape"
