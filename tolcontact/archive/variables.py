@@ -51,8 +51,9 @@ def define(group: netCDF4.Dataset, variable: ArchiveVariable, shape: Sequence[in
     options: dict[str, Any] = {"fletcher32": True}
     _create_dimensions(group, variable, shape)
     if terms.REALIZATION in variable.dims:
+        dimensions = _dimensions(group)
         # netCDF's own choice, one row per chunk, reads some fifty times slower.
-        fixed = [max(len(_dimension(group, dim)), 1) for dim in variable.dims[1:]]
+        fixed = [max(len(dimensions[dim]), 1) for dim in variable.dims[1:]]
         options["chunksizes"] = [_chunk_rows(np.dtype(variable.kind).itemsize * math.prod(fixed)), *fixed]
     created = group.createVariable(variable.name, variable.kind, variable.dims, **options)
     created.setncatts(attributes_of(variable))
@@ -67,16 +68,16 @@ def _chunk_rows(width: int) -> int:
     return rows
 
 
-def _dimension(group: netCDF4.Dataset, name: str) -> netCDF4.Dimension | None:
-    """Return a dimension of the group, or of the groups above it; None if there is none."""
-    if name in group.dimensions or group.parent is None:
-        return group.dimensions.get(name)
-    return _dimension(group.parent, name)
+def _dimensions(group: netCDF4.Dataset) -> dict[str, netCDF4.Dimension]:
+    """Return the dimensions of a group and of the groups above it by name."""
+    above = {} if group.parent is None else _dimensions(group.parent)
+    return above | group.dimensions
 
 
 def _create_dimensions(group: netCDF4.Dataset, variable: ArchiveVariable, shape: Sequence[int]) -> None:
+    known = _dimensions(group)
     for name, size in zip(variable.dims, shape, strict=False):
-        if _dimension(group, name) is None:
+        if name not in known:
             group.createDimension(name, size)
 
 
