@@ -42,7 +42,7 @@ from tolcontact.discretization.nominal import Nominal
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
-from tolcontact.errors import GeometryFault, ModelError, designation
+from tolcontact.errors import Faults, GeometryFault, designation
 from tolcontact.geometry.analytic_surfaces import Cylinder, axes_across
 from tolcontact.geometry.faces import patch
 from tolcontact.geometry.nearest_elements import nearest_elements
@@ -139,16 +139,13 @@ def nominal_measurements(nominal: Nominal) -> tuple[NominalMeasurement | None, .
     Raises ModelError with a fault for each measurement that the faces do not have.
     """
     measurements: dict[str, NominalMeasurement | None] = {}
-    faces, faults = MeasuredFaces(nominal), []
+    faces, faults = MeasuredFaces(nominal), Faults()
     for measure in nominal.measures:
         measurements[measure.name] = None
-        try:
-            if isinstance(measure.of, Measurement):
-                measurements[measure.name] = _with_numbers(measure.of, faces, measurements)
-        except GeometryFault as fault:
-            faults.append(f"{designation(measure.noun, measure)}: {fault}")
-    if faults:
-        raise ModelError(nominal.assembly.name, faults)
+        if isinstance(measure.of, Measurement):
+            place = designation(measure.noun, measure)
+            measurements[measure.name] = faults.attempt(place, _with_numbers, measure.of, faces, measurements)
+    faults.refuse(nominal.assembly.name)
     return tuple(measurements.values())
 
 

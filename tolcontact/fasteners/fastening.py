@@ -1,7 +1,7 @@
 """Expansion of a fastener into a part, its location, contact pairs and a force."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from tolcontact.declaration import Assembly, Cylinder, Face, Feature, Locator, Part, Pin, Size, Station
 from tolcontact.declaration.part import face_of
 from tolcontact.declaration.values import script_line
-from tolcontact.errors import GeometryFault, ModelError
+from tolcontact.errors import Faults, GeometryFault
 from tolcontact.fasteners.fit import INTO, SEAT, Fit, check_types, made_fit, part_fit, reference_faults, station_faults
 from tolcontact.fasteners.placed_faces import PlacedCylinder, PlacedPlane, meshes_of, placed_cylinder, placed_plane, placement
 from tolcontact.geometry.faces import face_area
@@ -78,30 +78,6 @@ def _feature_of(face: Face, name: str) -> Feature:
     return face.part.feature(name, face)
 
 
-class Faults:
-    """The faults of one fastener."""
-
-    def __init__(self, assembly: Assembly, name: str) -> None:
-        self._model, self._place, self._faults = assembly.name, f'fastener "{name}" ({script_line()})', list[str]()
-
-    def add(self, faults: Iterable[str]) -> None:
-        """Add faults, each with the name of the fastener."""
-        self._faults += [f"{self._place}: {fault}" for fault in faults]
-
-    def attempt(self, label: str, place: Callable[..., Any], *arguments: Any) -> Any:
-        """Return what `place` returns; None, and a fault, if the geometry does not allow it."""
-        try:
-            return place(*arguments)
-        except GeometryFault as fault:
-            self.add([f"{label}: {fault}"])
-            return None
-
-    def refuse(self) -> None:
-        """Raise ModelError if there are faults."""
-        if self._faults:
-            raise ModelError(self._model, self._faults)
-
-
 def fasten(
     scene: Assembly | Station,
     name: str,
@@ -130,20 +106,19 @@ def fasten(
     subject: Part | Size | float = fastener.part if isinstance(fastener, Face | Feature) else fastener
     faces = {f"through[{k}]": face_of(hole) for k, hole in enumerate(through)} | ({INTO: face_of(into)} if into else {})
     plane_face = face_of(seat) if seat else None
-    faults = Faults(assembly, name)
-    faults.add(station_faults(assembly, scene))
-    faults.add(reference_faults(assembly, subject, faces, plane_face, pushed))
-    faults.refuse()
-    holes = {label: faults.attempt(label, _hole, face) for label, face in faces.items()}
-    plane = faults.attempt(SEAT, placed_plane, plane_face) if plane_face else None
-    faults.refuse()
+    place = f'fastener "{name}" ({script_line()})'
+    found = [*station_faults(assembly, scene), *reference_faults(assembly, subject, faces, plane_face, pushed)]
+    faults = Faults(f"{place}: {fault}" for fault in found)
+    faults.refuse(assembly.name)
+    holes = {label: faults.attempt(f"{place}: {label}", _hole, face) for label, face in faces.items()}
+    plane = faults.attempt(f"{place}: {SEAT}", placed_plane, plane_face) if plane_face else None
+    faults.refuse(assembly.name)
     if isinstance(subject, Part):
-        fit = faults.attempt("the fastener", part_fit, subject, shank, holes, plane)
+        fit = faults.attempt(f"{place}: the fastener", part_fit, subject, shank, holes, plane)
+        faults.refuse(assembly.name)
     else:
         fit = made_fit(subject.nominal if isinstance(subject, Size) else float(subject), holes, plane)
-    faults.refuse()
-    faults.add(fit.faults())
-    faults.refuse()
+    Faults(f"{place}: {fault}" for fault in fit.faults()).refuse(assembly.name)
     part = subject if isinstance(subject, Part) else _made_part(assembly, name, subject, fit)
     _declare_contacts(scene, name, fit.shank or _shank_face(part, fit), fit)
     locate(scene, name, part, fit)
