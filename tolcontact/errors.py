@@ -5,7 +5,7 @@ A message states what was expected, what was got (naming the part, locator, pair
 
 import difflib
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any, Protocol
 
 # Control characters but tab and line feed, separators of lines and paragraphs, overrides of the writing direction, halves of
@@ -99,6 +99,12 @@ class ScriptError(TolcontactError):
 
 class OptionError(TolcontactError):
     """An option of a run (samples, seed, solver, method) has a value that cannot be used."""
+
+
+def check_choice(option: str, value: object, choices: Collection[str]) -> None:
+    """Raise OptionError unless the value of an option is one of its choices."""
+    if value not in choices:
+        raise OptionError(f"{option} is {value!r}; expected one of: {', '.join(choices)}")
 
 
 class ArchiveError(TolcontactError):

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
-from tolcontact.errors import OptionError
+from tolcontact.errors import OptionError, check_choice
 
 # A text from elsewhere has no literal type: it is checked when it is used.
 Resolution = Literal["linearized", "exact"]
@@ -89,8 +89,7 @@ class Method:
             "search": SEARCHES,
         }
         for choice, names in choices.items():
-            if getattr(self, choice) not in names:
-                raise OptionError(f"{choice} is {getattr(self, choice)!r}; expected one of: {', '.join(names)}")
+            check_choice(choice, getattr(self, choice), names)
         if self.search != "fixed" and self.resolution != "exact":
             raise OptionError(f'search is "{self.search}" with a linearized resolution; it needs resolution "exact"')
 

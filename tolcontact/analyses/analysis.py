@@ -11,7 +11,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.analyses.designs import Design
 from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
-from tolcontact.errors import OptionError
+from tolcontact.errors import OptionError, check_choice
 from tolcontact.features.freedoms import FORM
 from tolcontact.method import Solver
 from tolcontact.simulation import Block, block_rows, outcomes
@@ -210,8 +210,7 @@ def owners(program: Program, by: str) -> list[str]:
 
     Raises OptionError for a grouping that does not exist.
     """
-    if by not in GROUPED_BY:
-        raise OptionError(f"by is {by!r}; expected one of: {', '.join(GROUPED_BY)}")
+    check_choice("by", by, GROUPED_BY)
     nominal, labels = program.nominal, list(program.nominal.contributors)
     if by == "contributor":
         contributors = zip(labels, program.draws.contributors, strict=True)

@@ -3,6 +3,7 @@
 import json
 from dataclasses import fields
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -63,17 +64,13 @@ def method_of_run(results: xr.DataTree) -> Method:
     return Method(**choices)
 
 
-class _Triangles:
-    def __init__(self, vertices: np.ndarray, faces: np.ndarray, coordinate_spacing: np.ndarray) -> None:
-        self.vertices, self.faces, self.coordinate_spacing = vertices, faces, coordinate_spacing
-
-
 def _mesh(mesh: xr.Dataset) -> Any:
     """Return the mesh of a part, with the surfaces of its B-rep faces if there are any."""
     vertices, faces = mesh[terms.MESH_VERTICES.name].values, mesh[terms.MESH_FACES.name].values
     if any(variable.name not in mesh for variable in terms.KNOWN_SURFACES):
         stated = terms.COORDINATE_SPACING.name
-        return _Triangles(vertices, faces, mesh[stated].values if stated in mesh else np.zeros(3))
+        spacing = mesh[stated].values if stated in mesh else np.zeros(3)
+        return SimpleNamespace(vertices=vertices, faces=faces, coordinate_spacing=spacing)
     brep = mesh[terms.BREP_OF_FACE.name].values
     arrays = {name: mesh[variable.name].values for name, variable in terms.OF_BREP_FACE.items()}
     kinds = arrays["kind"]

@@ -14,7 +14,7 @@ import xarray as xr
 
 from tolcontact.archive import ArchiveWriter, Run, locked_archive, open_archive, open_unchecked
 from tolcontact.compilation import Program
-from tolcontact.errors import OptionError
+from tolcontact.errors import OptionError, check_choice
 from tolcontact.method import Solver
 from tolcontact.simulation import block_rows
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
@@ -205,12 +205,10 @@ def write_run(
 def _check_choices(settings: Run) -> None:
     """Raise OptionError for an invalid choice of `run`."""
     keep, fields, plan = settings.keep, settings.fields, settings.plan
-    if keep not in KEPT:
-        raise OptionError(f"keep is {keep!r}; expected one of: {', '.join(KEPT)}")
+    check_choice("keep", keep, KEPT)
     if fields not in FIELD_CHOICES and not (type(fields) is int and 2 <= fields < 2**63):
         raise OptionError(f"fields is {fields!r}; expected a whole number, at least 2, or one of: {', '.join(FIELD_CHOICES)}")
-    if plan not in PLANS:
-        raise OptionError(f"plan is {plan!r}; expected one of: {', '.join(PLANS)}")
+    check_choice("plan", plan, PLANS)
 
 
 def write_archive(
