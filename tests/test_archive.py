@@ -12,7 +12,7 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import SCRIPTS, run, script
 from tolcontact.archive import bytes_of_rows, stored_rows
-from tolcontact.archive.netcdf_library import open_netcdf
+from tolcontact.archive.variables import open_netcdf
 from tolcontact.errors import ArchiveError
 from tolcontact.testing import assert_gaps_recompute, assert_same_run
 from tolcontact.vocabulary import BY_REALIZATION

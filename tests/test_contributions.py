@@ -13,8 +13,8 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import PAPER, call, nightly
 from tests.test_ra1 import MEASURED, TOP, plane_weights
+from tolcontact.analyses.analysis import independent_groups
 from tolcontact.analyses.designs import MixedDraws, ReleasedDraws
-from tolcontact.analyses.grouping import independent_groups
 from tolcontact.analyses.linear_model import linear_model
 from tolcontact.statistics.sobol_indices import missed, shapley_effects, sobol_indices
 

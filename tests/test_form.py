@@ -15,7 +15,7 @@ import tolcontact as tc
 from tests import cases
 from tests.cases.seats import PRESS, seat, sliding
 from tests.helpers import SEATED, joined, simulate
-from tolcontact.analyses.grouping import owners
+from tolcontact.analyses.analysis import owners
 from tolcontact.compilation import compile_program
 from tolcontact.contact.raised_scan import raised_scan
 from tolcontact.contact.scan import PairScan, pair_scan

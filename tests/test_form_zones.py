@@ -11,7 +11,7 @@ from tests.cases.seats import seat
 from tests.helpers import nightly
 from tests.population_referee import measured_back
 from tolcontact.features.minimum_zone import ZoneMember, minimum_widths
-from tolcontact.variation.form_spreads import equal_form_spread
+from tolcontact.variation.spreads import equal_form_spread
 
 FORMS = [tc.Form(), tc.Form(length=10), tc.Form("matern 5/2"), tc.Form("matern 3/2")]
 SHARE = 0.9973002039367398

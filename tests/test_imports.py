@@ -10,7 +10,7 @@ from scipy.stats import qmc
 from tests.helpers import call, finish, start
 from tolcontact.cli.app import app
 from tolcontact.cli.commands import COMMANDS, declared_command
-from tolcontact.variation.sobol_points import MAX_DIMENSIONS, scrambled_points
+from tolcontact.variation.plans import MAX_DIMENSIONS, scrambled_points
 
 LISTING = "import sys; from tolcontact.cli import command_line\ntry: command_line({})\nexcept SystemExit: print(*sys.modules)"
 

@@ -1,4 +1,4 @@
-"""Tolerance analysis of rigid assemblies: Monte-Carlo variation simulation in which contact is resolved.
+"""Tolerance analysis of rigid assemblies: Monte-Carlo variation simulation with contact resolved.
 
 You declare parts, how they are located and toleranced, which faces may touch, and what is measured. tolcontact draws
 thousands of realizations, places every part, removes interpenetration by a convex QP in each realization, and reports every

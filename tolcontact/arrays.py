@@ -1,7 +1,7 @@
 """Arrays with their shapes in their types: Float[Array, "n part 12"]. The tests check them; a run does not.
 
-A name stands for the same length in all arguments of a call, and in all arrays of a dataclass. Whoever checks shapes imports
-jaxtyping first. A run does not, and saves its import: to it, the type is that of an array.
+A name means the same length in all arguments of a call, and in all arrays of a dataclass. Whoever checks shapes imports
+jaxtyping first. A run does not, and saves its import: for a run, all types are arrays.
 """
 
 import sys

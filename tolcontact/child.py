@@ -1,4 +1,4 @@
-"""Child processes for files of unknown origin, in which a library may crash, stall or take too much memory."""
+"""Child processes for files of unknown origin: a library may crash, stall or take too much memory there."""
 
 import contextlib
 import math
@@ -83,7 +83,7 @@ def peak_memory() -> int | None:
 
 
 def crash(code: int) -> str:
-    """Return the signal or the exception by which a process with an exit code crashed; "" if it did not."""
+    """Return the signal or the exception that crashed a process with an exit code; "" if it did not."""
     if code < 0:
         name = f", {signal.Signals(-code).name}" if -code in set(signal.Signals) else ""
         return f"signal {-code}{name}"

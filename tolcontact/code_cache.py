@@ -1,7 +1,7 @@
 """The cache of machine code on disk, for later processes that compile the same functions. It only saves time.
 
 Whoever can write to the cache can run code as its reader. So it is used only if its folder belongs to this user, nobody else
-can write to it or replace it, and a file in it only if it belongs to this user as well; otherwise all is compiled anew. Each
+can write to it or replace it, and a file in it only if it belongs to this user as well; otherwise all is compiled again. Each
 file has a checksum, since LLVM would crash on damaged code.
 """
 

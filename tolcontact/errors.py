@@ -5,8 +5,8 @@ A message states what was expected, what was got (naming the part, locator, pair
 
 import difflib
 import re
-from collections.abc import Iterable, Sequence
-from typing import Protocol
+from collections.abc import Callable, Collection, Iterable, Sequence
+from typing import Any, Protocol
 
 # Control characters but tab and line feed, separators of lines and paragraphs, overrides of the writing direction, halves of
 # surrogate pairs (bytes of a file name that are not text): they steer a terminal, or cannot be written to it.
@@ -76,12 +76,35 @@ class ModelError(TolcontactError):
         return ModelError, (self.model, self.faults)
 
 
+class Faults(list[str]):
+    """The faults of a model: sentences, each after the declaration that has it."""
+
+    def attempt(self, place: str, build: Callable[..., Any], *arguments: Any) -> Any:
+        """Return what `build` returns; None, and a fault at `place`, if the geometry does not allow it."""
+        try:
+            return build(*arguments)
+        except GeometryFault as fault:
+            self.append(f"{place}: {fault}")
+            return None
+
+    def refuse(self, model: str) -> None:
+        """Raise ModelError if there are faults."""
+        if self:
+            raise ModelError(model, self)
+
+
 class ScriptError(TolcontactError):
     """A model script cannot be read or has no usable `assembly()`."""
 
 
 class OptionError(TolcontactError):
     """An option of a run (samples, seed, solver, method) has a value that cannot be used."""
+
+
+def check_choice(option: str, value: object, choices: Collection[str]) -> None:
+    """Raise OptionError unless the value of an option is one of its choices."""
+    if value not in choices:
+        raise OptionError(f"{option} is {value!r}; expected one of: {', '.join(choices)}")
 
 
 class ArchiveError(TolcontactError):

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-GAP_ACCURACY = 1e-8  # mm, to which gaps of certified realizations are right (measured: 1e-9)
+GAP_ACCURACY = 1e-8  # mm, of gaps of certified realizations (measured: 1e-9)
 
 
 class Limits(NamedTuple):

@@ -1,14 +1,18 @@
-"""The named choices of how contact is resolved. They decide the answer, so every archive carries them."""
+"""The named choices of how contact is resolved. They decide the answer, so every archive states them."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal, get_args
 
-from tolcontact.errors import OptionError
+from tolcontact.errors import OptionError, check_choice
 
-RESOLUTIONS = ("linearized", "exact")
-REGULARIZATIONS = ("points", "identity")
-ACTIVE_SETS = ("closed", "initial")
-SEARCHES = ("fixed", "bounded")
+# A text from elsewhere has no literal type: it is checked when it is used.
+Resolution = Literal["linearized", "exact"]
+ObjectiveName = Literal["active points", "all points", "locator stiffness", "seating"]
+Regularization = Literal["points", "identity"]
+ActiveSet = Literal["closed", "initial"]
+Search = Literal["fixed", "bounded"]
+Solver = Literal["qpoases", "osqp", "daqp", "graph", "piqp", "highs", "proxqp"] | str  # see `compilation/solvers.py`
+RESOLUTIONS, REGULARIZATIONS, ACTIVE_SETS, SEARCHES = map(get_args, (Resolution, Regularization, ActiveSet, Search))
 # By resolution. That of one linear step is the paper's.
 USUAL_SEARCH = {"linearized": "fixed", "exact": "bounded"}
 USUAL_OBJECTIVE = {"linearized": "active points", "exact": "all points"}
@@ -18,21 +22,21 @@ USUAL_OBJECTIVE = {"linearized": "active points", "exact": "all points"}
 class Objective:
     """What a corrected pose minimizes, with everything that depends on this choice but its energy.
 
-    reaction_units   of what the rows of contact points carry
+    reaction_units   of the reactions at contact points
     counts_points    it sums up displacements of contact points,
     counts_all       of all of them, not only of those that are active in the raw state
     presses          forces press the parts: every realization moves, two-sided locators hold unless they have a stiffness, and
                      a force has to be declared
     """
 
-    name: str
+    name: ObjectiveName
     reaction_units: str
     counts_points: bool = False
     counts_all: bool = False
     presses: bool = False
 
 
-OBJECTIVES = {
+OBJECTIVES: dict[str, Objective] = {
     objective.name: objective
     for objective in (
         Objective("active points", "mm", counts_points=True),
@@ -67,11 +71,11 @@ class Method:
     Every archive states all of these choices.
     """
 
-    resolution: str = "exact"
-    objective: str = ""
-    regularization: str = "points"
-    active_set: str = "closed"
-    search: str = ""
+    resolution: Resolution | str = "exact"
+    objective: ObjectiveName | str = ""
+    regularization: Regularization = "points"
+    active_set: ActiveSet = "closed"
+    search: Search | Literal[""] = ""
 
     def __post_init__(self) -> None:
         for choice, usual in (("search", USUAL_SEARCH), ("objective", USUAL_OBJECTIVE)):
@@ -85,8 +89,7 @@ class Method:
             "search": SEARCHES,
         }
         for choice, names in choices.items():
-            if getattr(self, choice) not in names:
-                raise OptionError(f"{choice} is {getattr(self, choice)!r}; expected one of: {', '.join(names)}")
+            check_choice(choice, getattr(self, choice), names)
         if self.search != "fixed" and self.resolution != "exact":
             raise OptionError(f'search is "{self.search}" with a linearized resolution; it needs resolution "exact"')
 

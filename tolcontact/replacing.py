@@ -12,7 +12,7 @@ from pathlib import Path
 def replacing(path: Path) -> Iterator[Path]:
     """Yield the path of a new, empty file to write to, which then replaces `path`.
 
-    It stands beside `path`, under a name that nobody can have given to a file or link before.
+    It stands next to `path`, under a name that nobody can have given to a file or link before.
     Raises OSError if it cannot be made, or cannot replace `path`; then `path` stays as it is.
     """
     part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
@@ -27,5 +27,5 @@ def replacing(path: Path) -> Iterator[Path]:
 def remove_abandoned(path: Path) -> None:
     """Remove the files that writers of `path` left when they were killed. Nobody may be writing it now."""
     for part in path.parent.glob(f".{glob.escape(path.name)}.{'[0-9a-f]' * 8}.part"):
-        with contextlib.suppress(OSError):  # that of another user
+        with contextlib.suppress(OSError):  # the file belongs to another user
             part.unlink()

@@ -48,7 +48,7 @@ def single_spacing(vertices: np.ndarray) -> np.ndarray:
 
 
 def printed_spacing(content: bytes, kind: str) -> float:
-    """Return the unit of the last digit to which a text prints its largest coordinate; 0 for binary content and exact numbers.
+    """Return the unit of the last digit of the largest coordinate that a text prints; 0 for binary content and exact numbers.
 
     Trailing zeros may be left out in print, so the last digit follows from all numbers. A text that prints numbers of single
     precision to more digits than they have is no more accurate than these.

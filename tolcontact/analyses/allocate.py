@@ -11,12 +11,20 @@ import scipy
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Progress
-from tolcontact.analyses.grouping import owners
-from tolcontact.analyses.requirement import MIN_DECISIVE, Requirement
-from tolcontact.analyses.scaled_trials import STEP, ChangedRows, ScaledTrials, Trial, effect_samples, narrowing_effects
+from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Progress, owners
+from tolcontact.analyses.scaled_trials import (
+    MIN_DECISIVE,
+    STEP,
+    ChangedRows,
+    Requirement,
+    ScaledTrials,
+    Trial,
+    effect_samples,
+    narrowing_effects,
+)
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
+from tolcontact.method import Solver
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.workflow.models import Choice, Model
 
@@ -31,9 +39,9 @@ Cost = float | Callable[[float], float]
 
 
 def allocate(
-    model: Model | Program, require: str | Sequence[str], *, costs: Mapping[str, Cost] | None = None, by: str = "contributor",
-    samples: int = 8192, seed: int = 1, solver: str | None = None, method: Choice | None = None,
-    into: str | Path | None = None, client: Any = None, progress: Progress | None = None,
+    model: Model | Program, require: str | Sequence[str], *, costs: Mapping[str, Cost] | None = None,
+    by: terms.GroupedBy = "contributor", samples: int = 8192, seed: int = 1, solver: Solver | None = None,
+    method: Choice | None = None, into: str | Path | None = None, client: Any = None, progress: Progress | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Return tolerance ranges of least cost that meet requirements on measures, with contact resolved.
 

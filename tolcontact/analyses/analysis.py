@@ -1,4 +1,4 @@
-"""The common base of all analyses: checks, the engine that simulates, the returned dataset, and its storage in an archive."""
+"""The base of all analyses: checks, the engine that simulates, groups of contributors, the dataset and its storage."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -11,11 +11,16 @@ from tolcontact import vocabulary as terms
 from tolcontact.analyses.designs import Design
 from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
-from tolcontact.errors import OptionError
+from tolcontact.errors import OptionError, check_choice
+from tolcontact.features.freedoms import FORM
+from tolcontact.method import Solver
 from tolcontact.simulation import Block, block_rows, outcomes
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
 from tolcontact.simulation.threads import Sampler
+from tolcontact.statistics.linear_shares import joined_columns
 from tolcontact.variation import GivenDraws
+from tolcontact.variation.draws import Draws
+from tolcontact.vocabulary import GROUPED_BY
 from tolcontact.workflow.forecast import check_affordable
 from tolcontact.workflow.models import Choice, Model, check_counts, program_of
 
@@ -93,7 +98,7 @@ class Question:
     """
 
     def __init__(
-        self, record: terms.AnalysisRecord, model: Model | Program, *, solver: str | None, method: Choice | None,
+        self, record: terms.AnalysisRecord, model: Model | Program, *, solver: Solver | None, method: Choice | None,
         into: str | Path | None,
     ) -> None:  # fmt: skip
         self.record, self.program, self._into = record, program_of(model, solver, method), into
@@ -160,7 +165,7 @@ class Analysis(Question):
     """A question that is answered by simulations. All options are checked before anything is simulated."""
 
     def __init__(
-        self, record: terms.AnalysisRecord, model: Model | Program, *, samples: int, seed: int, solver: str | None,
+        self, record: terms.AnalysisRecord, model: Model | Program, *, samples: int, seed: int, solver: Solver | None,
         method: Choice | None, into: str | Path | None, client: Any, progress: Progress | None,
     ) -> None:  # fmt: skip
         check_counts(samples=samples, seed=seed)
@@ -198,3 +203,32 @@ class Analysis(Question):
         """Raise OptionError if nothing varies."""
         if not varies:
             raise OptionError(f'nothing varies in "{self.assembly}"; give it tolerances first')
+
+
+def owners(program: Program, by: str) -> list[str]:
+    """Return the owner of each column of deviations: its contributor, feature or part; the modes of a form have one owner.
+
+    Raises OptionError for a grouping that does not exist.
+    """
+    check_choice("by", by, GROUPED_BY)
+    nominal, labels = program.nominal, list(program.nominal.contributors)
+    if by == "contributor":
+        contributors = zip(labels, program.draws.contributors, strict=True)
+        return [label.rpartition(" ")[0] if contributor.source == FORM else label for label, contributor in contributors]
+    # Locators belong to the part that they locate, even if `by` is "feature"; in a station to the part or joint there.
+    owner_of = {label: part.located for part in nominal.parts for label in part.locators.labels}
+    for pattern in nominal.patterns:
+        part = pattern.declared.part.name
+        labels_of_pattern = [freedom.label for freedom in pattern.freedoms]
+        owner_of |= {label: part if by == "part" else label.rpartition(".")[0] for label in labels_of_pattern}
+    return [owner_of.get(label, label) for label in labels]
+
+
+def independent_groups(
+    draws: Draws, owners: Sequence[str], varies: np.ndarray, *, correlated: bool = True
+) -> dict[str, np.ndarray]:
+    """Return columns that vary, by independent groups: owners are joined if any of their columns are drawn jointly.
+
+    Without `correlated`, groups that are correlated by declaration remain separate.
+    """
+    return joined_columns(owners, draws.dependent(correlated=correlated), np.flatnonzero(varies))

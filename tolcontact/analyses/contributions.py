@@ -15,11 +15,11 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import Analysis, Engine, Progress
+from tolcontact.analyses.analysis import Analysis, Engine, Progress, independent_groups, owners
 from tolcontact.analyses.designs import MixedDraws, ReleasedDraws
-from tolcontact.analyses.grouping import independent_groups, owners
 from tolcontact.analyses.linear_model import total_derivatives
 from tolcontact.compilation import Program
+from tolcontact.method import Solver
 from tolcontact.simulation import Block
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.statistics.sobol_indices import missed, shapley_effects, sobol_indices
@@ -108,8 +108,8 @@ def _effective_count(f: np.ndarray) -> float:
 
 
 def contributions(
-    model: Model | Program, *, samples: int | None = None, seed: int = 1, solver: str | None = None,
-    method: Choice | None = None, by: str = "contributor", into: str | Path | None = None, client: Any = None,
+    model: Model | Program, *, samples: int | None = None, seed: int = 1, solver: Solver | None = None,
+    method: Choice | None = None, by: terms.GroupedBy = "contributor", into: str | Path | None = None, client: Any = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Return Sobol' indices of each measure (see tolcontact.statistics.sobol_indices), and the classical linear percentages.

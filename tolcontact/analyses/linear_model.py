@@ -102,10 +102,10 @@ def leverages(program: Program) -> np.ndarray:
         ends = [
             program.place(deviations=sign * steps)["poses"].reshape(len(columns), len(nominal.parts), -1) for sign in (1, -1)
         ]
-        carried = [k for k, other in enumerate(nominal.parts) if other.carried and other.parent == number]
+        joined = [k for k, other in enumerate(nominal.parts) if other.carried and other.parent == number]
         displacements = np.concatenate(
             [pose.apply(ends[0][:, k], nominal.parts[k].vertices) - pose.apply(ends[1][:, k], nominal.parts[k].vertices)
-             for k in (number, *carried)], axis=1
+             for k in (number, *joined)], axis=1
         )  # fmt: skip
         leverages[columns] = np.linalg.norm(displacements, axis=-1).max(axis=-1, initial=0) / (2 * STEP)
     return leverages

@@ -15,11 +15,12 @@ from tolcontact.declaration import Assembly, Locator, ThreeTwoOne
 from tolcontact.discretization import Nominal, NominalPart, discretize
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.limits import Limits
+from tolcontact.method import Solver
 from tolcontact.statistics import intervals, two_samples
 from tolcontact.statistics.capability import share_outside
 from tolcontact.statistics.intervals import Estimate
+from tolcontact.statistics.measure_statistics import StatisticRequest
 from tolcontact.statistics.sample import Sample
-from tolcontact.statistics.statistic_request import StatisticRequest
 from tolcontact.workflow.models import DEFAULT_SOLVER, Choice, Model
 
 GRID_POINTS = {1: 9, 2: 5, 3: 4}  # trial positions along each side, by the number of sides
@@ -31,7 +32,7 @@ EXAMPLES = (f"corner height: {SIX_SIGMA}", f"gap: {terms.PPM}")
 
 def relocate(
     model: Model, locator: str, *, between: tuple[Any, Any], least: str, samples: int = 4096, seed: int = 1,
-    solver: str = DEFAULT_SOLVER, method: Choice | None = None, into: str | Path | None = None, client: Any = None,
+    solver: Solver = DEFAULT_SOLVER, method: Choice | None = None, into: str | Path | None = None, client: Any = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Return the best position of a locator, "part.locator", in the box `between` two corners, in its part's own frame [mm].

@@ -11,6 +11,7 @@ from tolcontact.analyses.analysis import Analysis, Progress
 from tolcontact.analyses.designs import SteppedDraws
 from tolcontact.analyses.linear_model import leverages, total_derivatives
 from tolcontact.compilation import Program
+from tolcontact.method import Solver
 from tolcontact.simulation import Block
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
@@ -22,7 +23,7 @@ NEGLIGIBLE = 0.1  # of the largest derivative of a measure: smaller ones may dif
 
 
 def sensitivities(
-    model: Model | Program, *, samples: int = 1000, seed: int = 1, solver: str | None = None, method: Choice | None = None,
+    model: Model | Program, *, samples: int = 1000, seed: int = 1, solver: Solver | None = None, method: Choice | None = None,
     into: str | Path | None = None, client: Any = None, progress: Progress | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Return derivatives of each measure by each contributor that varies, from differences in each realization.

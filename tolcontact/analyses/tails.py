@@ -14,6 +14,7 @@ from tolcontact.analyses.analysis import Analysis, Engine, Progress
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
+from tolcontact.method import Solver
 from tolcontact.statistics.intervals import UNDEFINED
 from tolcontact.statistics.rare import NEGLIGIBLE, Tail, either, sufficient_tail
 from tolcontact.variation.draws import MIN_UNIFORM
@@ -26,7 +27,7 @@ UNDEFINED_TAIL = Tail(UNDEFINED, 1.0)
 
 
 def tails(
-    model: Model | Program, *, samples: int | None = None, seed: int = 1, solver: str | None = None,
+    model: Model | Program, *, samples: int | None = None, seed: int = 1, solver: Solver | None = None,
     method: Choice | None = None, into: str | Path | None = None, client: Any = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:  # fmt: skip

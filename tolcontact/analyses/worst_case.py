@@ -16,6 +16,7 @@ from tolcontact.analyses.linear_model import LinearModel, linear_model
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.features.freedoms import FORM
+from tolcontact.method import Solver
 from tolcontact.simulation import simulate_blocks
 from tolcontact.variation import GivenDraws
 from tolcontact.workflow.models import Choice, Model
@@ -90,7 +91,7 @@ class Influences:
 
 
 def worst_case(
-    model: Model | Program, *, samples: int = 512, seed: int = 1, solver: str | None = None, method: Choice | None = None,
+    model: Model | Program, *, samples: int = 512, seed: int = 1, solver: Solver | None = None, method: Choice | None = None,
     into: str | Path | None = None, client: Any = None, progress: Progress | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Return the worst-case minimum and maximum of each measure over everything that the tolerances allow.

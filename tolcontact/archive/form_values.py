@@ -1,4 +1,4 @@
-"""The values of an archive that describe the form of faces."""
+"""The values of an archive that describe the form of faces, and the datum planes that touch such faces."""
 
 from typing import Any
 
@@ -10,30 +10,20 @@ from tolcontact.features.associated_features import TERMS
 from tolcontact.geometry.analytic_surfaces import surface_arrays
 from tolcontact.vocabulary import ArchiveVariable
 
-
-def form_sizes(program: Program) -> dict[str, int]:
-    """Return the dimensions of the forms of faces; none if no face has form."""
-    forms = [face.form for face in program.nominal.faces if face.form is not None]
-    if not forms:
-        return {}
-    return {
-        terms.FORM_STATION: sum(len(form.stations) for form in forms),
-        terms.FORM_MODE: max(form.modes for form in forms),
-        terms.FORM_TERM: TERMS,
-    }
+COORDINATES = 3  # of a plane
 
 
 def form_values(program: Program) -> dict[ArchiveVariable, Any]:
     """Return the forms of faces; none if no face has form."""
-    faces, sizes = program.nominal.faces, form_sizes(program)
-    if not sizes:
+    faces, contributors = program.nominal.faces, program.draws.contributors
+    with_form = [(number, face, face.form) for number, face in enumerate(faces) if face.form is not None]
+    if not with_form:
         return {}
-    modes, contributors = sizes[terms.FORM_MODE], program.draws.contributors
+    modes = max(form.modes for _, _, form in with_form)
     numbers = {variable: np.full(len(faces), np.nan) for variable in NUMBERS}
     columns, removed = np.full((len(faces), modes), -1), np.zeros((len(faces), modes, TERMS))
     surfaces = [None if face.form is None else face.form.associated.surface for face in faces]
     weights = []
-    with_form = [(number, face, face.form) for number, face in enumerate(faces) if face.form is not None]
     for number, face, form in with_form:
         spread = np.nan if form.spreads is not None else contributors[face.form_columns[0]].spread
         width = program.draws.mean_widths[face.name]
@@ -60,3 +50,29 @@ NUMBERS = (
     terms.FORM_LENGTH, terms.FORM_LENGTH_ALONG, terms.FORM_START, terms.FORM_END, terms.FORM_SPREAD, terms.FORM_LEFT_OUT,
     terms.FORM_MEAN_ZONE,
 )  # fmt: skip
+
+
+def datum_values(program: Program) -> dict[ArchiveVariable, Any]:
+    """Return the planes that touch datum features with form, and the places that they may touch; none if there are none."""
+    planes = [shift for pattern in program.nominal.patterns for shift in pattern.shifts if shift.form is not None]
+    if not planes:
+        return {}
+    faces = {int(face.form_columns[0]): k for k, face in enumerate(program.nominal.faces) if face.form is not None}
+    count = len(program.nominal.contributors)
+    columns, residuals = np.full((len(planes), COORDINATES), -1), np.zeros((len(planes), COORDINATES, count))
+    free = np.zeros((len(planes), COORDINATES, COORDINATES))
+    for number, plane in enumerate(planes):
+        columns[number, list(plane.coordinates)] = plane.columns
+        residuals[number, :, : plane.residuals.shape[1]] = plane.residuals
+        free[number, :, : plane.free.shape[1]] = plane.free
+    touched = {faces[plane.datum.form_columns.start]: plane for plane in planes}
+    places = [program.nominal.faces[face].form for face in touched]
+    return {
+        terms.TANGENT_FACE: [faces[plane.datum.form_columns.start] for plane in planes],
+        terms.TANGENT_CONTRIBUTOR: columns,
+        terms.TANGENT_RESIDUAL: residuals,
+        terms.TANGENT_FREE: free,
+        terms.FACE_OF_TANGENT_PLACE: np.concatenate([np.full(len(plane.heights), k) for k, plane in touched.items()]),
+        terms.TANGENT_PLACE_AT: np.vstack([form.places for form in places if form is not None]),
+        terms.TANGENT_HEIGHT: np.vstack([plane.heights for plane in touched.values()]),
+    }

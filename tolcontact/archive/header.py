@@ -7,8 +7,7 @@ import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.datum_values import datum_sizes, datum_values
-from tolcontact.archive.form_values import form_sizes, form_values
+from tolcontact.archive.form_values import datum_values, form_values
 from tolcontact.archive.rows import Row, kept_rows
 from tolcontact.archive.settings import Run, declaration, now, run_settings, versions, watch_settings
 from tolcontact.archive.stored_rows import empty_checks
@@ -50,13 +49,10 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
     _write_rows(new, file, program, rows)
     _write_measures(new, file, program)
     _write_model(new, file.createGroup("model"), nominal, declaration(program))
-    _write_contact(new, file.createGroup("contact"), program)
+    points = sum(len(pair.P_m) for pair in nominal.pairs)
+    new.add_all(file.createGroup("contact"), contact_values(program) | empty_touching(points))
     _write_sample(new, file.createGroup("sample"), program, deviations=Row("sample", terms.DEVIATION) in rows)
-    file["contact"].createDimension(terms.BOUND, 2)
-    new.add_all(file["contact"], empty_touching(file["contact"].dimensions[terms.POINT].size))
-    checked = file.createGroup("surface")
-    checked.createDimension(terms.CHECKED, run.surfaces)
-    new.add_all(checked, empty_checks(run.surfaces, len(nominal.pairs)))
+    new.add_all(file.createGroup("surface"), empty_checks(run.surfaces, len(nominal.pairs)))
     for part, numbers in zip(nominal.last_parts, sums, strict=True):
         _write_field(new, file.createGroup(terms.field_of(part.name)), part, numbers)
     new.write()
@@ -96,7 +92,6 @@ def _write_stations(new: Definitions, file: netCDF4.Dataset, nominal: Nominal, r
         path = terms.station_group(scene.station)
         group = file.createGroup(path)
         group.setncattr("station", scene.station)
-        group.createDimension(terms.STATION_PART, len(scene.assembly.parts))
         new.add(group, terms.STATION_PART_LABEL, [part.name for part in scene.assembly.parts])
         for row in rows:
             if row.group == path:
@@ -119,16 +114,6 @@ def _write_measures(new: Definitions, file: netCDF4.Dataset, program: Program) -
 def _write_field(new: Definitions, group: netCDF4.Group, part: NominalPart, numbers: int) -> None:
     """Write the surface of a part, and lay out its displacement field and its sums."""
     group.setncattr("part", part.name)
-    sizes = {
-        terms.VERTEX: len(part.vertices),
-        terms.FACE: len(part.faces),
-        terms.CORNER: 3,
-        terms.COMPONENT: len(terms.COMPONENTS),
-        terms.BOUND: len(terms.BOUNDS),
-        terms.NUMBER: numbers,
-    }
-    for name, size in sizes.items():
-        group.createDimension(name, size)
     new.add(group, terms.COMPONENT_LABEL, terms.COMPONENTS)
     new.add(group, terms.FIELD_VERTICES, part.vertices)
     new.add(group, terms.FIELD_FACES, part.faces)
@@ -161,47 +146,23 @@ def _write_model(new: Definitions, group: netCDF4.Group, nominal: Nominal, docum
     new.add(group, terms.DECLARATION, document)
     lines = [(number, line) for number, lines in enumerate(nominal.lines) for line in lines]
     if lines:
-        group.createDimension(terms.MEASURE_LINE, len(lines))
-        group.createDimension(terms.LINE_END, 2)
         new.add(group, terms.MEASURE_OF_LINE, [number for number, _ in lines])
         new.add(group, terms.LINE_ENDS, np.array([line for _, line in lines]))
     for part in nominal.last_parts:
         if isinstance(part.part.geometry, Mesh):
             mesh = group.createGroup(f"mesh/{terms.group_of(part.name)}")
             mesh.setncattr("part", part.name)
-            mesh.createDimension(terms.VERTEX, len(part.mesh.vertices))
-            mesh.createDimension(terms.FACE, len(part.mesh.faces))
-            mesh.createDimension(terms.CORNER, 3)
             new.add(mesh, terms.MESH_VERTICES, part.mesh.vertices)
             new.add(mesh, terms.MESH_FACES, part.mesh.faces)
             if COORDINATE_SPACING in part.mesh.metadata:
                 new.add(mesh, terms.COORDINATE_SPACING, coordinate_spacing(part.mesh))
             surfaces = known_surfaces(part.mesh)
             if surfaces is not None:
-                mesh.createDimension(terms.BREP_FACE, len(surfaces[1]))
                 new.add(mesh, terms.BREP_OF_FACE, surfaces[0])
                 arrays = surface_arrays(surfaces[1])
                 new.add_all(mesh, {variable: arrays[name] for name, variable in terms.OF_BREP_FACE.items()})
                 if surfaces[2]:
                     new.add(mesh, terms.NAME_OF_BREP_FACE, surfaces[2])
-
-
-def _write_contact(new: Definitions, group: netCDF4.Group, program: Program) -> None:
-    nominal = program.nominal
-    group.createDimension(terms.POINT, sum(len(pair.P_m) for pair in nominal.pairs))
-    if any(pair.round for pair in nominal.pairs):
-        group.createDimension(terms.ROUND_POINT, sum(len(pair.round) for pair in nominal.pairs if pair.round))
-    if nominal.faces:
-        sizes = {
-            terms.FEATURE_FACE: len(nominal.faces),
-            terms.FREEDOM: len(terms.FREEDOMS),
-            terms.CONTRIBUTOR: len(nominal.contributors),
-            **form_sizes(program),
-            **datum_sizes(program),
-        }
-        for name, size in sizes.items():
-            group.createDimension(name, size)
-    new.add_all(group, contact_values(program))
 
 
 def contact_values(program: Program) -> dict[ArchiveVariable, Any]:

@@ -3,6 +3,7 @@
 import json
 from dataclasses import fields
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive.inspection import check_archive
-from tolcontact.archive.netcdf_library import small_caches
+from tolcontact.archive.variables import small_caches
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.document import from_document
 from tolcontact.errors import ArchiveError
@@ -59,12 +60,8 @@ def model_of(results: xr.DataTree) -> Assembly:
 
 def method_of_run(results: xr.DataTree) -> Method:
     """Return the method of a run."""
-    return Method(**{field.name: str(results.attrs[field.name]) for field in fields(Method)})
-
-
-class _Triangles:
-    def __init__(self, vertices: np.ndarray, faces: np.ndarray, coordinate_spacing: np.ndarray) -> None:
-        self.vertices, self.faces, self.coordinate_spacing = vertices, faces, coordinate_spacing
+    choices: dict[str, Any] = {field.name: str(results.attrs[field.name]) for field in fields(Method)}
+    return Method(**choices)
 
 
 def _mesh(mesh: xr.Dataset) -> Any:
@@ -72,7 +69,8 @@ def _mesh(mesh: xr.Dataset) -> Any:
     vertices, faces = mesh[terms.MESH_VERTICES.name].values, mesh[terms.MESH_FACES.name].values
     if any(variable.name not in mesh for variable in terms.KNOWN_SURFACES):
         stated = terms.COORDINATE_SPACING.name
-        return _Triangles(vertices, faces, mesh[stated].values if stated in mesh else np.zeros(3))
+        spacing = mesh[stated].values if stated in mesh else np.zeros(3)
+        return SimpleNamespace(vertices=vertices, faces=faces, coordinate_spacing=spacing)
     brep = mesh[terms.BREP_OF_FACE.name].values
     arrays = {name: mesh[variable.name].values for name, variable in terms.OF_BREP_FACE.items()}
     kinds = arrays["kind"]

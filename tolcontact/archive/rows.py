@@ -1,16 +1,22 @@
-"""The variables of each realization in an archive, their groups, and their values."""
+"""The variables of each realization in an archive: their groups, their values, and the disk space that they need."""
 
-from collections.abc import Collection
+import shutil
+from collections.abc import Collection, Sequence
+from math import prod
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from tolcontact import poses as pose, vocabulary as terms
+from tolcontact.archive.variables import sizes_of_rows
 from tolcontact.discretization import Nominal
+from tolcontact.errors import ArchiveError
 from tolcontact.simulation import Block
 from tolcontact.vocabulary import ArchiveVariable
 
 OMITTED = {"measures": {*terms.POSES, *terms.STATION_POSES, terms.DEVIATION}, "poses": {terms.DEVIATION}, "all": set()}
+COPIES = 2  # of each row for a moment: in the journal, and in the archive
 
 
 class Row(NamedTuple):
@@ -62,3 +68,39 @@ def _station_values(block: Block, nominal: Nominal) -> dict[Row, np.ndarray]:
         arrays = pose.translation(poses), pose.rotation(poses), block.station_status[:, number]
         values |= {Row(group, variable): array for variable, array in zip(terms.STATION_ROWS, arrays, strict=True)}
     return values
+
+
+def check_room(path: Path, nominal: Nominal, rows: Sequence[Row], samples: int) -> None:
+    """Raise ArchiveError if the disk has no room for `samples` more realizations of the variables `rows`."""
+    needed, free = COPIES * samples * bytes_of_row(nominal, rows), shutil.disk_usage(path.parent).free
+    if needed > free:
+        keeps_poses = any(row.variable is terms.ROTATION for row in rows)
+        advice = ", or keep less of each realization (measures)" if keeps_poses else ""
+        raise ArchiveError(
+            f'archive "{path}" needs {size_in_words(needed)} for {samples} realizations, but its disk has '
+            f"{size_in_words(free)} free; ask for fewer, write to another disk{advice}"
+        )
+
+
+def bytes_of_rows(nominal: Nominal, keep: str, samples: int) -> int:
+    """Return the size of `samples` realizations in an archive with the option `keep` [bytes]."""
+    return samples * bytes_of_row(nominal, kept_rows(nominal, keep))
+
+
+def bytes_of_row(nominal: Nominal, rows: Sequence[Row]) -> int:
+    """Return the size of one realization [bytes]."""
+    sizes = {terms.REALIZATION: 1, **sizes_of_rows(nominal)}
+    stations = {terms.station_group(scene.station): {terms.STATION_PART: len(scene.assembly.parts)} for scene in nominal.scenes}
+    return sum(
+        np.dtype(row.variable.kind).itemsize * prod((sizes | stations.get(row.group, {}))[dim] for dim in row.variable.dims)
+        for row in (Row("", terms.NUMBERS), *rows)
+    )
+
+
+def size_in_words(count: float) -> str:
+    """Return a number of bytes with a readable unit: 1.5 GB."""
+    for unit in ("B", "kB", "MB", "GB"):
+        if count < 1000:
+            return f"{count:.3g} {unit}"
+        count /= 1000
+    return f"{count:.3g} TB"

@@ -1,35 +1,62 @@
-"""Variables of the vocabulary in a netCDF file."""
+"""The netCDF library, which only one thread may use at a time, and variables of the vocabulary in its files."""
 
+import contextlib
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal
 
 import netCDF4
 import numpy as np
 import pandas as pd
 import xarray as xr
+from xarray.backends import NetCDF4DataStore
 
 from tolcontact import vocabulary as terms
 from tolcontact.compilation import Program
 from tolcontact.discretization import Nominal
 from tolcontact.vocabulary import ArchiveVariable
 
+CACHE_BYTES = 1 << 20  # a chunk of most variables; with the usual size, all caches would take as much memory as all else
 MAX_CHUNK_BYTES = 1 << 22  # bytes: more would not stay in the library's cache
 MIN_CHUNK_ROWS = 16
 
 
-def define(group: netCDF4.Dataset, variable: ArchiveVariable) -> netCDF4.Variable:
-    """Define a variable of numbers, without values. The library compares its checksums when it reads."""
+with netCDF4.Dataset("in memory", "w", diskless=True) as _file:
+    XARRAY_LOCK = NetCDF4DataStore(_file).lock  # type: ignore[no-untyped-call]  # held while xarray uses the library
+
+
+@contextlib.contextmanager
+def open_netcdf(path: Path, mode: Literal["w", "r+", "r"]) -> Iterator[netCDF4.Dataset]:
+    """Open a file whose values are read and written as they are, without masks. Meanwhile xarray uses no netCDF file."""
+    with XARRAY_LOCK, small_caches(), netCDF4.Dataset(path, mode, format="NETCDF4") as file:
+        file.set_auto_maskandscale(False)
+        yield file
+
+
+@contextlib.contextmanager
+def small_caches() -> Iterator[None]:
+    """Give each variable of a file that is opened meanwhile a small cache."""
+    usual = netCDF4.get_chunk_cache()
+    try:
+        netCDF4.set_chunk_cache(CACHE_BYTES)
+        yield
+    finally:
+        netCDF4.set_chunk_cache(*usual)
+
+
+def define(group: netCDF4.Dataset, variable: ArchiveVariable, shape: Sequence[int] = ()) -> netCDF4.Variable:
+    """Define a variable of numbers, without values, and missing dimensions by its shape. Checksums are compared on reading."""
     options: dict[str, Any] = {"fletcher32": True}
+    _create_dimensions(group, variable, shape)
     if terms.REALIZATION in variable.dims:
+        dimensions = _dimensions(group)
         # netCDF's own choice, one row per chunk, reads some fifty times slower.
-        fixed = [max(len(_dimension(group, dim)), 1) for dim in variable.dims[1:]]
+        fixed = [max(len(dimensions[dim]), 1) for dim in variable.dims[1:]]
         options["chunksizes"] = [_chunk_rows(np.dtype(variable.kind).itemsize * math.prod(fixed)), *fixed]
     created = group.createVariable(variable.name, variable.kind, variable.dims, **options)
-    attributes = variable.all_attributes
-    if "flag_values" in attributes:
-        attributes["flag_values"] = np.array(attributes["flag_values"], dtype=variable.kind)
-    created.setncatts(attributes)
+    created.setncatts(attributes_of(variable))
     return created
 
 
@@ -41,11 +68,17 @@ def _chunk_rows(width: int) -> int:
     return rows
 
 
-def _dimension(group: netCDF4.Dataset, name: str) -> netCDF4.Dimension:
-    """Return a dimension of the group, or of the groups above it."""
-    if name in group.dimensions or group.parent is None:
-        return group.dimensions[name]
-    return _dimension(group.parent, name)
+def _dimensions(group: netCDF4.Dataset) -> dict[str, netCDF4.Dimension]:
+    """Return the dimensions of a group and of the groups above it by name."""
+    above = {} if group.parent is None else _dimensions(group.parent)
+    return above | group.dimensions
+
+
+def _create_dimensions(group: netCDF4.Dataset, variable: ArchiveVariable, shape: Sequence[int]) -> None:
+    known = _dimensions(group)
+    for name, size in zip(variable.dims, shape, strict=False):
+        if name not in known:
+            group.createDimension(name, size)
 
 
 class Definitions:
@@ -59,12 +92,14 @@ class Definitions:
         self._values: list[tuple[netCDF4.Variable, np.ndarray]] = []
 
     def add(self, group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
-        """Define a variable in a group that has the dimensions, and keep its values."""
+        """Define a variable in a group, with the dimensions that the group does not have, and keep its values."""
         if variable.kind is not str:
-            self._values.append((define(group, variable), np.asarray(values)))
+            array = np.asarray(values)
+            self._values.append((define(group, variable, array.shape), array))
             return
         # The netCDF library crashes if text of variable length is read through two open handles, so it is stored as characters.
         text = np.char.encode(np.array(values, dtype=str), "utf-8")
+        _create_dimensions(group, variable, text.shape)
         length = group.createDimension(f"{variable.name}_length", max(text.dtype.itemsize, 1))
         created = group.createVariable(variable.name, "S1", (*variable.dims, length.name), fletcher32=True)
         created.setncatts({**variable.all_attributes, "_Encoding": "utf-8"})
@@ -119,12 +154,11 @@ def units_of_rows(program: Program) -> dict[ArchiveVariable, str]:
     }
 
 
-def attributes_of(variable: ArchiveVariable, program: Program) -> dict[str, Any]:
-    """Return the attributes of a variable of realizations, for a model."""
+def attributes_of(variable: ArchiveVariable, units: Mapping[ArchiveVariable, str] = MappingProxyType({})) -> dict[str, Any]:
+    """Return the attributes of a variable; `units` are those that depend on the model."""
     attributes = variable.all_attributes
     if "flag_values" in attributes:
         attributes["flag_values"] = np.array(attributes["flag_values"], dtype=variable.kind)
-    units = units_of_rows(program)
     return attributes | ({"units": units[variable]} if variable in units else {})
 
 
@@ -132,9 +166,9 @@ def labelled(program: Program, values: Mapping[ArchiveVariable, Any], attributes
     """Return arrays of any kind as variables of realizations, with the labels and attributes of an archive."""
     texts = {**labels_of_rows(program.nominal), terms.CONTRIBUTOR: program.nominal.contributors}
     labels: dict[str, Any] = {name: np.array(list(names), dtype=object) for name, names in texts.items()}  # text of any length
-    labels[terms.REALIZATION] = pd.RangeIndex(len(values[terms.STATUS]))
+    labels[terms.REALIZATION], units = pd.RangeIndex(len(values[terms.STATUS])), units_of_rows(program)
     return xr.Dataset(
-        {variable.name: (variable.dims, array, attributes_of(variable, program)) for variable, array in values.items()},
+        {variable.name: (variable.dims, array, attributes_of(variable, units)) for variable, array in values.items()},
         {label.name: label.entry(labels[label.name]) for label in (*terms.COORDINATES, terms.CONTRIBUTOR_LABEL)},
         attributes,
     )

@@ -1,29 +1,84 @@
 """Writing an archive: its header first, its realizations block by block to a journal, and all of them at the end."""
 
 import contextlib
+import json
+import os
 import shutil
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.disk_space import check_room
-from tolcontact.archive.header import write_header
+from tolcontact.archive.archive_lock import locked_archive
+from tolcontact.archive.header import contact_values, write_header
 from tolcontact.archive.inspection import inspect
 from tolcontact.archive.journal import Checkpoint, Journal
-from tolcontact.archive.netcdf_library import open_netcdf
 from tolcontact.archive.reader import open_unchecked
-from tolcontact.archive.resuming import check_same_run
-from tolcontact.archive.rows import kept_rows
-from tolcontact.archive.settings import Run, now, run_settings, versions
+from tolcontact.archive.rows import check_room, kept_rows
+from tolcontact.archive.settings import Run, declaration, now, run_settings, versions
 from tolcontact.archive.stored_rows import archived_poses, check_rows, choose, empty_checks
-from tolcontact.archive.variables import overwrite
+from tolcontact.archive.variables import open_netcdf, overwrite
 from tolcontact.compilation import Program
 from tolcontact.errors import ArchiveError
 from tolcontact.replacing import replacing
+
+POINT_TOLERANCE = 1e-9  # mm: points may differ by rounding from one machine to the next
+
+
+def check_same_run(file: netCDF4.Dataset, path: Path, program: Program, settings: Mapping[str, Any], surfaces: int) -> None:
+    """Raise ArchiveError if the archive `file`, in the file `path`, is of another model or another run."""
+    if not file.dimensions[terms.REALIZATION].isunlimited():
+        raise ArchiveError(f'"{path}" is a copy that cannot grow; resume the archive that tolcontact wrote')
+    check_same_model(file, path, program)
+    _check_same_distributions(file, path, program)
+    for name, value in settings.items():
+        was = getattr(file, name, None)
+        if name != "samples" and was != value:
+            raise ArchiveError(
+                f'"{path}" was run with {name} = {was}, now it is {value}; resume with the same, or write to a new file'
+            )
+    room = len(file["surface"].dimensions[terms.CHECKED])
+    if room != surfaces:
+        raise ArchiveError(f'"{path}" was begun with surfaces = {room}, now it is {surfaces}; resume with the same')
+
+
+def check_same_model(file: netCDF4.Dataset, path: Path, program: Program) -> None:
+    """Raise ArchiveError if the archive `file`, in the file `path`, is of another model."""
+    if _comparable(str(file["model"][terms.DECLARATION.name][...])) != _comparable(declaration(program)):
+        raise ArchiveError(f'"{path}" contains another model than this one; write to a new file')
+    for part in program.nominal.last_parts:
+        if not _is_equal(file[f"field/{terms.group_of(part.name)}"][terms.FIELD_VERTICES.name], part.vertices):
+            raise ArchiveError(f'"{path}": part "{part.name}" had another shape (was its mesh replaced?); write to a new file')
+    for variable, values in contact_values(program).items():
+        if variable in (terms.BOUNDED, terms.PLANE_ERROR):  # they follow from the method, which is compared separately
+            continue
+        stored = file["contact"].variables.get(variable.name)
+        if stored is None or not (variable.kind is str or _is_equal(stored, values)):  # texts are in the declaration
+            raise ArchiveError(f'"{path}": its contact points differ (it was written by {file.versions}); write to a new file')
+
+
+def _check_same_distributions(file: netCDF4.Dataset, path: Path, program: Program) -> None:
+    """Raise ArchiveError if the archive `file`, in the file `path`, describes a distribution otherwise than this version."""
+    for contributor, was in zip(program.draws.contributors, file["sample"][terms.DISTRIBUTION.name][...], strict=True):
+        if str(was) != contributor.description:
+            raise ArchiveError(
+                f'"{path}": contributor "{contributor.label}" was drawn as "{was}", now as "{contributor.description}"; '
+                "write to a new file"
+            )
+
+
+def _comparable(declared: str) -> Any:
+    """Return a declaration without what does not affect results: the lines of the script, and the title block."""
+    ignored = ("declared_at", "title_block")
+    return json.loads(declared, object_hook=lambda item: {key: item[key] for key in item if key not in ignored})
+
+
+def _is_equal(stored: netCDF4.Variable, values: Any) -> bool:
+    return stored.shape == np.shape(values) and np.allclose(stored[...], values, rtol=0, atol=POINT_TOLERANCE, equal_nan=True)
 
 
 class ArchiveWriter:
@@ -203,3 +258,35 @@ def _as_archive_error(path: Path) -> Iterator[None]:
     except (OSError, RuntimeError) as error:
         reason = getattr(error, "strerror", None) or f"{error} (is the disk full?)"
         raise ArchiveError(f'archive "{path}" cannot be written: {reason}') from error
+
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def check_room_for(path: str | Path, record: terms.AnalysisRecord, program: Program) -> None:
+    """Raise ArchiveError unless an archive is of the program's model and does not hold this analysis yet."""
+    archive = Path(os.path.realpath(path))
+    if not archive.is_file():
+        raise ArchiveError(f'archive "{path}" does not exist; write one with: tolcontact run MODEL.py --out {path}')
+    inspect(archive)
+    with open_netcdf(archive, "r") as file:
+        check_same_model(file, archive, program)
+        if terms.ANALYSES_GROUP in file.groups and record.name in file[terms.ANALYSES_GROUP].groups:
+            group = f"{terms.ANALYSES_GROUP}/{record.name}"
+            raise ArchiveError(f'"{path}" already has {group}, which is not replaced; choose another archive')
+
+
+def keep(path: str | Path, record: terms.AnalysisRecord, dataset: "xr.Dataset", program: Program) -> None:
+    """Add an analysis to an archive of the same model (see `check_room_for`).
+
+    The file is replaced only when all of the new one is written.
+    """
+    with locked_archive(path, resume=True) as archive:
+        check_room_for(archive, record, program)
+        with replacing_archive(archive) as part:
+            shutil.copyfile(archive, part)
+            stored = dataset.copy()
+            for array in stored.variables.values():
+                array.encoding = {"fletcher32": True} | ({"dtype": "S1"} if array.dtype.kind in "UO" else {})
+            stored.to_netcdf(part, mode="a", group=f"{terms.ANALYSES_GROUP}/{record.name}", engine="netcdf4")

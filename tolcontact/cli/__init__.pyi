@@ -4,7 +4,6 @@ from . import (
     archives as archives,
     compare as compare,
     models as models,
-    pmi as pmi,
     run as run,
     step_files as step_files,
 )

@@ -7,9 +7,21 @@ import typer
 
 from tolcontact import archive as archives, report as reports, workflow
 from tolcontact.cli.app import Archive, AsCsv, AsJson, Overwrite, app, examples, flag, only_one
-from tolcontact.cli.output import check_page, check_spreadsheet, console, print_data, print_summary
+from tolcontact.cli.output import (
+    Author,
+    Company,
+    Date,
+    PartNumber,
+    Revision,
+    Title,
+    check_page,
+    check_spreadsheet,
+    console,
+    print_data,
+    print_summary,
+    title_entries,
+)
 from tolcontact.cli.progress import waiting
-from tolcontact.cli.title_options import Author, Company, Date, PartNumber, Revision, Title, title_entries
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.errors import shown
 from tolcontact.vocabulary import ESTIMATE, MEASURE_UNITS, STATISTIC, units_of

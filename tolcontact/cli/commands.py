@@ -27,7 +27,7 @@ COMMANDS = {
         "Show an assembly before a run: faces, features with their tolerances, locators, contact points and nominal gaps.",
     ),
     "pmi": (
-        "pmi",
+        "step_files",
         "List the tolerances, dimensions and datums of a STEP file of AP242, and how features declare them. In mm and rad.",
     ),
     "run": ("run", "Simulate a model with and without contact, and print the statistics of its measurements."),

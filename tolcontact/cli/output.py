@@ -1,8 +1,10 @@
-"""Output of results on standard output, and checks of output files."""
+"""Output of results, checks of output files, and the options that replace entries of a title block of a report."""
 
 import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -10,11 +12,20 @@ import xarray as xr
 from rich.console import Console
 
 from tolcontact import report
-from tolcontact.errors import OptionError
+from tolcontact.declaration import Assembly, TitleBlock
+from tolcontact.declaration.script import load_model
+from tolcontact.errors import OptionError, shown
 from tolcontact.vocabulary import BY_STATUS, UNRESOLVED
 
 FAILED_SHARE = 0.001
 UNBOUNDED = 10_000  # columns outside a terminal
+Title = Annotated[str | None, typer.Option(help="Title of the report. Default: the model's.", rich_help_panel="Title block")]
+PartNumber = Annotated[str | None, typer.Option(help="Part number of the assembly.", rich_help_panel="Title block")]
+Author = Annotated[str | None, typer.Option(help="Author of the report.", rich_help_panel="Title block")]
+Revision = Annotated[str | None, typer.Option(help="Revision of the model or of its drawing.", rich_help_panel="Title block")]
+Date = Annotated[str | None, typer.Option(help="Date of the report, as text.", rich_help_panel="Title block")]
+Company = Annotated[str | None, typer.Option(help="Company that issues the report.", rich_help_panel="Title block")]
+ENTRIES = tuple(TitleBlock().entries)  # in the order of these options
 
 
 def console() -> Console:
@@ -68,3 +79,27 @@ def _as_json(values: np.ndarray) -> np.ndarray:
 def _plain(value: object) -> object:
     """Return a NumPy number as a JSON value."""
     return value.item() if isinstance(value, np.generic) else str(value)
+
+
+def title_entries(*options: str | None) -> dict[str, str | None]:
+    """Return the entries of a title block by their names, from the options above in their order."""
+    return dict(zip(ENTRIES, options, strict=True))
+
+
+def note_kept_title(archive: Path | None, entries: Mapping[str, str | None]) -> None:
+    """Print a note that a resumed archive keeps its title block, if the options state another one."""
+    if archive is not None and archive.exists() and any(entries.values()):
+        name = shown(str(archive))
+        typer.echo(
+            f"{name} keeps the title block that it was begun with; another one for its page: "
+            f"tolcontact report {name} --title ...",
+            err=True,
+        )
+
+
+def titled_model(path: Path, entries: Mapping[str, str | None]) -> Assembly:
+    """Return the assembly that a file declares, with its title block updated by the `entries` that are not None."""
+    assembly = load_model(path)
+    if any(entry is not None for entry in entries.values()):
+        assembly.title_block = (assembly.title_block or TitleBlock()).overridden(entries)
+    return assembly

@@ -9,7 +9,7 @@ import typer
 
 from tolcontact import report as reports
 from tolcontact.archive import Run, open_unchecked
-from tolcontact.cli import app as common, title_options
+from tolcontact.cli import app as common, output
 from tolcontact.cli.output import check_page, print_summary
 from tolcontact.cli.progress import shown_progress, stopped
 from tolcontact.errors import OptionError, shown
@@ -18,8 +18,7 @@ from tolcontact.statistics import Summary
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.accessor import summarize
 from tolcontact.workflow.models import DEFAULT_SOLVER
-from tolcontact.workflow.runs import SURFACES, write_run
-from tolcontact.workflow.until import Target
+from tolcontact.workflow.runs import SURFACES, Target, write_run
 
 Until = Annotated[
     str | None,
@@ -58,12 +57,12 @@ def run(
         int, typer.Option(help="Number of realizations that are checked between contact points, on the surfaces.")
     ] = SURFACES,
     report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Also write a page for a browser.")] = None,
-    title: title_options.Title = None,
-    part_number: title_options.PartNumber = None,
-    author: title_options.Author = None,
-    revision: title_options.Revision = None,
-    date: title_options.Date = None,
-    company: title_options.Company = None,
+    title: output.Title = None,
+    part_number: output.PartNumber = None,
+    author: output.Author = None,
+    revision: output.Revision = None,
+    date: output.Date = None,
+    company: output.Company = None,
     workers: common.Workers = None,
     scheduler: common.Scheduler = None,
     quiet: common.Quiet = False,
@@ -75,8 +74,8 @@ def run(
     """
     _check_files(out, report, overwrite=overwrite, resume=resume)
     method = common.method_choices(resolution=resolution, objective=objective)
-    titles = title_options.title_entries(title, part_number, author, revision, date, company)
-    title_options.note_kept_title(out if resume else None, titles)
+    titles = output.title_entries(title, part_number, author, revision, date, company)
+    output.note_kept_title(out if resume else None, titles)
     # A stop first restores the cursor.
     with (
         stopped(out, done := [0, samples]),
@@ -90,7 +89,7 @@ def run(
             show(*done)
 
         path = write_run(
-            functools.partial(title_options.titled_model, model, titles),
+            functools.partial(output.titled_model, model, titles),
             Run(seed, samples, keep, surfaces, int(fields) if fields.isdigit() else fields, plan),
             out or Path(folder) / "results.nc", solver=solver, method=method, overwrite=overwrite and out is not None,
             resume=resume, until=until, client=client, progress=progress,

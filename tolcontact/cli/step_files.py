@@ -1,18 +1,257 @@
-"""tolcontact bodies, tolcontact faces."""
+"""tolcontact pmi, tolcontact bodies, tolcontact faces."""
 
+import csv
+import io
 import json
-from collections.abc import Sequence
+import sys
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich import box
+from rich.console import RenderableType
+from rich.table import Table
+from rich.text import Text
 
-from tolcontact.cli.app import AsJson, StepFile, app, examples
+from tolcontact.cli.app import AsJson, StepFile, app, examples, flag, only_one
+from tolcontact.cli.output import console
 from tolcontact.cli.progress import waiting
-from tolcontact.errors import shown_name
+from tolcontact.errors import OptionError, clipped, shown, shown_name
 from tolcontact.geometry import bodies_in, faces_in, group_lines
+from tolcontact.geometry.step_listing import FacesOfRecords
+from tolcontact.pmi import Datum, Dimension, Pmi, Tolerance, read_pmi
+from tolcontact.pmi.claims import Annotation
+from tolcontact.pmi.declared import DeclaredFile, declared_file
+from tolcontact.pmi.script import script
+from tolcontact.report.table import FILE_WIDTH
+
+MAX_ROWS = 2000  # of a table, which takes a second; a drawing has about a hundred
+_CSV = (
+    "type", "number", "record", "kind", "name", "value", "lower", "upper", "unit", "zone", "details", "datums", "refines",
+    "face_records", "other_records", "end_face_records", "end_other_records", "faces", "end_faces", "features", "reason",
+)  # fmt: skip
+_TOLERANCES = ("", "kind", "value", "zone, modifiers", "datums", "faces", "declared as")
+_DIMENSIONS = ("", "dimension", "nominal", "limits", "details", "faces", "declared as")
+_DATUMS = ("", "faces", "targets", "declared as")
+MIN_WIDTHS = {"dimension": 9, "declared as": 12, "faces": 11}  # of columns, so that no word in them is cut
+MAX_FACES = 12  # in a cell
+MAX_FEATURES = 6  # in a cell
 
 Body = Annotated[str | None, typer.Option(help="Name or number of the body. Not needed for a file with a single body.")]
+AsCsv = Annotated[bool, flag("--csv", "Print the tolerances and dimensions as CSV.")]
+AsScript = Annotated[bool, flag("--script", "Print a model script that declares the parts with these tolerances.")]
+
+
+@app.command(epilog=examples("pmi part.stp", "pmi part.stp --csv > part.csv", "pmi part.stp --script > part.py"))
+def pmi(file: StepFile, as_json: AsJson = False, as_csv: AsCsv = False, as_script: AsScript = False) -> None:
+    """List the tolerances, dimensions and datums of a STEP file of AP242, and how features declare them. In mm and rad."""
+    only_one(json=as_json, csv=as_csv, script=as_script)
+    with waiting(f"reading {file}"):
+        information = read_pmi(file)
+        declared = _declared(file, information)
+    if as_script and information.is_empty:
+        raise OptionError(f"{_reason(information, shown(str(file)))}, so there is nothing to declare")
+    if as_script and not declared.parts:
+        raise OptionError(f'"{file}": none of its tolerances, dimensions and datums applies to a face that is listed')
+    if as_script:
+        typer.echo(script(file, declared), nl=False)
+    elif as_csv:
+        typer.echo(_csv(declared), nl=False)
+    elif information.is_empty and not as_json:
+        typer.echo(_reason(information, shown(str(file))))
+    elif as_json:
+        typer.echo(json.dumps(_entries(declared), allow_nan=False))
+    else:
+        _print_tables(declared)
+
+
+def _declared(file: Path, information: Pmi) -> DeclaredFile:
+    """Return how features declare the annotations of a file; nothing, with a warning, if its shapes cannot be read."""
+    if information.is_empty:
+        return DeclaredFile(information, (), (), {})
+    try:
+        declared = declared_file(file, information)
+    except OptionError as error:
+        typer.echo(f"warning: nothing is declared, and faces have no numbers: {error}", err=True)
+        return DeclaredFile(information, (), (), {})
+    for fault in declared.faults:
+        typer.echo(f"warning: nothing is declared of {fault}", err=True)
+    return declared
+
+
+def _entries(declared: DeclaredFile) -> dict[str, Any]:
+    """Return everything for JSON: the statements of the file, its faces, and the outcome."""
+    faces = {record: asdict(face) for record, face in declared.faces.items()}
+    declarations = {
+        entry.annotation.record: {"features": entry.features, "reason": entry.reason} for entry in declared.annotations
+    }
+    return asdict(declared.pmi) | {"faces": faces, "declared": declarations}
+
+
+def _reason(information: Pmi, name: str) -> str:
+    """Return a sentence about a file without annotations, with the reason if it is known."""
+    if not information.is_ap242:
+        schema = clipped(information.schema, 100) or "not stated"
+        return f'"{name}" is not an AP242 file (its schema is {schema}); tolerances and dimensions are read from AP242 only'
+    details = ""
+    if information.drawings:
+        details += f"; its {information.drawings} annotations are only drawn, and drawings are not read"
+    if information.is_tessellated:
+        details += "; its shapes are triangles, without faces to which tolerances could apply"
+    return f'"{name}" states no tolerances, dimensions or datums{details}'
+
+
+def _print_tables(declared: DeclaredFile) -> None:
+    output = console()
+    width = output.width if sys.stdout.isatty() else FILE_WIDTH
+    output.print(Text(str(declared.pmi), style="bold"))
+    for part in (*_sections(declared), *_undeclared_lines(declared)):
+        output.print(part, width=width)
+
+
+def _sections(declared: DeclaredFile) -> Iterator[RenderableType]:
+    """Yield the tables with their titles. Tables without rows are left out."""
+    information = declared.pmi
+    tolerances = [_tolerance_row(tolerance, declared) for tolerance in information.tolerances[:MAX_ROWS]]
+    dimensions = [_dimension_row(dimension, declared) for dimension in information.dimensions[:MAX_ROWS]]
+    datums = [_datum_row(datum, declared) for datum in information.datums[:MAX_ROWS]]
+    for title, columns, rows, count in (
+        ("tolerances [mm]", _TOLERANCES, tolerances, len(information.tolerances)),
+        ("dimensions [mm]", _DIMENSIONS, dimensions, len(information.dimensions)),
+        ("datums", _DATUMS, datums, len(information.datums)),
+    ):
+        if rows:
+            yield Text(f"\n{title}", style="bold")
+            yield _table(columns, rows)
+        if count > len(rows):
+            yield Text(f"and {count - len(rows)} more, which --json lists")
+    listed = [(row.face_records, row.other_records) for row in information.tolerances]
+    listed += [(row.face_records, row.other_records) for row in information.dimensions]
+    listed += [(row.face_records, row.other_records) for row in information.datums]
+    if any(items and not records for records, items in listed):
+        yield Text("\nin parentheses: edges, curves and points, where the file states no faces")
+    bare = sum(not tolerance.face_records for tolerance in information.tolerances)
+    if bare:
+        yield Text(f"tolerances for which the file states no face: {bare}")
+    if information.is_tessellated:
+        yield Text("the shapes of the file are triangles, without faces")
+
+
+def _undeclared_lines(declared: DeclaredFile) -> Iterator[RenderableType]:
+    """Yield the annotations that are not declared, or only partly, with the reasons."""
+    numbers: dict[tuple[str, str], list[str]] = defaultdict(list)
+    for kind, noun in ((Tolerance, "tolerance"), (Dimension, "dimension"), (Datum, "datum")):
+        for entry in declared.annotations:
+            if isinstance(entry.annotation, kind) and entry.reason:
+                reason = f"only in part, {entry.reason}" if entry.features else entry.reason
+                numbers[noun, reason].append(_number(entry.annotation))
+    if numbers:
+        yield Text("\nnot declared", style="bold")
+    for (noun, reason), group in numbers.items():
+        yield Text(shown(f"{noun}{'s' if len(group) > 1 else ''} {', '.join(group[:MAX_ROWS])}: {reason}"))
+
+
+def _number(annotation: Annotation) -> str:
+    return annotation.letter if isinstance(annotation, Datum) else str(annotation.number)
+
+
+def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """Return a table with wrapped cells that are never cut."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
+    for column in columns:
+        is_figure = column in ("value", "nominal")
+        is_short = column in ("", "limits")
+        width = MIN_WIDTHS.get(column)
+        if is_figure:
+            table.add_column(column, justify="right", no_wrap=True, min_width=width)
+        else:
+            table.add_column(column, no_wrap=is_short, overflow="fold", min_width=width)
+    for row in rows:
+        table.add_row(*map(Text, row))
+    return table
+
+
+def _tolerance_row(tolerance: Tolerance, declared: DeclaredFile) -> tuple[str, ...]:
+    return (
+        str(tolerance.number), tolerance.kind or "not stated", _figure(tolerance.value), tolerance.details,
+        tolerance.datum_system, _faces(tolerance.face_records, tolerance.other_records, declared.faces),
+        _features(tolerance, declared),
+    )  # fmt: skip
+
+
+def _dimension_row(dimension: Dimension, declared: DeclaredFile) -> tuple[str, ...]:
+    places = _faces(dimension.face_records, dimension.other_records, declared.faces)
+    if dimension.end_face_records or dimension.end_other_records:
+        places += f" to {_faces(dimension.end_face_records, dimension.end_other_records, declared.faces)}"
+    limits = f"{_figure(dimension.lower)} to {_figure(dimension.upper)}".strip()
+    unit = "" if dimension.unit in ("mm", "") else f" {dimension.unit}"
+    return (
+        str(dimension.number), shown(dimension.name) or dimension.kind, f"{_figure(dimension.nominal)}{unit}",
+        "" if limits == "to" else limits, dimension.details, places, _features(dimension, declared),
+    )  # fmt: skip
+
+
+def _datum_row(datum: Datum, declared: DeclaredFile) -> tuple[str, ...]:
+    targets = ", ".join(map(str, datum.targets))
+    places = _faces(datum.face_records, datum.other_records, declared.faces)
+    return shown(datum.letter), places, targets, _features(datum, declared)
+
+
+def _features(annotation: Annotation, declared: DeclaredFile) -> str:
+    """Return the names of the features that declare an annotation; a dash if none does."""
+    names = next((entry.features for entry in declared.annotations if entry.annotation is annotation), ())
+    more = f", and {len(names) - MAX_FEATURES} more" if len(names) > MAX_FEATURES else ""
+    return shown(", ".join(names[:MAX_FEATURES])) + more if names else "-"
+
+
+def _faces(records: Sequence[int], others: Sequence[int], faces: FacesOfRecords) -> str:
+    """Return the faces, or their count if they are unknown; without faces, the count of other items in parentheses."""
+    if faces and records:
+        known_faces = [faces[record] for record in records if record in faces][:MAX_FACES]
+        kinds = dict.fromkeys(face.kind for face in known_faces)
+        groups = [f"{kind} {', '.join(str(face) for face in known_faces if face.kind == kind)}".strip() for kind in kinds]
+        more = len(records) - len(known_faces)
+        return ", ".join([*groups, *([f"and {more} more"] if more else [])])
+    return str(len(records)) if records or not others else f"({len(others)})"
+
+
+def _figure(value: float | None) -> str:
+    return "" if value is None else f"{value:.6g}"
+
+
+def _csv(declared: DeclaredFile) -> str:
+    text = io.StringIO()
+    information, faces = declared.pmi, declared.faces
+    declarations = {entry.annotation.record: ("; ".join(entry.features), entry.reason) for entry in declared.annotations}
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(_CSV)
+    for tolerance in information.tolerances:
+        rows.writerow((
+            "tolerance", tolerance.number, tolerance.record, tolerance.kind, shown(tolerance.name), tolerance.value, None, None,
+            "mm", shown(tolerance.zone), tolerance.details, tolerance.datum_system, tolerance.refines,
+            _numbers(tolerance.face_records), _numbers(tolerance.other_records), None, None,
+            _named(tolerance.face_records, faces), None, *map(shown, declarations.get(tolerance.record, ("", ""))),
+        ))  # fmt: skip
+    for dimension in information.dimensions:
+        rows.writerow((
+            "dimension", dimension.number, dimension.record, dimension.kind, shown(dimension.name), dimension.nominal,
+            dimension.lower, dimension.upper, dimension.unit, None, dimension.details, None, None,
+            _numbers(dimension.face_records), _numbers(dimension.other_records), _numbers(dimension.end_face_records),
+            _numbers(dimension.end_other_records), _named(dimension.face_records, faces),
+            _named(dimension.end_face_records, faces), *map(shown, declarations.get(dimension.record, ("", ""))),
+        ))  # fmt: skip
+    return text.getvalue()
+
+
+def _named(records: Sequence[int], faces: FacesOfRecords) -> str:
+    return "; ".join(str(faces[record]) for record in records if record in faces)
+
+
+def _numbers(records: Sequence[int]) -> str:
+    return " ".join(map(str, records))
 
 
 @app.command(epilog=examples("bodies parts.stp"))

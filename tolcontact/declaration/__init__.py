@@ -4,7 +4,7 @@
 """
 
 from tolcontact.declaration.assembly import Assembly
-from tolcontact.declaration.contact_pair import ContactPair, Force
+from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overlap
 from tolcontact.declaration.dependence import Correlation, Population, Variable
 from tolcontact.declaration.feature_tolerance import (
     Angularity,
@@ -23,9 +23,7 @@ from tolcontact.declaration.feature_tolerance import (
     Symmetry,
     TotalRunout,
 )
-from tolcontact.declaration.form import Form
 from tolcontact.declaration.geometry import Box, Geometry, Mesh, Pin
-from tolcontact.declaration.joint import Joint, Overlap
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import (
@@ -48,7 +46,7 @@ from tolcontact.declaration.measurement import (
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.sequence import Station
-from tolcontact.declaration.size import Size
+from tolcontact.declaration.size import Form, Size
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import degrees

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Generic, TypeVar
 
 from tolcontact.declaration.checks import FRICTION, Checked
-from tolcontact.declaration.contact_pair import ContactPair, Force
+from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overlap
 from tolcontact.declaration.declarations import Declarations, expect
 from tolcontact.declaration.dependence import (
     Correlation,
@@ -15,7 +15,6 @@ from tolcontact.declaration.dependence import (
     population as _population,
 )
 from tolcontact.declaration.geometry import Geometry
-from tolcontact.declaration.joint import Joint, Overlap
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.part import Feature, Part

@@ -79,7 +79,7 @@ class Declaration(Checked):
 
     @property
     def designation(self) -> str:
-        """Its kind, its name and the line of the script, as messages name it."""
+        """The kind, the name and the line of the script, as messages name it."""
         return designation(self.noun, self)
 
     def located_faults(self, faults: Iterator[str] | None = None, owner: str = "") -> Iterator[str]:

@@ -1,16 +1,15 @@
 """The declarations that an assembly and each of its stations take: locations, contact pairs, forces and measures."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
-from tolcontact.declaration.contact_pair import ContactPair, Force
-from tolcontact.declaration.joint import Joint
-from tolcontact.declaration.locator import FIRST_ORDER, Location, Locator, ThreeTwoOne
+from tolcontact.declaration.contact_pair import ContactPair, Force, Joint
+from tolcontact.declaration.locator import Location, Locator, Placing, ThreeTwoOne
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
 from tolcontact.declaration.tolerance import tolerance as _tolerance
-from tolcontact.declaration.values import direction, script_line, vector as _vector
+from tolcontact.declaration.values import Direction, direction, script_line, vector as _vector
 
 T = TypeVar("T")
 
@@ -38,7 +37,7 @@ class Declarations:
         tolerance: Any = None,
         on: Part | Feature | Joint | None = None,
         floating: bool = False,
-        placing: str = FIRST_ORDER,
+        placing: Placing = "first order",
     ) -> Location:
         """Locate a part by six locators, or by fewer if it is `floating`, on the ground or `on` another part (see Location).
 
@@ -70,7 +69,7 @@ class Declarations:
         *,
         moving: Face | Feature,
         reference: Face | Feature,
-        points: int | str | None = None,
+        points: int | Literal["vertices"] | None = None,
         spacing: float | None = None,
         within: float | None = None,
         mu: float | None = None,
@@ -97,7 +96,7 @@ class Declarations:
         of: Point | Measurement | Callable[[Any], Any],
         *,
         to: Point | None = None,
-        along: Any = None,
+        along: Direction | None = None,
         tolerance: Any = None,
         limits: Sequence[float | None] | None = None,
         absolute: bool | None = None,

@@ -3,20 +3,18 @@
 import re
 from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal, TypedDict, Unpack, get_args
 
 from tolcontact.declaration.checks import LENGTH, LENGTH_OR_0, TRUTH, Check, Checked, direction_faults, one_of
-from tolcontact.declaration.form import Form
-from tolcontact.declaration.values import Vector, direction as _direction, is_length
+from tolcontact.declaration.size import Form
+from tolcontact.declaration.values import Direction, Vector, direction as _direction, is_length
 from tolcontact.readable import Readable
 
-INSIDE = "99.73 % inside"
-EXTREMES = "6 sigma at the extremes"
-TRANSLATION = "translation"  # a rule without tilts
-RULES = (INSIDE, EXTREMES, TRANSLATION)
-MATERIALS = ("", "M", "L")
+Rule = Literal["99.73 % inside", "6 sigma at the extremes", "translation"]  # the last one is without tilts
+INSIDE, EXTREMES, TRANSLATION = RULES = get_args(Rule)
+Material = Literal["", "M", "L"]
 SYMBOLS = {"M": "Ⓜ", "L": "Ⓛ"}
-ZONES = ("round", "flat")
+ZoneShape = Literal["round", "flat"]
 RUNOUTS = ("circular run-out", "total run-out")
 AROUND_ROUND = ("profile", "line profile", *RUNOUTS)  # kinds with zones for walls, not for axes
 USUAL_FORM = Form()
@@ -28,8 +26,8 @@ def _lengths(per: Any) -> tuple[Any, ...]:
 
 # What the values of options must be; a direction `along` has its own sentence.
 OPTION_CHECKS = {
-    "zone": one_of(ZONES),
-    "material": one_of(MATERIALS),
+    "zone": one_of(get_args(ZoneShape)),
+    "material": one_of(get_args(Material)),
     "projected": LENGTH,
     "outside": LENGTH_OR_0,
     "per": Check(
@@ -39,6 +37,22 @@ OPTION_CHECKS = {
     "tangent": TRUTH,
 }
 COMPARTMENT = re.compile(r"([A-Z]{1,2}(?:-[A-Z]{1,2})*)(?:\(([ML])\))?(><)?")
+
+
+class ToleranceOptions(TypedDict, total=False):
+    """The named arguments of a kind of tolerance; GeometricTolerance describes them, and has their defaults."""
+
+    zone: ZoneShape | None
+    along: Direction | None
+    material: Material
+    projected: float | None
+    outside: float | None
+    per: float | tuple[float, float] | None
+    tangent: bool
+    form: Form | None
+    rule: Rule
+    cp: float
+    cpk: float | None
 
 
 @dataclass(frozen=True, repr=False)
@@ -59,12 +73,12 @@ class ToleranceKind(Readable):
     is_form: bool = False
     around: tuple[str, ...] = ()
 
-    def __call__(self, width: float, datums: str = "", **options: Any) -> "GeometricTolerance":
+    def __call__(self, width: float, datums: str = "", **options: Unpack[ToleranceOptions]) -> "GeometricTolerance":
         return GeometricTolerance(self, width, datums, **options)
 
     @property
     def name(self) -> str:
-        """Its name in scripts."""
+        """The name in scripts."""
         return "".join(word.capitalize() for word in self.kind.replace("-", "").split())
 
     def __str__(self) -> str:
@@ -96,15 +110,15 @@ class GeometricTolerance(Checked):
     width: float
     datums: str = ""
     _: KW_ONLY
-    zone: str | None = None
-    along: Any = None
-    material: str = ""
+    zone: ZoneShape | None = None
+    along: Direction | None = None
+    material: Material = ""
     projected: float | None = None
     outside: float | None = None
     per: float | tuple[float, float] | None = None
     tangent: bool = False
     form: Form | None = USUAL_FORM
-    rule: str = INSIDE
+    rule: Rule = "99.73 % inside"
     cp: float = 1.0
     cpk: float | None = None
 

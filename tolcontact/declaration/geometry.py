@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from tolcontact.declaration.checks import LENGTH, TRUTH, Checked, one_of
 from tolcontact.errors import shown
@@ -38,7 +38,8 @@ class Pin(Checked):
 
 
 STEP = (".step", ".stp")
-UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}  # [mm]
+Unit = Literal["um", "mm", "cm", "m", "in", "ft"]
+UNITS: dict[str, float] = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}  # [mm]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,7 +54,7 @@ class Mesh(Checked):
     """
 
     source: Any
-    units: str | None = None
+    units: Unit | None = None
     body: str | int | None = None
     chord: float | None = None
 

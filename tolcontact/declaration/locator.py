@@ -1,8 +1,8 @@
 """Locators of parts, 3-2-1 schemes, and the locations that consist of them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from tolcontact.declaration.checks import LENGTH_OR_0, STIFFNESS, TRUTH, Checked
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
 from tolcontact.declaration.tolerance import Tolerance, tolerance as _tolerance
 from tolcontact.declaration.values import (
+    Direction,
     Vector,
     direction as _direction,
     is_finite,
@@ -19,7 +20,8 @@ from tolcontact.declaration.values import (
 )
 
 USUAL_STIFFNESS = 1.0  # N/mm, of locators that declare none
-FIRST_ORDER, EXACT, BEST_FIT = PLACINGS = ("first order", "exact", "best fit")
+Placing = Literal["first order", "exact", "best fit"]
+FIRST_ORDER, EXACT, BEST_FIT = PLACINGS = get_args(Placing)
 
 
 @dataclass(frozen=True, repr=False)
@@ -48,8 +50,8 @@ class Locator(Checked):
     def __init__(
         self,
         name: str,
-        point: Any,
-        direction: Any,
+        point: Point | Sequence[float] | np.ndarray,
+        direction: Direction,
         tolerance: Any = None,
         *,
         one_sided: bool = False,
@@ -57,10 +59,11 @@ class Locator(Checked):
         on: Feature | None = None,
         part: Part | None = None,
     ) -> None:
+        place: Any = point
         if isinstance(point, Point):
-            part, on, point = point.part, on or point.on, point.position
+            part, on, place = point.part, on or point.on, point.position
         vars(self).update(
-            name=name, point=_vector(point), direction=_direction(direction),
+            name=name, point=_vector(place), direction=_direction(direction),
             tolerance=None if tolerance is None else _tolerance(tolerance), one_sided=one_sided, stiffness=stiffness, on=on,
             part=part,
         )  # fmt: skip
@@ -144,7 +147,7 @@ class Location(Declaration):
     floating: bool = False
     station: str = ""
     joint: str = ""
-    placing: str = FIRST_ORDER
+    placing: Placing = "first order"
 
     checks: ClassVar = {"placing": one_of(PLACINGS)}
 

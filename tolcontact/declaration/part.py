@@ -3,18 +3,19 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar, TypeVar
+from typing import ClassVar, Literal, TypeVar, get_args
 
 from tolcontact.declaration.checks import Declaration, one_of
 from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
 from tolcontact.declaration.toleranced import Control, Toleranced, letter_faults
-from tolcontact.declaration.values import Vector, is_finite, script_line, vector
+from tolcontact.declaration.values import Side, Vector, is_finite, script_line, vector
 from tolcontact.readable import Readable
 
 D = TypeVar("D", bound=Declaration)
 
-OUTSIDE, LEAST_SQUARES = ASSOCIATIONS = ("outside", "least squares")  # from a plane to a datum, ISO 5459
+Association = Literal["outside", "least squares"]  # from a plane to a datum, ISO 5459
+OUTSIDE, LEAST_SQUARES = ASSOCIATIONS = get_args(Association)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,7 +55,7 @@ class Part(Declaration):
         name: str,
         *constituents: "Face | Control",
         datum: str | None = None,
-        association: str = OUTSIDE,
+        association: Association = "outside",
     ) -> "Feature":
         """Name a face, or two that are opposed, with its tolerances: `part.feature("H1", face, tc.Size(...), datum="B")`.
 
@@ -114,7 +115,7 @@ class Part(Declaration):
         """Return the point (x, y, z) [mm] of this part, in its own frame."""
         return Point(self, vector((x, y, z)))
 
-    def face(self, *selections: str | Sequence[int] | Picker | Selection) -> "Face":
+    def face(self, *selections: Side | str | Sequence[int] | Picker | Selection) -> "Face":
         """Return the triangles of this part that meet every criterion; without any, the whole surface.
 
         A criterion is a direction ("+x" to "-z": all triangles whose outward normal points there in the part's own
@@ -197,7 +198,7 @@ class Feature(Toleranced):
     tolerances: tuple[Control, ...] = ()
     datum: str | None = None
     declared_at: str = ""
-    association: str = OUTSIDE
+    association: Association = "outside"
 
     checks, fault_prefix = {"association": one_of(ASSOCIATIONS)}, "its "
 

@@ -3,27 +3,28 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 
 from tolcontact.declaration.checks import LENGTH, TRUTH, Checked, one_of
-from tolcontact.declaration.values import DIRECTIONS, Vector, direction as _direction, is_finite, is_length, vector
+from tolcontact.declaration.values import DIRECTIONS, Direction, Vector, direction as _direction, is_finite, is_length, vector
 from tolcontact.errors import shown
 from tolcontact.readable import Readable
-from tolcontact.vocabulary import SURFACE_KINDS
+from tolcontact.vocabulary import SURFACE_KINDS, SurfaceKind
 
 Picker = Callable[[np.ndarray, np.ndarray], np.ndarray]
 FACE_ANGLE = math.radians(1.0)
 KINDS = (*SURFACE_KINDS, "general")  # of surfaces
-FACE_GROUPS = ("slot", "pattern")  # one of their faces selects all of them
+FaceGroup = Literal["slot", "pattern"]  # one of their faces selects all of them
+FACE_GROUPS = get_args(FaceGroup)
 
 
 @dataclass(frozen=True, repr=False)
 class Facing(Readable):
     """Triangles whose outward normal is within `angle` [rad] of `direction`: "+x" to "-z", or a vector."""
 
-    direction: Any
+    direction: Direction
     angle: float = FACE_ANGLE
 
     @property
@@ -119,9 +120,9 @@ class Brep(Readable):
     """
 
     which: tuple[int | str | Vector, ...]
-    whole: bool | str
+    whole: bool | FaceGroup
 
-    def __init__(self, *which: Any, whole: bool | str = False) -> None:
+    def __init__(self, *which: Any, whole: bool | FaceGroup = False) -> None:
         object.__setattr__(self, "which", tuple(map(_brep_face, which)))
         object.__setattr__(self, "whole", whole)
 
@@ -184,8 +185,8 @@ class Largest(Checked):
     Faces are the B-rep faces of a STEP file, and the smooth pieces of other meshes.
     """
 
-    kind: str
-    direction: Any = None
+    kind: SurfaceKind | Literal["general"]
+    direction: Direction | None = None
 
     checks: ClassVar = {"kind": one_of(KINDS)}
 

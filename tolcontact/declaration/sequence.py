@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any, ClassVar
 
 from tolcontact.declaration.checks import Declaration
+from tolcontact.declaration.contact_pair import Joint, parts_of
 from tolcontact.declaration.declarations import Declarations, expect
-from tolcontact.declaration.joint import Joint, parts_of
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.part import Part
 from tolcontact.declaration.values import group_faults, key_faults, repetitions, script_line

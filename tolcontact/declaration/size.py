@@ -1,17 +1,21 @@
-"""The size of a feature, and its limits."""
+"""The size of a feature, with its limits, and the statistics of form deviations of a face."""
 
 import contextlib
 from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, ClassVar
+from typing import ClassVar, Literal, get_args
 
-from tolcontact.declaration.checks import Checked, one_of
-from tolcontact.declaration.tolerance import Tolerance
+from tolcontact.declaration.checks import LENGTH, Checked, one_of, whole_number
+from tolcontact.declaration.tolerance import Distribution, Tolerance
 from tolcontact.declaration.tolerance_class import tolerance_class
 from tolcontact.declaration.values import is_length
 from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
 
-MOVES = ("both", "first", "second")
+Moves = Literal["both", "first", "second"]
+Covariance = Literal["squared exponential", "matern 5/2", "matern 3/2"]
+MOVES, COVARIANCES = get_args(Moves), get_args(Covariance)
+MAX_MODES = 200
+MIN_LOBES, MAX_LOBES = 2, 12  # one lobe displaces a section
 
 
 @dataclass(frozen=True, repr=False)
@@ -34,8 +38,8 @@ class Size(Checked):
     _: KW_ONLY
     cp: float | None = None
     cpk: float | None = None
-    moves: str = "both"
-    distribution: Any = "normal"
+    moves: Moves = "both"
+    distribution: Distribution = "normal"
     tolerance_class: str = ""
 
     def __post_init__(self) -> None:
@@ -94,3 +98,45 @@ class Size(Checked):
             return f"size {self.nominal!r} {self.upper!r}"
         stated = f"{self.tolerance_class} " if self.tolerance_class else ""
         return f"size {self.nominal:g} {stated}{self.upper:+g} {self.lower:+g} mm"
+
+
+@dataclass(frozen=True, repr=False)
+class Form(Checked):
+    """A random field of heights of a face, orthogonal to displacements of the face as a whole.
+
+    covariance   of the heights of two points, by their distance: "squared exponential", "matern 5/2" or "matern 3/2", from
+                 smooth to rough
+    length       [mm] correlation length; by default a third of the longest extent of the face, of a cylinder or cone a
+                 third of its length along the axis, and of its diameter across it
+    modes        number of Karhunen-Loeve modes, those with the largest variances; each is a contributor
+    lobes        of a cylinder or cone: all sections have this number of lobes, as waviness has; covariances then count the
+                 distance along the axis alone
+    measured     path of the points of measured faces, one CSV or PLY file for each part, as in "scans/*.csv": lines x, y, z
+                 [mm] in the frame of the part. Faces then vary as these do, regardless of the tolerance, without the
+                 scatter of points about a smooth form; waves too short for the points or for 1280 stations are refused
+    """
+
+    covariance: Covariance = "squared exponential"
+    length: float | None = None
+    modes: int = 20
+    lobes: int | None = None
+    measured: str | None = None
+
+    checks: ClassVar = {
+        "covariance": one_of(COVARIANCES), "length": LENGTH, "modes": whole_number(1, MAX_MODES),
+        "lobes": whole_number(MIN_LOBES, MAX_LOBES),
+    }  # fmt: skip
+
+    def faults(self) -> Iterator[str]:
+        yield from super().faults()
+        if self.measured is not None and not (isinstance(self.measured, str) and self.measured):
+            yield f'measured is {self.measured!r}; expected the path of CSV or PLY files, as in "scans/*.csv"'
+        elif self.measured is not None and (self.covariance, self.length, self.lobes) != (COVARIANCES[0], None, None):
+            yield "it is measured, and has a covariance, a length or lobes beside that; leave these out"
+
+    def __str__(self) -> str:
+        if self.measured is not None:
+            return f"form of up to {self.modes} components, measured in {self.measured}"
+        length = "a third of the face" if self.length is None else f"{self.length:g} mm"
+        lobes = "" if self.lobes is None else f", {self.lobes} lobes"
+        return f"form of {self.modes} modes, {self.covariance}, length {length}{lobes}"

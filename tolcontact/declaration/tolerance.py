@@ -5,7 +5,7 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, get_args
 
 import scipy
 
@@ -15,7 +15,9 @@ from tolcontact.readable import Readable
 
 MAX_DRAW_SECONDS = 0.01
 DRAWN = (0.1, 0.4, 0.9)
-SHAPES = ("normal", "uniform", "triangular", "truncated normal")
+Shape = Literal["normal", "uniform", "triangular", "truncated normal"]
+Distribution = Shape | Any  # or a frozen distribution of scipy.stats
+SHAPES = get_args(Shape)
 
 
 @dataclass(frozen=True, repr=False)
@@ -35,7 +37,7 @@ class Tolerance(Readable):
     """
 
     range: float | None = None  # a text or a pair only if it is no tolerance
-    distribution: Any = "normal"
+    distribution: Distribution = "normal"
     shift: float = 0.0
     cp: float | None = None
     cpk: float | None = None
@@ -71,7 +73,7 @@ class Tolerance(Readable):
             yield f"cpk is {self.cpk!r} with cp {self.cp!r}; expected cp, and cpk not above it"
 
     def _scipy_faults(self) -> Iterator[str]:
-        frozen = self.distribution
+        frozen = self.frozen
         if not (hasattr(getattr(frozen, "dist", None), "pdf") and hasattr(getattr(frozen, "dist", None), "name")):
             yield (
                 f"distribution is a {type(frozen).__name__}; expected one of {', '.join(SHAPES)}, "
@@ -90,6 +92,11 @@ class Tolerance(Readable):
             )
 
     @property
+    def frozen(self) -> Any:
+        """The distribution, if it is one of scipy.stats, which have no types."""
+        return self.distribution
+
+    @property
     def mean_shift(self) -> float:
         """The shift [mm] of the distribution by `shift` and `cpk`."""
         capability_shift = 0.0 if self.cp is None or self.cpk is None else float(self.range or 0) / 2 * (1 - self.cpk / self.cp)
@@ -103,11 +110,11 @@ class Tolerance(Readable):
         """
         if is_length(self.range):
             return float(self.range or 0)
-        return float(6 * self.distribution.std()) if hasattr(self.distribution, "std") else 0.0
+        return float(6 * self.frozen.std()) if hasattr(self.frozen, "std") else 0.0
 
     def __str__(self) -> str:
-        if hasattr(self.distribution, "dist"):
-            spread = f"scipy.stats.{self.distribution.dist.name}"
+        if hasattr(self.frozen, "dist"):
+            spread = f"scipy.stats.{self.frozen.dist.name}"
         else:
             width = f"{self.range:g} mm" if is_length(self.range) else repr(self.range)
             spread = f"{self.distribution}, full width {width}"

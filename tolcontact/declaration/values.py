@@ -8,7 +8,9 @@ import unicodedata
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, overload
+from typing import Any, Literal, get_args, overload
+
+import numpy as np
 
 from tolcontact.errors import CONTROL_CHARACTERS, shown
 
@@ -72,10 +74,12 @@ def is_line(text: Any) -> bool:
 
 
 Vector = tuple[float, float, float]
+Side = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+Direction = Side | Literal["x", "y", "z"] | str | Sequence[float] | np.ndarray  # texts from elsewhere are checked later
 
 _PACKAGE = str(Path(__file__).resolve().parents[1])
 _AXES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-DIRECTIONS = tuple(sign + axis for axis in _AXES for sign in "+-")
+DIRECTIONS = get_args(Side)
 NOT_A_VECTOR: Vector = (math.nan, math.nan, math.nan)
 
 

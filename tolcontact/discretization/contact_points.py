@@ -186,7 +186,7 @@ def _deviation(face: Face, part: NominalPart, meshes: Meshes, features: Features
 
 
 def _height_offsets(points: ContactPoints) -> Offsets:
-    """Return the heights of the points from sizes and forms; those of the moving face count along the reference normal."""
+    """Return the heights of the points from sizes and forms; heights of the moving face count along the reference normal."""
     offsets, facing = list[Offsets](), points.facing
     for face, share, P in zip(points.deviating, (facing, np.ones_like(facing)), (points.P_m, points.P_r), strict=True):
         if face is not None and face.grows:

@@ -2,7 +2,7 @@
 
 import difflib
 import logging
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from typing import Any
 
@@ -24,8 +24,8 @@ from tolcontact.discretization.contact_points import contact_points, support_pai
 from tolcontact.discretization.locators import FACES_OF_SCHEME, Locators, NominalPart, scheme_locators
 from tolcontact.discretization.measurements import nominal_measurements
 from tolcontact.discretization.nominal import ContactPoints, Nominal
-from tolcontact.discretization.scenes import Scene, carried, scenes_of
-from tolcontact.errors import GeometryFault, ModelError, designation
+from tolcontact.discretization.scenes import Scene, joint_indices, scenes_of
+from tolcontact.errors import Faults, designation
 from tolcontact.features import Features, Placement, datum_order
 from tolcontact.features.freedoms import DATUM
 from tolcontact.geometry.faces import Meshes
@@ -38,18 +38,6 @@ log = logging.getLogger(__name__)
 MANY_PAIRS = 100
 
 
-class _Faults(list[str]):
-    """The faults of an assembly."""
-
-    def attempt(self, place: str, build: Callable[..., Any], *arguments: Any) -> Any:
-        """Return what `build` returns; None, and a fault at `place`, if the geometry does not allow it."""
-        try:
-            return build(*arguments)
-        except GeometryFault as fault:
-            self.append(f"{place}: {fault}")
-            return None
-
-
 def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | None = None) -> Nominal:
     """Return the nominal model of an assembly.
 
@@ -58,7 +46,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
     Raises ModelError with every fault of the declaration and of its geometry.
     """
     omissions = tuple(assembly.omissions()) if incomplete else ()
-    faults = _Faults(fault for fault in assembly.faults() if fault not in omissions)
+    faults = Faults(fault for fault in assembly.faults() if fault not in omissions)
     is_sound = not faults
     assembly = assembly.in_station_order if is_sound else assembly
     meshes = _shapes(assembly, faults)
@@ -74,7 +62,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
         parts = [
             replace(
                 _on_features(part, scene.assembly.location_of(part.part), features, meshes, placements, faults),
-                carried=carried(scenes, scene, part.part),
+                carried=joint_indices(scenes, scene, part.part),
             )
             for (scene, _), part in zip(entries, parts, strict=True)
             if part is not None
@@ -98,8 +86,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
             shifts = {freedom.label for freedom in features.freedoms if freedom.source == DATUM}
             faults.extend(_contributor_faults(assembly, labels, shifts))
     faults.extend(fault for scene in scenes for fault in _reserved_names(scene))
-    if faults:
-        raise ModelError(assembly.name, list(dict.fromkeys(faults)))
+    Faults(dict.fromkeys(faults)).refuse(assembly.name)
     return _nominal(assembly, scenes, nominal_parts, (*pairs, *support_pairs(nominal_parts, scenes)), features)
 
 
@@ -122,7 +109,7 @@ def _nominal(
     return Nominal(assembly, parts, pairs, measures, features, measurements, tuple(models))
 
 
-def _shapes(assembly: Assembly, faults: _Faults) -> dict[Part, Shape]:
+def _shapes(assembly: Assembly, faults: Faults) -> dict[Part, Shape]:
     """Return the shapes of the parts that can be read."""
     readable = [part for part in assembly.parts if not any(part.geometry.faults())]
     log.info("reading the shapes of %d parts", len(readable))
@@ -131,7 +118,7 @@ def _shapes(assembly: Assembly, faults: _Faults) -> dict[Part, Shape]:
     return {part: read for part, read in attempts.items() if read is not None}
 
 
-def _add_features(assembly: Assembly, indices: Mapping[Part, int], meshes: Meshes, features: Features, faults: _Faults) -> None:
+def _add_features(assembly: Assembly, indices: Mapping[Part, int], meshes: Meshes, features: Features, faults: Faults) -> None:
     for part in assembly.parts:
         index = indices[part]
         ordered, circular = datum_order(part)
@@ -155,7 +142,7 @@ def _on_features(
     features: Features,
     meshes: Meshes,
     placements: Mapping[Part, Placement],
-    faults: _Faults,
+    faults: Faults,
 ) -> NominalPart:
     """Return the part with the faces of features that its locators touch, and the feature of another part that they are on."""
     scheme, locators = part.scheme, part.locators
@@ -221,7 +208,7 @@ def _reserved_names(scene: Scene) -> Iterator[str]:
             yield f"{place}: its name is reserved for the one-sided locators of a part; rename it"
 
 
-def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> NominalPart | None:
+def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: Faults) -> NominalPart | None:
     """Return a part in its nominal pose with its locators; None if it has no shape or is badly declared."""
     if part not in meshes or any(part.faults()):
         return None

@@ -1,4 +1,4 @@
-"""Nominal measurements: faces become walls, axes and directions, and combinations refer to measures by index."""
+"""Nominal measurements: faces become walls, axes, directions and gaps; combinations refer to measures by index."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -20,13 +20,14 @@ from tolcontact.declaration import (
     MeanGap,
     Measurement,
 )
-from tolcontact.discretization.face_gaps import face_gap
+from tolcontact.discretization.form_points import affordable_spacing, form_lengths, with_rims
 from tolcontact.discretization.measured_geometry import (
     Axis,
     AxisPair,
     Combined,
     Crossing,
     DirectionPair,
+    FaceGap,
     Heights,
     MeasuredFace,
     MeasuredPoint,
@@ -38,18 +39,75 @@ from tolcontact.discretization.measured_geometry import (
     Wall,
 )
 from tolcontact.discretization.nominal import Nominal
+from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
-from tolcontact.errors import GeometryFault, ModelError, designation
+from tolcontact.errors import Faults, GeometryFault, designation
 from tolcontact.geometry.analytic_surfaces import Cylinder, axes_across
 from tolcontact.geometry.faces import patch
 from tolcontact.geometry.nearest_elements import nearest_elements
-from tolcontact.geometry.overlap import crossing_edges
+from tolcontact.geometry.overlap import crossing_edges, overlap_corners
+from tolcontact.geometry.spreading import spread
 from tolcontact.geometry.tolerances import OPPOSING_COSINE, PARALLEL
 
+DEFAULT_PLACES, FORM_PLACES, MAX_PLACES = 200, 600, 4000  # by default, of a face with form if that resolves it, at all
+MIN_SHARE = 0.04  # of a face, under the other one: smaller regions have fewer points
+MAX_FACING = 0.0  # cosine between the normals of faces that do not face each other
 OBTUSE = -1e-9  # cosine of an angle that counts as more than a right one
 MAX_EDGE_PAIRS = 2500  # of two rims, between which crossings are found at every pose; more take longer than contact itself
 NO_LINES = np.zeros((0, 2, 3))
+
+
+def face_gap(moving: MeasuredFace, reference: MeasuredFace, is_largest: bool) -> FaceGap:
+    """Return the largest or the mean gap between two faces.
+
+    Raises GeometryFault if they lie nowhere over each other, do not face each other, or need too many places.
+    """
+    places = _places(moving, reference)
+    feet, normals, is_over = reference.surface.project(places)
+    places, feet, normals = places[is_over], feet[is_over], normals[is_over]
+    if not len(places):
+        raise GeometryFault(f"its faces {moving.face} and {reference.face} lie nowhere over each other; choose faces that do")
+    _, outward, _ = moving.surface.project(places)
+    if ((outward * normals).sum(axis=1) >= MAX_FACING).any():
+        raise GeometryFault(
+            f"its faces {moving.face} and {reference.face} do not face each other everywhere; choose faces with material "
+            "behind both"
+        )
+    weights = point_weights(places, float(np.linalg.norm(places - feet, axis=1).max()), moving.surface, reference.surface)
+    points = [
+        (MeasuredPoint(moving.part, place, moving.deviation, direction), reference.wall(place))
+        for place, direction in zip(places, outward, strict=True)
+    ]
+    shown = np.abs(places - weights @ places / weights.sum()).sum(axis=1).argmin()
+    return FaceGap(np.array([[places[shown], feet[shown]]]), points, weights / weights.sum(), is_largest)
+
+
+def _places(moving: MeasuredFace, reference: MeasuredFace) -> np.ndarray:
+    """Return points (place, 3) of the moving face over the reference face, including the rim of the common region."""
+    surface, lengths = moving.surface, form_lengths([moving.deviation, reference.deviation])
+    spacing = (
+        affordable_spacing(lengths, surface.mesh.area, FORM_PLACES) if lengths else (surface.mesh.area / DEFAULT_PLACES) ** 0.5
+    )
+    places = spread(surface.mesh, None, spacing)
+    share = float(reference.surface.project(places)[2].mean())
+    if not lengths and share < 1:
+        spacing *= max(share, MIN_SHARE) ** 0.5
+        places = spread(surface.mesh, None, spacing)
+    if surface.is_flat and reference.surface.is_flat:
+        places = np.concatenate([places, overlap_corners(surface, reference.surface)])
+        reach = float(np.ptp(np.vstack([surface.mesh.bounds, reference.surface.mesh.bounds]), axis=0).sum())
+        places = with_rims(places, surface, reference.surface, spacing, reach)
+    places = places[reference.surface.project(places)[2]]
+    if len(places) and surface.surfaces:
+        places, _, _ = surface.project(places)  # from triangles onto the round face that they approximate
+    if len(places) > MAX_PLACES:
+        raise GeometryFault(
+            f"the gap between {moving.face} and {reference.face} needs {len(places)} places, by the correlation length of "
+            f"their form, {min(lengths):.3g} mm; expected at most {MAX_PLACES}; choose smaller faces, or a form "
+            "that changes over larger lengths"
+        )
+    return places
 
 
 class MeasuredFaces:
@@ -81,16 +139,13 @@ def nominal_measurements(nominal: Nominal) -> tuple[NominalMeasurement | None, .
     Raises ModelError with a fault for each measurement that the faces do not have.
     """
     measurements: dict[str, NominalMeasurement | None] = {}
-    faces, faults = MeasuredFaces(nominal), []
+    faces, faults = MeasuredFaces(nominal), Faults()
     for measure in nominal.measures:
         measurements[measure.name] = None
-        try:
-            if isinstance(measure.of, Measurement):
-                measurements[measure.name] = _with_numbers(measure.of, faces, measurements)
-        except GeometryFault as fault:
-            faults.append(f"{designation(measure.noun, measure)}: {fault}")
-    if faults:
-        raise ModelError(nominal.assembly.name, faults)
+        if isinstance(measure.of, Measurement):
+            place = designation(measure.noun, measure)
+            measurements[measure.name] = faults.attempt(place, _with_numbers, measure.of, faces, measurements)
+    faults.refuse(nominal.assembly.name)
     return tuple(measurements.values())
 
 

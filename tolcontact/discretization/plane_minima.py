@@ -46,7 +46,7 @@ class PlaneMinima:
     deviating           deviations of the moving and the reference face, if these belong to features
     moving, reference   the planes
     reach               [mm] of a search step: the contact-point spacing
-    slack               [mm] by which positions may overhang a rim
+    slack               [mm] that positions may overhang a rim
     """
 
     deviating: tuple[FaceDeviation | None, FaceDeviation | None]

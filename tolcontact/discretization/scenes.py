@@ -82,7 +82,7 @@ def scenes_of(assembly: Assembly, *, presses: bool) -> tuple[Scene, ...]:
     return tuple(Scene(*scene, presses) for scene in zip(models, names, starts, strict=True))
 
 
-def carried(scenes: Sequence[Scene], scene: Scene, part: Part) -> tuple[int, int] | None:
+def joint_indices(scenes: Sequence[Scene], scene: Scene, part: Part) -> tuple[int, int] | None:
     """Return the indices of the first part of a joint and of another part of it, in the station that joined them; else None."""
     joint = next((joint for joint in scene.assembly.joints if part in joint.members[1:]), None)
     if joint is None:

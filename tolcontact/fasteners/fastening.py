@@ -1,43 +1,81 @@
 """Expansion of a fastener into a part, its location, contact pairs and a force."""
 
-from collections.abc import Callable, Iterable, Sequence
+import math
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tolcontact.declaration import Assembly, Cylinder, Face, Feature, Part, Pin, Size, Station
+from tolcontact.declaration import Assembly, Cylinder, Face, Feature, Locator, Part, Pin, Size, Station
 from tolcontact.declaration.part import face_of
 from tolcontact.declaration.values import script_line
-from tolcontact.errors import GeometryFault, ModelError
-from tolcontact.fasteners.checks import check_types, reference_faults, station_faults
-from tolcontact.fasteners.fit import INTO, SEAT, Fit, made_fit, part_fit
-from tolcontact.fasteners.location import DIGITS, in_part, locate
-from tolcontact.fasteners.placed_faces import PlacedCylinder, placed_cylinder, placed_plane
+from tolcontact.errors import Faults, GeometryFault
+from tolcontact.fasteners.fit import INTO, SEAT, Fit, check_types, made_fit, part_fit, reference_faults, station_faults
+from tolcontact.fasteners.placed_faces import PlacedCylinder, PlacedPlane, meshes_of, placed_cylinder, placed_plane, placement
+from tolcontact.geometry.faces import face_area
+from tolcontact.geometry.shapes import HEAD_WIDTH
+
+DIGITS = 12  # of places [mm]: what is beyond is rounding
+SAME_FACE = 1 - 1e-6  # share of its area that a face has in common with the face of its feature
 
 
-class Faults:
-    """The faults of one fastener."""
+def locate(scene: Assembly | Station, name: str, part: Part, fit: Fit) -> None:
+    """Locate a fastener in the hole that holds it, or let it float: with its head on its seat, or held at an end alone."""
+    if INTO in fit.holes:
+        ground = _feature_of(fit.holes[INTO].face, f"{name} hole")
+        scene.locate(part, list(_hole_locators(part, fit, fit.holes[INTO])), on=ground)
+    elif fit.seat is not None:
+        ground = _feature_of(fit.seat.face, f"{name} seat")
+        scene.locate(part, list(_seat_locators(part, fit, fit.seat)), on=ground, floating=True)
+    else:
+        first = next(iter(fit.holes.values()))
+        end = _locator(part, "end", fit.axis.at(fit.reach[1]), fit.axis.head)
+        scene.locate(part, [end], on=first.face.part, floating=True)
 
-    def __init__(self, assembly: Assembly, name: str) -> None:
-        self._model, self._place, self._faults = assembly.name, f'fastener "{name}" ({script_line()})', list[str]()
 
-    def add(self, faults: Iterable[str]) -> None:
-        """Add faults, each with the name of the fastener."""
-        self._faults += [f"{self._place}: {fault}" for fault in faults]
+def _hole_locators(part: Part, fit: Fit, hole: PlacedCylinder) -> Iterator[Locator]:
+    """Yield locators at both ends of the axis of the hole that holds a fastener, along it, and against turning."""
+    x, y = fit.axis.across
+    low, high = hole.extent(fit.axis)
+    for number, station in enumerate((low, high), start=1):
+        for letter, direction in (("x", x), ("y", y)):
+            yield _locator(part, f"{letter}{number}", fit.axis.at(station), direction)
+    yield _locator(part, "end", fit.axis.at(low), fit.axis.head)
+    # Within the material: on its surface, along which it points, it would look like a mistake (see tolcontact.plausibility).
+    yield _locator(part, "turn", fit.axis.at((low + high) / 2) + fit.radius / 2 * x, y)
 
-    def attempt(self, label: str, place: Callable[..., Any], *arguments: Any) -> Any:
-        """Return what `place` returns; None, and a fault, if the geometry does not allow it."""
-        try:
-            return place(*arguments)
-        except GeometryFault as fault:
-            self.add([f"{label}: {fault}"])
-            return None
 
-    def refuse(self) -> None:
-        """Raise ModelError if there are faults."""
-        if self._faults:
-            raise ModelError(self._model, self._faults)
+def _seat_locators(part: Part, fit: Fit, seat: PlacedPlane) -> Iterator[Locator]:
+    """Yield supports under the head of a fastener, and above it: it slides on its seat, and neither lifts off nor tilts."""
+    x, y = fit.axis.across
+    middle, arm = fit.axis.at(fit.axis.station(seat.point)), HEAD_WIDTH * fit.radius
+    for number in range(3):
+        angle = 2 * math.pi * number / 3
+        foot = middle + arm * (math.cos(angle) * x + math.sin(angle) * y)
+        for name, direction in (("seat", fit.axis.head), ("clamp", -fit.axis.head)):
+            yield _locator(part, f"{name} {number + 1}", foot, direction, one_sided=True)
+
+
+def _locator(part: Part, name: str, point: np.ndarray, direction: np.ndarray, *, one_sided: bool = False) -> Locator:
+    R, _ = placement(part)
+    return Locator(name, in_part(part, point), direction @ R, 0.0, one_sided=one_sided)
+
+
+def in_part(part: Part, point: np.ndarray) -> np.ndarray:
+    """Return a point (3,) of the nominal assembly in the frame of a part."""
+    R, t = placement(part)
+    return np.round((point - t) @ R, DIGITS) + 0.0
+
+
+def _feature_of(face: Face, name: str) -> Feature:
+    """Return the feature of its part that a face belongs to, or declare one with this name, which has no tolerances."""
+    meshes = meshes_of(face)
+    area, mesh = face_area(face, meshes), meshes[face.part]
+    for feature in face.part.features:
+        if len(feature.faces) == 1 and area.share(face_area(feature.faces[0], meshes), mesh) > SAME_FACE:
+            return feature
+    return face.part.feature(name, face)
 
 
 def fasten(
@@ -68,20 +106,19 @@ def fasten(
     subject: Part | Size | float = fastener.part if isinstance(fastener, Face | Feature) else fastener
     faces = {f"through[{k}]": face_of(hole) for k, hole in enumerate(through)} | ({INTO: face_of(into)} if into else {})
     plane_face = face_of(seat) if seat else None
-    faults = Faults(assembly, name)
-    faults.add(station_faults(assembly, scene))
-    faults.add(reference_faults(assembly, subject, faces, plane_face, pushed))
-    faults.refuse()
-    holes = {label: faults.attempt(label, _hole, face) for label, face in faces.items()}
-    plane = faults.attempt(SEAT, placed_plane, plane_face) if plane_face else None
-    faults.refuse()
+    place = f'fastener "{name}" ({script_line()})'
+    found = [*station_faults(assembly, scene), *reference_faults(assembly, subject, faces, plane_face, pushed)]
+    faults = Faults(f"{place}: {fault}" for fault in found)
+    faults.refuse(assembly.name)
+    holes = {label: faults.attempt(f"{place}: {label}", _hole, face) for label, face in faces.items()}
+    plane = faults.attempt(f"{place}: {SEAT}", placed_plane, plane_face) if plane_face else None
+    faults.refuse(assembly.name)
     if isinstance(subject, Part):
-        fit = faults.attempt("the fastener", part_fit, subject, shank, holes, plane)
+        fit = faults.attempt(f"{place}: the fastener", part_fit, subject, shank, holes, plane)
+        faults.refuse(assembly.name)
     else:
         fit = made_fit(subject.nominal if isinstance(subject, Size) else float(subject), holes, plane)
-    faults.refuse()
-    faults.add(fit.faults())
-    faults.refuse()
+    Faults(f"{place}: {fault}" for fault in fit.faults()).refuse(assembly.name)
     part = subject if isinstance(subject, Part) else _made_part(assembly, name, subject, fit)
     _declare_contacts(scene, name, fit.shank or _shank_face(part, fit), fit)
     locate(scene, name, part, fit)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from tolcontact.declaration.form import Form
+from tolcontact.declaration.size import Form
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 
 

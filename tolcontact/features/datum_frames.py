@@ -35,8 +35,8 @@ class DatumShift:
 
     A plane that keeps its shape shifts by the largest height of its extremes. A plane with form is replaced by the minimax
     plane: of all planes outside the material the one whose largest distance from the face is smallest (ISO 5459). It is the
-    centre plane of the minimum zone of the face, moved out of the material by half the width, and it tilts as far as the datums
-    before it permit. If the form of a face is 0, the plane touches it as a face that keeps its shape.
+    centre plane of the minimum zone of the face, moved out of the material by half the width, and it tilts within the limits of
+    the datums before it. If the form of a face is 0, the plane touches it as a face that keeps its shape.
 
     datum        its feature
     extremes     (extreme, column) [mm]: heights of the extremes of the plane over the least-squares plane, per unit deviation
@@ -65,7 +65,7 @@ class DatumShift:
 
     @property
     def rule(self) -> str:
-        """What the shift follows from."""
+        """The dependence of the shift, in words."""
         if self.form is None:
             return "follows from the tilts of the datum feature"
         return "follows from the form of the datum feature; minimax plane outside of the material"

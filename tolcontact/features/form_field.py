@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tolcontact.declaration.form import Form
+from tolcontact.declaration.size import Form
 from tolcontact.errors import GeometryFault
 from tolcontact.features.associated_features import TERMS, AssociatedSurface, displacement_terms
 from tolcontact.features.covariances import Lengths, covariance

@@ -12,7 +12,7 @@ from typing import NamedTuple, Self
 import numpy as np
 import scipy
 
-from tolcontact.declaration.form import Form
+from tolcontact.declaration.size import Form
 from tolcontact.features.associated_features import AssociatedSurface
 from tolcontact.features.covariances import Lengths, covariance
 from tolcontact.features.form_field import longest_extent

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from tolcontact.declaration.form import Form
+from tolcontact.declaration.size import Covariance, Form
 from tolcontact.errors import GeometryFault
 from tolcontact.features.associated_features import AssociatedSurface, displacement_terms
 from tolcontact.features.covariances import Lengths
@@ -22,7 +22,7 @@ from tolcontact.geometry.measured_points import measured_points
 from tolcontact.geometry.spreading import spread
 from tolcontact.geometry.surface import Surface
 
-COVARIANCE = "matern 5/2"  # for the heights between stations
+COVARIANCE: Covariance = "matern 5/2"  # for the heights between stations
 MIN_POINTS = 24
 MAX_HEIGHT_SHARE = 0.02  # of a face's size: a point further from its surface was not measured on it
 DIGITS = 6  # of mm: points that are no further apart are one, whose scatter is not independent

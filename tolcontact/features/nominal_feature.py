@@ -42,10 +42,6 @@ class FaceDeviation:
         """The columns (mode,) of the deviations that are coefficients of the form."""
         return self.columns[self.modes]
 
-    def form_heights(self, points: np.ndarray) -> np.ndarray:
-        """Return the heights (..., mode) of the modes of the form at points (..., 3) [mm]."""
-        return np.zeros((*points.shape[:-1], 0)) if self.form is None else self.form.heights(points)
-
     @property
     def grows(self) -> bool:
         """Whether the height varies."""

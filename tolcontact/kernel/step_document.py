@@ -140,7 +140,7 @@ class Document:
         referred = TDF_Label()
         if not XCAFDoc_ShapeTool.GetReferredShape_s(label, referred):
             referred = label
-        # A place without a name of its own has that of its product.
+        # A place without a name of its own has the name of its product.
         own = [name for name in (label_name(label), label_name(referred)) if not is_nameless(name)]
         names = [*parents, *own[:1]]
         if XCAFDoc_ShapeTool.IsAssembly_s(referred):
@@ -181,7 +181,7 @@ class Document:
         return BodyShape(faces, face_names(faces, self._record_names(cavities) | names), count > 0, name, count)
 
     def _record_names(self, shapes: Sequence[Any]) -> dict[int, str]:
-        """Return the names of faces by their records: those of cavities, and of some parts with drawings, have no labels."""
+        """Return the names of faces by their records: faces of cavities, and of some parts with drawings, have no labels."""
         faces = [face for shape in shapes for face in explore(shape, TopAbs_FACE)] if self.has_face_names else []
         return {hash(face): entity_name(self._entity(face)) for face in faces}
 
@@ -214,7 +214,7 @@ class Document:
         return {model.Value(number): number for number in range(1, model.NbEntities() + 1)}
 
     def _entity(self, shape: Any) -> Any:
-        """Return the record of which the kernel made a shape; None if it is unknown."""
+        """Return the record that the kernel made a shape from; None if it is unknown."""
         return self.transfer.EntityFromShapeResult(shape, 1)
 
 
@@ -238,7 +238,7 @@ def entity_name(entity: Any) -> str:
 
 
 def stated_face_count(entity: Any) -> int:
-    """Return the number of faces that the record of a solid names, those of its cavities included; 0 if it is unknown."""
+    """Return the number of faces that the record of a solid names, with its cavities; 0 if it is unknown."""
     shells = [entity.Outer()] if hasattr(entity, "Outer") else []
     shells += [entity.VoidsValue(number) for number in range(1, entity.NbVoids() + 1)] if hasattr(entity, "NbVoids") else []
     return sum(shell.NbCfsFaces() for shell in shells if shell is not None)

@@ -9,7 +9,7 @@ import numpy as np
 from tolcontact.declaration import Measure, Part, Point
 from tolcontact.declaration.measure import BINARY, MAX_STEPS, UNARY, Tape
 from tolcontact.discretization import Nominal
-from tolcontact.errors import ModelError, designation
+from tolcontact.errors import Faults, designation
 from tolcontact.mechanics.group_equations import face_height, face_pose
 from tolcontact.mechanics.measurements import Observed, value_of
 from tolcontact.mechanics.pose import ENTRIES, Pose
@@ -119,7 +119,7 @@ def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list
     """
     if nominal.scenes:
         return [expression for scene in nominal.scenes for expression in measured(scene, poses, deviations)]
-    faults: list[str] = []
+    faults = Faults()
     expressions: list[ca.SX] = []
     for measure, measurement in zip(nominal.measures, nominal.measurements, strict=True):
         if measurement is not None:
@@ -133,8 +133,7 @@ def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list
                 f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
             )
             expressions.append(ca.SX.nan(1))
-    if faults:
-        raise ModelError(nominal.assembly.name, faults)
+    faults.refuse(nominal.assembly.name)
     return expressions
 
 

@@ -8,8 +8,7 @@ from tolcontact.errors import NominalWarning, shown
 from tolcontact.plausibility.bodies import body_overlaps, clashes, clashes_beyond_faces
 from tolcontact.plausibility.declared_points import doubtful_units, far_points, unfit_directions
 from tolcontact.plausibility.faces import measured_forms, partial_surfaces
-from tolcontact.plausibility.magnitudes import rotations, wide_tolerances
-from tolcontact.plausibility.measures import measure_limits, measured_reach
+from tolcontact.plausibility.measures import measure_limits, measured_reach, rotations, wide_tolerances
 from tolcontact.plausibility.pairs import coarse_pairs, pair_clearances, pair_overlaps, unconstrained_rotations, unsure_seats
 from tolcontact.plausibility.trial_draws import TrialDraws
 

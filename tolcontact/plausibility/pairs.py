@@ -77,8 +77,8 @@ def unconstrained_rotations(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence for each free part whose contact points lie close to a line, so that they hardly hold its rotation.
 
     A rotation about that line hardly displaces them: contact may rotate the part far to save a small displacement of points.
-    The points of parts that it carries count as its own, and a contact point of a ball counts as the ball. Round faces alone do
-    not rotate a part about their axis, since their normals pass through it.
+    The points of parts located on it count as its own, and a contact point of a ball counts as the ball. Round faces alone
+    do not rotate a part about their axis, since their normals pass through it.
     """
     method, parts, pairs = draws.program.method, draws.program.nominal.parts, draws.program.nominal.pairs
     for group in (compiled.group for compiled in draws.program.groups) if method.minimizes.counts_points else ():

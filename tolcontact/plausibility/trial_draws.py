@@ -72,7 +72,7 @@ class TrialDraws:
 
     @cached_property
     def pushes(self) -> list[float]:
-        """How far [mm] contact of each pair may push its parts, and forces may press them."""
+        """The displacement [mm] of parts that contact of each pair, and forces, may cause."""
         presses = self.program.method.minimizes.presses
         return [
             push(pair, self.relative[:, k], self.deviations, presses=presses)
@@ -80,7 +80,7 @@ class TrialDraws:
         ]
 
     def pushed_by_others(self, k: int) -> float:
-        """Return how far [mm] the other contact of the group of pair k may push its parts."""
+        """Return the displacement [mm] of its parts that the other contact of the group of pair k may cause."""
         groups = [group.group.pairs for group in self.program.groups if k in group.group.pairs]
         return sum(self.pushes[other] for pairs in groups for other in pairs if other != k)
 

@@ -1,7 +1,7 @@
 """Pictures of assemblies and displacement fields by pyvista, which also draws without a display."""
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -9,7 +9,7 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.declaration import Assembly
 from tolcontact.discretization import discretize
-from tolcontact.errors import OptionError
+from tolcontact.errors import OptionError, check_choice
 from tolcontact.report.annotations import Mark, Marks, marks_of, marks_of_nominal
 
 try:
@@ -38,7 +38,7 @@ def assembly(
     source: xr.DataTree | Assembly,
     *,
     realization: int | None = None,
-    state: str = "corrected",
+    state: terms.StateName = "corrected",
     marks: bool = True,
     opacity: float = 1.0,
     plotter: Any = None,
@@ -65,10 +65,10 @@ def assembly(
 
 def field(
     results: xr.DataTree,
-    statistic: str = "6 sigma",
+    statistic: Literal["mean", "6 sigma"] = "6 sigma",
     *,
-    component: str = "magnitude",
-    state: str = "corrected",
+    component: terms.ComponentName = "magnitude",
+    state: terms.StateName = "corrected",
     limits: tuple[float, float] | None = None,
     plotter: Any = None,
 ) -> Any:
@@ -78,9 +78,9 @@ def field(
     pictures of both states can be compared. Returns a pyvista.Plotter.
     Raises OptionError for an unknown statistic, component or state, and for an archive without fields.
     """
-    _expect("statistic", statistic, tuple(STATISTICS))
-    _expect("component", component, terms.COMPONENTS)
-    _expect("state", state, terms.STATES)
+    check_choice("statistic", statistic, tuple(STATISTICS))
+    check_choice("component", component, terms.COMPONENTS)
+    check_choice("state", state, terms.STATES)
     name, selection = STATISTICS[statistic].name, {terms.COMPONENT: component}
     fields = [group[name].sel(selection) for group in _groups(results)]
     values = np.concatenate([array.values.ravel() for array in fields])
@@ -116,11 +116,6 @@ def _in_view(plotter: Any) -> Any:
     return plotter
 
 
-def _expect(option: str, value: str, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise OptionError(f"{option} is {value!r}; expected one of: {', '.join(choices)}")
-
-
 def _groups(results: xr.DataTree) -> list[xr.Dataset]:
     names = results.to_dataset()[terms.PART].values
     return [results["field"].children[terms.group_of(str(name))].to_dataset() for name in names]
@@ -141,7 +136,7 @@ def _mesh(body: _Body) -> Any:
 
 
 def _moved(results: xr.DataTree | Assembly, part: int, realization: int, state: str, vertices: np.ndarray) -> np.ndarray:
-    _expect("state", state, terms.STATES)
+    check_choice("state", state, terms.STATES)
     if isinstance(results, Assembly):
         raise OptionError("a declared model has no realizations; give results instead, or leave out `realization`")
     rows = results.to_dataset()

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.errors import OptionError
+from tolcontact.errors import OptionError, check_choice
 from tolcontact.realizations import finished
 from tolcontact.statistics import limits
 
@@ -27,7 +27,7 @@ def histogram(
     results: xr.DataTree,
     measure: str | None = None,
     *,
-    states: Sequence[str] = terms.STATES,
+    states: Sequence[terms.StateName] = terms.STATES,
     bins: int = BINS,
     axes: Axes | None = None,
 ) -> Axes:
@@ -77,6 +77,5 @@ def _place(rows: xr.Dataset, name: str | None) -> int:
     names = [str(label) for label in rows[terms.MEASURE].values]
     if name is None and len(names) == 1:
         return 0
-    if name not in names:
-        raise OptionError(f"measure is {name!r}; expected one of: {', '.join(names)}")
-    return names.index(name)
+    check_choice("measure", name, names)
+    return names.index(str(name))

@@ -22,9 +22,8 @@ from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.files import Shape
 from tolcontact.pmi import declarable
 from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
-from tolcontact.pmi.claims import Claim, Place, claims_of
+from tolcontact.pmi.claims import Claim, Place, TolerancedSurfaces, claims_of
 from tolcontact.pmi.declarable import Undeclared
-from tolcontact.pmi.toleranced_surfaces import TolerancedSurfaces
 
 Statement = tuple[Claim, Control]
 Declared = Feature | Pattern | DatumTargets

@@ -30,7 +30,7 @@ from tolcontact.statistics.intervals import (
     proportion_of,
 )
 from tolcontact.statistics.sample import Sample
-from tolcontact.variation.sobol_points import scrambled_points
+from tolcontact.variation.plans import scrambled_points
 
 PERCENTS = 0.135, 50.0, 99.865
 TRIALS = 1 << 11  # simulated triples of percentiles; an interval covers 95 % of them

@@ -17,7 +17,7 @@ MAX_PAIRS = 20  # of parts, the most frequent ones
 VARIABLES = [variable.name for variable in (terms.CLASHES, terms.CLASH_DEPTH, terms.CLASH_PART, terms.CLASH_OTHER)]
 
 
-def carried(rows: xr.Dataset) -> np.ndarray:
+def loaded(rows: xr.Dataset) -> np.ndarray:
     """Return the share of realizations with each pair under load, (pair, interval)."""
     counts = np.sum([(piece[terms.CARRYING.name].values > 0).sum(axis=0) for piece in pieces(rows)], axis=0)
     total = rows.sizes[terms.REALIZATION]
@@ -41,7 +41,7 @@ def combinations(rows: xr.Dataset) -> list[tuple[tuple[str, ...], int]]:
         masks, times = _unique_rows(piece[terms.CARRYING.name].values > 0)
         counts.update({tuple(mask.tolist()): int(n) for mask, n in zip(masks, times, strict=True)})
     frequent = counts.most_common(MAX_COMBINATIONS)
-    return [(tuple(name for name, carries in zip(names, mask, strict=True) if carries), n) for mask, n in frequent]
+    return [(tuple(name for name, is_active in zip(names, mask, strict=True) if is_active), n) for mask, n in frequent]
 
 
 def _unique_rows(masks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -146,7 +146,7 @@ def _share(depths: np.ndarray, at_random: np.ndarray, limit: float) -> np.ndarra
 def clashes(rows: xr.Dataset) -> tuple[dict[ArchiveVariable, Any], list[str]]:
     """Return the share of realizations with clashes, the counts and depths of pairs of parts, and the names of these pairs.
 
-    A clash is a penetration of bodies. The share is that of pairs without declared contact, of all tested realizations. The
+    A clash is a penetration of bodies. The share counts pairs without declared contact, of all tested realizations. The
     most frequent pairs are those that are the deepest in their realization; their depth [mm] is NaN if none was measured.
     """
     names = [str(name) for name in rows[terms.PART].values]

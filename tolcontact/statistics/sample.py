@@ -105,7 +105,7 @@ class Sample:
 
     @cached_property
     def _sorted(self) -> np.ndarray:
-        """The values in ascending order; those of a sample that does not fit into memory are in a temporary file."""
+        """The values in ascending order; values of a sample that does not fit into memory are in a temporary file."""
         if self.count <= self.max_sorted:
             return np.sort(np.concatenate(list(self.pieces())))
         try:

@@ -165,7 +165,7 @@ def _contact_values(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], 
     total = rows.sizes[terms.REALIZATION]
     shares = np.array([intervals.proportion_of(count, total) for _, count in combinations])
     return {
-        terms.CARRIED: contact.carried(rows),
+        terms.CARRIED: contact.loaded(rows),
         terms.PAIR_REACTION: contact.reactions(rows),
         terms.CARRIED_TOGETHER: shares.reshape(-1, len(terms.ESTIMATE)),
     }

@@ -20,7 +20,7 @@ class ArchivedTangent:
         contact = {str(name): values.values for name, values in tree.children["contact"].to_dataset().data_vars.items()}
         face = int(contact[terms.TANGENT_FACE.name][number])
         self.columns = contact[terms.TANGENT_CONTRIBUTOR.name][number]
-        self._leaning, self._free = (contact[v.name][number] for v in (terms.TANGENT_LEANING, terms.TANGENT_FREE))
+        self._residuals, self._free = (contact[v.name][number] for v in (terms.TANGENT_RESIDUAL, terms.TANGENT_FREE))
         is_own = contact[terms.FACE_OF_TANGENT_PLACE.name] == face
         self._heights, form = contact[terms.TANGENT_HEIGHT.name][is_own], contact[terms.FORM_CONTRIBUTOR.name][face]
         modes = ArchivedForm(contact, face).heights(contact[terms.TANGENT_PLACE_AT.name][is_own])
@@ -29,7 +29,7 @@ class ArchivedTangent:
     def faults(self, deviations: np.ndarray) -> Iterator[tuple[int, str]]:
         """Yield realizations with a plane, from deviations (realization, contributor), that is not tangent, and the reason."""
         for row, deviation in enumerate(deviations):
-            heights = self._heights @ (self._leaning @ deviation) + self._modes @ deviation[self._form_columns]
+            heights = self._heights @ (self._residuals @ deviation) + self._modes @ deviation[self._form_columns]
             least_distance, archived = self._distance(heights, None), self._distance(heights, deviation)
             if not archived <= least_distance + TOLERANCE + SOLVER_TOLERANCE * float(np.abs(heights).max()):
                 yield row, f"is {archived:.9g} mm from its face, and one {least_distance:.9g} mm from it touches it, too"

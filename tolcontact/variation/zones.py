@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 from scipy.special import gammainc, ndtri
 
-from tolcontact.variation.sobol_points import MAX_DIMENSIONS, scrambled_points
+from tolcontact.variation.plans import MAX_DIMENSIONS, scrambled_points
 
 SHARE = 0.9973002039367398  # of a normal distribution within three standard deviations
 LOG2_DIRECTIONS = 14

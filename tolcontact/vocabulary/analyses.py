@@ -1,6 +1,7 @@
-"""Every analysis of a model: its group in an archive, its title, its variables and their labels."""
+"""Records of analyses: the variables of their datasets; and the words of terminal, page, pictures and spreadsheet."""
 
 from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple, get_args
 
 from tolcontact.vocabulary.archive import GAP_MIN, KKT_RESIDUAL, MEASURED, ROTATION, STATION_POSES, STATUS, TRANSLATION
 from tolcontact.vocabulary.labels import (
@@ -18,7 +19,8 @@ from tolcontact.vocabulary.labels import (
 from tolcontact.vocabulary.summary import ESTIMATE, INTERVAL, OUTSIDE
 
 ANALYSES_GROUP = "statistics"  # the group of an archive that holds a group for each analysis
-GROUP, GROUPED_BY, UNIT = "group", ("contributor", "feature", "part"), "unit"
+GroupedBy = Literal["contributor", "feature", "part"]
+GROUP, GROUPED_BY, UNIT = "group", get_args(GroupedBy), "unit"
 CONTACT, CONTACT_STATES = "contact", ("untouched", "touched")
 END, ENDS, SENSES = "end", ("least", "largest"), (-1, 1)
 CASE = "case"  # a corrected worst case as a realization, with the variables that archives have of realizations
@@ -103,7 +105,6 @@ SENSITIVITIES = AnalysisRecord(
         _by_status(),
     ),
 )
-_EXTREME = (MEASURE, STATE, END)
 WORST_CASE = AnalysisRecord(
     "worst_case",
     "worst cases of the measurements of {assembly}",
@@ -173,3 +174,44 @@ SEATING = AnalysisRecord(
 )
 _RECORDS = CONTRIBUTIONS, SENSITIVITIES, WORST_CASE, TAILS, ALLOCATION, RELOCATION, SEATING
 ANALYSES = {record.name: record for record in _RECORDS}
+
+
+WITHOUT_CONTACT, WITH_CONTACT = STATE_WORDS = ("without contact", "with contact")  # of `STATES`
+WORD_OF_STATE = dict(zip(STATES, STATE_WORDS, strict=True))
+EXTREME_WORDS = ("minimum", "maximum")  # of `ENDS`
+WORD_OF_END = dict(zip(ENDS, EXTREME_WORDS, strict=True))
+MEASUREMENT = "measurement"
+OUT_OF_SPECIFICATION = "out of specification"
+OUT_OF_SPECIFICATION_COLUMN = "out of\nspecification"  # heading of a narrow column
+IN_CONTACT = "in contact,\nshare of realizations"
+CONTRIBUTORS, SIMULATION_SETTINGS = "Contributors", "Simulation settings"
+ESTIMATES_NOTE = "Estimates are shown with their 95 % confidence intervals"
+ZONE_WIDTH = "tolerance (full width of the zone)"
+GLOSSARY = {
+    WITHOUT_CONTACT: "Parts stand where their locators put them, even if they penetrate each other.",
+    WITH_CONTACT: "Contact has moved the parts until none penetrates another.",
+    OUT_OF_SPECIFICATION: "The share of realizations beyond a limit of the measurement.",
+    CONTRIBUTORS.lower(): "All that varies: deviations of locators and of features, and causes that drive several of them.",
+    "realization": "One simulated assembly, with its own random deviations.",
+    "Ppk": "The distance from the median to a limit, divided by the distance from the median to the percentile of 0.135 % or "
+    "99.865 % on that side; the smaller of both ratios. 1 means 0.135 % beyond a limit."
+    " For a normal distribution it is the classical index.",
+}
+
+
+class ReactionWords(NamedTuple):
+    """The heading of the mean reaction of a pair, with its units, and a sentence that explains it."""
+
+    heading: str
+    explanation: str
+
+
+def reaction_words(units: str) -> ReactionWords:
+    """Return the words for reactions: forces [N] if the objective weighs forces or springs, multipliers otherwise."""
+    if units == "N":
+        return ReactionWords("mean\nreaction, N", "The reaction of a pair is the sum of the contact forces at its points.")
+    return ReactionWords(
+        f"mean\nmultiplier, {units}",
+        "The multiplier of a pair is the sum of the Lagrange multipliers of its contact points. It says how strongly the pair "
+        "displaces its parts, compared with other pairs. It is no force, because the objective has no stiffness and no force.",
+    )

@@ -135,7 +135,7 @@ QUANTITY = variable(
 )
 MEASURE_UNITS = variable("str measure_units(measure)", "units of the measure")
 
-MEASURE_LINE, LINE_END = "measure_line", "line_end"
+LINE_END = "line_end"
 MEASURE_OF_LINE = variable("i4 measure_of_line(measure_line)", "number of the measure that a line shows, counted from 0")
 LINE_ENDS = variable(
     "f8 measure_line_ends(measure_line, line_end, axis)",

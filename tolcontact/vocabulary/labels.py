@@ -3,32 +3,37 @@
 import enum
 import re
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal, get_args
 
 CONVENTIONS = "CF-1.11"
 FORMAT = 1  # of the archive
-STATES = ("raw", "corrected")
+StateName = Literal["raw", "corrected"]
+STATES = get_args(StateName)
 RAW, CORRECTED = 0, 1  # their positions
-AXES = ("x", "y", "z")
-COMPONENTS = (*AXES, "magnitude")
+ComponentName = Literal["x", "y", "z", "magnitude"]
+COMPONENTS = get_args(ComponentName)
+AXES = COMPONENTS[:3]
 
 REALIZATION, STATE, PART, PAIR, MEASURE = "realization", "state", "part", "pair", "measure"
 AXIS, BODY_AXIS, POINT, LOCATOR = "axis", "body_axis", "point", "locator"
-VERTEX, FACE, CORNER, COMPONENT, BOUND = "vertex", "face", "corner", "component", "bound"
+FACE, CORNER, COMPONENT, BOUND = "face", "corner", "component", "bound"
 CONTRIBUTOR, FEATURE_FACE, FREEDOM = "contributor", "feature_face", "freedom"
 NUMBER, CHECKED = "number", "checked"
 BLOCK_ROWS = 4096  # realizations of a block at most: they are simulated together
 PIECE_ROWS = 24 * BLOCK_ROWS  # realizations that are read at once
 SOLVER, RUN, DESIGN, STATUS_MEANING, EXTENT = "solver", "run", "design", "status_meaning", "extent"
 BOUNDS = ("lower", "upper")
-MONTE_CARLO, LATIN_HYPERCUBE, SOBOL = PLANS = ("monte-carlo", "latin hypercube", "sobol")  # sampling plans
+Plan = Literal["monte-carlo", "latin hypercube", "sobol"]  # sampling plans
+MONTE_CARLO, LATIN_HYPERCUBE, SOBOL = PLANS = get_args(Plan)
 REPLICATE = 256  # realizations that the last two draw together, independent of all others
 # Attributes of archives and summaries: the largest depth [mm] in the test for interference, and what is not tested.
 INTERFERENCE_DEPTH, NOT_WATCHED = "interference_depth", "not_watched"
 METHOD_ATTRIBUTES = ("resolution", "objective", "active_set")  # of archives, summaries and analyses
-KEPT = ("measures", "poses", "all")
+Kept = Literal["measures", "poses", "all"]
+KEPT = get_args(Kept)
 TITLE_PREFIX = "document_"  # of the attributes of an archive that hold its title block
-FIELD_CHOICES = ("some", "all", "none")  # besides a number
+FieldChoice = Literal["some", "all", "none"]  # or a number
+FIELD_CHOICES = get_args(FieldChoice)
 
 _DECLARATION = re.compile(r"(\w+) (\w+)\(([\w, ]*)\)")
 

@@ -1,8 +1,11 @@
 """Variables of bodies: their surfaces, checks against these, clashes without contact, and coordinates in files."""
 
+from typing import Literal, get_args
+
 from tolcontact.vocabulary.labels import ArchiveVariable, variable
 
-SURFACE_KINDS = ("plane", "cylinder", "cone", "sphere", "torus")  # in the order of their numbers
+SurfaceKind = Literal["plane", "cylinder", "cone", "sphere", "torus"]
+SURFACE_KINDS = get_args(SurfaceKind)  # in the order of their numbers
 KINDS_MEAN = {"flag_values": list(range(len(SURFACE_KINDS))), "flag_meanings": " ".join(SURFACE_KINDS)}
 
 

@@ -66,7 +66,7 @@ FEATURE_FACES = (
 )  # fmt: skip
 
 
-TANGENT, TANGENT_PLACE, COORDINATE, TANGENT_FREEDOM = "tangent", "tangent_place", "plane_coordinate", "tangent_freedom"
+TANGENT = "tangent"
 
 TANGENT_FACE = variable("i4 tangent_face(tangent)", "number of the feature's face that a plane touches, counted from 0")
 TANGENT_CONTRIBUTOR = variable(
@@ -74,7 +74,7 @@ TANGENT_CONTRIBUTOR = variable(
     "number of the contributor that is the offset or a tilt of the plane, from the datum by least squares, counted from 0; -1: "
     "it makes no difference",
 )
-TANGENT_LEANING = variable(
+TANGENT_RESIDUAL = variable(
     "f8 tangent_leaning(tangent, plane_coordinate, contributor)",
     "offset and tilts of the face from the least-squares datum per unit deviation",
 )
@@ -91,11 +91,9 @@ TANGENT_HEIGHT = variable(
     "f8 tangent_height(tangent_place, plane_coordinate)", "height of a plane at the place, for an offset or a tilt of 1 mm", "1"
 )
 TANGENTS = (
-    TANGENT_FACE, TANGENT_CONTRIBUTOR, TANGENT_LEANING, TANGENT_FREE, FACE_OF_TANGENT_PLACE, TANGENT_PLACE_AT, TANGENT_HEIGHT,
+    TANGENT_FACE, TANGENT_CONTRIBUTOR, TANGENT_RESIDUAL, TANGENT_FREE, FACE_OF_TANGENT_PLACE, TANGENT_PLACE_AT, TANGENT_HEIGHT,
 )  # fmt: skip
 
-
-FORM_STATION, FORM_MODE, FORM_TERM = "form_station", "form_mode", "form_term"
 
 FORM_COVARIANCE = variable(
     "str form_covariance(feature_face)", "covariance of the form of a feature's face, by distance; empty: it keeps its shape"

@@ -17,7 +17,7 @@ from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly
 from tolcontact.discretization import discretize
 from tolcontact.errors import OptionError
-from tolcontact.method import USUAL_SEARCH, Method
+from tolcontact.method import USUAL_SEARCH, Method, Solver
 from tolcontact.plausibility import warn_of_nominal
 from tolcontact.simulation import Block
 from tolcontact.simulation.cluster import MapBlocks, Workers, mapping, threads_of
@@ -34,7 +34,7 @@ QUANTILES = {"median": 0.5, "largest": 1.0}
 
 def compare(
     model: Model,
-    solvers: str | Sequence[str],
+    solvers: Solver | Sequence[Solver],
     *,
     samples: int = 1000,
     seed: int = 1,
@@ -212,7 +212,7 @@ def study(
     samples: int,
     *,
     seeds: int | Sequence[int] = 1,
-    solver: str | None = None,
+    solver: Solver | None = None,
     methods: Choice | Sequence[Choice] | None = None,
 ) -> xr.Dataset:
     """Return the realizations of every model with every seed and method (see `simulate`), along the dimension `design`.

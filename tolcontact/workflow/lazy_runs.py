@@ -12,6 +12,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.archive import Run, labelled, row_values, run_settings, sizes_of_rows
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
+from tolcontact.method import Solver
 from tolcontact.simulation import Block
 from tolcontact.simulation.lazy import chunk_rows, dask_arrays, lazy_draws, lazy_realizations
 from tolcontact.workflow.models import Choice, Model, check_counts, program_of
@@ -24,7 +25,7 @@ def simulate(
     samples: int | xr.DataArray,
     *,
     seed: int = 1,
-    solver: str | None = None,
+    solver: Solver | None = None,
     method: Choice | None = None,
 ) -> xr.Dataset:
     """Return the realizations of a run as a lazy dataset with the variables of archives; nothing is simulated yet.

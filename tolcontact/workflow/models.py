@@ -11,10 +11,10 @@ from tolcontact.declaration import Assembly
 from tolcontact.declaration.script import load_model, write_json
 from tolcontact.discretization import discretize
 from tolcontact.errors import ArchiveError, ModelError, OptionError, TolcontactError
-from tolcontact.method import Method
+from tolcontact.method import Method, Solver
 from tolcontact.plausibility import warn_of_nominal
 
-DEFAULT_SOLVER = "qpoases"
+DEFAULT_SOLVER: Solver = "qpoases"
 COUNTS = {  # smallest and largest
     "samples": (2, 10**12), "seed": (0, 2**63 - 1), "surfaces": (0, 10**6),
 }  # fmt: skip
@@ -22,7 +22,7 @@ Model = Assembly | Callable[[], Assembly] | str | Path
 Choice = Method | Mapping[str, Any]  # a method, or some of its choices; the model's own method has the others
 
 
-def build(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None = None) -> Program:
+def build(model: Model, *, solver: Solver = DEFAULT_SOLVER, method: Choice | None = None) -> Program:
     """Discretize and compile a model: an assembly, the function that declares it, or the path of its script or archive.
 
     The model of an archive has the method of its run. `method` replaces the model's own; a mapping, such as
@@ -37,7 +37,7 @@ def build(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None =
     return program
 
 
-def check(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None = None) -> tuple[str, ...]:
+def check(model: Model, *, solver: Solver = DEFAULT_SOLVER, method: Choice | None = None) -> tuple[str, ...]:
     """Return every fault of a model; the tuple is empty if the model can be built (see `build`)."""
     try:
         build(model, solver=solver, method=method)
@@ -58,7 +58,7 @@ def write_model(model: Model, path: str | Path) -> None:
     write_json(assembly, Path(path), program.nominal.triangles, program.tapes)
 
 
-def program_of(model: Model | Program, solver: str | None, method: Choice | None) -> Program:
+def program_of(model: Model | Program, solver: Solver | None, method: Choice | None) -> Program:
     """Return the program of a model (see `build`). A Program already has its solver and method, and is returned unchanged."""
     check_program(model, solver, method)
     return model if isinstance(model, Program) else build(model, solver=solver or DEFAULT_SOLVER, method=method)

@@ -1,7 +1,7 @@
-"""The 3D scenes of pages: of an archive with fields, contact points and single realizations, and of a declared assembly."""
+"""The 3D scenes of pages: of an archive with fields and single realizations, and of a declared assembly with features."""
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -12,13 +12,17 @@ import xarray as xr
 from scipy.spatial import cKDTree
 
 from tolcontact import vocabulary as terms
-from tolcontact.declaration import Assembly, Part
+from tolcontact.declaration import Assembly, Face, Feature, Part, Pattern
+from tolcontact.declaration.feature_tolerance import GeometricTolerance
+from tolcontact.declaration.selection import Inside
+from tolcontact.declaration.size import Size
 from tolcontact.discretization import Nominal
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry import PartPreview, preview
+from tolcontact.geometry.faces import Meshes, triangles
 from tolcontact.realizations import finished
 from tolcontact.report.analysis_tables import archived_analysis
 from tolcontact.report.annotations import Marks, fixed_points, marks_of, marks_of_nominal
-from tolcontact.report.html.feature_list import feature_lists
 from tolcontact.report.html.form_scene import MAX_GAPS, SingleStates
 from tolcontact.report.html.station_scenes import station_poses, stations_of, stations_of_nominal, worst_poses
 from tolcontact.statistics import touching
@@ -29,6 +33,7 @@ MIN_TRIANGLES = 500  # of a body
 MAX_EXCESS = 1.2  # ratio of triangles to the target number, above which the fast method has failed
 EXTREMES = 5  # of each measure, on either side
 MAX_REALIZATIONS = 300
+Entry = dict[str, Any]
 
 
 def single_realizations(results: xr.DataTree) -> dict[int, str]:
@@ -237,3 +242,62 @@ def coarser(vertices: np.ndarray, faces: np.ndarray, count: int) -> tuple[np.nda
             np.asarray(vertices, dtype=np.float64, order="C"), np.asarray(faces, dtype=np.int64, order="C"), count
         )
     return coarse, corners, cKDTree(vertices).query(coarse)[1]
+
+
+def feature_lists(assembly: Assembly, meshes: Meshes) -> list[Entry]:
+    """Return the features and patterns of each part that has any. `meshes` contains the meshes of all drawn parts, in order.
+
+    number    of the drawn part; None if it is not drawn
+    members   the feature itself, or the features of a pattern. The faces of a member consist of `runs` of consecutive triangles
+              of the mesh (first triangle, and one after the last), clipped by all `boxes` (lower and upper corner [mm])
+    """
+    numbers: Mapping[Part, int] = {part: number for number, part in enumerate(meshes)}
+    return [
+        {
+            "part": str(part.name),
+            "number": numbers.get(part),
+            "features": [_entry(declared, meshes) for declared in part.toleranced],
+        }
+        for part in assembly.parts
+        if part.toleranced
+    ]
+
+
+def _entry(declared: Feature | Pattern, meshes: Meshes) -> Entry:
+    return {
+        "noun": declared.noun,
+        "name": str(declared.name),
+        "datum": None if declared.datum is None else str(declared.datum),
+        "tolerances": [_text(tolerance) for tolerance in declared.tolerances],
+        "members": [
+            {"name": str(member.name), "faces": list(_faces(member, declared.part, meshes))} for member in declared.members
+        ],
+    }
+
+
+def _text(tolerance: Size | GeometricTolerance) -> str:
+    """Return a tolerance as printed, or only its kind if a fault prevents printing."""
+    return tolerance.kind if any(tolerance.faults()) else str(tolerance)
+
+
+def _faces(member: Feature, part: Part, meshes: Meshes) -> Iterator[Entry]:
+    """Yield the faces of a member that have triangles on its part."""
+    for face in member.faces:
+        if face.part is part and not any(face.faults()) and all(mentioned in meshes for mentioned in face.parts):
+            try:
+                indices = triangles(face, meshes)
+            except GeometryFault:  # a fault of the model, which the page lists
+                continue
+            yield {"runs": _runs(indices), "boxes": _boxes(face)}
+
+
+def _runs(indices: np.ndarray) -> list[int]:
+    """Return the first index, and one after the last, of each run of consecutive `indices` (index,)."""
+    ends = np.flatnonzero(np.diff(indices) != 1)
+    first, last = indices[np.r_[0, ends + 1]], indices[np.r_[ends, len(indices) - 1]]
+    return [int(index) for index in np.column_stack([first, last + 1]).ravel()]
+
+
+def _boxes(face: Face) -> list[list[list[float]]]:
+    boxes = [selection for selection in face.selections if isinstance(selection, Inside)]
+    return [[[float(x) for x in corner] for corner in (box.lower, box.upper)] for box in boxes]
