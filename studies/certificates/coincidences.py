@@ -26,6 +26,7 @@ from tolcontact.discretization import contact_points
 from tolcontact.method import OBJECTIVES
 from tolcontact.simulation import simulate_blocks
 from tolcontact.vocabulary import CORRECTED, RAW, Status
+from tolcontact.workflow import models
 
 ALLOWED, NOTICED = 5e-4, 1e-4  # radius of a ball in two bodies, as a share of the smallest tolerance range
 TOUCHING = 1e-6  # mm
@@ -167,7 +168,8 @@ class Tally:
 def quick_builds() -> Iterator[None]:
     """Leave out what takes most of a build and does not change it.
 
-    That is the error between contact points, which warnings state, and to keep machine code that no other scene will need.
+    That is the error between contact points and the check of the nominal assembly, which only warn, and to keep machine code
+    that no other scene will need.
     """
     sample = contact_points._with_curvature
 
@@ -177,6 +179,7 @@ def quick_builds() -> Iterator[None]:
     forgetful = types.SimpleNamespace(load=code_cache.load, store=lambda *entry: None, write=lambda *entry: None)
     with (
         mock.patch.object(contact_points, "_with_curvature", unchecked),
+        mock.patch.object(models, "warn_of_nominal", lambda program: None),
         mock.patch.object(named, "code_cache", forgetful),
         mock.patch.object(native, "code_cache", forgetful),
     ):
