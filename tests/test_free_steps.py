@@ -27,6 +27,14 @@ def test_bodies_that_are_free_nearby_have_an_answer(family, seed, samples):
     assert not findings.wrong
 
 
+@pytest.mark.slow
+def test_short_steps_find_an_answer_where_free_bodies_go_to_and_fro():
+    with quick_builds():
+        findings = judged(scene(800196, "pegs", "all points"), 8, 800196, "graph")
+    assert findings.counts["certified"] == 8
+    assert not findings.wrong
+
+
 def test_a_scene_whose_points_leave_a_rotation_free_is_posed_with_springs():
     with quick_builds():
         findings = judged(scene(3024, "lattice", "all points"), SAMPLES, 3024, "daqp")
