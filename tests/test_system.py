@@ -92,6 +92,7 @@ def python(code: str, *arguments, **options):
     return stripped([sys.executable, "-c", code, *arguments], **options)
 
 
+@pytest.mark.slow
 def test_commands_work_without_what_only_posix_has(tmp_path):
     model = ROOT / "models" / "ra1.py"
     (tmp_path / "block.step").write_text(step_block())
@@ -139,6 +140,13 @@ def test_a_file_that_stays_open_is_named_with_what_to_do(tmp_path):
     assert second == "before 1"
 
 
+def test_a_file_that_cannot_be_replaced_for_another_reason_is_not_said_to_be_open(tmp_path):
+    code = "import os, sys\nfrom pathlib import Path\nfrom tolcontact.system import files\n"
+    code += "path = Path(sys.argv[1])\npath.touch()\nopened = path.open()\nos.access = lambda path, mode: False\n"
+    code += "try: files.remove(path)\nexcept PermissionError as error: print(type(error).__name__)"
+    assert python(code, tmp_path / "a").stdout == "PermissionError\n"
+
+
 RUN_AGAIN = """
 import tolcontact as tc
 from models.ra1 import assembly
@@ -180,6 +188,28 @@ def test_a_link_in_the_cache_is_not_followed(tmp_path):
     code = f"import os\nos.environ.update(HOME='{tmp_path}', XDG_CACHE_HOME='{tmp_path}')\n{CACHE}"
     code += "(code_cache.cache_folder() / 'link').symlink_to(code_cache.cache_folder() / 'a')\nprint(code_cache.load('link'))"
     assert python(code).stdout.splitlines()[-1] == "None"
+
+
+CLUSTER = """
+import signal
+if hasattr(signal, "pthread_sigmask"):
+    del signal.pthread_sigmask
+from tolcontact.simulation.cluster import local_cluster
+def ignores():
+    import signal
+    return signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+if __name__ == "__main__":
+    with local_cluster(1) as client:
+        client.wait_for_workers(1)
+        print(list(client.run(ignores).values()))
+"""
+
+
+@pytest.mark.slow
+def test_workers_ignore_an_interrupt_where_they_cannot_inherit_that_it_is_blocked(tmp_path):
+    (tmp_path / "cluster.py").write_text(CLUSTER)
+    done = run([sys.executable, tmp_path / "cluster.py"])
+    assert done.stdout == "[True]\n", done.stderr
 
 
 def test_peak_memory_is_in_bytes_on_macos_as_well():

@@ -47,18 +47,12 @@ def replace(source: Path, target: Path) -> None:
 
     On Windows that fails while any program has one of them open. It is tried five times, and then raises FileInUseError.
     """
-    if IS_POSIX:
-        source.replace(target)
-        return
-    for seconds in (*_RETRY_SECONDS, None):
-        try:
-            source.replace(target)
-        except PermissionError as error:
-            if seconds is None:
-                raise FileInUseError(errno.EACCES, IN_USE, str(target)) from error
-            time.sleep(seconds)
-        else:
-            return
+    _try_again(lambda: source.replace(target), target)
+
+
+def remove(path: Path) -> None:
+    """Remove a file, if there is one. On Windows it is tried five times, and then raises FileInUseError."""
+    _try_again(lambda: path.unlink(missing_ok=True), path)
 
 
 def remove_held(path: Path, release: Callable[[], object]) -> None:
@@ -78,6 +72,21 @@ def is_link(status: os.stat_result) -> bool:
     """Return whether the status from `lstat` is that of a link, or of a junction of Windows."""
     junction = getattr(stat, "IO_REPARSE_TAG_MOUNT_POINT", None)
     return stat.S_ISLNK(status.st_mode) or (junction is not None and getattr(status, "st_reparse_tag", None) == junction)
+
+
+def _try_again(change: Callable[[], object], path: Path) -> None:
+    """Change a file, on Windows again while it is open in another program. Folders and read-only files fail at once."""
+    for seconds in (*_RETRY_SECONDS, None):
+        try:
+            change()
+        except PermissionError as error:
+            if IS_POSIX or path.is_dir() or (path.exists() and not os.access(path, os.W_OK)):
+                raise
+            if seconds is None:
+                raise FileInUseError(errno.EACCES, IN_USE, str(path)) from error
+            time.sleep(seconds)
+        else:
+            return
 
 
 def _refuse_link(path: Path) -> None:
