@@ -62,7 +62,7 @@ APART = {
 }
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
-    "version", "errors", "interrupts", "readable", "child", "stored_coordinates", "shape_worker", "kernel",
+    "version", "errors", "system", "interrupts", "readable", "child", "stored_coordinates", "shape_worker", "kernel",
     "vocabulary", "realizations",
     "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "select", "geometry",
     "features", "fasteners", "pmi", "discretization", "interference", "variation", "mechanics",

@@ -2,12 +2,13 @@
 
 import gc
 import os
-import resource
 import sys
 from collections.abc import Callable
 from typing import NoReturn
 
 from tolcontact import cli, interrupts
+from tolcontact.system import streams
+from tolcontact.system.resources import address_space
 
 MIN_ADDRESS_SPACE = 1_500_000_000  # bytes
 MIN_GARBAGE = 200_000  # objects: modules hold no garbage, and looking for it takes a fifth of the time of all imports
@@ -17,7 +18,7 @@ def command_line() -> None:
     """Run the command line (see tolcontact.cli)."""
     try:
         with interrupts.stoppable(at_once=True):
-            open_streams()
+            streams.open_closed()
             check_address_space()
             limit_threads()
             gc.set_threshold(MIN_GARBAGE)
@@ -33,20 +34,10 @@ def _imported() -> Callable[[], None]:
         _refuse(f"libraries cannot be loaded ({error}); is there enough memory, and are all of them installed?")
 
 
-def open_streams() -> None:
-    """Open a closed standard input, output or error as the null device: else the next file takes its number, and its output."""
-    while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
-        os.set_inheritable(number, True)
-    os.close(number)
-    sys.stdin = sys.stdin or os.fdopen(0)
-    sys.stdout = sys.stdout or os.fdopen(1, "w")
-    sys.stderr = sys.stderr or os.fdopen(2, "w")
-
-
 def check_address_space() -> None:
     """Exit with code 2 unless libraries can be loaded: with less address space some of them hang instead of failing."""
-    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-    if limit != resource.RLIM_INFINITY and limit < MIN_ADDRESS_SPACE:
+    limit = address_space()
+    if limit is not None and limit < MIN_ADDRESS_SPACE:
         needed = f"{MIN_ADDRESS_SPACE / 1e9:g} GB"
         _refuse(f"this process may use {limit / 1e9:g} GB of address space, and its libraries need {needed}; raise ulimit -v")
 

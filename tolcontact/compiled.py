@@ -13,6 +13,7 @@ from typing import Any
 import numba
 
 from tolcontact import code_cache
+from tolcontact.system.ownership import is_private
 
 
 def compiled(function: Callable[..., Any], *, inline: bool = False, counts: bool = True, inner: bool = False) -> Any:
@@ -62,6 +63,6 @@ def _cache_folder() -> Path | None:
     folder = code_cache.cache_folder().with_name("numba") / content.hexdigest()
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        return folder if code_cache.is_private(folder) else None
+        return folder if is_private(folder) else None
     except OSError:
         return None

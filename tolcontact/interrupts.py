@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: the first one ends a command with KeyboardInterrupt, a further one ends the process at once."""
+"""Ctrl-C, SIGTERM, Ctrl-Break: the first one ends a command with KeyboardInterrupt, a further one ends the process at once."""
 
 import contextlib
 import os
@@ -7,6 +7,8 @@ import sys
 import threading
 from collections.abc import Iterator
 from typing import Any, NoReturn
+
+from tolcontact.system.signals import STOPPING
 
 _received: list[int] = []  # signals
 
@@ -31,7 +33,7 @@ def stoppable(*, at_once: bool = False) -> Iterator[None]:
         raise KeyboardInterrupt
 
     is_main = threading.current_thread() is threading.main_thread()
-    handlers = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM) if is_main}
+    handlers = {number: signal.signal(number, stop) for number in STOPPING if is_main}
     try:
         yield
     except BaseException as error:

@@ -2,10 +2,11 @@
 
 import contextlib
 import glob
-import os
 import secrets
 from collections.abc import Iterator
 from pathlib import Path
+
+from tolcontact.system import files
 
 
 @contextlib.contextmanager
@@ -16,10 +17,10 @@ def replacing(path: Path) -> Iterator[Path]:
     Raises OSError if it cannot be made, or cannot replace `path`; then `path` stays as it is.
     """
     part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-    os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_WRONLY | os.O_CLOEXEC, 0o666))
+    files.make_new(part)
     try:
         yield part
-        part.replace(path)
+        files.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
 

@@ -20,8 +20,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from tolcontact.child import STALL_FACTOR, TIME_LIMIT, crash, environment
+from tolcontact.child import STALL_FACTOR, environment
 from tolcontact.errors import GeometryFault, clipped
+from tolcontact.system.exit_codes import TIME_LIMIT, crash
 
 PROGRAM = Path(__file__).parent / "geometry" / "files" / "worker.py"
 LOAD_KERNEL = "--kernel"  # argument of the program: load the CAD kernel before the first job

@@ -27,7 +27,7 @@ from tolcontact.archive import ArchiveWriter, Run, row_values
 from tolcontact.archive.journal import Journal
 from tolcontact.compilation.functions import InterpretedFunction, named
 from tolcontact.contact.scan import CompiledScan
-from tolcontact.simulation import simulate_blocks, threads as running
+from tolcontact.simulation import processors, simulate_blocks
 from tolcontact.statistics import DisplacementFields
 from tolcontact.variation import Draws
 from tolcontact.variation.draws import draw
@@ -110,7 +110,7 @@ def against_loops(samples: int) -> None:
         # Not highs: CasADi's copy of it and highspy's, which qpsolvers loads, crash each other in one process.
         contenders |= {f"ours, {solver}": ours(a, fewest, solver=solver) for solver in ("piqp", "proxqp", "osqp")}
         for solver in ("daqp", "qpoases"):
-            contenders[f"ours, {solver}, all processors"] = ours(a, many, solver=solver, threads=running.processors())
+            contenders[f"ours, {solver}, all processors"] = ours(a, many, solver=solver, threads=processors())
         contenders["ours, daqp, exact"] = ours(a, many // 2, method=EXACT)
         contenders["loop over DAQP's own interface"] = loop(a, few, peers.with_daqp)
         contenders["the same, until closed"] = loop(a, few, peers.with_daqp, "closed")
@@ -147,7 +147,7 @@ def against_loops(samples: int) -> None:
 
 def against_threads(samples: int) -> None:
     """One thread and all, one after the other: quartiles of many ratios, since others use the machine, too."""
-    threads = running.processors()
+    threads = processors()
     print(
         f"\n| {threads} threads against one, {PAIRS} pairs | lower quartile | median | upper quartile |\n|---|---:|---:|---:|"
     )

@@ -10,6 +10,7 @@ from filelock import FileLock, Timeout
 from tolcontact.archive.inspection import check_name
 from tolcontact.errors import ArchiveError, OptionError
 from tolcontact.replacing import remove_abandoned
+from tolcontact.system import files
 
 
 @contextlib.contextmanager
@@ -39,14 +40,14 @@ def locked_archive(path: str | Path, *, overwrite: bool = False, resume: bool = 
         # A run that is stopped between making and locking the file removes it too, unless it is another run's.
         with contextlib.suppress(OSError):
             holding.acquire()
-            lock.unlink(missing_ok=True)  # a run that opened it meanwhile detects this, and tries again
-            holding.release(force=True)
+            # A run that opened it meanwhile detects that it is removed, and tries again.
+            files.remove_held(lock, lambda: holding.release(force=True))
 
 
 def _acquire(holding: FileLock, lock: Path, path: str | Path) -> None:
     try:
         # Fails with a reason if it cannot be made. The lock itself does not say one.
-        os.close(os.open(lock, os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_RDWR | os.O_CLOEXEC, 0o666))
+        files.make_writable(lock)
         holding.acquire()
     except Timeout as error:
         raise ArchiveError(f'archive "{path}" is being written by another run; wait, or write to a new file') from error

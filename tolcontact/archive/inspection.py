@@ -17,8 +17,9 @@ import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.child import ChildDiedError, limit_resources, run_child
+from tolcontact.child import ChildDiedError, run_child
 from tolcontact.errors import ArchiveError, shown
+from tolcontact.system.resources import limit_resources
 from tolcontact.vocabulary import ArchiveVariable, archive, variation
 
 MAX_SECONDS, SECONDS_PER_GB = 20.0, 20.0  # of processor time

@@ -20,6 +20,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.archive.rows import Row
 from tolcontact.errors import ArchiveError
 from tolcontact.replacing import remove_abandoned, replacing
+from tolcontact.system import files
 
 WRITTEN_BYTES = 1 << 24  # that the netCDF library writes together; each call takes as long as many realizations
 
@@ -125,8 +126,8 @@ class Journal:
         """Remove the files."""
         self.size = self.checksum = 0
         remove_abandoned(self._checkpoint)
-        self._checkpoint.unlink(missing_ok=True)
-        self._rows.unlink(missing_ok=True)
+        files.remove(self._checkpoint)
+        files.remove(self._rows)
 
 
 def _read(journal: BinaryIO, stored: netCDF4.Variable, count: int) -> np.ndarray:

@@ -1,7 +1,6 @@
 """The application: shared options of commands, and exit codes."""
 
 import inspect
-import io
 import shutil
 import sys
 import textwrap
@@ -15,6 +14,7 @@ import typer
 from tolcontact.cli.commands import Commands
 from tolcontact.errors import OptionError, TolcontactError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
+from tolcontact.system import streams
 from tolcontact.version import __version__
 
 if TYPE_CHECKING:
@@ -114,9 +114,7 @@ def main(assembly: "Callable[[], Assembly]") -> None:
 
 def command_line(arguments: list[str] | None = None) -> None:
     """Run `app` as the console script; an error prints one message and gives exit code 2."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # for terminals with few characters
+    streams.escape_unprintable()
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning

@@ -6,14 +6,12 @@ shards of lost workers to other workers. Shards that a restarted scheduler does 
 """
 
 import logging
-import signal
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from importlib.metadata import version
 from importlib.util import find_spec
-from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
 import lazy_loader
@@ -30,7 +28,9 @@ from tolcontact.simulation.packing import (
     simulate_shard,
     versions,
 )
-from tolcontact.simulation.threads import Sampler, Threads, block_rows, processors
+from tolcontact.simulation.threads import Sampler, Threads, block_rows
+from tolcontact.system.machine import processors
+from tolcontact.system.worker_signals import interrupts_blocked, worker_options
 
 dask = lazy_loader.load("dask", error_on_import=False)
 distributed = lazy_loader.load("distributed", error_on_import=False)
@@ -81,6 +81,7 @@ def local_cluster(workers: int) -> Iterator[Any]:
                 n_workers=workers, threads_per_worker=1, processes=True, memory_limit=0, silence_logs=logging.CRITICAL,
                 # Any user of this machine can reach the scheduler, which runs code for everyone who has the credentials.
                 security=security, dashboard_address=LOOPBACK, worker_dashboard_address=LOOPBACK, loop=loop,
+                **worker_options(),
             )  # fmt: skip
         except (OSError, RuntimeError) as error:
             raise ClusterError(f"worker processes cannot be started: {error.__cause__ or error}") from error
@@ -91,17 +92,10 @@ def local_cluster(workers: int) -> Iterator[Any]:
 
 @contextmanager
 def _event_loop() -> Iterator[Any]:
-    """Yield an event loop for a cluster with SIGINT blocked, since a terminal sends Ctrl-C to all processes of the cluster.
-
-    A thread inherits its blocked signals from the thread that starts it, and a process from the parent's thread.
-    """
+    """Yield an event loop for a cluster whose processes Ctrl-C does not reach."""
     runner = distributed.utils.LoopRunner()
-    resource_tracker.ensure_running()  # start it while SIGINT is not blocked in this thread
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
+    with interrupts_blocked():
         runner.start()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     try:
         yield runner.loop
     finally:

@@ -7,7 +7,6 @@ share a small run. Pieces do not depend on each other, either.
 
 import contextlib
 import functools
-import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -19,6 +18,7 @@ from tolcontact.compilation import Program
 from tolcontact.contact import ContactResolver
 from tolcontact.mechanics import curved_pairs
 from tolcontact.simulation.block import Block, simulate_block
+from tolcontact.system.machine import processors
 from tolcontact.vocabulary import BLOCK_ROWS
 
 CURVED_ROWS, MIN_ROWS = 512, 16
@@ -172,8 +172,3 @@ def block_rows(program: Program) -> int:
     while rows > MIN_ROWS and rows * bodies**growth > BLOCK_ROWS * MAX_BODIES**growth:
         rows //= 2
     return rows
-
-
-def processors() -> int:
-    """Return the number of processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

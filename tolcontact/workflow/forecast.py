@@ -1,16 +1,16 @@
 """Forecasts of time, memory and disk space before a run or an analysis begins."""
 
 import logging
-import os
 import time
 
 import numpy as np
 
 from tolcontact.archive import bytes_of_rows, size_in_words
-from tolcontact.child import peak_memory
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import block_rows, simulate_blocks
+from tolcontact.system.machine import machine_memory
+from tolcontact.system.resources import peak_memory
 from tolcontact.vocabulary import BLOCK_ROWS
 
 log = logging.getLogger(__name__)
@@ -55,8 +55,8 @@ def check_affordable(program: Program, *, samples: int, seed: int, threads: int,
 def check_memory(samples: int, kept: int) -> None:
     """Raise OptionError if the machine has too little memory for `kept` numbers in each of `samples` realizations."""
     needed = np.dtype(float).itemsize * samples * kept
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    if needed > memory:
+    memory = machine_memory()
+    if memory is not None and needed > memory:
         raise OptionError(
             f"{samples} realizations need {size_in_words(needed)} of memory, and this machine has {size_in_words(memory)}; "
             "ask for fewer samples"

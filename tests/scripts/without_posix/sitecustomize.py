@@ -1,0 +1,56 @@
+"""Take away from this Python, on Linux, what Windows does not have. It is imported at the start of every process.
+
+Libraries keep what their parts for Linux need: `fcntl`, `os.uname`, `os.getuid`, `os.O_NONBLOCK`. An open file can neither be
+replaced nor removed under its name, as on Windows; only files of this process count.
+"""
+
+import builtins
+import os
+import signal
+import sys
+from pathlib import Path
+
+FLAGS = "O_NOFOLLOW O_CLOEXEC O_DIRECTORY O_NOCTTY O_SYNC"
+USERS = "geteuid getegid getgid getgroups getpgid getpgrp setpgid setsid setuid setgid chown lchown fchown fchmod"
+SYSTEM = "sysconf sysconf_names confstr sched_getaffinity getloadavg fork forkpty mkfifo mknod nice killpg wait3 wait4"
+SIGNALS = "SIGXCPU SIGHUP SIGUSR1 SIGUSR2 SIGALRM SIGCHLD SIGPIPE alarm pause setitimer siginterrupt sigpending sigwait"
+THREADS = "pthread_kill pthread_sigmask SIG_BLOCK SIG_SETMASK SIG_UNBLOCK"
+AWAY = {os: (FLAGS, USERS, SYSTEM), signal: (SIGNALS, THREADS)}
+
+for module, texts in AWAY.items():
+    for name in " ".join(texts).split():
+        delattr(module, name)
+for name in ("resource", "grp", "pwd", "termios", "pty", "tty"):
+    sys.modules[name] = None
+os.supports_fd.discard(os.utime)
+
+import_, replace, unlink = builtins.__import__, os.replace, os.unlink
+
+
+def imported(name, variables=None, *arguments, **options):
+    if name == "fcntl" and (variables or {}).get("__name__", "").startswith("tolcontact"):
+        raise ImportError(name)
+    return import_(name, variables, *arguments, **options)
+
+
+def refuse_open(*paths):
+    """Raise PermissionError if this process has one of these files open."""
+    targets = {os.path.realpath(link) for link in Path("/proc/self/fd").iterdir()}
+    for path in paths:
+        if os.path.realpath(path) in targets:
+            raise PermissionError(13, "The process cannot access the file because it is being used by another process", path)
+
+
+def replaced(source, target, **options):
+    if not options:
+        refuse_open(source, target)
+    replace(source, target, **options)
+
+
+def unlinked(path, **options):
+    if not options:
+        refuse_open(path)
+    unlink(path, **options)
+
+
+builtins.__import__, os.replace, os.unlink, os.remove = imported, replaced, unlinked, unlinked

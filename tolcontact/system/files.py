@@ -1,0 +1,95 @@
+"""Files: opened without following links, replaced while others may have them open, removed while they are locked."""
+
+import errno
+import os
+import stat
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO
+
+from tolcontact.system.kind import IS_POSIX
+
+# A link is not followed, and a pipe not waited for. Windows has neither flag, but it changes line ends unless told not to.
+_FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
+_RETRY_SECONDS = (0.05, 0.1, 0.2, 0.4)  # a virus scanner or an indexer holds a new file open for a moment
+IN_USE = "it is open in another program, or as results in this one (results.close()); close it there, and try again"
+
+
+class FileInUseError(PermissionError):
+    """Another program holds open a file that should be replaced; `strerror` says what to close."""
+
+
+def open_unlinked(path: Path) -> BinaryIO:
+    """Open a file, and no link, for reading; it may be a pipe or a device."""
+    _refuse_link(path)
+    return os.fdopen(os.open(path, os.O_RDONLY | _FLAGS), "rb")
+
+
+def make_new(path: Path) -> None:
+    """Make an empty file. Raises FileExistsError if there is one, or a link."""
+    os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY | _FLAGS, 0o666))
+
+
+def make_writable(path: Path) -> None:
+    """Make an empty file unless there is one that can be written to. Raises OSError if that cannot be done, or for a link."""
+    _refuse_link(path)
+    os.close(os.open(path, os.O_CREAT | os.O_RDWR | _FLAGS, 0o666))
+
+
+def mark_used(file: BinaryIO, path: Path) -> None:
+    """Set the time of the last change of an open file to now."""
+    os.utime(file.fileno() if os.utime in os.supports_fd else path)
+
+
+def replace(source: Path, target: Path) -> None:
+    """Move a file to the name of another one, which it replaces.
+
+    On Windows that fails while any program has one of them open. It is tried five times, and then raises FileInUseError.
+    """
+    _try_again(lambda: source.replace(target), target)
+
+
+def remove(path: Path) -> None:
+    """Remove a file, if there is one. On Windows it is tried five times, and then raises FileInUseError."""
+    _try_again(lambda: path.unlink(missing_ok=True), path)
+
+
+def remove_held(path: Path, release: Callable[[], object]) -> None:
+    """Remove a file that this process holds open and locked, and release it.
+
+    On Windows, no open file can be removed: it is released first, and stays if another process has opened it meanwhile.
+    """
+    if IS_POSIX:
+        path.unlink(missing_ok=True)
+        release()
+    else:
+        release()
+        path.unlink(missing_ok=True)
+
+
+def is_link(status: os.stat_result) -> bool:
+    """Return whether the status from `lstat` is that of a link, or of a junction of Windows."""
+    junction = getattr(stat, "IO_REPARSE_TAG_MOUNT_POINT", None)
+    return stat.S_ISLNK(status.st_mode) or (junction is not None and getattr(status, "st_reparse_tag", None) == junction)
+
+
+def _try_again(change: Callable[[], object], path: Path) -> None:
+    """Change a file, on Windows again while it is open in another program. Folders and read-only files fail at once."""
+    for seconds in (*_RETRY_SECONDS, None):
+        try:
+            change()
+        except PermissionError as error:
+            if IS_POSIX or path.is_dir() or (path.exists() and not os.access(path, os.W_OK)):
+                raise
+            if seconds is None:
+                raise FileInUseError(errno.EACCES, IN_USE, str(path)) from error
+            time.sleep(seconds)
+        else:
+            return
+
+
+def _refuse_link(path: Path) -> None:
+    """Raise OSError for a link, where opening it cannot."""
+    if not hasattr(os, "O_NOFOLLOW") and os.path.lexists(path) and is_link(path.lstat()):
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))

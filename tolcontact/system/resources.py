@@ -1,0 +1,43 @@
+"""The memory and the processor time of this process: how much it may use, and how much it has used."""
+
+import contextlib
+import math
+import sys
+import time
+
+try:
+    import resource
+except ImportError:  # on Windows, where nothing is limited
+    resource = None  # type: ignore[assignment]
+
+_PEAK_UNIT = 1 if sys.platform == "darwin" else 1024  # bytes; of the peak memory that the system states
+
+
+def limit_resources(memory: int, *, seconds: float | None = None) -> None:
+    """Limit this process to `memory` [byte] and to `seconds` of processor time from now on, and let it leave no core.
+
+    Windows limits nothing, and macOS does not limit memory.
+    """
+    if resource is None:
+        return
+    limits = {resource.RLIMIT_AS: memory, resource.RLIMIT_CORE: 0}
+    if seconds is not None:
+        limits[resource.RLIMIT_CPU] = math.ceil(time.process_time() + seconds)
+    for name, limit in limits.items():
+        _, hard = resource.getrlimit(name)
+        allowed = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+        with contextlib.suppress(OSError, ValueError):  # some systems lack a limit
+            resource.setrlimit(name, (allowed, hard))
+
+
+def address_space() -> int | None:
+    """Return the address space [byte] that this process may use; None without a limit."""
+    if resource is None:
+        return None
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    return None if limit == resource.RLIM_INFINITY else limit
+
+
+def peak_memory() -> int | None:
+    """Return the largest memory [byte] that this process has used so far; None where the system does not tell."""
+    return None if resource is None else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _PEAK_UNIT
