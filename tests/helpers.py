@@ -17,6 +17,7 @@ from tolcontact.cli import command_line
 from tolcontact.compilation import ContactGroup, compile_program
 from tolcontact.compilation.contact_qp import contact_qp
 from tolcontact.compilation.contact_solver import ContactSolver
+from tolcontact.declaration import script as models_as_data
 from tolcontact.discretization import discretize
 from tolcontact.simulation import Block, simulate_blocks
 from tolcontact.workflow.models import DEFAULT_SOLVER, assembly_of, method_of
@@ -45,6 +46,11 @@ def compiled(model, *, solver=DEFAULT_SOLVER, method=None):
     assembly = assembly_of(model)
     choice = method_of(assembly, method)
     return compile_program(discretize(assembly, presses=choice.minimizes.presses), solver, choice)
+
+
+def json_schema():
+    """The schema of models as data, which `python -m tolcontact.declaration.script` prints."""
+    return models_as_data.json_schema()
 
 
 def simulate(model, samples=200, seed=1, block=1000, build=compiled, **options):

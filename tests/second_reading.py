@@ -17,7 +17,7 @@ from tests.kernel_annotations import (
 )
 from tolcontact.errors import GeometryFault, shown
 from tolcontact.geometry.step_listing import FacesOfRecords
-from tolcontact.pmi.annotations import Dimension, Pmi, Tolerance
+from tolcontact.pmi import Dimension, Pmi, Tolerance
 from tolcontact.readable import Readable
 
 PRECISION = 1e-9  # relative, of values that agree; units may be converted in another order

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 import trimesh
 from scipy.optimize import approx_fprime
-from typer.testing import CliRunner
 
 import tolcontact as tc
 from tests import cases
 from tests.helpers import ROOT, call
+from tests.shapes import shape
 from tests.step_files import assembly, step_block
-from tolcontact.cli.app import app
 from tolcontact.discretization import discretize
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder, Plane, Sphere, Torus
@@ -25,7 +24,6 @@ from tolcontact.geometry.files.reading import usual_chord
 from tolcontact.geometry.files.step_shapes import credible, onto
 from tolcontact.geometry.files.step_text import StepText
 from tolcontact.geometry.fitting import fit_surface
-from tolcontact.geometry.shapes import shape
 
 COVER = cases.MODELS / "cover.step"
 TILTED = np.array([1.0, 2.0, 2.0]) / 3
@@ -217,16 +215,16 @@ def test_names_that_no_part_may_have_are_changed(tmp_path):
 
 
 def test_the_command_line_lists_bodies_and_faces(file):
-    listed = CliRunner().invoke(app, ["bodies", str(file)])
+    listed = call(file.parent, "bodies", file)
     assert listed.stdout.splitlines()[:2] == [
         "lengths in the file: millimetre; here: mm, along x, y, z of the assembly",
         "whole",
     ]
-    bodies = json.loads(CliRunner().invoke(app, ["bodies", str(file), "--json"]).stdout)
+    bodies = json.loads(call(file.parent, "bodies", file, "--json").stdout)
     assert [body["name"] for body in bodies][-1] == "use 2" and bodies[-1]["at"] == [0, 0, 5]
-    listed = CliRunner().invoke(app, ["faces", str(file), "--body", "use 2"]).stdout
+    listed = call(file.parent, "faces", file, "--body", "use 2").stdout
     assert len(listed.splitlines()) == 6 and "1. plane, along (0, 0, -1), 25 mm2" in listed
-    faces = json.loads(CliRunner().invoke(app, ["faces", str(file), "--body", "5", "--json"]).stdout)
+    faces = json.loads(call(file.parent, "faces", file, "--body", "5", "--json").stdout)
     assert sum(face["area"] for face in faces) == pytest.approx(150)
 
 
@@ -259,8 +257,8 @@ def test_check_and_bodies_state_sizes_along_the_same_axes(tmp_path):
         f"    parts = tc.io.parts_from(model, {str(source)!r}, fixed=True)\n"
         "    model.measure('x', parts['nut_1'].point(0, 0, 0), along='x')\n    return model\n"
     )
-    listed = CliRunner().invoke(app, ["bodies", str(source)]).stdout
-    checked = CliRunner().invoke(app, ["check", str(model)]).stdout
+    listed = call(tmp_path, "bodies", source).stdout
+    checked = call(tmp_path, "check", model).stdout
     sizes = dict(re.findall(r"\d+\. (.*): (.*) mm, \d+ faces", listed))
     assert sizes["nut_1"] == "3 x 15 x 20" and len(sizes) == 18
     assert dict(re.findall(r"  part (.*): (.*) mm along x, y, z of the assembly, \d+ triangles", checked)) == sizes
@@ -272,7 +270,7 @@ def test_a_wrong_body_has_a_message_that_lists_the_bodies(file, tmp_path):
         (["--body", "99"], "holds no body 99; it holds 5: 1. "),
         ([], '--body "..."'),
     ):
-        finished = call(tmp_path, "faces", file, *options)
+        finished = call(file.parent, "faces", file, *options)
         assert finished.returncode == 2
         assert message in finished.stderr and '"use 2"' in finished.stderr
 
@@ -338,20 +336,17 @@ def test_wrong_bodies_and_names_are_told_and_names_do_not_steer_a_terminal(file)
     with pytest.raises(TypeError, match="expected a list of the names"):
         tc.io.parts_from(tc.Assembly("stack"), file, "use 0")
     file.write_text(file.read_text().replace("use 0", "\x1b[31m red"))
-    listed = CliRunner().invoke(app, ["bodies", str(file)]).stdout
+    listed = call(file.parent, "bodies", file).stdout
     assert "red" in listed and "\x1b" not in listed
     assert "\x1b" not in "".join(tc.io.parts_from(tc.Assembly("stack"), file))
     file.write_text(file.read_text().replace("\x1b[31m red", r"two\X\0Alines"))
-    assert r"two\nlines" in CliRunner().invoke(app, ["bodies", str(file)]).stdout
+    assert r"two\nlines" in call(file.parent, "bodies", file).stdout
 
 
 def test_the_units_of_a_file_are_stated(file):
     assert all(body.units == "millimetre" for body in tc.io.bodies_in(file))
-    assert (
-        CliRunner()
-        .invoke(app, ["bodies", str(file)])
-        .stdout.startswith("lengths in the file: millimetre; here: mm, along x, y, z of the assembly\n")
-    )
+    listed = call(file.parent, "bodies", file).stdout
+    assert listed.startswith("lengths in the file: millimetre; here: mm, along x, y, z of the assembly\n")
     si = b"#1=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(%s,.METRE.));\n"
     inch = b"#2=( CONVERSION_BASED_UNIT('INCH',#3) LENGTH_UNIT() NAMED_UNIT(#4) );\n"
     for text, units in (

@@ -11,16 +11,15 @@ from studies.certificates.judge import contradictions
 from studies.certificates.scenes import scene
 from tests import cases
 from tests.helpers import ALL_POINTS, EXACT, PAPER, SEATED, SEATED_ON_POINTS, joined, nightly, recompiled, simulate
+from tests.shapes import patch, shape
 from tolcontact import poses as pose
 from tolcontact.compilation import usable_solvers
 from tolcontact.compilation.active_set import ActiveSet
 from tolcontact.compilation.conic_plugin import Plugin
+from tolcontact.contact import ContactResolver
 from tolcontact.contact.acceptance import MAX_TURN
-from tolcontact.contact.resolver import ContactResolver
 from tolcontact.discretization import discretize
-from tolcontact.geometry.faces import patch
 from tolcontact.geometry.overlap import overlap_corners
-from tolcontact.geometry.shapes import shape
 from tolcontact.simulation import simulate_block, simulate_blocks
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 

@@ -7,9 +7,10 @@ import pytest
 
 from tests import cases, referee
 from tests.helpers import PAPER, R_t, simulate
-from tolcontact.contact.resolver import ContactResolver, checked_residual
+from tolcontact.contact import ContactResolver
+from tolcontact.contact.resolver import checked_residual
 from tolcontact.contact.state import State
-from tolcontact.simulation.block import simulate_block
+from tolcontact.simulation import simulate_block
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 

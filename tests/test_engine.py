@@ -30,10 +30,9 @@ from tolcontact.discretization import Offsets, discretize
 from tolcontact.mechanics.gap import gap_map, gap_matrix
 from tolcontact.mechanics.groups import contact_groups
 from tolcontact.poses import AT_REST
-from tolcontact.simulation import simulate_blocks
-from tolcontact.simulation.block import simulate_block
-from tolcontact.simulation.threads import MIN_ROWS, block_rows
-from tolcontact.variation.draws import draw
+from tolcontact.simulation import block_rows, simulate_block, simulate_blocks
+from tolcontact.simulation.threads import MIN_ROWS
+from tolcontact.variation import draw
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 RNG = np.random.default_rng(5)

@@ -8,13 +8,13 @@ import pytest
 import tolcontact as tc
 from studies.cad.exact_edges import Text
 from studies.cad.trimmed_faces import area
+from tests.shapes import shape
 from tests.test_cad import COVER, triangles
 from tests.test_whole_surfaces import AS1
 from tolcontact.geometry.brep_face import DESCRIPTIONS, describe_faces
 from tolcontact.geometry.files import BREP, STATED_FACES
 from tolcontact.geometry.files.product import product
 from tolcontact.geometry.files.step_text import StepText
-from tolcontact.geometry.shapes import shape
 from tolcontact.shape_worker import Job, Worker
 
 

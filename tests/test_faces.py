@@ -6,13 +6,11 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
-from tests.shapes import BLOCK, HOUSING, face_of
+from tests.shapes import BLOCK, HOUSING, face_of, patch, shape
 from tolcontact import poses as pose
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.face_pair import FacePair, body_face
-from tolcontact.geometry.faces import patch
 from tolcontact.geometry.files.reading import STEP_CHORD
-from tolcontact.geometry.shapes import shape
 
 
 def test_a_brep_face_is_found_by_a_point_on_it():

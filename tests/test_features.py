@@ -14,8 +14,8 @@ from tests.cases import Frame, toleranced
 from tests.cases.round_contact import BARREL
 from tests.helpers import nightly
 from tests.population_referee import measured_back
+from tests.shapes import shape
 from tolcontact.discretization import discretize
-from tolcontact.geometry.shapes import shape
 from tolcontact.report import summary_text
 from tolcontact.simulation import simulate_block
 from tolcontact.simulation.surfaces import check_surfaces

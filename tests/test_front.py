@@ -13,7 +13,8 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import ALL_POINTS, call
 from tolcontact.compilation.solvers import SOLVERS
-from tolcontact.declaration.feature_tolerance import GeometricTolerance, ToleranceOptions
+from tolcontact.declaration import GeometricTolerance
+from tolcontact.declaration.feature_tolerance import ToleranceOptions
 from tolcontact.declaration.geometry import UNITS, Unit
 from tolcontact.errors import OptionError
 from tolcontact.method import OBJECTIVES, ObjectiveName, Solver

@@ -7,8 +7,7 @@ import pytest
 
 import tolcontact as tc
 from tests.cases.measured import PLANE, ROUND, drilled, hole, ring, seated, shaft, two
-from tests.helpers import call
-from tolcontact.declaration.script import json_schema
+from tests.helpers import call, json_schema
 from tolcontact.report.annotations import marks_of, marks_of_nominal
 
 

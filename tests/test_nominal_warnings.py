@@ -12,8 +12,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
-from tests.helpers import nightly
-from tolcontact.declaration.script import load_model
+from tests.helpers import assembly_of, nightly
 from tolcontact.geometry.body_overlap import SolidBody, common_ball
 from tolcontact.plausibility import KINDS
 
@@ -313,4 +312,4 @@ def test_a_run_and_its_continuation_warn_once_each(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
 def test_the_models_are_silent(path):
-    assert not warned(load_model(path))
+    assert not warned(assembly_of(path))

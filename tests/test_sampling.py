@@ -7,7 +7,7 @@ from scipy import stats
 import tolcontact as tc
 from tests import cases
 from tolcontact.discretization import discretize
-from tolcontact.variation.draws import draw
+from tolcontact.variation import draw
 from tolcontact.variation.plans import STREAM, uniform
 
 SHAPES = {

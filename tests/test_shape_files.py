@@ -9,11 +9,10 @@ import pytest
 import trimesh
 
 import tolcontact as tc
-from tests.shapes import BLOCK, refusal
+from tests.shapes import BLOCK, refusal, shape
 from tests.step_files import step_block
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.files import ReadingLimits
-from tolcontact.geometry.shapes import shape
 
 STL, ASCII_STL = BLOCK.export(file_type="stl"), BLOCK.export(file_type="stl_ascii").encode()
 

@@ -18,13 +18,12 @@ import trimesh
 
 import tolcontact as tc
 from tests.helpers import finish, run, script, start
-from tests.shapes import BLOCK, refusal
+from tests.shapes import BLOCK, refusal, shape
 from tests.step_files import Step, step_block
 from tolcontact import shape_worker
 from tolcontact.child import TIME_LIMIT, crash, environment
 from tolcontact.discretization import discretize
 from tolcontact.geometry.files import ReadingLimits, read_files
-from tolcontact.geometry.shapes import shape
 
 
 def crashing():

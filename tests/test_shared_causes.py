@@ -12,7 +12,8 @@ from tests.test_datums import plate
 from tests.test_ra1 import plane_weights
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.designs import MixedDraws, SteppedDraws
-from tolcontact.features.freedoms import LOCATOR, Freedom
+from tolcontact.features import Freedom
+from tolcontact.features.freedoms import LOCATOR
 from tolcontact.report.analysis_tables import analysis_report
 
 SUPPORTS = ("A1", "A2", "A3")

@@ -5,11 +5,9 @@ import re
 import pytest
 
 import tolcontact as tc
-from tests.shapes import refusal
+from tests.shapes import patch, refusal, shape
 from tests.step_files import Step, assembly, corners, step_block, step_of
-from tolcontact.geometry.faces import patch
 from tolcontact.geometry.files import STATED_FACES
-from tolcontact.geometry.shapes import shape
 
 SEVERAL = {
     "solids apart": (

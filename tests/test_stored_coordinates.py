@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests.cases.stored import FAR, SCENES, ascii_stl, stored, stored_case
 from tests.helpers import FIXED, call, nightly
+from tests.shapes import shape
 from tolcontact.geometry.inset import inset
-from tolcontact.geometry.shapes import shape
 from tolcontact.geometry.triangle_mesh import coordinate_error
 from tolcontact.interference import Neighbours, deviating_solid, solid
 from tolcontact.poses import AT_REST

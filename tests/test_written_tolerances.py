@@ -8,8 +8,7 @@ from jsonschema import Draft202012Validator
 
 import tolcontact as tc
 from tests.cases import toleranced
-from tests.helpers import simulate
-from tolcontact.declaration.script import json_schema, load_model
+from tests.helpers import assembly_of, json_schema, simulate
 from tolcontact.declaration.written_tolerance import text_fault, written
 
 LIMITS = {
@@ -214,7 +213,7 @@ def test_models_as_data_take_the_same_texts(tmp_path):
     document["variables"] = [{"name": "heat", "tolerance": "+20/-10", "drives": {"block.width.size": 0.001}}]
     (tmp_path / "written.json").write_text(json.dumps(document))
     Draft202012Validator(json_schema()).validate(document)
-    model = load_model(tmp_path / "written.json")
+    model = assembly_of(tmp_path / "written.json")
     assert model.features[2].tolerances == (tc.Size(50, "h7"),)
     assert [measure.tolerance for measure in model.measures] == [(-0.05, 0.1), 0.2, None]
     assert model.variables[0].tolerance == tc.Tolerance(30.0, shift=5.0)
@@ -222,14 +221,14 @@ def test_models_as_data_take_the_same_texts(tmp_path):
     size["upper"] = "j9"
     (tmp_path / "written.json").write_text(json.dumps(document))
     with pytest.raises(tc.TolcontactError, match=r"does not define j9 for 50 mm"):
-        load_model(tmp_path / "written.json")
+        assembly_of(tmp_path / "written.json")
 
 
 def test_models_with_written_tolerances_come_back_from_json(tmp_path):
     model = block("+0.1/-0.05", tolerance="+0.3/-0.1")
     model.variable("heat", "±20", drives={"block.A1": 0.001}, units="K")
     tc.io.write_model(model, tmp_path / "model.json")
-    copy = load_model(tmp_path / "model.json")
+    copy = assembly_of(tmp_path / "model.json")
     assert str(copy) == str(model)
     assert copy.locations[0].tolerance == tc.Tolerance(0.15, shift=0.025)
 
@@ -239,4 +238,4 @@ def test_numbers_of_numpy_are_numbers(number, tmp_path):
     model = block(number, tolerance=number)
     assert tc.check(model) == ()
     tc.io.write_model(model, tmp_path / "model.json")
-    assert load_model(tmp_path / "model.json").locations[0].tolerance.range == number
+    assert assembly_of(tmp_path / "model.json").locations[0].tolerance.range == number
