@@ -13,9 +13,7 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import PAPER, call
 from tests.test_report import data_of, unpacked
-from tolcontact.cli.analyses import COMMANDS
 from tolcontact.report import write_page
-from tolcontact.vocabulary import ANALYSES
 
 FAST = {"solver": "daqp", "method": PAPER}
 
@@ -124,13 +122,6 @@ def test_numbers_that_were_damaged_are_not_shown(archive):
         pytest.raises(tc.errors.ArchiveError, match="contributions in the archive is not what"),
     ):
         write_page(results, tc.summarize(results), archive.with_suffix(".html"))
-
-
-def test_every_analysis_is_public_has_a_command_and_tables():
-    assert {command.record.name for command in COMMANDS} == set(ANALYSES)
-    assert {command.analysis for command in COMMANDS} == set(tc.analyses.__all__)
-    for record in ANALYSES.values():
-        assert len({variable.name for variable in record.variables}) == len(record.variables)
 
 
 @pytest.mark.slow
