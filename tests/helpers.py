@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -14,9 +14,8 @@ import xarray as xr
 
 import tolcontact as tc
 from tolcontact.cli import command_line
-from tolcontact.compilation import ContactGroup, compile_program
-from tolcontact.compilation.contact_qp import contact_qp
-from tolcontact.compilation.contact_solver import ContactSolver
+from tolcontact.compilation import compile_program
+from tolcontact.declaration import script as models_as_data
 from tolcontact.discretization import discretize
 from tolcontact.simulation import Block, simulate_blocks
 from tolcontact.workflow.models import DEFAULT_SOLVER, assembly_of, method_of
@@ -47,22 +46,15 @@ def compiled(model, *, solver=DEFAULT_SOLVER, method=None):
     return compile_program(discretize(assembly, presses=choice.minimizes.presses), solver, choice)
 
 
+def json_schema():
+    """The schema of models as data, which `python -m tolcontact.declaration.script` prints."""
+    return models_as_data.json_schema()
+
+
 def simulate(model, samples=200, seed=1, block=1000, build=compiled, **options):
     """The program, and its blocks joined to one: arrays by name."""
     program = build(model, **options)
     return program, joined(simulate_blocks(program, samples=samples, seed=seed, block=block))
-
-
-def recompiled(program, *, solver=None, standing=None):
-    """A program with another solver, or with other points of each of its pairs that always have a row."""
-    solver, groups = solver or program.solver, [group.group for group in program.groups]
-    rows = [() if standing is None else [standing[pair] for pair in group.pairs] for group in groups]
-    qps = [
-        contact_qp(program.nominal, group, program.gaps, program.method, points)
-        for group, points in zip(groups, rows, strict=True)
-    ]
-    solved = tuple(ContactGroup(group, qp, ContactSolver(qp, solver)) for group, qp in zip(groups, qps, strict=True))
-    return replace(program, solver=solver, groups=solved)
 
 
 def joined(blocks):
@@ -108,7 +100,7 @@ def call(folder, *arguments):
 
 
 def script(name, *arguments):
-    """The command that runs a script of `tests/scripts`."""
+    """The command that runs a script of `tests/scripts`, or another one of which the path is given without its ending."""
     return [sys.executable, SCRIPTS / f"{name}.py", *map(str, arguments)]
 
 

@@ -4,7 +4,7 @@ The kernel reads less than the file states. Annotations of the same record are c
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,8 +16,7 @@ from tests.kernel_annotations import (
     kernel_annotations,
 )
 from tolcontact.errors import GeometryFault, shown
-from tolcontact.geometry.step_listing import FacesOfRecords
-from tolcontact.pmi.annotations import Dimension, Pmi, Tolerance
+from tolcontact.pmi import Dimension, Pmi, Tolerance
 from tolcontact.readable import Readable
 
 PRECISION = 1e-9  # relative, of values that agree; units may be converted in another order
@@ -85,7 +84,7 @@ class SecondReading(Readable):
             yield f"only the kernel has {title}"
 
 
-def second_reading(pmi: Pmi, path: str | Path, faces: FacesOfRecords) -> SecondReading:
+def second_reading(pmi: Pmi, path: str | Path, faces: Mapping[int, object]) -> SecondReading:
     """Compare the annotations of a file with those that the CAD kernel reads from it.
 
     Faces in `faces` are called by their numbers, others by their records. A kernel that crashes is a fault of the result.
@@ -96,7 +95,7 @@ def second_reading(pmi: Pmi, path: str | Path, faces: FacesOfRecords) -> SecondR
         return SecondReading(fault=str(fault))
 
 
-def compare(pmi: Pmi, kernel: KernelAnnotations, faces: FacesOfRecords) -> SecondReading:
+def compare(pmi: Pmi, kernel: KernelAnnotations, faces: Mapping[int, object]) -> SecondReading:
     """Compare the annotations of a file with those that the kernel read."""
     tolerances = {tolerance.record: tolerance for tolerance in kernel.tolerances}
     dimensions = {dimension.record: dimension for dimension in kernel.dimensions}
@@ -127,7 +126,7 @@ def compare(pmi: Pmi, kernel: KernelAnnotations, faces: FacesOfRecords) -> Secon
 Pair = tuple[str, str, str]  # an attribute, and both readings of it
 
 
-def _tolerance_pairs(tolerance: Tolerance, kernel: KernelTolerance, faces: FacesOfRecords) -> Iterator[Pair]:
+def _tolerance_pairs(tolerance: Tolerance, kernel: KernelTolerance, faces: Mapping[int, object]) -> Iterator[Pair]:
     """Yield the attributes in which a tolerance differs."""
     if tolerance.kind != kernel.kind:
         yield "kind", tolerance.kind, kernel.kind
@@ -147,7 +146,7 @@ def _tolerance_pairs(tolerance: Tolerance, kernel: KernelTolerance, faces: Faces
     yield from _face_pairs("faces", tolerance.face_records, kernel.items, faces)
 
 
-def _dimension_pairs(dimension: Dimension, kernel: KernelDimension, faces: FacesOfRecords) -> Iterator[Pair]:
+def _dimension_pairs(dimension: Dimension, kernel: KernelDimension, faces: Mapping[int, object]) -> Iterator[Pair]:
     """Yield the attributes in which a dimension differs. The kernel has no nominal value beside limits."""
     if dimension.kind.startswith("angular") != kernel.is_angular:
         yield "kind", dimension.kind, "angle" if kernel.is_angular else "length"
@@ -174,7 +173,7 @@ def _limits(dimension: Dimension, kernel: KernelDimension, scale: float) -> tupl
     return scale * (kernel.nominal + (lower if is_above else -lower)), scale * (kernel.nominal + upper)
 
 
-def _face_pairs(attribute: str, records: Sequence[int], items: KernelItems, faces: FacesOfRecords) -> Iterator[Pair]:
+def _face_pairs(attribute: str, records: Sequence[int], items: KernelItems, faces: Mapping[int, object]) -> Iterator[Pair]:
     """Yield the faces that only one reading has. Where the kernel has none, it may have edges in their place."""
     if set(records) != items.face_records:
         listed = [record for record in records if record not in items.face_records]
@@ -183,7 +182,7 @@ def _face_pairs(attribute: str, records: Sequence[int], items: KernelItems, face
         yield attribute, _names(listed, faces), _names(kernel, faces) or others
 
 
-def _names(records: Sequence[int], faces: FacesOfRecords) -> str:
+def _names(records: Sequence[int], faces: Mapping[int, object]) -> str:
     return ", ".join(str(faces[record]) if record in faces else f"#{record}" for record in records)
 
 

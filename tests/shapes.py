@@ -6,7 +6,7 @@ import trimesh
 import tolcontact as tc
 from tests import cases
 from tolcontact.errors import GeometryFault
-from tolcontact.geometry.faces import patch
+from tolcontact.geometry.faces import patch, triangles
 from tolcontact.geometry.shapes import shape
 
 HOUSING = cases.MODELS / "housing.step"
@@ -17,6 +17,11 @@ BLOCK = trimesh.creation.box(bounds=[[0, 0, 0], [10, 20, 30]])
 def face_of(mesh, *selections):
     part = tc.Assembly("faces").part("part", tc.Mesh(mesh))
     return patch(part.face(*selections), {part: shape(part.geometry)})
+
+
+def triangles_of(face):
+    """The numbers of the triangles of a face."""
+    return triangles(face, {face.part: shape(face.part.geometry)})
 
 
 def refusal(path, content=None):

@@ -13,9 +13,7 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import PAPER, call
 from tests.test_report import data_of, unpacked
-from tolcontact.cli.analyses import COMMANDS
-from tolcontact.report.html.page import page_of
-from tolcontact.vocabulary import ANALYSES
+from tolcontact.report import write_page
 
 FAST = {"solver": "daqp", "method": PAPER}
 
@@ -52,7 +50,8 @@ def test_an_archive_keeps_what_was_asked_of_its_model(archive):
                 np.testing.assert_array_equal(there[each], found[each])
                 assert there[each].dims == found[each].dims and "long_name" in there[each].attrs
             assert there.attrs.items() >= {"title": found.attrs["title"]}.items()
-        page = page_of(results, tc.summarize(results))
+        write_page(results, tc.summarize(results), archive.with_suffix(".html"))
+    page = archive.with_suffix(".html").read_text(encoding="utf-8")
     assert '<h2 id="answers">Contributors' in page and "Worst cases: corner height [mm]" in page and "Rare events" in page
     assert "beyond linear: sensitivities change" in page
     assert "Allocation" in page and "Cost 2 before" in page
@@ -85,9 +84,10 @@ def test_a_model_without_contact_can_be_asked_as_well():
 
 
 @pytest.mark.slow
-def test_a_page_without_analyses_has_no_such_section(archive):
+def test_a_page_without_analyses_has_no_such_section(archive, tmp_path):
     with tc.open_archive(archive) as results:
-        assert "What matters" not in page_of(results, tc.summarize(results))
+        write_page(results, tc.summarize(results), tmp_path / "page.html")
+    assert "What matters" not in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
@@ -121,14 +121,7 @@ def test_numbers_that_were_damaged_are_not_shown(archive):
         tc.open_archive(archive) as results,
         pytest.raises(tc.errors.ArchiveError, match="contributions in the archive is not what"),
     ):
-        page_of(results, tc.summarize(results))
-
-
-def test_every_analysis_is_public_has_a_command_and_tables():
-    assert {command.record.name for command in COMMANDS} == set(ANALYSES)
-    assert {command.analysis for command in COMMANDS} == set(tc.analyses.__all__)
-    for record in ANALYSES.values():
-        assert len({variable.name for variable in record.variables}) == len(record.variables)
+        write_page(results, tc.summarize(results), archive.with_suffix(".html"))
 
 
 @pytest.mark.slow

@@ -11,8 +11,7 @@ import xarray as xr
 import tolcontact as tc
 from tests import cases
 from tests.helpers import SCRIPTS, run, script
-from tolcontact.archive import bytes_of_rows, stored_rows
-from tolcontact.archive.variables import open_netcdf
+from tolcontact.archive import bytes_of_rows
 from tolcontact.errors import ArchiveError
 from tolcontact.testing import assert_gaps_recompute, assert_same_run
 from tolcontact.vocabulary import BY_REALIZATION
@@ -129,13 +128,3 @@ def test_the_bytes_of_a_row_are_foreseen(keep, tmp_path):
         rows = [v for group in (file, file["sample"]) for v in group.variables.values() if "realization" in v.dimensions]
         stored = sum(v.dtype.itemsize * v.size for v in rows)
     assert bytes_of_rows(program.nominal, keep, 50) == stored
-
-
-def test_values_are_not_masked(archive):
-    with open_netcdf(archive, "r") as file:
-        assert all(type(file[name][:5]) is np.ndarray for name in ("status", "measured", "contact/moving_point"))
-
-
-def test_rows_are_not_read_where_none_are_to_be_checked():
-    no_file = None
-    assert [len(values) for values in stored_rows.choose(no_file, 0, seed=1)] == [0, 0]

@@ -6,22 +6,18 @@ import os
 import pty
 import re
 import sys
-import time
 from pathlib import Path
 
 import pytest
 import typer
 from rich.cells import cell_len
 from rich.console import Console
-from typer.testing import CliRunner
 
 import tolcontact as tc
 from tests.cases import MODELS
 from tests.helpers import COMMAND, SCRIPTS, call, finish, run, start
 from tests.model_scripts import GOOD, HEADER, write_model
 from tests.test_report import data_of
-from tolcontact.cli.app import app
-from tolcontact.cli.progress import shown_progress
 from tolcontact.report import summary_text
 
 OPTIONS = {
@@ -46,12 +42,6 @@ def test_a_wrong_option_is_refused_before_the_run(mistake, tmp_path):
     assert "Traceback" not in done.stderr
     for words in expected:
         assert words in done.stderr, done.stderr
-
-
-def test_help_states_values_only_of_options_that_take_one():
-    printed = CliRunner().invoke(app, ["run", "--help"], terminal_width=100).stdout
-    assert re.search("--samples +<int>", printed)
-    assert all(re.search(f"--{name}  +[A-Z]", printed) for name in ("overwrite", "resume", "quiet")), printed
 
 
 @pytest.mark.slow
@@ -156,31 +146,6 @@ def test_tables_are_as_wide_as_the_terminal(archive):
     assert heights[1] < heights[0]
 
 
-@pytest.mark.parametrize(("interval", "quiet", "lines"), [(0.0, False, 4), (0.0, True, 0), (1e9, False, 0)])
-def test_without_a_terminal_a_line_says_at_intervals_how_far_a_run_is(interval, quiet, lines, capsys):
-    with shown_progress("ra1", 20_000, quiet=quiet, interval=interval) as show:
-        for done in (4096, 8192, 12_288, 16_384):
-            show(done, 20_000)
-            time.sleep(0.01)
-    said = capsys.readouterr().err.splitlines()
-    assert len(said) == lines
-    assert (
-        said[:3] == ["ra1: 4 096 of 20 000", "ra1: 8 192 of 20 000", "ra1: 12 288 of 20 000"][:lines]
-    )  # too early to forecast
-    assert not lines or re.fullmatch(r"ra1: 16 384 of 20 000, [\d ]+ a second, \d+ s left", said[3])
-
-
-@pytest.mark.parametrize(("long_wait", "quiet", "lines"), [(0.0, False, 1), (0.0, True, 0), (1e6, False, 0)])
-def test_a_long_run_is_told_once_what_takes_less_time(long_wait, quiet, lines, capsys):
-    with shown_progress("ra1", 20_000, quiet=quiet, interval=1e9, long_wait=long_wait) as show:
-        for done in range(1000, 9000, 1000):
-            show(done, 20_000)
-            time.sleep(0.01)
-    said = capsys.readouterr().err.splitlines()
-    assert len(said) == lines
-    assert not lines or re.fullmatch(r"ra1: about \d+ s left; fewer --samples take less time, with wider intervals", said[0])
-
-
 @pytest.mark.slow
 def test_on_a_terminal_a_bar_shows_how_far_a_run_is(tmp_path):
     command = [*COMMAND, "run", MODELS / "ra1.py", "--samples", "20000", "--solver", "daqp", "--surfaces", "0"]
@@ -194,12 +159,6 @@ def test_on_a_terminal_a_bar_shows_how_far_a_run_is(tmp_path):
     done, quiet = finish(process), call(tmp_path, *command[len(COMMAND) :], "--quiet")
     assert re.search(r"ra1 ━+ 20000/20000 [\d ]+ a second, 0 s left", re.sub("\x1b.*?[a-zA-Z]", "", shown.decode()))
     assert quiet.stderr == "" and quiet.stdout == done.stdout
-
-
-def test_every_command_has_examples_that_name_it():
-    for command in app.registered_commands:
-        name = command.name or command.callback.__name__
-        assert command.epilog.startswith("Examples:") and f"tolcontact {name} " in command.epilog
 
 
 def test_a_model_is_checked_and_seen(monkeypatch, tmp_path):

@@ -9,11 +9,10 @@ import xarray as xr
 import tolcontact as tc
 from tests import cases
 from tests.helpers import call
-from tolcontact.workflow.comparison import compare
 
 
 def test_solvers_that_agree_are_said_to_agree():
-    found = compare(cases.ra1(), ["daqp", "qpoases", "osqp"], samples=200, seed=3)
+    found = tc.compare(cases.ra1(), ["daqp", "qpoases", "osqp"], samples=200, seed=3)
     assert list(found.solver) == ["daqp", "qpoases", "osqp"]
     assert (found.by_status.sum("status_meaning") == 200).all()
     assert (found.both_resolved == 200).all()
@@ -26,7 +25,7 @@ def test_solvers_that_agree_are_said_to_agree():
 
 @pytest.mark.slow
 def test_the_difference_of_poses_is_that_of_the_furthest_surface_point():
-    found = compare(cases.ra1(), ["daqp", "osqp"], samples=50)
+    found = tc.compare(cases.ra1(), ["daqp", "osqp"], samples=50)
     tree = {s: tc.run(cases.ra1(), samples=50, solver=s).sel(state="corrected") for s in ("daqp", "osqp")}
     furthest = 0.0
     for part in ("base", "top"):

@@ -5,17 +5,12 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from scipy import stats
 
 import tolcontact as tc
 from tests import cases
 from tests.helpers import call, nightly
-from tests.test_plans import clipped
 from tests.test_report import data_of
 from tolcontact.report import write_comparison
-from tolcontact.statistics import two_samples
-from tolcontact.statistics.sample import Sample
-from tolcontact.vocabulary import LATIN_HYPERCUBE, MONTE_CARLO, REPLICATE, SOBOL
 
 
 def lifted(by, name="top", tolerance=None):
@@ -70,71 +65,6 @@ def test_a_tolerance_that_differs_is_of_the_same_seed():
     wider_run = tc.run(wider, samples=50, solver="daqp", keep="measures", surfaces=0)
     narrow_run = tc.run(lifted(0.0), samples=50, solver="daqp", keep="measures", surfaces=0)
     assert str(tc.compare_runs({"a": wider_run, "b": narrow_run}).draws.sel(run="b").values) == "same seed"
-
-
-def hits(generator, p, n):
-    return generator.random(n) < p
-
-
-DIFFERENCES = {  # samples of 80 realizations, and the true difference or ratio
-    "shift": (two_samples.shift, lambda g: (g.exponential(2, 80), g.normal(1, 1, 80)), 1.0),
-    "ratio": (two_samples.variance_ratio, lambda g: (g.normal(0, 2, 80), g.uniform(-1, 1, 80)), 12.0),
-    "share": (two_samples.share_shift, lambda g: (hits(g, 0.3, 80), hits(g, 0.1, 80)), 0.2),
-}
-
-
-@pytest.mark.parametrize("name", DIFFERENCES)
-def test_intervals_of_independent_samples_cover(name):
-    """500 repeats: 95 % is covered in 465 to 487 of them with 98 % probability; shares are a little conservative."""
-    function, draw, truth = DIFFERENCES[name]
-    generator, inside = np.random.default_rng(5), 0
-    for _ in range(500):
-        after, before = (Sample.of(x) for x in draw(generator))
-        estimate = function(after, before, paired=False)
-        inside += estimate.lower <= truth <= estimate.upper
-    assert 463 <= inside <= 490
-
-
-def test_intervals_of_paired_shares_cover():
-    generator, inside = np.random.default_rng(6), 0
-    for _ in range(500):
-        u = generator.random(100)
-        estimate = two_samples.share_shift(Sample.of(u < 0.3), Sample.of((u > 0.05) & (u < 0.2)), paired=True)
-        inside += estimate.lower <= 0.15 <= estimate.upper
-    assert 463 <= inside <= 492
-
-
-def planned(name, seed, shift=0.0, replicates=20):
-    """A run by a sampling plan: max(0, x) of standard normal x that is the sum of three, and a shift."""
-    values = clipped(name, seed, replicates * REPLICATE) + shift
-    return Sample(lambda: [values[:3000], values[3000:]], 1 if name == MONTE_CARLO else REPLICATE)
-
-
-@pytest.mark.parametrize(
-    ("plan", "reference_plan", "paired"),
-    [
-        (SOBOL, SOBOL, False),
-        *nightly((LATIN_HYPERCUBE, LATIN_HYPERCUBE, False), (MONTE_CARLO, SOBOL, False), (SOBOL, SOBOL, True)),
-    ],
-)
-def test_intervals_of_changes_between_planned_runs_cover(plan, reference_plan, paired):
-    """300 repeats: 95 % is covered in 276 to 295 of them with 99 % probability. Shares are of max(0, x) > 1, and > 0.8."""
-    hits, narrowest, repeats = dict.fromkeys(("shift", "ratio", "share"), 0), [], 300
-    truths = {"shift": 0.2, "ratio": 1.0, "share": stats.norm.sf(0.8) - stats.norm.sf(1)}
-    for k in range(repeats):
-        after, before = planned(plan, 2 * k, 0.2), planned(reference_plan, 2 * k + 1)
-        shares = [x.map(lambda piece: piece > 1) for x in (after, before)]
-        found = {
-            "shift": two_samples.shift(after, before, paired=paired),
-            "ratio": two_samples.variance_ratio(after, before, paired=paired),
-            "share": two_samples.share_shift(*shares, paired=paired),
-        }
-        for name, (_, lower, upper) in found.items():
-            hits[name] += lower <= truths[name] <= upper
-        independent = two_samples.shift(*(Sample.of(np.concatenate(list(x.pieces()))) for x in (after, before)), paired=False)
-        narrowest.append(np.ptp(found["shift"]) / np.ptp(independent))
-    assert all(276 <= count <= 296 for count in hits.values()), hits
-    assert np.median(narrowest) < (0.9 if plan == MONTE_CARLO else 0.6)
 
 
 @pytest.mark.slow

@@ -8,10 +8,9 @@ import trimesh
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import ALL_POINTS, simulate
+from tests.helpers import ALL_POINTS, compiled, simulate
 from tolcontact.discretization import discretize
-from tolcontact.statistics import intervals
-from tolcontact.vocabulary import CORRECTED
+from tolcontact.statistics import estimate_of
 
 
 def tessellated(n):
@@ -77,14 +76,14 @@ def test_points_on_curved_faces_lie_on_them_and_look_outward(solid):
 @pytest.mark.slow
 def test_halving_the_spacing_moves_measures_on_curved_faces_by_less_than_their_interval():
     method = replace(ALL_POINTS, search="fixed")
-    runs = [simulate(cases.bar_in_a_half_pipe(spacing), samples=300, solver="daqp", method=method) for spacing in (6, 3)]
-    few, many = (len(program.nominal.pairs[0].P_m) for program, _ in runs)
+    programs = [compiled(cases.bar_in_a_half_pipe(spacing), solver="daqp", method=method) for spacing in (6, 3)]
+    few, many = (len(program.nominal.pairs[0].P_m) for program in programs)
     assert many > 3 * few
-    coarse, fine = (run["measured"][:, CORRECTED] for _, run in runs)
-    for k in range(2):
-        for estimate in (intervals.mean, intervals.standard_deviation):
-            _, lower, upper = estimate(coarse[:, k])
-            assert lower < estimate(fine[:, k])[0] < upper
+    coarse, fine = (tc.run(program, samples=300, surfaces=0, fields="none") for program in programs)
+    for measure in coarse["measure"].values:
+        for statistic in ("mean", "standard deviation"):
+            _, lower, upper = estimate_of(coarse, measure, statistic)
+            assert lower < estimate_of(fine, measure, statistic).value < upper
 
 
 @pytest.mark.parametrize("size", [(20, 20, 10), (50, 8, 10), (7, 90, 3)])

@@ -1,33 +1,14 @@
 """Where and how often contact is, against closed forms and the rows themselves."""
 
-from collections import Counter
-
 import numpy as np
 import pytest
-import xarray as xr
 
 import tolcontact as tc
 from tests import cases
 from tests.test_report import data_of
 from tolcontact.report import write_page
 from tolcontact.statistics import touching
-from tolcontact.statistics.contact import combinations
 from tolcontact.vocabulary import TOUCHING_GAP
-from tolcontact.workflow.run_sums import MAX_REALIZATIONS
-
-
-def test_a_block_touches_in_half_of_the_realizations_at_all_its_points():
-    results = tc.run(cases.one_dimensional(0), samples=4000, seed=1, solver="daqp", surfaces=0)
-    _, lower, upper = results.tolcontact.summary().carried.sel(pair="seat").values
-    assert lower < 0.5 < upper and upper - lower < 0.04
-    found = results.tolcontact.touching()
-    share = (results["status"].values[:MAX_REALIZATIONS] == tc.Status.RESOLVED).mean()
-    assert found.attrs["realizations"] == MAX_REALIZATIONS and (found["pair"] == "seat").all()
-    assert np.abs(found["touching"].sel(interval="estimate") - share).max() < 1e-12
-    archived = results["contact"]  # for whoever reads an archive without tolcontact
-    assert np.array_equal(archived["touching"], found["touching"].sel(interval="estimate"))
-    assert np.array_equal(archived["touching_interval"], found["touching"].sel(interval=["lower", "upper"]))
-    assert int(archived["touching_realizations"]) == MAX_REALIZATIONS and archived["touching"].dims == ("point",)
 
 
 def test_figures_are_those_of_the_rows():
@@ -43,16 +24,6 @@ def test_figures_are_those_of_the_rows():
     assert float(together.sel(combination="lower joint + upper joint")) == pytest.approx(carries.all(axis=1).mean())
     if "none" in together["combination"]:
         assert float(together.sel(combination="none")) == pytest.approx((~carries.any(axis=1)).mean())
-
-
-@pytest.mark.parametrize("pairs", [1, 9, 64, 65])
-def test_combinations_of_pairs_are_counted(pairs):
-    names = [f"pair {k}" for k in range(pairs)]
-    masks = np.random.default_rng(pairs).random((6, pairs)) < 0.3
-    carrying = np.repeat(masks, [1, 2, 3, 4, 5, 6], axis=0).astype(np.int16)
-    found = combinations(xr.Dataset({"carrying": (("realization", "pair"), carrying)}, {"pair": names}))
-    expected = Counter(tuple(np.array(names)[row].tolist()) for row in carrying > 0)
-    assert Counter(dict(found)) == expected
 
 
 @pytest.mark.slow

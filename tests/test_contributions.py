@@ -13,25 +13,6 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import PAPER, call, nightly
 from tests.test_ra1 import MEASURED, TOP, plane_weights
-from tolcontact.analyses.analysis import independent_groups
-from tolcontact.analyses.designs import MixedDraws, ReleasedDraws
-from tolcontact.analyses.linear_model import linear_model
-from tolcontact.statistics.sobol_indices import missed, shapley_effects, sobol_indices
-
-
-def values(function, A, B):
-    """f (n, 2 + group) of each column alone as a group."""
-    mixed = [np.where(np.arange(A.shape[1]) == k, B, A) for k in range(A.shape[1])]
-    return np.column_stack([function(x) for x in (A, B, *mixed)])
-
-
-def ishigami(x):
-    return np.sin(x[:, 0]) + 7 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
-
-
-def clipped(x):
-    """A contact that is open below: what lies below is cut off."""
-    return np.maximum(0, x[:, 0] + 0.5 * x[:, 1])
 
 
 def of_clipped(variances=(1.0, 0.25)):
@@ -51,48 +32,6 @@ def of_clipped(variances=(1.0, 0.25)):
         given, left = moments(own * z, other)[0], moments(other * z, own)[1]
         found.append(((weights @ given**2 - (weights @ given) ** 2) / whole, weights @ left / whole))
     return np.array(found).T
-
-
-ISHIGAMI = np.array([[0.31390, 0.44241, 0.0], [0.55758, 0.44241, 0.24368]])  # a = 7, b = 0.1
-KNOWN = {
-    "ishigami": (ishigami, lambda g, n: g.uniform(-np.pi, np.pi, (n, 3)), ISHIGAMI),
-    "clipped": (clipped, lambda g, n: g.normal(size=(n, 2)), of_clipped()),
-}
-
-
-@pytest.mark.parametrize("name", KNOWN)
-def test_intervals_of_known_functions_cover(name):
-    """500 repeats with n = 2000 each: 95 % is covered in 465 to 487 of them with 98 % probability, for one index."""
-    function, draw, truth = KNOWN[name]
-    generator, inside = np.random.default_rng(4), np.zeros(truth.shape)
-    for _ in range(500):
-        f = values(function, draw(generator, 2000), draw(generator, 2000))
-        for order, found in enumerate(sobol_indices(f)):
-            inside[order] += [e.lower <= t <= e.upper for e, t in zip(found, truth[order], strict=True)]
-    assert (inside >= 460).all() and (inside <= 490).all(), inside
-
-
-def test_estimates_are_those_of_scipy():
-    generator = np.random.default_rng(1)
-    A, B = generator.normal(size=(2, 4096, 2))
-    f = values(clipped, A, B)
-    first, total = sobol_indices(f)
-    theirs = stats.sobol_indices(func={"f_A": f[None, :, 0], "f_B": f[None, :, 1], "f_AB": f.T[2:, None]}, n=4096)
-    assert [e.value for e in first] == pytest.approx(theirs.first_order.ravel(), abs=5e-3)
-    assert [e.value for e in total] == pytest.approx(theirs.total_order.ravel(), abs=5e-3)
-
-
-def test_nothing_is_said_of_what_does_not_vary_or_is_no_number():
-    for f in (np.ones((10, 4)), np.full((10, 4), np.nan)):
-        assert all(np.isnan(e).all() for found in sobol_indices(f) for e in found)
-
-
-def test_a_prediction_misses_what_it_does_not_explain():
-    generator = np.random.default_rng(2)
-    x, noise = generator.normal(size=(2, 20_000))
-    for scale, expected in ((0.0, 0.0), (1.0, 0.5)):
-        found = missed(x + scale * noise, x)
-        assert found.lower - 1e-12 <= expected <= found.upper + 1e-12 and found.upper - found.lower < 0.03
 
 
 @pytest.fixture(scope="module")
@@ -149,29 +88,6 @@ def test_fixing_a_group_removes_its_share():
     assert abs(found - estimate) < 3.3 * np.hypot(error, (upper - lower) / 4)
 
 
-def test_mixtures_do_not_depend_on_blocks_and_exchange_columns():
-    draws = tc.build(cases.ra1(), solver="daqp").draws
-    mixed = MixedDraws(draws, [np.array([0]), np.array([3, 5])])
-    whole = mixed(seed=2, start=0, stop=40)
-    assert np.array_equal(whole[7:23], mixed(seed=2, start=7, stop=23))
-    A, B, first, second = whole.reshape(10, 4, -1).transpose(1, 0, 2)
-    assert np.array_equal(A, draws(seed=2, start=0, stop=10)) and not (A == B).any()
-    assert np.array_equal(first[:, 0], B[:, 0]) and np.array_equal(np.delete(first, 0, 1), np.delete(A, 0, 1))
-    assert np.array_equal(second[:, [3, 5]], B[:, [3, 5]]) and np.array_equal(second[:, :3], A[:, :3])
-
-
-def test_what_is_drawn_together_is_one_group():
-    a = cases.stack()
-    a.correlate(["upper.A1", "middle.A1"], [[1, 0.8], [0.8, 1]])
-    program = tc.build(a, solver="daqp")
-    labels = list(program.nominal.contributors)
-    groups = independent_groups(program.draws, labels, np.ones(len(labels), dtype=bool))
-    assert "middle.A1 + upper.A1" in groups or "upper.A1 + middle.A1" in groups
-    assert sorted(k for columns in groups.values() for k in columns) == list(range(len(labels)))
-    by_part = tc.analyses.contributions(a, samples=16, solver="daqp", by="part")
-    assert by_part.sizes["group"] == 2 and "bottom" in by_part["group"].values
-
-
 def of_normal(weights, matrix):
     """Shapley effects of a sum of correlated normal numbers, from the variance that each set of them explains."""
     weights, matrix = np.asarray(weights), np.asarray(matrix)
@@ -186,64 +102,6 @@ def of_normal(weights, matrix):
         for place, own in enumerate(order):
             found[own] += explained(order[: place + 1]) - (explained(order[:place]) if place else 0)
     return found / len(orders) / (weights @ matrix @ weights)
-
-
-CORRELATED = ["upper.A3", "middle.A1", "upper.A1"]
-MATRIX = [[1, 0.8, -0.3], [0.8, 1, 0.1], [-0.3, 0.1, 1]]
-
-
-@pytest.mark.slow
-def test_shapley_effects_divide_what_is_correlated():
-    """Against the closed form: also of a locator that the measure does not follow; it is correlated with one it follows."""
-    rho, first, second = 0.5, 1, 2  # Owen, Prieur (2017), two numbers
-    own = (first**2 * (1 - rho**2 / 2) + rho * first * second + second**2 * rho**2 / 2) / 7
-    assert of_normal([first, second], [[1, rho], [rho, 1]]) == pytest.approx([own, 1 - own])
-    a = cases.stack()
-    a.correlate(CORRELATED, MATRIX)
-    program = tc.build(a, solver="daqp", method=PAPER)
-    found = tc.analyses.contributions(program, samples=4096).sel(measure="top")
-    columns = [list(program.nominal.contributors).index(label) for label in (*CORRELATED, "upper.A2")]
-    slopes = linear_model(program).by_deviations[0, columns]
-    matrix = np.eye(4)
-    matrix[:3, :3] = MATRIX
-    for label, truth in zip((*CORRELATED, "upper.A2"), of_normal(slopes, matrix), strict=True):
-        estimate, lower, upper = found["shapley"].sel(state="raw", unit=label).values
-        assert abs(estimate - truth) < 1.7 * (upper - lower) / 2 + 1e-3 and truth > 0.05, label
-    assert found["shapley"].sel(interval="estimate").sum("unit").values == pytest.approx([1, 1])
-    assert found.sizes["unit"] == found.sizes["group"] + 2
-    assert tc.analyses.contributions(program, samples=16, by="part").sizes["unit"] == 3
-
-
-def test_intervals_of_shapley_effects_cover():
-    """Of a clipped sum of independent numbers they are the means of first-order and total indices."""
-    draws, inside = np.random.default_rng(8), np.zeros(2)
-    truth = of_clipped().mean(axis=0)
-    for _ in range(500):
-        A, B = draws.normal(size=(2, 1000, 2))
-        places = draws.random((1000, 2)).argsort(axis=1)
-        f = np.column_stack([clipped(np.where(places < members, A, B)) for members in range(3)])
-        inside += [e.lower <= t <= e.upper for e, t in zip(shapley_effects(f, places), truth, strict=True)]
-    assert (inside >= 460).all() and (inside <= 490).all(), inside
-
-
-def test_released_draws_do_not_depend_on_blocks_and_keep_correlations():
-    a = cases.stack()
-    a.correlate(CORRELATED, MATRIX)
-    program = tc.build(a, solver="daqp")
-    labels = list(program.nominal.contributors)
-    columns = [labels.index(label) for label in CORRELATED]
-    released = ReleasedDraws(
-        program.draws, independent_groups(program.draws, labels, np.ones(len(labels), dtype=bool), correlated=False)
-    )
-    whole = released(seed=2, start=0, stop=19 * 3000)
-    assert np.array_equal(whole[37:777], released(seed=2, start=37, stop=777))
-    rows = whole.reshape(3000, 19, -1)
-    assert np.abs(rows[:, -1] - program.draws(seed=2, start=0, stop=3000)).max() < 1e-9
-    for members in (0, 9, 18):
-        assert np.corrcoef(rows[:, members, columns].T) == pytest.approx(np.array(MATRIX), abs=0.06)
-    places = released.positions(2, 0, 3000)
-    kept = np.isclose(rows[:, 9], rows[:, -1], atol=1e-9)[:, labels.index("upper.A2")]
-    assert np.array_equal(kept, places[:, labels.index("upper.A2")] < 9)
 
 
 def test_the_command_prints_a_table_json_and_csv(tmp_path):
@@ -378,14 +236,6 @@ def test_a_cause_is_stepped_with_what_it_drives():
     assert found.contributor.values.tolist() == ["v"]
     raw, corrected = found.sensitivity.sel(contributor="v").values
     assert raw[0] == pytest.approx(1.0, abs=1e-6) and corrected[1] <= 0.5 <= corrected[2]
-
-
-def test_what_varies_by_less_than_its_accuracy_has_no_shares():
-    rng = np.random.default_rng(1)
-    f = -0.15 + 1e-9 * rng.standard_normal((500, 4))
-    first, total = sobol_indices(f, 1e-8)
-    assert np.isnan(first).all() and np.isnan(total).all() and np.isnan(missed(f[:, 0], f[:, 1], 1e-8)).all()
-    assert not np.isnan(sobol_indices(f, 0.0)[0][0].value)
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ from scipy.optimize import linprog
 
 import tolcontact as tc
 from tests import cases
+from tests.helpers import assembly_of
 from tests.population_referee import measured_back
-from tolcontact.declaration.script import load_model
 from tolcontact.discretization import discretize
 from tolcontact.testing import assert_same_run
 from tolcontact.variation import draw
@@ -82,7 +82,7 @@ def test_the_association_is_in_the_model_and_its_json(tmp_path):
     model = plate("least squares")
     path = tmp_path / "plate.json"
     tc.io.write_model(model, path)
-    again = load_model(path)
+    again = assembly_of(path)
     assert [feature.association for feature in again.features] == ["outside", "least squares", "least squares", "outside"]
     with pytest.raises(tc.ModelError, match="its association is 'best'; expected one of: outside, least squares"):
         tc.build(plate("best"))

@@ -7,34 +7,6 @@ import trimesh
 import tolcontact as tc
 from tests import cases
 from tolcontact.discretization import discretize
-from tolcontact.geometry.spreading import spread
-from tolcontact.geometry.surface import Surface
-
-
-def face(width, height):
-    return trimesh.Trimesh([[0, 0, 0], [width, 0, 0], [width, height, 0], [0, height, 0]], [[0, 1, 2], [0, 2, 3]])
-
-
-@pytest.mark.parametrize("count", [1, 4, 202, 1000])
-def test_points_are_as_many_as_asked_and_spread_evenly(count):
-    points = spread(face(50, 25), count, None)
-    assert points.shape == (count, 3)
-    assert ((points >= 0) & (points <= [50, 25, 0])).all()
-    if count >= 202:
-        # Each cell of area 1/count of the face holds about one point: no hole and no heap.
-        radius = np.sqrt(50 * 25 / count)
-        spots = np.random.default_rng(0).uniform([0, 0, 0], [50, 25, 0], (2000, 3))
-        apart = np.linalg.norm(points[:, None] - points, axis=2) + np.eye(count) * 99
-        assert np.linalg.norm(spots[:, None] - points, axis=2).min(axis=1).max() < 1.1 * radius
-        assert apart.min() > 0.5 * radius
-        for corner in ((0, 0), (50, 0), (0, 25), (50, 25)):
-            assert np.abs(points[:, :2] - corner).max(axis=1).min() == 0
-
-
-def test_a_spacing_is_kept_everywhere():
-    points = spread(face(50, 25), None, 4.0)
-    spots = np.random.default_rng(0).uniform([0, 0, 0], [50, 25, 0], (2000, 3))
-    assert np.linalg.norm(spots[:, None] - points, axis=2).min(axis=1).max() <= 4.0 + 1.0
 
 
 def test_ra1_has_the_papers_202_points_on_its_interface():
@@ -55,20 +27,6 @@ def test_points_that_overhang_the_rim_do_not_take_part():
     (pair,) = discretize(a).pairs
     assert pair.P_m[:, 0].min() >= 0 and pair.P_m[:, 0].max() <= 10
     assert np.allclose(pair.P_m[:, 2] - pair.P_r[:, 2], 0.5)
-
-
-@pytest.mark.parametrize("solid", [trimesh.creation.icosphere(4, 10), trimesh.creation.cylinder(10, 40, sections=96)])
-def test_projections_on_curved_faces_lie_on_them_with_normals_outward(solid):
-    rng = np.random.default_rng(1)
-    direction = rng.normal(size=(200, 3))
-    if len(solid.vertices) < 1000:  # the cylinder's barrel
-        direction[:, 2] = 0
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    nearest, normals, over = Surface(solid).project(direction * 11)
-    chord = 10 * (1 - np.cos(np.pi / 48))
-    assert over.all()
-    assert np.abs(np.linalg.norm(nearest, axis=1) - 10).max() < chord
-    assert ((normals * direction).sum(axis=1) > 0.99).all()
 
 
 def test_a_three_two_one_scheme_stands_inside_the_edges_of_its_faces():

@@ -7,8 +7,8 @@ import tolcontact as tc
 from tests import cases, referee
 from tests.helpers import EXACT, FIXED, PAPER, SEATED, R_t, compiled, moved_at_locators, nightly, simulate
 from tests.nonlinear import TrueProblem
-from tolcontact.simulation.block import simulate_block
-from tolcontact.variation.draws import draw
+from tolcontact.simulation import simulate_block
+from tolcontact.variation import draw
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 JUDGED = {

@@ -5,13 +5,12 @@ import re
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import tolcontact as tc
+from tests.helpers import assembly_of, call
 from tests.step_files import Step, assembly, corners, step_of
 from tests.test_cad import COVER
-from tests.test_json_models import load_model, written
-from tolcontact.cli.app import app
+from tests.test_json_models import written
 from tolcontact.discretization import discretize
 from tolcontact.errors import GeometryFault
 
@@ -50,7 +49,7 @@ def test_faces_are_chosen_by_their_names(tmp_path):
         nominal.triangles(block.face(tc.select.Brep("lid")))
     assert "empty name" in next(tc.select.Brep("").faults())
     assert [face.name for face in tc.io.faces_in(tmp_path / "named.step")][1::4] == ["", ""]
-    listed = CliRunner().invoke(app, ["faces", str(tmp_path / "named.step")]).stdout.splitlines()
+    listed = call(tmp_path, "faces", "named.step").stdout.splitlines()
     assert listed[0].startswith('1. "seat", plane, along (0, 0, -1)') and listed[1].startswith("2. plane")
 
 
@@ -83,7 +82,7 @@ def test_names_come_with_json(tmp_path):
     model.locate(pin, tc.three_two_one(pin.face("-z"), pin.face("-y"), pin.face("-x"), inset=0.5), tolerance=0.2)
     model.contact("seat", moving=pin.face("-z"), reference=block.face(tc.select.Brep("+z")))
     document = written(model, tmp_path / "first.json")
-    again = load_model(tmp_path / "first.json")
+    again = assembly_of(tmp_path / "first.json")
     assert again.pairs[0].reference.selections == (tc.select.Brep("+z"),)
     assert written(again, tmp_path / "second.json") == document
 

@@ -11,14 +11,12 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests import cases
 from tests.cases import Frame, toleranced
-from tests.cases.round_contact import BARREL
 from tests.helpers import nightly
 from tests.population_referee import measured_back
+from tests.shapes import shape
 from tolcontact.discretization import discretize
-from tolcontact.geometry.shapes import shape
 from tolcontact.report import summary_text
 from tolcontact.simulation import simulate_block
-from tolcontact.simulation.surfaces import check_surfaces
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
 from tolcontact.variation import Draws
 
@@ -192,25 +190,6 @@ def test_diameters_vary_as_offsets(points, solver):
         np.abs(apart).max() < 1e-9 if points is None else np.ptp(apart) < 0.05 * np.ptp(expected)
     )  # a point aside grows aside
     assert float(results["surface"].surface_penetration.max()) < (1e-6 if points is None else 0.5)
-
-
-def test_surfaces_are_checked_as_large_as_they_are():
-    """A pin that outgrows its hole lies in it as deep as it is too large, and one that shrank does not, whatever the shapes."""
-    a = tc.Assembly("fit")
-    plate = a.part("plate", tc.Mesh(trimesh.creation.annulus(5, 20, 10, sections=64)), fixed=True)
-    pin = a.part("pin", tc.Mesh(trimesh.creation.cylinder(5, 20, sections=64)))
-    barrel = pin.feature("barrel", pin.face(BARREL), tc.Size(10, 0.1))
-    points = [(4, 0, 0), (-4, 0, 0), (0, 4, 0), (0, 0, 0), (0, 0, 0), (4, 0, 0)]
-    held = [tc.Locator(f"{n}{k}", p, n.lower(), 0) for k, (n, p) in enumerate(zip("ZZZXYY", points, strict=True))]
-    a.locate(pin, held)
-    a.contact("fit", moving=barrel, reference=plate.face(tc.select.Cylinder(radius=5)))
-    a.measure("x", pin.point(0, 0, 0), along="x")
-    program = tc.build(a, method=EXACT)
-    deviations = np.zeros((2, len(program.nominal.contributors)))
-    deviations[:, -1] = 0.04, -0.04
-    rest = np.tile(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), (2, 2, 1))
-    depth = check_surfaces(program, rest, deviations).penetration[:, 0]
-    assert depth == pytest.approx([0.02, 0.0], abs=1e-6)
 
 
 def test_axes_of_an_archive_are_where_the_position_says():

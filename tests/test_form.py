@@ -1,30 +1,22 @@
 """Faces that are not flat: seats against a linear programme on the same heights, archives, and one field for all uses."""
 
-import copy
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pytest
-import trimesh
 from scipy.optimize import linprog
-from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 import tolcontact as tc
 from tests import cases
 from tests.cases.seats import PRESS, seat, sliding
 from tests.helpers import SEATED, joined, simulate
-from tolcontact.analyses.analysis import owners
 from tolcontact.compilation import compile_program
-from tolcontact.contact.raised_scan import raised_scan
-from tolcontact.contact.scan import PairScan, pair_scan
 from tolcontact.discretization import Offsets, discretize
 from tolcontact.errors import ModelError
 from tolcontact.features import FormField
-from tolcontact.geometry.region_kernel import keep_over
 from tolcontact.simulation import simulate_blocks
-from tolcontact.simulation.surfaces import check_surfaces, warn_of
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
 from tolcontact.vocabulary import CORRECTED, Status
 
@@ -118,29 +110,6 @@ def test_a_saddle_rocks_onto_three_corners():
     expected = np.where(c[:, None] > 0, c[:, None] * (1 - x + y), -c[:, None] * (1 + x + y))
     np.testing.assert_allclose(measured[:, :4], expected, atol=1e-5)
     assert np.abs(c).max() > 0.01
-
-
-@pytest.fixture(scope="module")
-def between_points():
-    """The program of a seat, and its surfaces between contact points."""
-    program, run = simulate(seat(), samples=60, solver="daqp", method=SEATED)
-    return program, check_surfaces(program, run["poses"][:, CORRECTED], run["deviations"])
-
-
-def test_faces_of_a_seat_do_not_penetrate_each_other_between_contact_points(between_points):
-    _, surfaces = between_points
-    assert 0 < surfaces.penetration[:, 0].max() < 1e-3
-
-
-def test_a_warning_of_penetration_gives_half_the_spacing(between_points):
-    program, surfaces = between_points[0], copy.deepcopy(between_points[1])
-    surfaces.penetration[:] = 1.0
-    with pytest.warns(
-        tc.errors.ContactWarning, match=r'pair "seat": .*; place contact points closer together, such as spacing=2.4$'
-    ):
-        warn_of(program, surfaces)
-    pair = program.nominal.pairs[0]
-    assert pair.form_spacing / 2 == pytest.approx(2.4, abs=0.05)
 
 
 def test_without_coefficients_a_face_is_flat():
@@ -242,35 +211,11 @@ def test_a_correlation_length_far_beyond_the_face_has_points_by_the_size_of_the_
     )
 
 
-@pytest.mark.parametrize("turn", [(0, 0, 0), (0.3, -0.7, 0.2)])
-def test_points_over_a_flat_face_with_a_hole_are_those_that_project_onto_it(turn):
-    a = tc.Assembly("ring")
-    part = a.part("ring", tc.Mesh(trimesh.creation.annulus(15, 40, 20, sections=48)), fixed=True)
-    part.feature("top", part.face("+z"), tc.Flatness(0.05))
-    a.measure("corner", part.point(20, 0, 10), along="z")
-    R, t = Rotation.from_euler("xyz", turn).as_matrix(), np.array([3.0, -2.0, 7.0])
-    face = discretize(a).features[0].surfaces[0].placed(R, t)
-    places = np.random.default_rng(0).uniform((-42, -42, 9), (42, 42, 11), (4000, 3)) @ R.T + t
-    numbers, at_rest = np.arange(4000)[None].copy(), np.array([[1.0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]])
-    keep_over(at_rest, places, np.zeros((1, 0, 3)), face.region, face.region, numbers)
-    np.testing.assert_array_equal(numbers[0] >= 0, face.project(places)[2])
-    assert 0.5 < (numbers >= 0).mean() < 0.8
-
-
 def test_contact_points_too_far_apart_for_a_form_are_refused():
     def sparse(a, block, base):
         a.contact("c", moving=block.feature("f", block.face("-z"), tc.Flatness(0.1)), reference=base.face("+z"), points=8)
 
     assert "correlation length of 33.3 mm; expected at most half of that" in refused(sparse)
-
-
-def test_the_modes_of_a_form_contribute_as_one():
-    program = tc.build(seat())
-    assert list(dict.fromkeys(owners(program, "contributor"))) == [
-        *(f"block.{name}" for name in ("Z0", "Z1", "Z2", "X", "Y1", "Y2")),
-        "block.under.form",
-    ]
-    assert set(owners(program, "feature")[6:]) == {"block.under"}
 
 
 def test_no_worst_case_of_faces_with_form_is_searched():
@@ -293,26 +238,6 @@ def test_the_gap_of_a_station_over_a_face_with_form_counts_its_height_there():
     a.measure("clearance", tc.Clearance(block.face("-z"), base.face("+z")))
     with pytest.raises(ModelError, match="which has form, cannot be measured"):
         tc.build(a)
-
-
-def test_heights_that_are_summed_up_once_give_the_same_deepest_points():
-    program = tc.build(seat())
-    pair, gaps = program.nominal.pairs[0], program.gaps[0]
-    deviations = program.draws(seed=3, start=0, stop=50)
-    poses = program.place(deviations=deviations)["poses"]
-    relative = program.observe(poses=poses, deviations=deviations)["relative"].reshape(50, -1, 12)[:, 0]
-    scan = pair_scan(pair, gaps, (), 8)
-    raised = raised_scan(scan, deviations).take(np.arange(49, -1, -1))
-    actual, expected = (
-        raised.deepest(relative[::-1], deviations[::-1]),
-        PairScan.deepest(scan, relative[::-1], deviations[::-1]),
-    )
-    assert (actual.points == expected.points).all() and expected.depth.max() > 0
-    np.testing.assert_allclose(actual.depth, expected.depth, atol=1e-14)
-    for one, other in zip(
-        raised.rows(actual.points, deviations[::-1]), scan.rows(actual.points, deviations[::-1]), strict=True
-    ):
-        np.testing.assert_allclose(one, other, atol=1e-15)
 
 
 @pytest.mark.nightly

@@ -8,9 +8,8 @@ import tolcontact as tc
 from tests.cases import Frame
 from tests.cases.seats import sliding
 from tests.form_referee import Rectangle, deepest
-from tests.helpers import nightly, simulate
-from tolcontact.contact.candidates import Candidates
-from tolcontact.vocabulary import CORRECTED, Status
+from tests.helpers import nightly
+from tolcontact.vocabulary import Status
 
 TURNED = Frame((0.4, -0.7, 0.3), (12.0, -5.0, 31.0))
 TABLE, BLOCK = (100, 60, 10), (50, 30, 20)
@@ -74,16 +73,6 @@ def test_a_block_over_the_end_of_a_table():
     over = Rectangle(np.array([70.0, 10, 0]), np.array([(60.0, 0, 0), (0, 40, 0)]), np.array([0.0, 0, -1]))
     top = Rectangle(np.array([0.0, 0, 0]), np.array([(100.0, 0, 0), (0, 60, 0)]), np.array([0.0, 0, 1]))
     check(sliding(), over, top)
-
-
-def test_answers_that_lie_deeper_are_noticed():
-    program, run = simulate(box_on_box("block"), samples=40, solver="daqp")
-    candidates, deviations = Candidates(program, program.groups[0]), run["deviations"]
-    relative = program.observe(poses=run["poses"][:, CORRECTED], deviations=deviations)["relative"].reshape(40, 1, 12)
-    scans = candidates.scans(relative, deviations)
-    lowered = relative - np.eye(12)[11] * 0.0005
-    for X_RM, expected in ((relative, False), (lowered, True)):
-        assert (candidates.bulge(candidates.scans(X_RM, deviations, earlier=scans), X_RM) == expected).all()
 
 
 def feet(step):

@@ -12,8 +12,7 @@ from studies.benchmarks.problems import friction_on_an_incline as incline
 from tests import cases
 from tests.cases.frames import STILL
 from tests.cases.measured import ring, shaft
-from tests.helpers import call, nightly
-from tolcontact.report.html.page import tables_of
+from tests.helpers import nightly
 
 PADS = np.array([(10, 10, 0), (90, 15, 0), (45, 50, 0)], dtype=float)
 STOPS = {"left": ((0, 20, 12), (1, 0, 0)), "front": ((60, 0, 8), (0, 1, 0))}
@@ -132,18 +131,6 @@ def test_what_cannot_be_asked_is_refused():
         tc.analyses.seating(cases.ra1())
     with pytest.raises(tc.OptionError, match='nothing that touches holds "block" against the forces, even'):
         tc.analyses.seating(seat((0, 0, 300)))
-
-
-def test_the_command_prints_seats_and_what_holds_them_and_keeps_them_for_the_page(tmp_path):
-    results = tc.run(incline.assembly(), samples=4, solver="daqp", surfaces=0, fields="none", out=tmp_path / "run.nc")
-    results.close()
-    done = call(tmp_path, "seating", tmp_path / "run.nc", "--into", tmp_path / "run.nc")
-    assert done.returncode == 0, done.stderr
-    with tc.open_archive(tmp_path / "run.nc") as results:
-        (table,) = tables_of(results)
-    assert table["title"] == "Seating" and ["block.stop", "0.364", "-", "plane 100 %"] in table["rows"]
-    rows = [line.split() for line in done.stdout.splitlines()]
-    assert ["block.stop", "0.364", "-", "plane", "100", "%"] in rows
 
 
 def pushed_blocks(pushes, joined=False):

@@ -2,9 +2,7 @@
 
 import html
 import tomllib
-from dataclasses import fields
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 import pytest
@@ -12,11 +10,7 @@ import pytest
 import tolcontact as tc
 from tests import cases
 from tests.helpers import ALL_POINTS, call
-from tolcontact.compilation.solvers import SOLVERS
-from tolcontact.declaration.feature_tolerance import GeometricTolerance, ToleranceOptions
-from tolcontact.declaration.geometry import UNITS, Unit
 from tolcontact.errors import OptionError
-from tolcontact.method import OBJECTIVES, ObjectiveName, Solver
 
 
 def test_every_public_name_is_there_and_the_version_is_the_projects(tmp_path):
@@ -116,11 +110,3 @@ def test_what_is_no_method_is_refused():
         tc.Assembly("x", method="exact")
     with pytest.raises(OptionError, match="a method has no choice 'resolutoin'; expected some of: resolution, objective"):
         tc.run(cases.stack(), samples=20, method={"resolutoin": "exact"})
-
-
-def test_the_words_that_an_editor_offers_are_the_words_of_the_tables():
-    literal, _ = get_args(Solver)
-    assert get_args(literal) == tuple(SOLVERS)
-    assert get_args(ObjectiveName) == tuple(OBJECTIVES)
-    assert get_args(Unit) == tuple(UNITS)
-    assert list(ToleranceOptions.__annotations__) == [field.name for field in fields(GeometricTolerance) if field.kw_only]

@@ -4,16 +4,12 @@ import warnings
 
 import numpy as np
 import pytest
-import trimesh
-from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
-from studies.certificates.ends import Convex, judged, scene, separation
-from tests.cases.laps import CASES, TABLE, box, case, on_table
+from studies.certificates.ends import judged, scene
+from tests.cases.laps import CASES, case
 from tests.helpers import nightly
 from tests.test_ends import FAULTS
-from tolcontact.geometry.meeting import Reach, meeting
-from tolcontact.geometry.surface import Surface
 from tolcontact.vocabulary import Status
 
 
@@ -54,26 +50,6 @@ def test_the_frame_of_whole_bodies_does_not_matter(name):
     assert np.array_equal(runs[0].status, runs[1].status)
     raw = [run.gap_min.sel(state="raw").values for run in runs]
     assert raw[0] == pytest.approx(raw[1], abs=1e-7)
-
-
-@pytest.mark.parametrize("lap, overlap", [(1.5, 0.0), (0.8, 0.0), (1.5, 0.1)])
-@pytest.mark.parametrize("low, high", [(10, 40), (-10, 60), (48, 90)])
-def test_the_least_gap_of_a_lap_is_the_depth_of_the_bodies(lap, overlap, low, high):
-    """It is the signed distance by separating axes, but for the square of the tilt."""
-    block, _ = on_table(lap, low, high, overlap)
-    points = box(*block), box(*TABLE)
-    bodies = [trimesh.convex.convex_hull(corners) for corners in points]
-    reach = Reach(travel=2.0, tilt=0.01, spread=0.5, overlap=overlap, clearance=0.0)
-    places = meeting(tuple(Surface(body) for body in bodies), tuple(bodies), reach)
-    rng, convex = np.random.default_rng(3), [Convex(corners) for corners in points]
-    middle = np.array([40, (low + high) / 2, 13])
-    R = Rotation.from_rotvec(rng.uniform(-0.003, 0.003, (200, 3))).as_matrix()
-    t = middle - R @ middle + rng.uniform(-0.3, 0.3, (200, 3))
-    gaps = places.at(np.hstack([R.reshape(-1, 9), t])).gaps.min(axis=1, initial=np.inf)
-    distances = np.array([separation(*convex, *pose) for pose in zip(R, t, strict=True)])
-    assert 60 < (distances < 0).sum()
-    assert np.array_equal(gaps < 0, distances < 0)
-    assert np.minimum(gaps, 0) == pytest.approx(np.minimum(distances, 0), abs=1e-3)
 
 
 def test_nothing_is_computed_of_the_mean_normal_of_a_closed_body():

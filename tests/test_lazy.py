@@ -11,9 +11,6 @@ import xarray as xr
 import tolcontact as tc
 from tests import cases
 from tests.helpers import PAPER, nightly
-from tolcontact.simulation.cluster import local_cluster
-from tolcontact.simulation.lazy import CHUNK_BLOCKS
-from tolcontact.simulation.packing import pack_model, packed_program
 
 
 def rows_of(results, name):
@@ -130,15 +127,6 @@ def test_what_is_written_is_streamed(tmp_path):
 
 
 @pytest.mark.slow
-def test_workers_compute_the_same():
-    program = tc.build(cases.ra1(), solver="qpoases")
-    found = tc.simulate(program, CHUNK_BLOCKS * 4096 + 100, seed=5).measured
-    here = found.values
-    with local_cluster(2):
-        assert np.array_equal(found.values, here)
-
-
-@pytest.mark.slow
 def test_a_study_is_one_graph_over_designs():
     models = {"narrow": cases.one_dimensional(2), "wide": cases.one_dimensional(6), "stack": cases.stack()}
     methods = [{"resolution": "linearized"}, {"resolution": "exact"}]
@@ -168,11 +156,3 @@ def test_studies_that_cannot_be():
     ):
         with pytest.raises(tc.OptionError, match=said):
             tc.study(models, 100, **options)
-
-
-def test_the_process_that_asks_does_not_compile_again():
-    a = tc.Assembly("asked for once")
-    a.measure("corner", a.part("plate", tc.Box(100, 50, 10), fixed=True).point(100, 50, 10), along="z")
-    program = tc.build(a)
-    tc.simulate(program, 10)
-    assert packed_program(pack_model(program)) is program

@@ -10,8 +10,6 @@ import scipy.stats
 import tolcontact as tc
 from tests.helpers import ROOT, call
 from tests.test_json_models import PLAIN
-from tolcontact.declaration.script import MAX_BYTES
-from tolcontact.workflow.forecast import announce
 
 RA1 = "models/ra1.py"
 
@@ -82,13 +80,6 @@ def test_a_name_that_stands_twice_is_refused(tmp_path):
         tc.build(tmp_path / "m.json")
 
 
-def test_a_huge_file_is_refused_before_it_is_read(tmp_path):
-    with (tmp_path / "m.json").open("wb") as file:
-        file.truncate(MAX_BYTES + 1)
-    with pytest.raises(tc.errors.ScriptError, match=f"expected at most {MAX_BYTES}"):
-        tc.build(tmp_path / "m.json")
-
-
 def test_usual_distributions_are_quick_enough():
     for frozen in (scipy.stats.norm(0, 0.1), scipy.stats.beta(2, 3), scipy.stats.ksone(22), scipy.stats.skewnorm(4)):
         assert not list(tc.Tolerance(distribution=frozen).faults())
@@ -115,9 +106,3 @@ def test_what_cannot_end_is_refused(command, message):
 def test_an_interval_can_be_asked_to_be_as_narrow_as_nothing():
     done = call(ROOT, "run", RA1, "--samples", 100, "--until", "corner height: mean +-1e-300", "--quiet")
     assert done.returncode == 1 and "+- 1e-300 needs more than 100000000" in done.stderr
-
-
-def test_a_run_that_would_take_longer_than_anybody_waits_is_refused():
-    program = tc.build(ROOT / RA1, solver="daqp")
-    with pytest.raises(tc.OptionError, match=r"1000000000000 realizations would take about \d+ days; ask for at most \d+"):
-        announce(program, samples=10**12, seed=1, keep="measures", threads=1)

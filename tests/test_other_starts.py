@@ -1,18 +1,13 @@
 """Where an answer is looked for from other starts, and what that is good for."""
 
-from unittest import mock
-
 import numpy as np
 import pytest
 import trimesh
 from scipy.optimize import linprog
 
 import tolcontact as tc
-from studies.certificates.coincidences import quick_builds
-from studies.certificates.placements import scene
 from tests import cases
 from tests.helpers import R_t, simulate
-from tolcontact.contact.candidates import Candidates
 from tolcontact.vocabulary import CORRECTED, Status
 
 EXACT = tc.Method(resolution="exact")
@@ -115,19 +110,6 @@ def plates_with_a_cap(x, y):
     web = tc.select.Inside((0, -25, 1), (100, 25, 3))
     a.contact("cap", moving=cap.face("-z"), reference=inner.face("+z", web))
     return a
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [320030, 320045])
-def test_interfering_answers_are_rescued_though_a_pair_of_the_group_has_no_guard(seed):
-    """As where other bodies of the group grow where they touch. One realization is doubtful without the rescue."""
-    with (
-        quick_builds(),
-        mock.patch.object(Candidates, "are_guarded", False),
-        mock.patch.object(Candidates, "partings", {}),
-    ):
-        _, run = simulate(scene(seed, "lattice of three", "all points").assembly, samples=40, seed=seed, solver="daqp")
-    assert (run["status"] <= Status.RESOLVED).all()
 
 
 @pytest.mark.slow

@@ -9,8 +9,8 @@ from scipy.stats import binom
 import tolcontact as tc
 from tests.cases import Frame
 from tests.cases.toleranced import HOLES, plate_with_holes
+from tests.helpers import assembly_of
 from tests.population_referee import measured_back
-from tolcontact.declaration.script import load_model
 from tolcontact.discretization import discretize
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
 from tolcontact.variation import Draws
@@ -223,7 +223,7 @@ def test_members_are_used_as_features_in_models_archives_and_json(tmp_path):
         moved.geometry.source.export(file)
         object.__setattr__(moved.geometry, "source", file)
     tc.io.write_model(a, tmp_path / "plug.json")
-    again = load_model(tmp_path / "plug.json")
+    again = assembly_of(tmp_path / "plug.json")
     tc.io.write_model(again, tmp_path / "again.json")
     assert (tmp_path / "again.json").read_text() == (tmp_path / "plug.json").read_text()
     assert discretize(again).contributors == discretize(a).contributors

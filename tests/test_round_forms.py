@@ -3,16 +3,13 @@
 import numpy as np
 import pytest
 import trimesh
-from scipy.optimize import linprog
 
 import tolcontact as tc
 from tests.cases import toleranced
 from tests.cases.fits import CLEARANCE, LENGTH, PULL, RADIUS, shaft_in_a_bore, shaft_on_a_table
-from tests.helpers import SEATED, nightly, simulate
+from tests.helpers import SEATED, simulate
 from tests.population_referee import measured_back
 from tests.test_form import coefficients
-from tolcontact.features.minimum_zone import minimum_widths
-from tolcontact.simulation.surfaces import check_surfaces
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
 from tolcontact.vocabulary import CORRECTED, Status
 
@@ -28,10 +25,6 @@ def heights_on(program, run, feature, radius, along, azimuths):
     z, angle = (grid.ravel() for grid in np.meshgrid(along, azimuths, indexing="ij"))
     places = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
     return coefficients(program, run, feature) @ form_of(program, feature).heights(places).T
-
-
-def sums_of_heights(program, run, along, azimuths):
-    return sum(heights_on(program, run, *face, along, azimuths) for face in (("shaft", RADIUS), ("bore", RADIUS + CLEARANCE)))
 
 
 def test_a_two_lobed_shaft_in_a_two_lobed_bore_by_closed_form():
@@ -69,33 +62,6 @@ def test_a_lobed_shaft_lies_on_its_highest_line(tmp_path):
     assert_gaps_recompute(path)
 
 
-def farthest(heights, along, azimuths):
-    """The largest motion along the pull of an axis at z = 3 (realization,), at first order: a linear programme."""
-    z, angle = (grid.ravel() for grid in np.meshgrid(along, azimuths, indexing="ij"))
-    n, share = np.column_stack([np.cos(angle), np.sin(angle)]), (z / LENGTH + 0.5)[:, None]
-    rows = np.hstack([n * share, n * (1 - share)])  # of the ends of the axis
-    aim = np.array(PULL) / np.linalg.norm(PULL)
-    cost = -np.concatenate([aim * (3 / LENGTH + 0.5), aim * (0.5 - 3 / LENGTH)])
-    return [
-        -linprog(cost, A_ub=rows, b_ub=CLEARANCE - of_one, bounds=[(None, None)] * 4, method="highs").fun for of_one in heights
-    ]
-
-
-def test_a_fit_is_the_one_of_a_linear_programme_and_needs_no_more_points():
-    """The grid of the pair tells within 0.5 um what 25 x 144 places tell."""
-    program, run = simulate(shaft_in_a_bore(tc.Cylindricity(0.02), tc.Cylindricity(0.02)), 20, solver="daqp", method=SEATED)
-    assert (run["status"] == Status.RESOLVED).all() and run["gap_min"][:, CORRECTED].min() > -1e-9
-    P = program.nominal.pairs[0].P_m
-    along, azimuths = np.unique(P[:, 2].round(9)), np.unique(np.arctan2(P[:, 1], P[:, 0]).round(9))
-    assert len(P) == len(along) * len(azimuths) and len(azimuths) == 48
-    far = run["measured"][:, CORRECTED, 4:] @ PULL / np.linalg.norm(PULL)
-    np.testing.assert_allclose(far, farthest(sums_of_heights(program, run, along, azimuths), along, azimuths), atol=1e-4)
-    fine = np.linspace(-20, 20, 25), np.arange(144) * 2 * np.pi / 144
-    np.testing.assert_allclose(far, farthest(sums_of_heights(program, run, *fine), *fine), atol=5e-4)
-    surfaces = check_surfaces(program, run["poses"][:5, CORRECTED], run["deviations"][:5])
-    assert 0 < surfaces.penetration[:, 0].max() < 1e-3
-
-
 def test_gaps_of_sections_and_lines_with_form_follow_from_the_archive_alone(tmp_path):
     path = tmp_path / "fit.nc"
     rough, lobed = tc.Form("matern 5/2", length=12, modes=6), tc.Form("matern 3/2", lobes=3, modes=4)
@@ -113,35 +79,6 @@ def radial_terms(azimuths, along):
     """Radii for a size, two shifts and two tilts of a cylinder."""
     n = np.column_stack([np.cos(azimuths), np.sin(azimuths)])
     return np.column_stack([np.ones(len(n)), n, n * along[:, None] / LENGTH])
-
-
-def width_by_programme(terms, heights):
-    """The least distance of two surfaces with these terms (place, term) around heights (place,)."""
-    ones, size = np.ones((len(terms), 1)), terms.shape[1]
-    rows = np.vstack([np.hstack([terms, 0 * ones]), np.hstack([-terms, -ones])])
-    limits = np.concatenate([heights, -heights])
-    return linprog(np.eye(size + 1)[-1], A_ub=rows, b_ub=limits, bounds=[(None, None)] * (size + 1), method="highs").fun
-
-
-@pytest.mark.parametrize("tolerance", [tc.Cylindricity(0.05), *nightly(tc.Roundness(0.05), tc.Straightness(0.05))], ids=str)
-def test_zones_of_cylinders_are_those_of_a_linear_programme(tolerance):
-    program = tc.build(shaft_in_a_bore(tolerance))
-    field = form_of(program, "shaft")
-    spread = program.draws.contributors[len(program.nominal.contributors) - 1].spread
-    heights = np.random.default_rng(1).normal(0, spread, (8, field.modes)) @ field.heights(field.places).T
-    x, y, z = field.places.T
-    terms = radial_terms(np.arctan2(y, x), z)
-    keys = {"cylindricity": 0 * z, "roundness": z.round(6), "straightness": np.arctan2(y, x).round(6) % (2 * np.pi - 1e-5)}
-    columns = {"cylindricity": [0, 1, 2, 3, 4], "roundness": [0, 1, 2], "straightness": [0]}[tolerance.kind]
-    key, expected = keys[tolerance.kind], np.zeros(len(heights))
-    if tolerance.kind == "straightness":
-        terms, columns = np.column_stack([np.ones(len(z)), z]), [0, 1]
-    for value in np.unique(key):
-        own = key == value
-        widths = [width_by_programme(terms[own][:, columns], of_one[own]) for of_one in heights]
-        expected = np.maximum(expected, widths)
-    np.testing.assert_allclose(minimum_widths(field.zone, heights), expected, rtol=1e-6)
-    assert 0.01 < expected.mean() < 0.05
 
 
 def test_a_roundness_displaces_no_section_and_a_straightness_no_line():

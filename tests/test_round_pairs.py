@@ -3,19 +3,18 @@
 import numpy as np
 import pytest
 import trimesh
-from typer.testing import CliRunner
 
 import tolcontact as tc
 from tests import cases
 from tests.cases import round_contact as round_cases
-from tolcontact.cli.app import app
+from tests.helpers import call
+from tests.shapes import patch
 from tolcontact.discretization import discretize
-from tolcontact.geometry.faces import patch
 
 
 @pytest.mark.slow
 def test_check_says_which_pairs_are_round():
-    listed = CliRunner().invoke(app, ["check", str(cases.MODELS / "cover.py")]).stdout
+    listed = call(cases.MODELS, "check", "cover.py").stdout
     assert "contact seat: 78 contact points; they are fixed, and err by 0 mm at most\n" in listed
     assert "contact round hole: 12 contact points, exact on round faces; triangles up to 0.00061 mm inside\n" in listed
 

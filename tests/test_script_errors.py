@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from tolcontact.declaration.script import load_model
+from tests.helpers import assembly_of
 from tolcontact.errors import ScriptError
 
 BODY = """import tolcontact as tc
@@ -58,7 +58,7 @@ def test_the_line_is_told(mistake, way, tmp_path):
         if way in ("relative", "upward"):
             path = path.relative_to(folder) if way == "relative" else folder.relative_to(tmp_path).parent / "../models/model.py"
         with pytest.raises(ScriptError) as raised:
-            load_model(path)
+            assembly_of(path)
     assert f'model script "{path}" failed in line 6: ' in str(raised.value) and expected in str(raised.value)
     assert raised.value.__cause__ is not None
 
@@ -73,7 +73,7 @@ def test_a_module_beside_the_script_is_told_with_its_line(text, where, tmp_path)
     (tmp_path / "link").symlink_to(tmp_path)
     for path in (tmp_path / "model.py", tmp_path / "link" / "model.py"):
         with pytest.raises(ScriptError) as raised:
-            load_model(path)
+            assembly_of(path)
         assert f" failed in line 3 ({where}): " in str(raised.value)
 
 
@@ -81,7 +81,7 @@ def test_a_function_of_a_module_beside_the_script(tmp_path):
     (tmp_path / "methods.py").write_text('import tolcontact as tc\n\ndef fine():\n    return tc.Method(objective="least")\n')
     (tmp_path / "model.py").write_text("from methods import fine\n\n\ndef assembly():\n    return fine()\n")
     with pytest.raises(ScriptError, match=r"failed in line 5 \(methods.py:4\): objective is 'least'"):
-        load_model(tmp_path / "model.py")
+        assembly_of(tmp_path / "model.py")
 
 
 @pytest.mark.parametrize("text", ["def assembly(:\n", "\n\n\tx = (\n", "x = '\udce9'\n"])
@@ -89,13 +89,13 @@ def test_what_is_no_python_is_told_with_its_line(text, tmp_path):
     path = tmp_path / "model.py"
     path.write_bytes(os.fsencode(text))
     with pytest.raises(ScriptError, match=r"failed( in line \d)?: (SyntaxError|IndentationError|TabError)"):
-        load_model(path)
+        assembly_of(path)
 
 
 def test_a_script_may_change_where_python_looks(tmp_path):
     path = tmp_path / "model.py"
     path.write_text("import sys\nsys.path.pop(0)\nimport tolcontact as tc\n\n\ndef assembly():\n    return tc.Assembly('A')\n")
-    assert load_model(path).name == "A"
+    assert assembly_of(path).name == "A"
 
 
 LIKE_A_LIBRARY = """from __future__ import annotations
@@ -103,6 +103,7 @@ LIKE_A_LIBRARY = """from __future__ import annotations
 import dataclasses
 
 import tolcontact as tc
+from tests.helpers import assembly_of
 
 @dataclasses.dataclass
 class Size:
@@ -117,5 +118,5 @@ def test_a_script_may_be_called_like_a_library(tmp_path):
     """And is not mistaken for it afterwards."""
     path = tmp_path / "colorsys.py"
     path.write_text(LIKE_A_LIBRARY)
-    assert load_model(path).name == "sized 1.0"
+    assert assembly_of(path).name == "sized 1.0"
     assert importlib.import_module("colorsys").rgb_to_hsv(0, 0, 0) == (0, 0, 0)

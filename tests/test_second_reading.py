@@ -11,7 +11,6 @@ from tests.second_reading import compare, second_reading
 from tests.test_cad import COVER
 from tests.test_pmi import AP242, step
 from tolcontact.errors import GeometryFault
-from tolcontact.geometry.step_listing import faces_of_records
 
 ASPECT = "SHAPE_ASPECT('','',#4,.T.)"
 DEGREE = (
@@ -186,12 +185,6 @@ def test_words_that_the_kernel_has_not_are_no_difference(path, kernel):
     spherical = replace(kernel.tolerances[1], zone="spherical diameter")
     kernel = replace(kernel, tolerances=(kernel.tolerances[0], spherical))
     assert [str(difference) for difference in compare(pmi, kernel, {}).differences] == [LOST_LIMIT]
-
-
-def test_faces_that_differ_have_the_numbers_of_the_listing(path, kernel):
-    tolerances = (replace(kernel.tolerances[0], items=KernelItems(frozenset(), 0)), kernel.tolerances[1])
-    first, *_ = compare(tc.io.read_pmi(path), replace(kernel, tolerances=tolerances), faces_of_records(path)).differences
-    assert str(first) == "tolerance 1: faces 1, kernel none"
 
 
 def test_annotations_that_only_one_reading_has_are_told(path, kernel):

@@ -14,17 +14,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import trimesh
 
 import tolcontact as tc
 from tests.helpers import finish, run, script, start
-from tests.shapes import BLOCK, refusal
+from tests.shapes import BLOCK, refusal, shape
 from tests.step_files import Step, step_block
 from tolcontact import shape_worker
 from tolcontact.child import TIME_LIMIT, crash, environment
 from tolcontact.discretization import discretize
-from tolcontact.geometry.files import ReadingLimits, read_files
-from tolcontact.geometry.shapes import shape
 
 
 def crashing():
@@ -85,13 +82,6 @@ def test_all_faults_are_said_at_once_though_the_reader_dies_twice(tmp_path):
     assert "good.step" not in said
 
 
-@pytest.mark.slow
-def test_a_file_that_takes_too_much_memory_is_a_fault(tmp_path):
-    trimesh.creation.icosphere(7).export(tmp_path / "fine.obj")
-    (fault,) = read_files([tc.Mesh(tmp_path / "fine.obj")], ReadingLimits(memory=350 * 2**20)).values()
-    assert "takes more than 0.342 GiB of memory" in str(fault)
-
-
 def test_each_file_is_read_once_and_one_process_reads_them_all(tmp_path, monkeypatch):
     started, popen = [], subprocess.Popen
 
@@ -148,15 +138,6 @@ def early_process(tmp_path):
     yield process
     shape_worker.end_unused()
     process.wait()
-
-
-def test_the_process_that_was_started_early_reads_the_files(tmp_path, early_process, monkeypatch):
-    monkeypatch.setattr(subprocess, "Popen", None)
-    (tmp_path / "block.step").write_text(step_block())
-    (tmp_path / "rotten.step").write_text(step_block().replace("VERTEX_POINT", "VERTEX_PINT"))
-    block, rotten = read_files([tc.Mesh(tmp_path / name) for name in ("block.step", "rotten.step")]).values()
-    assert len(block.shapes[0].triangles) == 12 and "rotten.step" in str(rotten)
-    assert early_process.poll() is not None
 
 
 def test_a_new_process_reads_the_files_if_the_early_one_is_gone(tmp_path, early_process):

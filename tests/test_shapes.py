@@ -7,9 +7,8 @@ import pytest
 import trimesh
 
 import tolcontact as tc
-from tests.shapes import BLOCK, HOUSING, face_of
+from tests.shapes import BLOCK, HOUSING, face_of, shape
 from tolcontact.errors import GeometryFault
-from tolcontact.geometry.shapes import shape
 
 
 @pytest.mark.slow

@@ -8,12 +8,7 @@ import tolcontact as tc
 from tests import cases
 from tests.cases import toleranced
 from tests.test_contributions import of_clipped, of_normal
-from tests.test_datums import plate
 from tests.test_ra1 import plane_weights
-from tolcontact import vocabulary as terms
-from tolcontact.analyses.designs import MixedDraws, SteppedDraws
-from tolcontact.features.freedoms import LOCATOR, Freedom
-from tolcontact.report.analysis_tables import analysis_report
 
 SUPPORTS = ("A1", "A2", "A3")
 
@@ -29,23 +24,6 @@ def shelf(causes, tolerance=0.0):
         a.variable(name, 0.6, drives={f"block.{support}": weight for support in SUPPORTS})
     a.measure("height", block.point(25, 12.5, 10), along="z")
     return a
-
-
-def labels_of(model):
-    program = tc.build(model, solver="daqp")
-    return program, list(program.nominal.contributors)
-
-
-def test_a_cause_that_is_all_that_varies_has_the_derivative_of_what_it_drives():
-    found = tc.analyses.sensitivities(shelf({"v": 1.0}), samples=2000, solver="daqp")
-    assert found["contributor"].values.tolist() == ["v"] and float(found["step"][0]) == pytest.approx(0.001, rel=0.02)
-    own = found.sel(measure="height", contributor="v")
-    assert float(own["nominal"]) == pytest.approx(1, abs=1e-9)
-    assert own["sensitivity"].sel(state="raw").values == pytest.approx([1, 1, 1], abs=1e-9)
-    estimate, lower, upper = own["sensitivity"].sel(state="corrected").values
-    assert lower < 0.5 < upper and upper - lower < 0.05 and estimate == pytest.approx(0.5, abs=0.03)
-    (table,) = analysis_report(terms.SENSITIVITIES, found).tables
-    assert [row[0] for row in table.rows] == ["v"] and table.remarks == []
 
 
 def test_independent_causes_of_the_same_locators_have_their_own_shares():
@@ -127,32 +105,6 @@ def test_a_cause_that_drives_a_feature():
     assert shares["linear"].values == pytest.approx(parts / parts.sum(), rel=1e-3)
 
 
-def test_designs_combine_what_causes_drive_and_do_not_depend_on_blocks():
-    a = plate("outside")
-    a.variable("warp", 0.2, drives={"plate.side.tilt z": 1.0, "plate.far.offset": -2.0})
-    program, labels = labels_of(a)
-    draws, tilt, offset, cause = program.draws, *map(labels.index, ("plate.side.tilt z", "plate.far.offset", "warp"))
-    stepped, mixed = (
-        SteppedDraws(draws, np.array([tilt, cause]), np.array([0.01, 0.02])),
-        MixedDraws(draws, [np.array([cause])]),
-    )
-    for design in (stepped, mixed):
-        assert np.array_equal(design(seed=2, start=0, stop=60)[17:41], design(seed=2, start=17, stop=41))
-    members = stepped.members(2, 0, 50)
-    up, down = members[:, 2] - members[:, 0], members[:, 4] - members[:, 0]
-    assert up[:, [tilt, offset, cause]] == pytest.approx(np.tile([0.02, -0.04, 0.02], (50, 1)))
-    assert down[:, [tilt, offset, cause]] == pytest.approx(np.tile([-0.02, 0.04, -0.02], (50, 1)))
-    assert np.abs(members[:, 1] - members[:, 0])[:, np.arange(len(labels)) != tilt].max() == 0
-    A, B, mixture = mixed.members(2, 0, 50).transpose(1, 0, 2)
-    assert np.array_equal(A, draws(seed=2, start=0, stop=50)) and np.array_equal(mixture[:, cause], B[:, cause])
-    change = B[:, cause] - A[:, cause]
-    assert (mixture - A)[:, [tilt, offset]] == pytest.approx(np.outer(change, [1, -2]))
-    for rows in (members[:, 2], mixture):  # the datum that follows from the tilt has shifted with it
-        again = rows.copy()
-        draws.add_shifts(again)
-        assert np.array_equal(again, rows)
-
-
 def test_groups_are_named_after_what_varies():
     a = cases.stack()
     a.locate(
@@ -161,22 +113,6 @@ def test_groups_are_named_after_what_varies():
     a.correlate(["still.A1", "upper.A1"], 0.8)
     groups = tc.analyses.contributions(a, samples=16, solver="daqp")["group"].values.tolist()
     assert "upper.A1" in groups and not any("still" in group for group in groups)
-
-
-@pytest.mark.parametrize(
-    "tolerance",
-    [
-        tc.Tolerance(0.6, shift=0.1),
-        tc.Tolerance(0.6, cp=1.5, cpk=1.2),
-        *(tc.Tolerance(0.6, shape) for shape in ("uniform", "triangular", "truncated normal")),
-        tc.Tolerance(distribution=stats.gamma(4, scale=0.02)),
-    ],
-    ids=str,
-)
-def test_variances_are_those_of_the_quantiles(tolerance):
-    contributor = Freedom("block.A1", LOCATOR, tolerance)
-    deviations = contributor.deviations((np.arange(1_000_000) + 0.5) / 1_000_000)
-    assert contributor.variance == pytest.approx(deviations.var(), rel=1e-4)
 
 
 def test_a_distribution_without_a_variance_has_that_of_its_draws():

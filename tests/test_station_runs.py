@@ -10,7 +10,6 @@ from tests.cases import stations as cases
 from tests.helpers import contents, run, script
 from tolcontact.archive import bytes_of_rows
 from tolcontact.errors import ArchiveError, ModelError
-from tolcontact.report.model_tables import model_tables
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
 
 GROUPS = (None, "sample", "contact", "station/weld", "station/check", "field/a", "field/b", "field/c")
@@ -170,24 +169,6 @@ def test_a_fault_of_the_sequence_is_one_message(case):
     hits = [fault for fault in refused.value.faults if all(fragment in fault for fragment in fragments)]
     assert len(hits) == 1, refused.value
     assert case == "a part is not held" or len(refused.value.faults) == 1, refused.value
-
-
-def test_declarations_of_stations_may_stand_in_any_order():
-    line = cases.rail()
-    a, b, c = line.parts
-    weld, check = line.stations
-    spare = line.part("spare", tc.Box(100, 5, 10), at=(60, -5, 10), fixed=True)
-    check.contact("after", moving=c.face("-x"), reference=b.face("+x"), points=10, within=20)
-    weld.contact("before", moving=b.face("-y"), reference=spare.face("+y"), points=30)
-    weld.measure("late", a.point(100, 0, 10), along="z", tolerance=0.25)
-    results = tc.run(line, samples=20, solver="daqp", surfaces=0)
-    assert results.measure.values.tolist() == ["step", "late", "flush"]
-    assert results.pair.values.tolist() == ["lap", "before", "after"]
-    tables = {table.title: table.rows for table in model_tables(results)}
-    points = np.bincount(results["contact"].pair_of_point.values)
-    assert [(row[0], row[3]) for row in tables["Contact pairs"]] == list(zip(results.pair.values, points, strict=True))
-    assert [(row[0], row[-1]) for row in tables["Measurements"]] == [("step", None), ("late", 0.125), ("flush", None)]
-    assert [part.name for part in tc.build(line).nominal.scenes[0].assembly.parts] == ["a", "b", "spare"]
 
 
 def test_raw_states_follow_raw_states_and_gaps_are_those_of_each_station():

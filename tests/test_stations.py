@@ -6,8 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests.cases import MODELS, stations as cases
-from tests.helpers import compiled
-from tolcontact.declaration.script import load_model
+from tests.helpers import assembly_of, compiled
 from tolcontact.errors import ModelError
 
 LINEARIZED = tc.Method(resolution="linearized")
@@ -172,7 +171,7 @@ def levers(points, x, y):
 
 
 def test_the_rail_has_the_spread_of_its_levers():
-    line = load_model(MODELS / "rail.py")
+    line = assembly_of(MODELS / "rail.py")
     values = measured(line, samples=4000)
     front, rear = [(20, 10), (20, 70), (480, 40)], [(520, 10), (520, 70), (920, 40)]
     pins, bracket = [(20, 10), (20, 70), (840, 40)], [(955, 10), (1035, 10), (995, 70)]
@@ -190,7 +189,7 @@ def test_the_rail_has_the_spread_of_its_levers():
 
 
 def test_a_hood_is_hung_and_inspected_as_its_model_says():
-    values = measured(load_model(MODELS / "hood.py"), samples=500)
+    values = measured(assembly_of(MODELS / "hood.py"), samples=500)
     spread = {name: x.std(axis=0) for name, x in values.items()}
     assert np.abs(values["flush as inspected"] - values["flush as hung"]).max() < 1e-3
     assert 0.53 < spread["flush as hung"][1] / spread["flush as hung"][0] < 0.66

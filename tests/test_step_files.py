@@ -5,11 +5,8 @@ import re
 import pytest
 
 import tolcontact as tc
-from tests.shapes import refusal
+from tests.shapes import patch, refusal, shape
 from tests.step_files import Step, assembly, corners, step_block, step_of
-from tolcontact.geometry.faces import patch
-from tolcontact.geometry.files import STATED_FACES
-from tolcontact.geometry.shapes import shape
 
 SEVERAL = {
     "solids apart": (
@@ -158,19 +155,3 @@ def test_a_face_that_stands_twice_counts_once(tmp_path, caplog):
         mesh = shape(tc.Mesh(tmp_path / "twice.step"))
     assert mesh.is_watertight and mesh.volume == pytest.approx(6000) and len(tc.io.faces_in(tmp_path / "twice.step")) == 6
     assert "2 triangles that stand twice are left out" in caplog.text
-
-
-def test_a_face_on_a_part_of_a_spline_surface_is_read(tmp_path):
-    """The face at the bottom of a block is stated on a part of a bilinear surface, which is a plane."""
-    step = Step()
-    block = step.solid((0, 0, 0), (10, 20, 30))
-    rows = [f"(#{step.point((-50, y, 0))},#{step.point((50, y, 0))})" for y in (-50, 50)]
-    ends = "(2,2),(2,2),(0.,1.),(0.,1.)"
-    spline = step.add(f"B_SPLINE_SURFACE_WITH_KNOTS('',1,1,({','.join(rows)}),.UNSPECIFIED.,.F.,.F.,.F.,{ends},.UNSPECIFIED.)")
-    plane = next(number for number, entity in enumerate(step.lines) if entity.startswith("PLANE("))
-    step.lines[plane] = f"RECTANGULAR_TRIMMED_SURFACE('',#{spline},0.1,0.9,0.1,0.9,.T.,.T.)"
-    step.product("block", [block])
-    (tmp_path / "block.step").write_text(str(step))
-    mesh = shape(tc.Mesh(tmp_path / "block.step"))
-    assert mesh.volume == pytest.approx(6000)
-    assert [face.surface.kind for face in mesh.metadata[STATED_FACES]] == ["plane"] * 6

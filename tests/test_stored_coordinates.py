@@ -8,11 +8,6 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests.cases.stored import FAR, SCENES, ascii_stl, stored, stored_case
 from tests.helpers import FIXED, call, nightly
-from tolcontact.geometry.inset import inset
-from tolcontact.geometry.shapes import shape
-from tolcontact.geometry.triangle_mesh import coordinate_error
-from tolcontact.interference import Neighbours, deviating_solid, solid
-from tolcontact.poses import AT_REST
 from tolcontact.stored_coordinates import printed_spacing
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
 
@@ -96,18 +91,6 @@ def test_a_pin_without_clearance_fits_as_its_fitted_cylinder_does(at, tmp_path):
     assert_gaps_recompute(run)
 
 
-def test_the_test_of_interference_allows_the_error_and_no_more(tmp_path):
-    lower, upper = (trimesh.creation.box(bounds=[(0, 0, z), (10, 10, z + 10)]).apply_translation(FAR) for z in (0, 10))
-    solids = [
-        deviating_solid(solid(shape(stored(mesh, tmp_path / f"{name}.stl"))), [], np.zeros(12))
-        for name, mesh in (("lower", lower), ("upper", upper))
-    ]
-    error = sum(coordinate_error(shape(tc.Mesh(tmp_path / f"{name}.stl"))) for name in ("lower", "upper"))
-    X_BA = np.repeat(AT_REST[None], 3, axis=0)
-    X_BA[:, 11] = [0.0, 0.9 * error, 2.5 * error]
-    assert Neighbours(*solids, insets=(4e-6, 6e-6), reach=1.0).interfere(X_BA).tolist() == [False, False, True]
-
-
 def test_exact_coordinates_have_no_error():
     program = tc.build(stored_case("key", None))
     assert program.nominal.pairs[0].coordinate_error == 0
@@ -121,13 +104,6 @@ def test_a_model_from_an_archive_has_the_error_of_its_files(tmp_path):
         again = tc.run(tc.io.model_of(first), **QUICK)
         assert again["contact"].coordinate_error.item() == first["contact"].coordinate_error.item() > 0
         assert again.measured.values == pytest.approx(first.measured.values, abs=1e-9)
-
-
-def test_a_small_part_near_the_origin_has_next_to_no_error(tmp_path):
-    block = trimesh.creation.box(bounds=[(0, 0, 0), (100, 50, 10)])
-    part = shape(stored(block, tmp_path / "block.stl"))
-    assert 2 * coordinate_error(part) < 1e-5
-    assert coordinate_error(shape(tc.Box(100, 50, 10))) == 0
 
 
 def test_the_summary_and_the_check_say_what_contact_allows(tmp_path):
@@ -152,13 +128,3 @@ def test_the_summary_and_the_check_say_what_contact_allows(tmp_path):
 )  # fmt: skip
 def test_the_digits_of_a_text_tell_how_exact_it_is(mesh, number, spacing):
     assert printed_spacing(ascii_stl(mesh, number).encode(), "stl") == pytest.approx(spacing)
-
-
-def test_a_body_is_smaller_by_its_error():
-    error, rng = 1e-4, np.random.default_rng(1)
-    rounded = trimesh.Trimesh(BOX.vertices + rng.uniform(-error, error, (8, 3)) / 3, BOX.faces, process=False)
-    vertices = inset(rounded, error)
-    middle = BOX.vertices.mean(axis=0)
-    assert vertices == pytest.approx(BOX.vertices - error * np.sign(BOX.vertices - middle), abs=error / 2)
-    flat = trimesh.Trimesh(vertices, BOX.faces, process=False)
-    assert flat.face_adjacency_angles[BOX.face_adjacency_angles < 0.1].max() < 1e-7

@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import linprog
 
 import tolcontact as tc
+from tests.helpers import assembly_of
 from tests.population_referee import measured_back
-from tolcontact.declaration.script import load_model
 from tolcontact.features import FormField
 from tolcontact.testing import assert_datums_recompute, assert_same_run
 
@@ -168,7 +168,7 @@ def test_archives_state_the_planes_and_recompute_them(tmp_path):
 
 def test_a_model_of_json_has_the_same_datums(tmp_path):
     tc.io.write_model(plate(), tmp_path / "plate.json")
-    assert_same_run(tc.run(load_model(tmp_path / "plate.json"), samples=8), tc.run(plate(), samples=8))
+    assert_same_run(tc.run(assembly_of(tmp_path / "plate.json"), samples=8), tc.run(plate(), samples=8))
 
 
 def test_contributions_count_a_plane_with_the_form_that_it_follows():

@@ -6,7 +6,6 @@ import pytest
 from tests import cases
 from tolcontact import build
 from tolcontact.simulation import map_blocks, simulate_blocks
-from tolcontact.simulation.threads import PIECE_ROWS, Threads
 
 BLOCK = 2048
 
@@ -17,30 +16,11 @@ def program():
     return build(cases.model("ra1"), solver="qpoases")
 
 
-@pytest.mark.parametrize("samples", [1, PIECE_ROWS, PIECE_ROWS + 1, 1300, BLOCK, BLOCK + 700])
-def test_results_are_the_same_for_any_number_of_threads(program, samples):
-    expected = list(simulate_blocks(program, samples=samples, seed=1, block=BLOCK, threads=1))
-    assert [len(block) for block in expected] == [min(BLOCK, samples - start) for start in range(0, samples, BLOCK)]
-    for threads in (2, 7):
-        blocks = list(simulate_blocks(program, samples=samples, seed=1, block=BLOCK, threads=threads))
-        for actual, block in zip(blocks, expected, strict=True):
-            assert actual.start == block.start
-            for name, values in vars(block).items():
-                np.testing.assert_array_equal(getattr(actual, name), values, err_msg=name)
-
-
 def test_a_later_start_gives_the_same_blocks(program):
     everything = list(simulate_blocks(program, samples=BLOCK + 700, seed=1, block=BLOCK, threads=2))
     (rest,) = simulate_blocks(program, samples=BLOCK + 700, seed=1, block=BLOCK, start=BLOCK, threads=2)
     for name, values in vars(everything[1]).items():
         np.testing.assert_array_equal(getattr(rest, name), values, err_msg=name)
-
-
-def test_a_block_is_reduced_once_whoever_simulated_its_pieces(program):
-    threads = Threads()
-    for _ in range(2):  # with new resolvers, and with these
-        starts = list(threads(lambda block: (block.start, len(block)), program, samples=BLOCK + 1000, seed=1, block=BLOCK))
-        assert starts == [(0, BLOCK), (BLOCK, 1000)]
 
 
 @pytest.mark.parametrize("failing_start", [0, 500])

@@ -9,18 +9,17 @@ import trimesh
 import tolcontact as tc
 from tests import cases
 from tests.helpers import call
+from tests.shapes import patch, shape, triangles_of
 from tests.test_report import data_of, picture
 from tolcontact.discretization import discretize
 from tolcontact.geometry import preview
-from tolcontact.geometry.faces import patch, triangles
-from tolcontact.geometry.shapes import shape
 from tolcontact.report import write_view
 
 
 def chosen(part, words):
     """The triangles that the words of a face choose."""
     face = eval(f"part.{words}", {"part": part, "tc": tc})
-    return triangles(face, {part: shape(part.geometry)})
+    return triangles_of(face)
 
 
 GEOMETRIES = {

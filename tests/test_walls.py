@@ -4,7 +4,9 @@ An import is a statement, also one for the type checker alone, the stub of a laz
 """
 
 import ast
+import itertools
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -214,3 +216,81 @@ def test_tests_reach_no_private_name_and_change_no_module():
 )
 def test_a_test_that_reaches_inside_is_found(source):
     assert len(list(intrusions(ast.parse(source)))) == 1
+
+
+TESTS = Path(__file__).parent
+UNITS = TESTS / "units"
+# Helpers that look inside a room, so that a room that is rebuilt changes them, and no test of another room.
+INSIDERS = {
+    "helpers.py": "programs without the check of the nominal assembly, which resolves 128 realizations; the schema of models",
+    "shapes.py": "the triangles of a geometry and of a face, which no public name returns without a whole model",
+    "kernel_annotations.py": "a second reader of a STEP file keeps to the limits of the first, and numbers its records alike",
+    "population_referee.py": "it measures drawn parts back by the zones that the tolerances have",
+    "scripts/kill_at_each_write.py": "no public name writes an archive with a checkpoint after each block",
+    "scripts/read_shapes.py": "no public name limits the seconds that a file may take",
+}
+
+
+@cache
+def exports(room: str) -> set[str]:
+    """Names that a room offers to others: what its first file, or the stub of it, imports from its modules."""
+    file = PACKAGE / room.removeprefix("tolcontact.") / "__init__.py"
+    nodes = itertools.chain.from_iterable(map(ast.walk, trees(file))) if file.exists() else ()
+    imported = [node for node in nodes if isinstance(node, ast.ImportFrom) and node.module]
+    return {alias.asname or alias.name for node in imported for alias in node.names}
+
+
+def reaches(tree: ast.AST) -> Iterator[tuple[str, str]]:
+    """Modules of rooms that are imported, each with its room, though the room itself is what others may import."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names = {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            offered = exports(node.module) if node.module in MODULES and node.module.count(".") == 1 else set()
+            inner = {f"{node.module}.{alias.name}" for alias in node.names if alias.name not in offered}
+            names = {node.module, *(name for name in inner if name in MODULES)}
+        else:
+            continue
+        yield from ((name.split(".")[1], name) for name in names if name.startswith("tolcontact.") and name.count(".") > 1)
+
+
+def test_only_tests_of_a_room_reach_into_it():
+    """Tests of a room stand in `tests/units/ROOM`; they may reach into rooms that stand before it, too."""
+    found, insiders = [], set()
+    for file in sorted(TESTS.rglob("*.py")):
+        place, reached = file.relative_to(TESTS), list(reaches(ast.parse(file.read_text(encoding="utf-8"))))
+        if UNITS in file.parents:
+            own = ORDER.index(place.parts[1]) if len(place.parts) > 2 else -1
+            found += [f"{place} imports {name}" for target, name in reached if ORDER.index(target) > own]
+        elif str(place) in INSIDERS:
+            insiders |= {str(place)} if reached else set()
+        else:
+            found += [f"{place} imports {name}" for _, name in reached]
+    assert not found, "\n".join(found)
+    assert insiders == set(INSIDERS)
+
+
+def test_no_other_test_needs_the_tests_of_a_room():
+    for file in {*TESTS.rglob("*.py")} - {*UNITS.rglob("*.py")}:
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else [getattr(node, "module", None) or ""]
+            assert not [name for name in names if name.startswith("tests.units")], f"{file}: line {node.lineno}"
+
+
+@pytest.mark.parametrize(
+    ("source", "count"),
+    [
+        ("from tolcontact.geometry.shapes import shape", 1),
+        ("import tolcontact.geometry.shapes", 1),
+        ("from tolcontact.statistics import intervals", 1),
+        ("from tolcontact.report.html import page_of", 1),
+        ("from tolcontact.cli import app", 1),
+        ("from tolcontact.statistics import summarize", 0),
+        ("from tolcontact.analyses import contributions", 0),
+        ("from tolcontact.geometry import preview", 0),
+        ("from tolcontact import geometry, poses", 0),
+        ("import tolcontact.geometry", 0),
+    ],
+)
+def test_a_test_that_imports_the_module_of_a_room_is_found(source, count):
+    assert len(list(reaches(ast.parse(source)))) == count

@@ -5,18 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import tolcontact as tc
 from tests.cases import MODELS
-from tests.helpers import nightly
-from tests.test_json_models import load_model, written
-from tolcontact.cli.app import app
+from tests.helpers import assembly_of, call, nightly
+from tests.shapes import triangles_of
+from tests.test_json_models import written
 from tolcontact.discretization import discretize
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry import preview
-from tolcontact.geometry.faces import triangles
-from tolcontact.geometry.shapes import shape
 
 AS1 = Path(__file__).resolve().parents[1] / "studies" / "cad" / "as1-oc-214.stp"
 HALVES = [(6, 7), (8, 9), (10, 11), (12, 13), (14, 15), (16, 17)]  # of the plate's six holes
@@ -82,14 +79,14 @@ def test_a_feature_on_half_a_hole_is_doubted_and_a_whole_one_has_its_axis():
 def test_unions_and_whole_surfaces_come_with_json(tmp_path):
     model, _, _ = plate_with(tc.select.Brep(6, (47.46, 82.99, 6.667), whole=True))
     document = written(model, tmp_path / "first.json")
-    again = load_model(tmp_path / "first.json")
+    again = assembly_of(tmp_path / "first.json")
     assert again.parts[0].features[1].faces[0].selections == (tc.select.Brep(6, (47.46, 82.99, 6.667), whole=True),)
     assert written(again, tmp_path / "second.json") == document
     text = (tmp_path / "first.json").read_text()
     for wrong in ('"all"', '"any ones"'):
         (tmp_path / "wrong.json").write_text(text.replace('"any"', wrong))
         with pytest.raises(tc.TolcontactError, match='faces under the key "any"'):
-            load_model(tmp_path / "wrong.json")
+            assembly_of(tmp_path / "wrong.json")
 
 
 def written_step(tmp_path, name):
@@ -216,18 +213,17 @@ def test_holes_by_hand_are_the_patterns_of_an_assembly():
 
 def test_a_slot_is_chosen_by_any_of_its_faces():
     part = tc.Assembly("cover").part("cover", tc.Mesh(MODELS / "cover.step"))
-    meshes = {part: shape(part.geometry)}
     slot = [12, 13, 14, 15]
     selections = [tc.select.Brep(*slot), *(tc.select.Brep(number, whole="slot") for number in slot)]
-    masks = {tuple(triangles(part.face(selection), meshes)) for selection in selections}
+    masks = {tuple(triangles_of(part.face(selection))) for selection in selections}
     assert len(masks) == 1
     image = preview(part)
     for number in slot:
         (snippet,) = image.groups[number - 1]
-        assert tuple(triangles(eval(f"part.{snippet}", {"part": part, "tc": tc}), meshes)) in masks
+        assert tuple(triangles_of(eval(f"part.{snippet}", {"part": part, "tc": tc}))) in masks
     assert str(part.face(tc.select.Brep(12, whole="slot"))) == "cover slot of B-rep face 12"
     with pytest.raises(GeometryFault, match=r"face 1 belongs to no slot; slot, radius 4.05 mm, faces 12, 13, 14, 15: tc"):
-        triangles(part.face(tc.select.Brep(1, whole="slot")), meshes)
+        triangles_of(part.face(tc.select.Brep(1, whole="slot")))
     assert "expected True, False, 'slot' or 'pattern'" in next(tc.select.Brep(1, whole="pocket").faults())
 
 
@@ -241,10 +237,10 @@ def test_a_pattern_comes_with_json(tmp_path):
     model.contact("pin in the holes", moving=pin.face(), reference=holes)
     model.measure("height", pin.point(0, 0, 0), along="z")
     written(model, tmp_path / "pattern.json")
-    assert load_model(tmp_path / "pattern.json").pairs[0].reference.selections == holes.selections
+    assert assembly_of(tmp_path / "pattern.json").pairs[0].reference.selections == holes.selections
 
 
 def test_the_list_states_axes_slots_and_patterns():
-    lines = CliRunner().invoke(app, ["faces", str(MODELS / "cover.step")]).stdout.splitlines()
+    lines = call(MODELS, "faces", "cover.step").stdout.splitlines()
     assert lines[-1] == 'slot, radius 4.05 mm, faces 12, 13, 14, 15: tc.select.Brep(12, whole="slot")'
     assert "axis through (106.7483, 65.97129, 5.333333), along (0, 0, -1)" in lines[14]

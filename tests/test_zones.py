@@ -9,7 +9,6 @@ from tests.cases import Frame, toleranced
 from tests.population_referee import measured_back
 from tolcontact.discretization import discretize
 from tolcontact.variation import Draws
-from tolcontact.variation.zones import MemberZone, equal_spread, share_inside
 
 MOVED = Frame(turn=(0.4, -1.1, 2.0), shift=(1000, -700, 300))
 SAMPLES = 20_000
@@ -40,29 +39,12 @@ FACTORS = {  # t / s for 99.73 % inside; the first ten from VARIATION's table, c
 }  # fmt: skip
 
 
-def zone_with(rows):
-    """The zone of one feature, whose coordinates are its components."""
-    return [MemberZone(rows, np.eye(rows.shape[2]))]
-
-
 @pytest.mark.parametrize("name", FACTORS)
 def test_spreads_are_those_of_the_table(name):
     model, factor = FACTORS[name]
     contributors = Draws(discretize(model())).contributors
     spreads = [each.spread for each in contributors if each.geometric is not None] or [contributors[-1].tolerance.width / 6]
     assert spreads == pytest.approx([1 / factor] * len(spreads), rel=2e-3)
-
-
-@pytest.mark.slow
-def test_the_share_inside_is_that_of_draws():
-    rng = np.random.default_rng(0)
-    for entries, components in ((1, 3), (2, 4), (3, 3), (1, 6)):
-        rows, sds = rng.normal(size=(7, entries, components)), rng.uniform(0.02, 0.1, size=components)
-        width = equal_spread(zone_with(rows), sds[:0], components, 1.0) and 1.0
-        drawn = rng.normal(size=(400_000, components)) * sds
-        inside = (np.linalg.norm(np.einsum("pec,nc->npe", rows, drawn), axis=2).max(axis=1) <= width / 2).sum()
-        low, high = binom.interval(0.9999, len(drawn), share_inside(zone_with(rows), sds, width))
-        assert low - 40 <= inside <= high + 40  # the directions' own error: 1e-4
 
 
 @pytest.mark.parametrize("name", toleranced.EVERY)
@@ -111,19 +93,6 @@ def test_a_capability_off_centre_shifts_the_place_of_a_face_and_not_its_tilts():
     place, *tilts = [each for each in Draws(discretize(block)).contributors if each.geometric is not None]
     assert place.mean_shift == pytest.approx(3 * place.spread * 1.5 * (1 - 1.2 / 1.5), rel=1e-12) and len(tilts) == 2
     assert [tilt.mean_shift for tilt in tilts] == [0, 0]
-
-
-def test_spreads_are_in_proportion_to_the_width_down_to_a_nanometre():
-    rows = np.random.default_rng(1).normal(size=(7, 2, 3))
-    inner, factor = np.array([0.05]), equal_spread(zone_with(rows), np.array([0.05]), 2, 1.0)
-    for width in (1e3, 1e-3, 1e-6):
-        assert equal_spread(zone_with(rows), inner * width, 2, width) == pytest.approx(factor * width, rel=1e-6)
-
-
-def test_a_feature_that_does_not_vary_is_inside_its_zone():
-    rows = np.random.default_rng(1).normal(size=(7, 2, 3))
-    assert share_inside(zone_with(rows), np.zeros(3), 1e-3) == 1.0
-    assert share_inside(zone_with(rows[:0]), np.ones(3), 1e-3) == 1.0  # nor does one without points, whatever its components do
 
 
 def test_one_rule_for_a_tail_is_enough_that_no_share_is_stated():

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests.cases.ends import prism
-from tolcontact.declaration.geometry import UNITS
 
+MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}  # of a unit
 FAR = (3000.0, -1800.0, 900.0)  # mm
 FLANK = np.array([4.0, 0.0, 3.0]) / 5  # normal of a flank of the dovetail
 
@@ -79,7 +79,7 @@ def ascii_stl(mesh, number):
 
 def stored(mesh, path, units="mm", number=""):
     """A mesh in a file with these units; a text, if numbers are printed like `number`."""
-    scaled = trimesh.Trimesh(mesh.vertices / UNITS[units], mesh.faces, process=False)
+    scaled = trimesh.Trimesh(mesh.vertices / MILLIMETRES[units], mesh.faces, process=False)
     if number:
         path.write_text(ascii_stl(scaled, number))
     else:

@@ -36,7 +36,11 @@ from OCP.XCAFDoc import (
 )
 
 from tolcontact.child import limit_resources
-from tolcontact.kernel.step_document import LabelSequence
+
+try:
+    from OCP.collections import Sequence_TDF_Label as LabelSequence
+except ModuleNotFoundError:  # release 7.9 of OCP
+    from OCP.TDF import TDF_LabelSequence as LabelSequence
 
 ANNOTATIONS = (StepDimTol_GeometricTolerance, StepShape_DimensionalLocation, StepShape_DimensionalSize)
 # Words of the kernel where standards have others.

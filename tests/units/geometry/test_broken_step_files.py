@@ -48,8 +48,6 @@ BROKEN = {
     "zeros within": WHOLE[:HALF] + "\0" * 1000 + WHOLE[HALF + 1000 :],
     "a line twice": "".join(LINES[:100] + LINES[50:]),
 }
-
-
 NAMED = ("cut off in the middle", "without its data", "without points", "without faces", "without units", "a line twice")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from tolcontact.compilation.graph import GraphSolver
 
-qp = {name: values[None] for name, values in np.load(Path(__file__).parents[1] / "cases" / "full_joint.npz").items()}
+qp = {name: values[None] for name, values in np.load(Path(__file__).parents[2] / "cases" / "full_joint.npz").items()}
 sparsities = {
     "h": ca.Sparsity.diag(7), "g": ca.Sparsity.dense(7, 1), "a": ca.Sparsity.dense(12, 7), "lba": ca.Sparsity.dense(12, 1)
 }  # fmt: skip

@@ -13,7 +13,7 @@ from tolcontact.compilation.graph import GraphSolver
 from tolcontact.compilation.solvers import SOLVERS
 from tolcontact.simulation import simulate_blocks
 
-MODELS = Path(__file__).resolve().parents[1] / "models"
+MODELS = Path(__file__).resolve().parents[3] / "models"
 FREEDOMS, PRICE, OPENING = 6, 50.0, 1e-3
 
 
@@ -199,7 +199,7 @@ def test_equations_that_repeat_each_other_hold():
 
 def test_no_row_is_active_without_a_position(monkeypatch):
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
-    done = run(script("solve_full_joint"))
+    done = run(script(Path(__file__).with_name("solve_full_joint")))
     assert done.returncode == 0, done.stderr
 
 

@@ -12,7 +12,7 @@ from tests.cases import round_contact as round_cases
 from tolcontact import vocabulary as terms
 from tolcontact.discretization import RoundPoint, RoundPoints, discretize
 from tolcontact.geometry.analytic_surfaces import ANALYTIC_SURFACES, Cone, Cylinder, Plane
-from tolcontact.mechanics.pose import ENTRIES
+from tolcontact.mechanics import ENTRIES
 from tolcontact.mechanics.round_gap import round_gaps
 
 NONE = np.zeros(3)

@@ -1,0 +1,1 @@
+"""Tests of the insides of rooms, which may go when a room is rebuilt."""

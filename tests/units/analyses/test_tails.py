@@ -1,0 +1,25 @@
+"""Insides of `analyses` under the claims of `tests/test_tails.py`."""
+
+import numpy as np
+import pytest
+
+import tolcontact as tc
+from tests import cases
+from tests.helpers import SEATED
+from tolcontact.analyses.analysis import Engine
+from tolcontact.analyses.tails import NotAssemblable
+from tolcontact.simulation import map_blocks
+from tolcontact.variation.plans import uniform
+
+
+@pytest.mark.slow
+def test_normal_scores_are_drawn_as_in_a_run():
+    """CASES C6, rotations alone; larger deviations do not make assembly possible again."""
+    program = tc.build(cases.square_pins("rotations"), solver="daqp", method=SEATED)
+    score = NotAssemblable(Engine(program, map_blocks))
+    u = np.random.default_rng(3).standard_normal((24, len(program.draws.varying)))
+    stuck = np.stack([score(factor * u) for factor in 1.3 ** np.arange(7)])
+    assert (stuck[1:] >= stuck[:-1]).all() and set(np.unique(stuck)) == {-1.0, 1.0}
+    of_run = program.draws(seed=1, start=0, stop=24)
+    again = program.draws.from_numbers(lambda label: uniform(1, label, 0, 24), 24)
+    assert np.array_equal(again, of_run)
