@@ -3,7 +3,7 @@
 The objective is a sum over the pairs and the parts of a group, and the rows of a pair depend on few increments. So the terms of
 a pair are a Function of its poses, points and constants, which `assemble` calls for each pair of this kind. A tower of thirty
 blocks is compiled as fast as a tower of six. Up to rounding, the results are equal to the results of contact_rows and
-quadratic_terms for the whole group (tests/test_pair_terms.py).
+quadratic_terms for the whole group (tests/units/compilation/test_pair_terms.py).
 """
 
 import pickle
