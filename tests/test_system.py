@@ -3,7 +3,6 @@
 import ast
 import os
 import re
-import resource
 import sys
 from collections.abc import Iterator
 
@@ -11,7 +10,6 @@ import pytest
 
 from tests.helpers import COMMAND, ROOT, SCRIPTS, run
 from tests.step_files import step_block
-from tolcontact.system.resources import peak_memory
 
 PACKAGE = ROOT / "tolcontact"
 FILES = [file for file in sorted(PACKAGE.rglob("*.py")) if file.relative_to(PACKAGE).parts[0] != "system"]
@@ -212,13 +210,11 @@ def test_workers_ignore_an_interrupt_where_they_cannot_inherit_that_it_is_blocke
     assert done.stdout == "[True]\n", done.stderr
 
 
-def test_peak_memory_is_in_bytes_on_macos_as_well():
-    """There the system states bytes, on Linux units of 1024 bytes."""
-    code = "import sys; sys.platform = 'darwin'\nfrom tolcontact.system.resources import peak_memory\nimport resource\n"
-    code += "print(peak_memory() <= resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < 2 * peak_memory())"
+@pytest.mark.parametrize(("system", "unit"), [("darwin", 1), ("linux", 1024)])
+def test_peak_memory_is_in_bytes_on_every_system(system, unit):
+    code = f"import resource, sys; sys.platform = {system!r}\nfrom tolcontact.system.resources import peak_memory\n"
+    code += f"peak = {unit} * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\nprint(peak <= peak_memory() < 2 * peak)"
     assert run([sys.executable, "-c", code]).stdout == "True\n"
-    stated = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    assert 1024 * stated <= peak_memory() < 2048 * stated
 
 
 def test_letters_that_a_code_page_lacks_become_escapes(tmp_path):
