@@ -69,7 +69,7 @@ def test_far_answers_are_not_certified():
     run = vars(simulate_block(program, free["deviations"], resolvers=resolvers))
     far = largest_turn(free) > max_turn
     assert far.sum() > 2
-    assert (run["status"][far] == Status.DOUBTFUL).all() and (run["starts"][far] == 5).all()
+    assert (run["status"][far] == Status.DOUBTFUL).all() and (run["starts"][far] == 9).all()
     assert (run["status"][~far] == free["status"][~far]).all()
     assert largest_turn(run)[run["status"] == Status.RESOLVED].max() <= max_turn
 
