@@ -90,6 +90,19 @@ def shapes_are_checked(request):
     config.update("jaxtyping_disable", False)
 
 
+@pytest.fixture
+def early_process(tmp_path):
+    """A process that was started before its files are known, by a model that names one of them."""
+    (tmp_path / "model.py").write_text('part = tc.Mesh("block.step")')
+    from tolcontact import shape_worker  # noqa: PLC0415  (the hook must be there first)
+
+    worker = shape_worker.start_early(["--samples", "20", str(tmp_path / "model.py")])
+    process = worker.process
+    yield process
+    shape_worker.end_unused()
+    process.wait()
+
+
 @pytest.fixture(scope="session")
 def drawing():
     """Bodies can be drawn here; where there is no OpenGL, not even in software, the process that tries it dies."""

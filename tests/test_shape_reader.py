@@ -129,17 +129,6 @@ def test_the_reader_ends_with_an_interrupted_process(tmp_path):
         process.wait()
 
 
-@pytest.fixture
-def early_process(tmp_path):
-    """A process that was started before its files are known, by a model that names one of them."""
-    (tmp_path / "model.py").write_text('part = tc.Mesh("block.step")')
-    worker = shape_worker.start_early(["--samples", "20", str(tmp_path / "model.py")])
-    process = worker.process
-    yield process
-    shape_worker.end_unused()
-    process.wait()
-
-
 def test_a_new_process_reads_the_files_if_the_early_one_is_gone(tmp_path, early_process):
     early_process.kill()
     early_process.wait()

@@ -272,7 +272,7 @@ def _passes_facet(side, f, p, q, start, end, shares, senses):  # type: ignore[no
 def _passes_listed(side, f, p, q, start, end, shares, senses):  # type: ignore[no-untyped-def]
     """Return whether the segment from p to q passes a facet, or any other one near it if the facet is not flat.
 
-    start, end   heights of p and q over its plane, which have opposite signs
+    start, end   heights of p and q over its plane, not of the same sign
     """
     first, last = side.first_members[f], side.first_members[f + 1]
     if last - first > MANY:
@@ -304,7 +304,7 @@ def _passes_any(owner, target, X, is_forward, motion, shares, senses):  # type: 
         for m in range(owner.starts[j], owner.starts[j + 1]):
             if owner.reaches[m] > motion:
                 break
-            # Here, since a call takes much longer than this.
+            # Before the call, which copies the arrays of the body and takes ten times as long.
             start, end = _heights(target, owner.listed[m], p, q)
             if start * end > 0.0 or start == end:
                 continue

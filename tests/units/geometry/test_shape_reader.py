@@ -7,7 +7,6 @@ import trimesh
 
 import tolcontact as tc
 from tests.step_files import step_block
-from tolcontact import shape_worker
 from tolcontact.geometry.files import ReadingLimits, read_files
 
 
@@ -16,17 +15,6 @@ def test_a_file_that_takes_too_much_memory_is_a_fault(tmp_path):
     trimesh.creation.icosphere(7).export(tmp_path / "fine.obj")
     (fault,) = read_files([tc.Mesh(tmp_path / "fine.obj")], ReadingLimits(memory=350 * 2**20)).values()
     assert "takes more than 0.342 GiB of memory" in str(fault)
-
-
-@pytest.fixture
-def early_process(tmp_path):
-    """A process that was started before its files are known, by a model that names one of them."""
-    (tmp_path / "model.py").write_text('part = tc.Mesh("block.step")')
-    worker = shape_worker.start_early(["--samples", "20", str(tmp_path / "model.py")])
-    process = worker.process
-    yield process
-    shape_worker.end_unused()
-    process.wait()
 
 
 def test_the_process_that_was_started_early_reads_the_files(tmp_path, early_process, monkeypatch):
