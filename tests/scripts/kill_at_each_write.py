@@ -19,6 +19,7 @@ from tolcontact.workflow.runs import write_archive
 
 folder, step = Path(sys.argv[1]), int((*sys.argv, 1)[2])
 whole = folder / "whole.nc"
+CHECKPOINT = 4096  # realizations from one to the next
 program = tc.build(stations.rail() if "stations" in sys.argv else cases.stack(), solver="daqp")
 
 
@@ -48,22 +49,40 @@ def is_killed(path, write):
     return os.waitpid(child, 0)[1] != 0
 
 
-def check_resumed(path, write):
-    """Resumed it comes to the same, and goes on after the last checkpoint."""
+def resumed(path):
+    """Where a killed run goes on, after the realizations of its last checkpoint; it comes to the same as an undisturbed one."""
     begun = []
     with locked_archive(path, resume=True):
         write_archive(path, program, settings, progress=begun.append, is_resumed=path.exists())
-    reached.append((begun[0] - 1) // 4096 * 4096)
     for group in (None, *(f"field/{part.name}" for part in program.nominal.last_parts)):
-        assert contents(path, group).identical(contents(whole, group)), f"{group} after kill {write}"
-    assert not [file.name for file in folder.iterdir() if file.name.startswith(".")], f"left after kill {write}"
+        assert contents(path, group).identical(contents(whole, group)), f"{group} of {path.name}"
+    assert not [file.name for file in folder.iterdir() if file.name.startswith(".")], f"left by {path.name}"
+    return (begun[0] - 1) // CHECKPOINT * CHECKPOINT
 
 
-reached = []
-write_archive(whole, program, settings)
-for write in itertools.count(1, step):
+def reached_at(write):
+    """The last checkpoint of a run that is killed at a write; None for a run that ends before it."""
     path = folder / f"{write}.nc"
-    if not is_killed(path, write):
+    return resumed(path) if is_killed(path, write) else None
+
+
+def fill_between(first, last):
+    """Kill between two writes as well, as long as a checkpoint that lies between theirs was never the last one."""
+    if last - first > 1 and reached[last] - reached[first] > CHECKPOINT:
+        middle = (first + last) // 2
+        reached[middle] = reached_at(middle)
+        fill_between(first, middle)
+        fill_between(middle, last)
+
+
+write_archive(whole, program, settings)
+reached = {}
+for write in itertools.count(1, step):
+    checkpoint = reached_at(write)
+    if checkpoint is None:
         break
-    check_resumed(path, write)
-assert write > 100 and reached == sorted(reached) and set(reached) == {0, 4096, 8192}, (write, reached)
+    reached[write] = checkpoint
+for first, last in itertools.pairwise(list(reached)):
+    fill_between(first, last)
+order = [reached[write] for write in sorted(reached)]
+assert write > 100 and order == sorted(order) and set(order) == {0, CHECKPOINT, 2 * CHECKPOINT}, (write, reached)
