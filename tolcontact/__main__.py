@@ -20,6 +20,7 @@ def command_line() -> None:
         with interrupts.stoppable(at_once=True):
             streams.open_closed()
             check_address_space()
+            check_threads()
             limit_threads()
             gc.set_threshold(MIN_GARBAGE)
             _imported()()
@@ -40,6 +41,13 @@ def check_address_space() -> None:
     if limit is not None and limit < MIN_ADDRESS_SPACE:
         needed = f"{MIN_ADDRESS_SPACE / 1e9:g} GB"
         _refuse(f"this process may use {limit / 1e9:g} GB of address space, and its libraries need {needed}; raise ulimit -v")
+
+
+def check_threads() -> None:
+    """Exit with code 2 for a number of threads in the environment that Numba would not take."""
+    threads = os.environ.get("NUMBA_NUM_THREADS", "1")
+    if not (threads.isdecimal() and int(threads)):
+        _refuse(f"NUMBA_NUM_THREADS is {threads!r} in the environment; expected a whole number from 1, so set or unset it")
 
 
 def limit_threads() -> None:

@@ -55,11 +55,19 @@ def _acquire(holding: FileLock, lock: Path, path: str | Path) -> None:
         raise ArchiveError(f'archive "{path}" cannot be written: {error.strerror}') from error
 
 
+def _is_netcdf(path: Path) -> bool:
+    """Return whether a file begins as netCDF files do, or is empty."""
+    with path.open("rb") as file:
+        return file.read(8).startswith((b"\x89HDF\r\n\x1a\n", b"CDF")) or not path.stat().st_size
+
+
 def _check_replaceable(path: str | Path, real: Path, *, is_allowed: bool) -> None:
     if not is_allowed:
         raise ArchiveError(
             f'archive "{path}" exists; choose another name, replace it (--overwrite, overwrite=True) or continue it '
             "(--resume, resume=True)"
         )
+    if not _is_netcdf(real):
+        raise ArchiveError(f'"{path}" is no netCDF file, and only these are replaced; choose another name, or remove it first')
     if not os.access(real, os.W_OK):
         raise ArchiveError(f'archive "{path}" cannot be written: it is read-only')

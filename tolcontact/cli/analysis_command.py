@@ -12,7 +12,7 @@ from tolcontact import analyses
 from tolcontact.archive import open_archive
 from tolcontact.cli import app as common
 from tolcontact.cli.analyses import COMMANDS, REQUIRED, AnalysisCommand
-from tolcontact.cli.output import console, print_data
+from tolcontact.cli.output import console, print_csv, print_data
 from tolcontact.cli.progress import shown_progress
 from tolcontact.report import analysis_text
 from tolcontact.simulation.cluster import client_of
@@ -74,7 +74,7 @@ def _run(
     if as_json:
         print_data(dataset)
     elif as_csv:
-        typer.echo(command.frame(dataset).to_csv(lineterminator="\n"), nl=False)
+        print_csv(command.frame(dataset))
     else:
         console().print(analysis_text(command.record, dataset))
     if "met" in dataset and not dataset["met"].all():

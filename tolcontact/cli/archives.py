@@ -14,9 +14,9 @@ from tolcontact.cli.output import (
     PartNumber,
     Revision,
     Title,
-    check_page,
-    check_spreadsheet,
+    check_outputs,
     console,
+    print_csv,
     print_data,
     print_summary,
     title_entries,
@@ -41,7 +41,7 @@ def summary(
         values = estimates["statistic_value"].to_dataset("interval").to_dataframe()
         names = values.index.get_level_values(STATISTIC)
         values["units"] = [units_of(*labels) for labels in zip(names, values[MEASURE_UNITS.name], strict=True)]
-        typer.echo(values[[*ESTIMATE, "units"]].to_csv(lineterminator="\n"), nl=False)
+        print_csv(values[[*ESTIMATE, "units"]])
     elif as_json:
         print_data(estimates)
     elif limits:
@@ -68,10 +68,7 @@ def report(
 ) -> None:
     """Write a self-contained page for a browser from an archive, or a spreadsheet of its tables."""
     page = out if out or xlsx else Path(archive).with_suffix(".html")
-    if page is not None:
-        check_page(page, overwrite=overwrite)
-    if xlsx is not None:
-        check_spreadsheet(xlsx, overwrite=overwrite)
+    check_outputs([archive], page=page, spreadsheet=xlsx, overwrite=overwrite)
     entries = title_entries(title, part_number, author, revision, date, company)
     with waiting(f"writing the report of {archive}"), archives.open_archive(archive) as results:
         summary, titles = workflow.summarize(results), title_block_of(results.attrs).overridden(entries)

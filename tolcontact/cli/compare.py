@@ -11,7 +11,7 @@ import xarray as xr
 from tolcontact import report as reports
 from tolcontact.archive import locked_archive, open_archive, replacing_archive
 from tolcontact.cli import app as common
-from tolcontact.cli.output import check_page, console, print_data
+from tolcontact.cli.output import check_outputs, console, print_data
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
@@ -61,10 +61,9 @@ def compare(
     options = [name for name in MODEL_OPTIONS if name in common.set_options(context)]
     if all(are_archives) and options:
         raise OptionError(f"--{options[0]} applies to a model; archives have their own")
-    if report is not None:
-        if not all(are_archives):
-            raise OptionError("--report applies to archives; write an archive for each solver (run --out), and compare these")
-        check_page(report, overwrite=overwrite)
+    if report is not None and not all(are_archives):
+        raise OptionError("--report applies to archives; write an archive for each solver (run --out), and compare these")
+    check_outputs(inputs, archive=out, page=report, overwrite=overwrite)
     with contextlib.nullcontext() if out is None else locked_archive(out, overwrite=overwrite) as path:
         if all(are_archives):
             comparison = _compare_archives(inputs, report)

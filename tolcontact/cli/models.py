@@ -11,7 +11,7 @@ import typer
 
 from tolcontact.archive import open_archive
 from tolcontact.cli import app as common
-from tolcontact.cli.output import check_page
+from tolcontact.cli.output import check_outputs
 from tolcontact.cli.progress import waiting
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.geometry import STEP
@@ -105,9 +105,8 @@ def view(
 
     The page lists the faults of a model, which may be incomplete: it needs no measurements. For an archive it is the report.
     """
-    if out is not None:
-        check_page(out, overwrite=overwrite)
-    path = out or temporary_page(source)
+    check_outputs([source], page=out, overwrite=overwrite)
+    path = out.absolute() if out else temporary_page(source)  # a script may change the working folder
     with waiting(f"reading {source}"):
         if source.suffix.lower() == ".nc":
             with open_archive(source) as results:
@@ -119,7 +118,7 @@ def view(
         else:
             model = load_model(source)
             write_view(model, *nominal_and_faults(model), path)
-    typer.echo(f"page: {shown(str(path))}")
+    typer.echo(f"page: {shown(str(out or path))}")
     if out is None:
         typer.launch(str(path))
 

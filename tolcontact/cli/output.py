@@ -1,10 +1,11 @@
 """Output of results, checks of output files, and the options that replace entries of a title block of a report."""
 
+import itertools
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
@@ -15,7 +16,11 @@ from tolcontact import report
 from tolcontact.declaration import Assembly, TitleBlock
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
+from tolcontact.texts import csv_cell
 from tolcontact.vocabulary import BY_STATUS, UNRESOLVED
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FAILED_SHARE = 0.001
 UNBOUNDED = 10_000  # columns outside a terminal
@@ -25,6 +30,7 @@ Author = Annotated[str | None, typer.Option(help="Author of the report.", rich_h
 Revision = Annotated[str | None, typer.Option(help="Revision of the model or of its drawing.", rich_help_panel="Title block")]
 Date = Annotated[str | None, typer.Option(help="Date of the report, as text.", rich_help_panel="Title block")]
 Company = Annotated[str | None, typer.Option(help="Company that issues the report.", rich_help_panel="Title block")]
+ENDINGS = {"page": (".html", ".htm"), "spreadsheet": (".xlsx",)}
 ENTRIES = tuple(TitleBlock().entries)  # in the order of these options
 
 
@@ -33,24 +39,41 @@ def console() -> Console:
     return Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else UNBOUNDED)
 
 
-def check_page(path: Path, *, overwrite: bool = False) -> None:
-    """Raise OptionError unless a page may be written to `path`: no other file is replaced without `overwrite`."""
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise OptionError(f'"{path}" is not the name of a page; expected one that ends in .html')
-    if not path.parent.is_dir():
-        raise OptionError(f'page "{path}" cannot be written: there is no folder "{path.parent}"; make it first')
-    if not overwrite and path.exists() and not report.is_page(path):
-        raise OptionError(f'"{path}" exists, and is not a tolcontact page; choose another name, or replace it with --overwrite')
+def check_outputs(
+    inputs: Iterable[Path],
+    *,
+    archive: Path | None = None,
+    page: Path | None = None,
+    spreadsheet: Path | None = None,
+    overwrite: bool = False,
+) -> None:
+    """Raise OptionError unless a command may write its outputs: none is an input or another output, by whatever name.
+
+    Pages of tolcontact are replaced, other pages and spreadsheets only with `overwrite`. Archives are checked when locked.
+    """
+    named = {"archive": archive, "page": page, "spreadsheet": spreadsheet}
+    outputs = {name: path for name, path in named.items() if path is not None}
+    for (name, path), (other, taken) in itertools.combinations([*(("input", path) for path in inputs), *outputs.items()], 2):
+        if other in outputs and _is_same(path, taken):
+            raise OptionError(f'"{taken}" would be the {name} and the {other}; choose another name for the {other}')
+    for name, path in outputs.items():
+        if name == "archive":
+            continue
+        expected = ENDINGS[name]
+        if path.suffix.lower() not in expected:
+            raise OptionError(f'"{path}" is not the name of a {name}; expected one that ends in {expected[0]}')
+        if not path.parent.is_dir():
+            raise OptionError(f'{name} "{path}" cannot be written: there is no folder "{path.parent}"; make it first')
+        if not overwrite and path.exists() and not (name == "page" and report.is_page(path)):
+            what = ", and is not a tolcontact page" if name == "page" else ""
+            raise OptionError(f'"{path}" exists{what}; choose another name, or replace it with --overwrite')
 
 
-def check_spreadsheet(path: Path, *, overwrite: bool = False) -> None:
-    """Raise OptionError unless a spreadsheet may be written to `path`: no file is replaced without `overwrite`."""
-    if path.suffix.lower() != ".xlsx":
-        raise OptionError(f'"{path}" is not the name of a spreadsheet; expected one that ends in .xlsx')
-    if not path.parent.is_dir():
-        raise OptionError(f'spreadsheet "{path}" cannot be written: there is no folder "{path.parent}"; make it first')
-    if not overwrite and path.exists():
-        raise OptionError(f'"{path}" exists; choose another name, or replace it with --overwrite')
+def _is_same(path: Path, other: Path) -> bool:
+    """Return whether two paths lead to one file; names that differ only in case do on some systems."""
+    if path.exists() and other.exists():
+        return path.samefile(other)
+    return str(path.resolve()).casefold() == str(other.resolve()).casefold()
 
 
 def print_summary(summary: xr.Dataset) -> None:
@@ -67,6 +90,12 @@ def print_data(dataset: xr.Dataset) -> None:
     data = dataset.reset_coords()
     numbers = {name: values.copy(data=_as_json(values.values)) for name, values in data.items() if values.dtype.kind == "f"}
     typer.echo(json.dumps(data.assign(numbers).to_dict(), allow_nan=False, default=_plain))
+
+
+def print_csv(frame: "pd.DataFrame") -> None:
+    """Print a table as CSV, which a spreadsheet opens without running any text in it as a formula."""
+    cells = frame.rename(index=csv_cell, columns=csv_cell).map(csv_cell)
+    typer.echo(cells.to_csv(lineterminator="\n"), nl=False)
 
 
 def _as_json(values: np.ndarray) -> np.ndarray:

@@ -1,6 +1,7 @@
 """tolcontact run."""
 
 import functools
+import re
 import tempfile
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +11,7 @@ import typer
 from tolcontact import report as reports
 from tolcontact.archive import Run, open_unchecked
 from tolcontact.cli import app as common, output
-from tolcontact.cli.output import check_page, print_summary
+from tolcontact.cli.output import print_summary
 from tolcontact.cli.progress import shown_progress, stopped
 from tolcontact.errors import OptionError, shown
 from tolcontact.simulation.cluster import client_of
@@ -72,7 +73,10 @@ def run(
     The exit code is 1 if more than 0.1 % of the realizations were not resolved (not converged, not assemblable, or doubtful),
     and if an interval is not as narrow as --until states.
     """
-    _check_files(out, report, overwrite=overwrite, resume=resume)
+    if out is None and (resume or (overwrite and report is None)):
+        raise OptionError("--overwrite and --resume need an archive; name one: --out FILE.nc")
+    output.check_outputs([model], archive=out, page=report, overwrite=overwrite)
+    report = report and report.absolute()  # a script may change the working folder
     method = common.method_choices(resolution=resolution, objective=objective)
     titles = output.title_entries(title, part_number, author, revision, date, company)
     output.note_kept_title(out if resume else None, titles)
@@ -90,20 +94,12 @@ def run(
 
         path = write_run(
             functools.partial(output.titled_model, model, titles),
-            Run(seed, samples, keep, surfaces, int(fields) if fields.isdigit() else fields, plan),
+            Run(seed, samples, keep, surfaces, int(fields) if re.fullmatch(r"[0-9]{1,18}", fields) else fields, plan),
             out or Path(folder) / "results.nc", solver=solver, method=method, overwrite=overwrite and out is not None,
             resume=resume, until=until, client=client, progress=progress,
         )  # fmt: skip
         summary, shortfall = _summed_up(path, until, report)
     _print_results(summary, out, shortfall, quiet=quiet)
-
-
-def _check_files(out: Path | None, report: Path | None, *, overwrite: bool, resume: bool) -> None:
-    """Raise OptionError for options without their file, and for a page that must not be written."""
-    if out is None and (resume or (overwrite and report is None)):
-        raise OptionError("--overwrite and --resume need an archive; name one: --out FILE.nc")
-    if report is not None:
-        check_page(report, overwrite=overwrite)
 
 
 def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Summary, str]:

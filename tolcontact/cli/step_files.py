@@ -27,6 +27,7 @@ from tolcontact.pmi.claims import Annotation
 from tolcontact.pmi.declared import DeclaredFile, declared_file
 from tolcontact.pmi.script import script
 from tolcontact.report.table import FILE_WIDTH
+from tolcontact.texts import csv_cell
 
 MAX_ROWS = 2000  # of a table, which takes a second; a drawing has about a hundred
 _CSV = (
@@ -229,20 +230,20 @@ def _csv(declared: DeclaredFile) -> str:
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(_CSV)
     for tolerance in information.tolerances:
-        rows.writerow((
+        rows.writerow(map(csv_cell, (
             "tolerance", tolerance.number, tolerance.record, tolerance.kind, shown(tolerance.name), tolerance.value, None, None,
             "mm", shown(tolerance.zone), tolerance.details, tolerance.datum_system, tolerance.refines,
             _numbers(tolerance.face_records), _numbers(tolerance.other_records), None, None,
             _named(tolerance.face_records, faces), None, *map(shown, declarations.get(tolerance.record, ("", ""))),
-        ))  # fmt: skip
+        )))  # fmt: skip
     for dimension in information.dimensions:
-        rows.writerow((
+        rows.writerow(map(csv_cell, (
             "dimension", dimension.number, dimension.record, dimension.kind, shown(dimension.name), dimension.nominal,
             dimension.lower, dimension.upper, dimension.unit, None, dimension.details, None, None,
             _numbers(dimension.face_records), _numbers(dimension.other_records), _numbers(dimension.end_face_records),
             _numbers(dimension.end_other_records), _named(dimension.face_records, faces),
             _named(dimension.end_face_records, faces), *map(shown, declarations.get(dimension.record, ("", ""))),
-        ))  # fmt: skip
+        )))  # fmt: skip
     return text.getvalue()
 
 

@@ -15,6 +15,7 @@ from tolcontact.declaration.checks import Declaration
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import is_length, is_line
 from tolcontact.errors import shown
+from tolcontact.input_files import check_inputs
 
 SEPARATORS = {";": "semicolons", "\t": "tabs"}
 MIN_EIGENVALUE = 1e-12  # of a correlation matrix; of a smaller absolute value it is zero
@@ -162,6 +163,7 @@ def _table_of(source: str | Path, title: str, names: Set[str]) -> Any:
     """
     pd = importlib.import_module("pandas")
     try:
+        check_inputs([Path(source)])
         table = pd.read_csv(source)
     except (OSError, ValueError) as error:
         raise ValueError(f'population "{title}" cannot be read as CSV: {str(error).splitlines()[0]}') from error

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal, TypedDict, Unpack, get_args
 
 from tolcontact.declaration.checks import LENGTH, LENGTH_OR_0, TRUTH, Check, Checked, direction_faults, one_of
 from tolcontact.declaration.size import Form
-from tolcontact.declaration.values import Direction, Vector, direction as _direction, is_length
+from tolcontact.declaration.values import MAX_NUMBER, Direction, Vector, direction as _direction, is_length
 from tolcontact.readable import Readable
 
 Rule = Literal["99.73 % inside", "6 sigma at the extremes", "translation"]  # the last one is without tilts
@@ -178,7 +178,7 @@ class GeometricTolerance(Checked):
 
     def faults(self) -> Iterator[str]:
         if not (is_length(self.width) and (self.width > 0 or (self.width == 0 and self.material))):
-            bound = "0 or above" if self.material else "above 0"
+            bound = f"{'0 or above' if self.material else 'above 0'}, up to {MAX_NUMBER:g}"
             yield f"width is {self.width!r}; expected the full width of the zone in mm, {bound}"
         yield from self._datum_faults()
         yield from self._zone_faults()

@@ -21,6 +21,7 @@ from tolcontact.declaration.measure import Tape
 from tolcontact.declaration.part import Face
 from tolcontact.declaration.place import EntryError, Sources
 from tolcontact.errors import ScriptError, TolcontactError, clipped, nearest_name
+from tolcontact.input_files import check_inputs
 
 UNEXPECTED = re.compile(r"([\w.]+)\(\) got an unexpected keyword argument '(\w+)'")  # a TypeError of Python
 PACKAGES = ("tolcontact.declaration", "tolcontact.geometry", "tolcontact.fasteners")  # whose functions scripts call
@@ -35,8 +36,7 @@ def read_json(path: Path) -> Assembly:
     structure.
     """
     try:
-        if (size := path.stat().st_size) > MAX_BYTES:
-            raise ValueError(f"it has {size} bytes; expected at most {MAX_BYTES}")
+        check_inputs([path], MAX_BYTES)
         document = json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_unique)
     except (OSError, ValueError, RecursionError) as error:
         raise ScriptError(f'model "{path}" cannot be read as JSON: {error}') from error

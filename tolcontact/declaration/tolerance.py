@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 
 import scipy
 
-from tolcontact.declaration.values import is_length
+from tolcontact.declaration.values import MAX_NUMBER, is_length
 from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
 from tolcontact.readable import Readable
 
@@ -59,7 +59,7 @@ class Tolerance(Readable):
             if fault := text_fault(self.range):
                 yield f"tolerance is {fault}"
             elif not (is_length(self.range) and self.width >= 0):
-                yield f"tolerance is {self.range!r}; expected the full width of the zone in mm, 0 or above"
+                yield f"tolerance is {self.range!r}; expected the full width of the zone in mm, from 0 to {MAX_NUMBER:g}"
         else:
             yield from self._scipy_faults()
         if not is_length(self.shift):

@@ -15,6 +15,7 @@ import numpy as np
 from tolcontact.errors import CONTROL_CHARACTERS, shown
 
 MAX_NAME = 500  # characters
+MAX_NUMBER = 1e15  # of a length [mm], a force, a stiffness: nothing overflows
 MAX_GROUP_NAME = 255  # bytes in UTF-8: the netCDF library's NC_MAX_NAME is 256, with which some groups cannot be written
 _KEY = re.compile(r"\w(?:[^/]*[^/\s])?")
 
@@ -129,8 +130,8 @@ def is_finite(value: Vector) -> bool:
 
 
 def is_length(value: Any) -> bool:
-    """Return True for a finite number; a truth value is not a number."""
-    return isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(value)
+    """Return True for a finite number, up to MAX_NUMBER either way; a truth value is not a number."""
+    return isinstance(value, numbers.Real) and not isinstance(value, bool) and abs(value) <= MAX_NUMBER
 
 
 def script_line() -> str:

@@ -23,6 +23,7 @@ from tolcontact.geometry.spreading import spread
 from tolcontact.geometry.surface import Surface
 
 COVARIANCE: Covariance = "matern 5/2"  # for the heights between stations
+MIN_EXTENT_SHARE = 0.5  # of a face, in each of its principal directions
 MIN_POINTS = 24
 MAX_HEIGHT_SHARE = 0.02  # of a face's size: a point further from its surface was not measured on it
 DIGITS = 6  # of mm: points that are no further apart are one, whose scatter is not independent
@@ -108,6 +109,13 @@ def _scan(cloud: np.ndarray, path: str, face: Surface, everywhere: np.ndarray, a
     if distance > face.mesh.scale / 4:
         raise GeometryFault(
             f'"{path}" has no points within {distance:.3g} mm of a place of the face; expected points all over it'
+        )
+    *_, axes = np.linalg.svd(everywhere - everywhere.mean(axis=0), full_matrices=False)
+    extents, extents_of_face = np.ptp(feet @ axes.T, axis=0), np.ptp(everywhere @ axes.T, axis=0)
+    if (narrow := extents < MIN_EXTENT_SHARE * extents_of_face - 1e-6 * face.mesh.scale).any():
+        raise GeometryFault(
+            f'"{path}" has points over {extents[narrow][0]:.3g} mm of the {extents_of_face[narrow][0]:.3g} mm that the face '
+            "extends in a direction; expected points all over it"
         )
     feet, normals, heights = feet[distinct], normals[distinct], heights[distinct]
     terms = displacement_terms(normals, feet - feet.mean(axis=0))

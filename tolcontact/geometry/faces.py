@@ -19,6 +19,7 @@ from tolcontact.geometry.shapes import placement_of
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.tolerances import OPPOSING_COSINE, ROUNDING
 from tolcontact.geometry.triangle_mesh import have_area, overlaps, subdivided
+from tolcontact.user_functions import FunctionError, called
 
 NEAR_DIVISIONS = 100
 CUT = 4  # refinement factor of the pieces of triangles in one step
@@ -126,9 +127,9 @@ def _by_index(face: Face, mesh: trimesh.Trimesh, selection: Triangles) -> np.nda
 
 def _by_function(face: Face, mesh: trimesh.Trimesh, selection: Picked) -> np.ndarray:
     try:
-        mask = np.asarray(selection.function(mesh.triangles_center, mesh.face_normals))
-    except Exception as error:  # a user's function may raise anything; it becomes a fault of the model
-        raise GeometryFault(f"face {face}: its function failed with {type(error).__name__}: {error}") from error
+        mask = np.asarray(called(selection.function, mesh.triangles_center, mesh.face_normals))
+    except FunctionError as error:
+        raise GeometryFault(f"face {face}: its function {error}") from error
     if mask.shape != (len(mesh.faces),) or mask.dtype != bool:
         raise GeometryFault(
             f"face {face}: its function returned an array of shape {mask.shape} and type {mask.dtype}; "

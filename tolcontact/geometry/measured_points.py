@@ -6,6 +6,7 @@ import numpy as np
 import trimesh
 
 from tolcontact.errors import GeometryFault
+from tolcontact.input_files import check_inputs
 
 MIN_FILES = 3  # smallest number of parts with a meaningful spread
 EXPECTED = "expected lines of three numbers x, y, z [mm], in the frame of the part"
@@ -22,6 +23,10 @@ def measured_points(pattern: str) -> dict[Path, np.ndarray]:
             f"measured={pattern!r} names {len(paths)} files; expected at least {MIN_FILES}, one for each measured part, "
             'as in "scans/*.csv"'
         )
+    try:
+        check_inputs(paths)
+    except (OSError, ValueError) as error:
+        raise GeometryFault(f"measured={pattern!r} cannot be read: {error}") from error
     return {path: _points(path) for path in paths}
 
 
@@ -51,7 +56,7 @@ def _of_table(path: Path) -> np.ndarray:
         for number, line in enumerate(lines, start=1)
         if line.strip() and not line.lstrip().startswith("#")
     ]
-    if rows and not _is_number(rows[0][1][0]):
+    if rows and not any(map(_is_number, rows[0][1])):  # a heading
         rows = rows[1:]
     for number, row in rows:
         if len(row) != 3 or not all(map(_is_number, row)):

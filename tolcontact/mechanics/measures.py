@@ -13,6 +13,7 @@ from tolcontact.errors import Faults, designation
 from tolcontact.mechanics.group_equations import face_height, face_pose
 from tolcontact.mechanics.measurements import Observed, value_of
 from tolcontact.mechanics.pose import ENTRIES, Pose
+from tolcontact.user_functions import FunctionError, called
 
 UNARY_FUNCTIONS: dict[str, Callable[[Any], Any]] = {
     "neg": lambda a: -a, "exp": ca.exp, "log": ca.log, "sqrt": ca.sqrt, "sq": lambda a: a * a, "twice": lambda a: 2 * a,
@@ -127,11 +128,8 @@ def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list
             continue
         try:
             expressions.append(_expression(measure, nominal, poses, deviations))
-        except Exception as error:  # a user's function may raise anything; it becomes a fault of the model
-            faults.append(
-                f"{designation(measure.noun, measure)}: its function failed with "
-                f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
-            )
+        except FunctionError as error:
+            faults.append(f"{designation(measure.noun, measure)}: its function {error}")
             expressions.append(ca.SX.nan(1))
     faults.refuse(nominal.assembly.name)
     return expressions
@@ -150,8 +148,11 @@ def _expression(measure: Measure, nominal: Nominal, poses: Sequence[Pose], devia
             moved = part_poses.position(point) - ca.DM(origin)
         return ca.dot(ca.DM(np.array(measure.along)), moved)
     function: Any = measure.of
-    value: Any = replay(measure.of, poses, deviations) if isinstance(measure.of, tuple) else function(part_poses)
-    expression = ca.SX(value)
+    recorded = isinstance(function, tuple)
+    expression = called(lambda: ca.SX(replay(function, poses, deviations) if recorded else function(part_poses)))
     if expression.shape != (1, 1):
-        raise ValueError(f"it returned an expression of shape {expression.shape}; expected one number")
+        raise FunctionError(f"returned an expression of shape {expression.shape}; expected one number")
+    known = {symbol.element_hash() for symbol in ca.symvar(ca.vertcat(*(pose.vector() for pose in poses), deviations))}
+    if unknown := [symbol.name() for symbol in ca.symvar(expression) if symbol.element_hash() not in known]:
+        raise FunctionError(f"returned an expression of symbols of its own ({', '.join(unknown)}); expected poses alone")
     return expression

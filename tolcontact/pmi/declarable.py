@@ -105,7 +105,7 @@ def _limits(stated: Dimension, nominal: float, is_inner: bool) -> tuple[float, f
         raise Undeclared("its limits are not stated")
     basis = nominal if stated.nominal is None else factor * stated.nominal
     try:
-        fit = tolerance_class(stated.fit.split()[0])
+        fit = tolerance_class("".join(stated.fit.split()[:1]))
         lower, upper = fit.deviations(basis) if fit else (math.nan, math.nan)
     except UndefinedClass as error:
         raise Undeclared(str(error)) from error

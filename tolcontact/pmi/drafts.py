@@ -121,7 +121,7 @@ def _with_claim(draft: Draft, claim: Claim) -> Draft:
             return replace(draft, datum=claim)
         case Dimension() as dimension:
             if not isinstance(geometry, FeatureOfSize):
-                kind = draft.name.split()[0]
+                kind = draft.name.partition(" ")[0]
                 raise Undeclared(
                     f"sizes of features are those of cylinders, spheres and two opposed planes, and it is a {kind}"
                 )

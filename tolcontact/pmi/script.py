@@ -1,6 +1,5 @@
 """A model script with the features that the PMI of a file states, as a starting point."""
 
-import json
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -14,6 +13,7 @@ from tolcontact.declaration.size import Size
 from tolcontact.errors import shown
 from tolcontact.pmi.annotations import Tolerance
 from tolcontact.pmi.declared import DeclaredFile
+from tolcontact.texts import literal
 
 MAX_WIDTH = 120  # of a line that can be broken
 _DIGITS = 9  # of lengths: more than a shape resolves
@@ -24,13 +24,13 @@ def script(path: Path, declared: DeclaredFile) -> str:
     comments = [str(entry) for entry in declared.annotations if entry.reason and isinstance(entry.annotation, Tolerance)]
     comments = [f"- {comment}" for comment in [*comments, *declared.faults]]
     return "\n".join([
-        f'"""Parts of {shown(path.name)}, with the tolerances that it states; add locators, contact and measures."""',
+        f'""{literal(f"Parts of {path.name}, with the tolerances that it states; add locators, contact and measures.")}""',
         "",
         "import tolcontact as tc",
         "",
         "",
         "def assembly() -> tc.Assembly:",
-        f"    model = tc.Assembly({_text(path.stem)})",
+        f"    model = tc.Assembly({literal(path.stem)})",
         *(line for part in declared.parts for line in _part_lines(part)),
         *(["    # Not declared, or not wholly:"] if comments else []),
         *(line for comment in comments for line in _comment_lines(comment)),
@@ -49,28 +49,28 @@ def _comment_lines(comment: str) -> list[str]:
 
 def _part_lines(part: Part) -> Iterator[str]:
     assert isinstance(part.geometry, Mesh)
-    body = "" if part.geometry.body is None else f", body={_text(part.geometry.body)}"
+    body = "" if part.geometry.body is None else f", body={literal(part.geometry.body)}"
     place = "".join(f", {name}={vector!r}" for name in ("at", "rotation") if any(vector := getattr(part, name)))
-    yield f"    part = model.part({_text(part.name)}, tc.Mesh({_text(str(part.geometry.source))}{body}){place})"
+    yield f"    part = model.part({literal(part.name)}, tc.Mesh({literal(str(part.geometry.source))}{body}){place})"
     named = {feature for pattern in part.toleranced if isinstance(pattern, Pattern) for feature in pattern.borrowed}
     named |= {feature for targets in part.targets for feature in targets.features}
     for declared in part.toleranced:
         name = f"{_identifier(declared.name)} = " if declared in named else ""
         yield from _lines(f"    {name}part.{declared.noun}(", _arguments(declared))
     for targets in part.targets:
-        yield from _lines("    part.datum_targets(", [_text(targets.letter), *map(_point, targets.points)])
+        yield from _lines("    part.datum_targets(", [literal(targets.letter), *map(_point, targets.points)])
 
 
 def _arguments(declared: Feature | Pattern) -> list[str]:
     """Return the arguments with which a feature or pattern is declared."""
-    arguments = [_text(declared.name)]
+    arguments = [literal(declared.name)]
     if isinstance(declared, Feature):
         arguments += map(_face, declared.faces)
     else:
         for member in declared.constituents:
             arguments.append(_identifier(member.name) if isinstance(member, Feature) else _member(member))
     arguments += map(_source, declared.tolerances)
-    return arguments + ([] if declared.datum is None else [f"datum={_text(declared.datum)}"])
+    return arguments + ([] if declared.datum is None else [f"datum={literal(declared.datum)}"])
 
 
 def _point(point: Point) -> str:
@@ -102,7 +102,7 @@ def _face(face: Face) -> str:
 
 def _brep(selection: Any) -> str:
     assert isinstance(selection, Brep)
-    return f"tc.select.Brep({', '.join(map(_text, selection.which))})"
+    return f"tc.select.Brep({', '.join(map(literal, selection.which))})"
 
 
 def _source(tolerance: Size | GeometricTolerance) -> str:
@@ -111,12 +111,7 @@ def _source(tolerance: Size | GeometricTolerance) -> str:
     for option in (member for member in fields(tolerance) if member.name != "of"):
         value = getattr(tolerance, option.name)
         if value != option.default:
-            text = f"{value:.{_DIGITS}g}" if isinstance(value, float) else _text(value)
+            text = f"{value:.{_DIGITS}g}" if isinstance(value, float) else literal(value)
             arguments.append(f"{option.name}={text}" if option.kw_only else text)
     name = tolerance.of.name if isinstance(tolerance, GeometricTolerance) else type(tolerance).__name__
     return f"tc.{name}({', '.join(arguments)})"
-
-
-def _text(value: Any) -> str:
-    """Return a text, a number or None as Python reads it, texts in double quotes."""
-    return "None" if value is None else json.dumps(value, ensure_ascii=False)

@@ -1,6 +1,7 @@
 """The tables of a report as a spreadsheet: one sheet per table, numbers as numbers, units in the headings."""
 
 import importlib
+import io
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,10 +20,10 @@ from tolcontact.report.model_tables import archived_settings, model_tables
 from tolcontact.report.results_table import STATISTICS, result_rows
 from tolcontact.report.table import Table
 from tolcontact.statistics.capability import VERDICT_RULE
+from tolcontact.texts import sheet_cell
 from tolcontact.vocabulary import units_of
 
 MAX_WIDTH = 48  # characters of a column
-FORMULA_SIGNS = ("=", "+", "-", "@")  # a text that begins with one of them might be run as a formula
 INTERVAL = ("", ", lower end of its 95 % interval", ", upper end of its 95 % interval")
 
 
@@ -40,21 +41,23 @@ def write_spreadsheet(results: xr.DataTree, summary: xr.Dataset, path: Path, tit
     bold = openpyxl.styles.Font(bold=True)
     for sheet in sheets_of(results, summary, title_block or title_block_of(results.attrs)):
         page = book.create_sheet(sheet.title)
-        page.append(list(sheet.columns))
+        page.append(list(map(sheet_cell, sheet.columns)))
         for row in sheet.rows:
             page.append([_plain(cell) for cell in row])
         for cells in page.iter_rows():
             for cell in cells:
-                if isinstance(cell.value, str) and cell.value.startswith(FORMULA_SIGNS):
-                    cell.data_type = "s"
+                if isinstance(cell.value, str):
+                    cell.data_type = "s"  # neither a formula nor an error value, whatever it says
         for cell in page[1]:
             cell.font = bold
             texts = [sheet.columns[cell.column - 1], *(str(row[cell.column - 1]) for row in sheet.rows)]
             page.column_dimensions[cell.column_letter].width = min(max(map(len, texts)) + 2, MAX_WIDTH)
         page.freeze_panes = "B2"
+    content = io.BytesIO()
+    book.save(content)
     try:
         with replacing(path) as part:
-            book.save(part)
+            part.write_bytes(content.getvalue())
     except OSError as error:
         raise ArchiveError(f'spreadsheet "{path}" cannot be written: {error.strerror}') from error
 
@@ -140,4 +143,4 @@ def _plain(value: Any) -> Any:
     """Return a cell for openpyxl, without numbers that a spreadsheet cannot contain."""
     if isinstance(value, np.generic):
         value = value.item()
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return None if isinstance(value, float) and not math.isfinite(value) else sheet_cell(value)

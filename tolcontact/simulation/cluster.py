@@ -6,6 +6,7 @@ shards of lost workers to other workers. Shards that a restarted scheduler does 
 """
 
 import logging
+import os
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -38,6 +39,7 @@ log = logging.getLogger(__name__)
 
 SHARDS_AHEAD = 4  # shards in progress for each thread of a worker
 SHARD_SECONDS, MAX_SHARD_ROWS = 1.0, 1 << 15
+WORKERS_PER_CORE = 16  # more than any run can use: each takes some 200 MB
 WORKER_TIMEOUT = 60.0  # s: for a lost connection, and for the first worker
 LOOPBACK = "127.0.0.1:0"  # any port; by default, the dashboard of a cluster is served on all interfaces
 LOOP_TIMEOUT, SCHEDULER_TIMEOUT = 1.0, 5.0  # s: for the end of an event loop, for an answer of the scheduler
@@ -61,8 +63,9 @@ def client_of(workers: int | None, scheduler: str | None) -> Iterator[Any]:
 @contextmanager
 def local_cluster(workers: int) -> Iterator[Any]:
     """Open the client of new processes on this machine, with one thread each; they always end with the client."""
-    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
-        raise OptionError(f"workers is {workers!r}; expected a whole number, at least 1")
+    most = WORKERS_PER_CORE * (os.cpu_count() or 1)
+    if isinstance(workers, bool) or not isinstance(workers, int) or not 1 <= workers <= most:
+        raise OptionError(f"workers is {workers!r}; expected a whole number from 1 to {most}, {WORKERS_PER_CORE} for each core")
     with needs_dask():
         local_cluster_type, security = distributed.LocalCluster, distributed.Security.temporary()
         default_environ = dask.config.get("distributed.nanny.pre-spawn-environ")
