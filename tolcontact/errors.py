@@ -52,15 +52,15 @@ def designation(kind: str, thing: NamedDeclaration) -> str:
     return f'{kind} "{thing.name}" ({thing.declared_at})'
 
 
-class GeometryFault(Exception):
-    """A sentence on what is wrong with a shape; it is collected with the other faults of a model."""
-
-
 class TolcontactError(Exception):
     """Base of all errors that a user can cause and fix."""
 
     def __init__(self, message: str) -> None:
         super().__init__(shown(message))
+
+
+class GeometryFault(TolcontactError):
+    """A sentence on what is wrong with a shape; it is collected with the other faults of a model."""
 
 
 class ModelError(TolcontactError):

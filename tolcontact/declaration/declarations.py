@@ -10,6 +10,7 @@ from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import Direction, direction, script_line, vector as _vector
+from tolcontact.user_functions import refuse_in_functions
 
 T = TypeVar("T")
 
@@ -26,6 +27,7 @@ class Declarations:
 
     def _add(self, name: str, thing: T) -> T:
         """Append a declaration to a list of the assembly and return it."""
+        refuse_in_functions()
         self.assembly._declared[name].append(thing)
         return thing
 

@@ -11,6 +11,7 @@ from tolcontact.declaration.selection import Near, Picker, Selection, criterion
 from tolcontact.declaration.toleranced import Control, Toleranced, letter_faults
 from tolcontact.declaration.values import Side, Vector, is_finite, script_line, vector
 from tolcontact.readable import Readable
+from tolcontact.user_functions import refuse_in_functions
 
 D = TypeVar("D", bound=Declaration)
 
@@ -101,6 +102,7 @@ class Part(Declaration):
 
     def add(self, declared: D) -> D:
         """Add a declaration of this part, and return it."""
+        refuse_in_functions()
         self._declared.append(declared)  # type: ignore[arg-type]
         return declared
 

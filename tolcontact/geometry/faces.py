@@ -127,7 +127,7 @@ def _by_index(face: Face, mesh: trimesh.Trimesh, selection: Triangles) -> np.nda
 
 def _by_function(face: Face, mesh: trimesh.Trimesh, selection: Picked) -> np.ndarray:
     try:
-        mask = np.asarray(called(selection.function, mesh.triangles_center, mesh.face_normals))
+        mask = called(lambda: np.asarray(selection.function(mesh.triangles_center, mesh.face_normals)))
     except FunctionError as error:
         raise GeometryFault(f"face {face}: its function {error}") from error
     if mask.shape != (len(mesh.faces),) or mask.dtype != bool:
