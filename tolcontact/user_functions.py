@@ -29,7 +29,7 @@ def called(function: Callable[..., Any], *arguments: Any) -> Any:
     streams, errors = (sys.stdin, sys.stdout, sys.stderr), np.geterr()
     folder = Path.cwd() if Path().exists() else None
     is_main = threading.current_thread() is threading.main_thread()
-    handlers = {number: signal.getsignal(number) for number in signal.valid_signals()} if is_main else {}
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)} if is_main else {}
     recursion, modules, token = sys.getrecursionlimit(), list(sys.path), _IS_RUNNING.set(True)
     try:
         with warnings.catch_warnings():

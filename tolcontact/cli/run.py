@@ -73,10 +73,7 @@ def run(
     The exit code is 1 if more than 0.1 % of the realizations were not resolved (not converged, not assemblable, or doubtful),
     and if an interval is not as narrow as --until states.
     """
-    if out is None and (resume or (overwrite and report is None)):
-        raise OptionError("--overwrite and --resume need an archive; name one: --out FILE.nc")
-    output.check_outputs([model], archive=out, page=report, overwrite=overwrite)
-    report = report and report.absolute()  # a script may change the working folder
+    report = _checked_page(model, out, report, overwrite=overwrite, resume=resume)
     method = common.method_choices(resolution=resolution, objective=objective)
     titles = output.title_entries(title, part_number, author, revision, date, company)
     output.note_kept_title(out if resume else None, titles)
@@ -100,6 +97,14 @@ def run(
         )  # fmt: skip
         summary, shortfall = _summed_up(path, until, report)
     _print_results(summary, out, shortfall, quiet=quiet)
+
+
+def _checked_page(model: Path, out: Path | None, report: Path | None, *, overwrite: bool, resume: bool) -> Path | None:
+    """Return the page's path, whatever folder the script changes to. Raises OptionError for files that must not be written."""
+    if out is None and (resume or (overwrite and report is None)):
+        raise OptionError("--overwrite and --resume need an archive; name one: --out FILE.nc")
+    output.check_outputs([model], archive=out, page=report, overwrite=overwrite)
+    return report and report.absolute()
 
 
 def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Summary, str]:

@@ -59,7 +59,8 @@ class Tolerance(Readable):
             if fault := text_fault(self.range):
                 yield f"tolerance is {fault}"
             elif not (is_length(self.range) and self.width >= 0):
-                yield f"tolerance is {self.range!r}; expected the full width of the zone in mm, from 0 to {MAX_NUMBER:g}"
+                expected = f"the full width of the zone in mm, 0 or above, up to {MAX_NUMBER:g}"
+                yield f"tolerance is {self.range!r}; expected {expected}"
         else:
             yield from self._scipy_faults()
         if not is_length(self.shift):
