@@ -1,0 +1,40 @@
+"""Outputs of commands: none is an input, another output, or a file that is no such output."""
+
+import pytest
+
+import tolcontact as tc
+from tests import cases
+from tests.helpers import call
+
+MODEL = """import tolcontact as tc
+from tests import cases
+def assembly():
+    return cases.stack()
+"""
+
+
+@pytest.mark.parametrize("outputs, words", [
+    (["--out", "a.html", "--report", "a.html"], '"a.html" would be the archive and the page'),
+    (["--out", "m.py", "--overwrite"], '"m.py" would be the input and the archive'),
+    (["--out", "other.py", "--overwrite"], '"other.py" is no netCDF file, and only these are replaced'),
+    (["--out", "A.html", "--report", "./sub/../a.html"], "would be the archive and the page"),
+], ids=["page", "model", "other", "case"])  # fmt: skip
+def test_no_output_replaces_an_input_or_another_output(outputs, words, tmp_path):
+    (tmp_path / "sub").mkdir()
+    for name in ("m.py", "other.py"):
+        (tmp_path / name).write_text(MODEL)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
+    done = call(tmp_path, "run", "m.py", "--samples", "10", *outputs)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
+
+
+def test_a_comparison_replaces_none_of_the_runs_that_it_compares(tmp_path):
+    for name in ("a.nc", "b.nc"):
+        tc.run(cases.stack(), samples=20, surfaces=0, fields="none", out=tmp_path / name).close()
+    (tmp_path / "link.nc").hardlink_to(tmp_path / "a.nc")
+    before = (tmp_path / "a.nc").read_bytes()
+    done = call(tmp_path, "compare", "a.nc", "b.nc", "--out", "link.nc", "--overwrite")
+    assert done.returncode == 2 and '"link.nc" would be the input and the archive' in done.stderr
+    assert (tmp_path / "a.nc").read_bytes() == before
