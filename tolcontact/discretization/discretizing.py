@@ -161,8 +161,8 @@ def _on_features(
             )
         locators = replace(locators, faces=faces)
     if location is not None and isinstance(location.on, Feature):
-        ground = features.face_of(location.on, None, placements[location.on.part])
-        locators = replace(locators, grounds=(ground,) * len(locators))
+        grounds = features.grounds(location.on, locators.points, locators.directions, placements[location.on.part])
+        locators = replace(locators, grounds=grounds)
     return replace(part, locators=locators)
 
 

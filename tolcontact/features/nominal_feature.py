@@ -7,13 +7,14 @@ import numpy as np
 
 from tolcontact.declaration import Feature
 from tolcontact.errors import GeometryFault
-from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize, target_point
+from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, SlabFeature, target_point
 from tolcontact.features.form_field import FormField
 from tolcontact.geometry.faces import FaceArea
 from tolcontact.geometry.surface import Surface
 
 Placement = tuple[np.ndarray, np.ndarray]  # R (3, 3) and t (3,) [mm] of a part in the nominal assembly
 FACE_TOLERANCE = 1e-4  # of a face's size: the largest distance of a point on it
+ALONG_NORMAL = 0.999  # cosine of the angle between the direction of a locator and the normal of the face that it stands on
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,13 +96,32 @@ class NominalFeature:
         return self.size_column is not None or self.form is not None or bool(self.coordinates.any())
 
     def face_with(self, position: np.ndarray) -> int | None:
-        """Return the index of the face that a point (3,) [mm] is on; None, for the centre, if it is on neither of two."""
-        if len(self.surfaces) == 1:
-            return 0
-        tolerance = FACE_TOLERANCE * max(surface.mesh.scale for surface in self.surfaces)
-        distances = [float(np.linalg.norm(surface.nearest(position[None])[1][0] - position)) for surface in self.surfaces]
-        nearest = int(np.argmin(distances))
-        return nearest if distances[nearest] <= tolerance else None
+        """Return the index of the face that a point (3,) [mm] is on; None, for the centre, if it is on none.
+
+        A point beyond the rim of one of two planes is on this plane, too. A point that is nearer to the axis of a cylinder, or
+        to the centre of a sphere, than to its surface is on none.
+        """
+        geometry = self.geometry
+        if isinstance(geometry, SlabFeature):
+            tolerance = FACE_TOLERANCE * max(surface.mesh.scale for surface in self.surfaces)
+            distances = [abs((position - surface.vertices.mean(axis=0)) @ geometry.normal) for surface in self.surfaces]
+            nearest = int(np.argmin(distances))
+            return nearest if distances[nearest] <= tolerance else None
+        arm = position - geometry.centre
+        if isinstance(geometry, AxisFeature):
+            arm = arm - (arm @ geometry.axis) * geometry.axis
+        return 0 if not isinstance(geometry, FeatureOfSize) or np.linalg.norm(arm) > geometry.size / 4 else None
+
+    def face_under(self, position: np.ndarray, direction: np.ndarray) -> int | None:
+        """Return the index of the face of a size that a locator at a point (3,) [mm] stands on; None for the centre.
+
+        On a round face it stands where it points along the outward normal: a pin rests in its hole, or follows its axis.
+        """
+        index = None if self.size_column is None else self.face_with(position)
+        if index is None or isinstance(self.geometry, SlabFeature):
+            return index
+        normal = self.surfaces[0].normals(*self.surfaces[0].nearest(position[None]))[0]
+        return index if normal @ direction > ALONG_NORMAL else None
 
     def target(self, position: np.ndarray) -> "NominalFeature":
         """Return the datum that touches the feature at a point (3,) [mm]. Raises GeometryFault for a point elsewhere."""

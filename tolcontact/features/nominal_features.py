@@ -128,15 +128,25 @@ class Features:
                     )
         return None
 
-    def face_of(self, feature: Feature, position: np.ndarray | None, placement: Placement) -> FaceDeviation | None:
-        """Return how a feature deviates at a locator's point (3,) [mm] of its part; None if it could not be added.
-
-        Without a point it is the centre of the feature, which no size moves.
-        """
+    def face_of(self, feature: Feature, position: np.ndarray, placement: Placement) -> FaceDeviation | None:
+        """Return how a feature deviates at a locator's point (3,) [mm] of its part; None if it could not be added."""
         nominal = self.features.get(feature)
+        return None if nominal is None else self._used(nominal, nominal.face_with(position), placement)
+
+    def grounds(
+        self, feature: Feature, points: np.ndarray, directions: np.ndarray, placement: Placement
+    ) -> tuple[FaceDeviation | None, ...]:
+        """Return how a feature deviates under locators of another part that are on it; None if it could not be added.
+
+        points, directions   (locator, 3) of the locators [mm], in the nominal assembly
+
+        A locator follows the face of a size that it stands on, and else the centre of the feature, which no size moves.
+        """
+        nominal, (R, t) = self.features.get(feature), placement
         if nominal is None:
-            return None
-        return self._used(nominal, None if position is None else nominal.face_with(position), placement)
+            return (None,) * len(points)
+        faces = [nominal.face_under(*row) for row in zip((points - t) @ R, directions @ R, strict=True)]
+        return tuple(self._used(nominal, index, placement) for index in faces)
 
     def use_touched(self, placements: Sequence[Placement]) -> None:
         """Use the faces with form that datums touch, so that archives hold them."""

@@ -7,6 +7,7 @@ from tolcontact.compilation import Program
 from tolcontact.errors import NominalWarning, shown
 from tolcontact.plausibility.bodies import body_overlaps, clashes, clashes_beyond_faces
 from tolcontact.plausibility.declared_points import doubtful_units, far_points, unfit_directions
+from tolcontact.plausibility.effects import unfollowed_by_locators, unfollowed_by_measures, unused_features
 from tolcontact.plausibility.faces import measured_forms, partial_surfaces
 from tolcontact.plausibility.measures import measure_limits, measured_reach, rotations, wide_tolerances
 from tolcontact.plausibility.pairs import coarse_pairs, pair_clearances, pair_overlaps, unconstrained_rotations, unsure_seats
@@ -28,6 +29,7 @@ KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
     "reach": (measured_reach,),
     "friction": (unsure_seats,),
     "form": (measured_forms,),
+    "effect": (unfollowed_by_measures, unfollowed_by_locators, unused_features),
 }
 
 

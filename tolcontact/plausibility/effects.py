@@ -1,0 +1,172 @@
+"""Tolerances without the effect that they seem to have: points and locators on a face that do not follow it, unused faces."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tolcontact.compilation import Program
+from tolcontact.declaration import Measure, Point
+from tolcontact.discretization import Nominal, NominalPart
+from tolcontact.discretization.measured_geometry import Combined, Heights, NominalMeasurement
+from tolcontact.features import FaceDeviation, NominalFeature
+from tolcontact.features.freedoms import FEATURE, FORM
+from tolcontact.plausibility.declared_points import location_designation
+from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws
+
+ON_FACE = 1e-4  # of a face's size: the largest distance of a point on it
+MIN_MOTION = 1e-9  # mm, at three sigma
+LISTED = 3  # features by name
+
+
+class Use(NamedTuple):
+    """A point (3,) [mm] of a part of the nominal assembly, a direction (3,) that counts there, and the face that it follows."""
+
+    part: NominalPart
+    point: np.ndarray
+    direction: np.ndarray
+    followed: FaceDeviation | None
+
+
+def unfollowed_by_measures(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each measure with a point that lies on a deviating face, and belongs to the part alone."""
+    nominal = draws.program.nominal
+    scenes = [
+        (model, *row) for model in nominal.scenes or (nominal,) for row in zip(model.measures, model.measurements, strict=True)
+    ]
+    owned = [(measure, use) for model, measure, of in scenes for use in _measured_points(model, measure, of)]
+    doubtful = set[Measure]()
+    for number, feature, motion in _unfollowed(draws, [use for _, use in owned]):
+        measure, use = owned[number]
+        if measure not in doubtful:
+            doubtful.add(measure)
+            R_WP, t_WP = use.part.placement
+            place = ", ".join(f"{coordinate:.6g}" for coordinate in np.round((use.point - t_WP) @ R_WP, 9) + 0.0)
+            yield (
+                f'{measure.designation}: its point ({place}) of part "{use.part.name}" lies on {_named(feature)}, which '
+                f"deviates there by {motion:.3g} mm (3 sigma), but the point does not follow it; take it from the feature, as "
+                f"in {feature.feature.name}.point({place}), if the face is meant"
+            )
+
+
+def unfollowed_by_locators(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each part with a locator on a deviating face that the part does not follow."""
+    nominal = draws.program.nominal
+    for part in nominal.parts:
+        owned = list(_located_points(nominal, part))
+        for number, feature, motion in _unfollowed(draws, [use for _, _, use in owned]):
+            label, advice, _ = owned[number]
+            if not _is_in_contact(nominal, part, feature):
+                yield (
+                    f"{location_designation(nominal.assembly, part.part, part.station)}: locator "
+                    f'"{label.rpartition(".")[2]}" lies on {_named(feature)}, which deviates there by {motion:.3g} mm '
+                    f"(3 sigma), but the part does not follow it; {advice.format(feature.feature.name)}"
+                )
+                break
+
+
+def unused_features(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence on the features whose tolerances displace nothing that is measured, located or in contact."""
+    program, nominal = draws.program, draws.program.nominal
+    used, numbers = _used_columns(program), {label: number for number, label in enumerate(nominal.contributors)}
+    unused = []
+    for pattern in nominal.patterns:
+        columns = [numbers[freedom.label] for freedom in pattern.freedoms if freedom.source in (FEATURE, FORM)]
+        if columns and not used[columns].any() and draws.deviations[:, columns].std(axis=0).any():
+            unused.append(pattern.declared)
+    if unused:
+        names = ", ".join(f'"{declared.name}" of {declared.part.name}' for declared in unused[1 : 1 + LISTED])
+        others = f", nor do those of {len(unused) - 1} more ({names}{', ...' * (len(unused) > LISTED + 1)})" if names else ""
+        yield (
+            f'part "{unused[0].part.name}": {unused[0].designation}: its tolerances have no effect on any measurement or '
+            f"contact{others}; measure a point of the feature, or let contact and locators use its face"
+        )
+
+
+def _used_columns(program: Program) -> np.ndarray:
+    """Return which deviations (contributor,) any measure or any gap depends on."""
+    by_place = _dependence(program, "place", "deviations", "poses")
+    used = np.zeros(by_place.shape[1], dtype=bool)
+    for output in ("measured", "relative"):
+        used |= _dependence(program, "observe", "deviations", output).any(axis=0)
+        used |= by_place[_dependence(program, "observe", "poses", output).any(axis=0)].any(axis=0)
+    for pair in program.nominal.pairs:
+        for columns in (pair.offsets.columns, *(face.columns for face in pair.deviating if face is not None)):
+            used[columns] = True
+    return used
+
+
+def _dependence(program: Program, function: str, argument: str, result: str) -> np.ndarray:
+    """Return which entries of a result depend on which entries of an argument of a function of the program."""
+    evaluated = getattr(program, function).function
+    pattern = evaluated.jac_sparsity(evaluated.index_out(result), evaluated.index_in(argument))
+    dependence = np.zeros((evaluated.numel_out(result), evaluated.numel_in(argument)), dtype=bool)
+    dependence[tuple(np.array(indices, dtype=int) for indices in pattern.get_triplet())] = True
+    return dependence
+
+
+def _measured_points(model: Nominal, measure: Measure, measurement: NominalMeasurement | None) -> Iterator[Use]:
+    """Yield the points of a measure, in the direction that it counts."""
+    if measurement is not None:
+        operands = measurement.operands if isinstance(measurement, Combined) else ()
+        for operand in operands:
+            if isinstance(operand, NominalMeasurement):
+                yield from _measured_points(model, measure, operand)
+        for point, wall in measurement.points if isinstance(measurement, Heights) else ():
+            direction = wall.surface.distance(point.position[None])[1][0]
+            yield Use(model.parts[point.part], point.position, direction, point.deviation)
+    elif isinstance(measure.of, Point):
+        for end in measure.points:
+            part = model.parts[model.part_index(end.part)]
+            yield Use(part, model.position(end), np.array(measure.along), model.face_at(end))
+
+
+def _located_points(nominal: Nominal, part: NominalPart) -> Iterator[tuple[str, str, Use]]:
+    """Yield the points of the locators of a part, on it and on the part that it is located on, with labels and advice."""
+    locators = part.locators
+    for number, (label, point, direction) in enumerate(zip(locators.labels, locators.points, locators.directions, strict=True)):
+        owner = nominal.parts[part.owners[number]] if part.owners else part
+        yield label, "give the locator on={}", Use(owner, point, direction, locators.faces[number])
+        if part.parent is not None:
+            ground = locators.grounds[number]
+            advice = "locate the part with on={}" if ground is None else "add this to the tolerance of the locator"
+            yield label, advice, Use(nominal.parts[part.parent], point, direction, ground)
+
+
+def _unfollowed(draws: TrialDraws, uses: Sequence[Use]) -> list[tuple[int, NominalFeature, float]]:
+    """Return points that follow no face, but lie on one that deviates: indices, features, motion at three sigma [mm]."""
+    still = [k for k, use in enumerate(uses) if use.followed is None or _motion(draws, use.followed, use, use.direction) == 0]
+    doubts = list[tuple[int, NominalFeature, float]]()
+    for feature in draws.program.nominal.features:
+        numbers = [k for k in still if uses[k].part.part is feature.feature.part and feature.varies]
+        for index, surface in enumerate(feature.surfaces if numbers else ()):
+            R_WP, t_WP = placement = uses[numbers[0]].part.placement
+            places = np.array([(uses[k].point - t_WP) @ R_WP for k in numbers])
+            triangles, feet = surface.nearest(places)
+            normals, distances = surface.normals(triangles, feet) @ R_WP.T, np.linalg.norm(feet - places, axis=1)
+            for row in np.flatnonzero(distances <= ON_FACE * surface.mesh.scale):
+                use, normal = uses[numbers[row]], normals[row]
+                motion = _motion(draws, feature.deviation(index, placement), use, normal) * abs(float(normal @ use.direction))
+                doubts += [(numbers[row], feature, motion)] * (motion > 0)
+    return sorted(doubts, key=lambda doubt: doubt[0])
+
+
+def _motion(draws: TrialDraws, deviation: FaceDeviation, use: Use, direction: np.ndarray) -> float:
+    """Return how far a face moves along a direction (3,) at a point, at three sigma [mm]; 0 if that is rounding."""
+    motions = draws.deviations[:, deviation.columns] @ deviation.outward(use.point[None], direction[None])[0]
+    motion = SIGMAS * float(motions.std())
+    return motion if motion > MIN_MOTION else 0.0
+
+
+def _is_in_contact(nominal: Nominal, part: NominalPart, feature: NominalFeature) -> bool:
+    """Return whether contact of a part with the face of a feature decides where it comes to lie."""
+    sides = [
+        (nominal.parts[pair.moving], pair.reference is not None and nominal.parts[pair.reference], pair.deviating)
+        for pair in nominal.pairs
+    ]
+    names = [face.name for *bodies, faces in sides if part in bodies for face in faces if face is not None]
+    return feature.label in names
+
+
+def _named(feature: NominalFeature) -> str:
+    return f'feature "{feature.feature.name}" of {feature.feature.part.name}'
