@@ -56,6 +56,19 @@ def test_nothing_that_varies_is_refused():
         tc.analyses.worst_case(a, samples=1)
 
 
+def test_measured_parts_alone_have_the_worst_of_their_rows():
+    """The least square is that of a row between the others, which no direction leads to."""
+    a, rows = tc.Assembly("measured"), [0.3, -0.2, 0.05, 0.1]
+    block = a.part("block", tc.Box(50, 25, 10))
+    a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=0)
+    a.population({f"block.A{k}": rows for k in (1, 2, 3)})
+    a.measure("height", block.point(0, 0, 0), along="z")
+    a.measure("square", lambda poses: poses.position(block.point(0, 0, 0))[2] ** 2, units="mm^2")
+    found = tc.analyses.worst_case(a, samples=16, solver="daqp")
+    assert values(found) == pytest.approx([-0.2, 0.3], abs=1e-12)
+    assert values(found, measure=1) == pytest.approx([0.0025, 0.09], abs=1e-12)
+
+
 @pytest.mark.slow
 def test_the_command_prints_a_table_json_and_csv(tmp_path):
     options = ("worst", cases.MODELS / "clutch.py", "--samples", "16", "--solver", "daqp")

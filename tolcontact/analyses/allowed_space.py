@@ -194,6 +194,13 @@ class AllowedRegion:
             points[:, columns] = ends[:count, columns]
         return np.asarray(points)
 
+    def measured_rows(self, count: int) -> Iterator[np.ndarray]:
+        """Yield points (n, contributor) for each population: its first `count` rows, with all else at its centre."""
+        for columns, values in self._populations:
+            points = np.tile(self.middle, (min(count, len(values)), 1))
+            points[:, columns] = values[: len(points)]
+            yield points
+
     def reach(self, points: np.ndarray, step: np.ndarray) -> np.ndarray:
         """Return the shares (n,), at most 1, of steps (n, contributor) from points (n, contributor) that stay in the region."""
         with np.errstate(divide="ignore", invalid="ignore"):

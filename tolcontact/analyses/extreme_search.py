@@ -85,14 +85,18 @@ class Evaluation:
             self._record_undefined(measured[~unresolved, terms.CORRECTED])
             measured[unresolved, terms.CORRECTED] = np.nan
             self._known.update(zip(rows, measured, strict=True))
-        return np.array([self._known[key] for key in keys]).reshape(*points.shape[:-1], len(terms.STATES), -1)
+        return self._shaped(np.array([self._known[key] for key in keys]), points)
 
     def raw(self, points: np.ndarray) -> np.ndarray:
         """Return the same with raw measures only, which takes no time; the corrected ones are NaN."""
         program, deviations = self._engine.program, self._deviations(points)
         measured = program.observe(poses=program.place(deviations=deviations)["poses"], deviations=deviations)["measured"]
         self._record_undefined(measured)
-        return np.stack([measured, np.full_like(measured, np.nan)], axis=1).reshape(*points.shape[:-1], len(terms.STATES), -1)
+        return self._shaped(np.stack([measured, np.full_like(measured, np.nan)], axis=1), points)
+
+    def _shaped(self, measured: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Return measures (..., state, measure) at points (..., contributor), of which there may be none."""
+        return measured.reshape(*points.shape[:-1], len(terms.STATES), len(self.is_undefined))
 
     def _record_undefined(self, measured: np.ndarray) -> None:
         """Record which measures (n, measure) are not finite numbers."""

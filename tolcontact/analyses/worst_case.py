@@ -117,9 +117,10 @@ def worst_case(
     concave, and the linearized resolution jumps: the searches may miss a worse combination, and `agreeing` states how many of
     them met. Each measure is searched along the contributors that have an influence on it; the others change nothing when they
     are exchanged all at once, in 24 random combinations and at each end (see tolcontact.analyses.worst_case).
-    `samples` / 256 searches start at the best of all trial combinations: random ones, the far ends along nominal sensitivities,
-    and the far ends along the slopes of a regression; `samples` / 128 start at any of them (see
-    tolcontact.analyses.extreme_search). The best one continues in other random directions until it gains no more. `unseen` is
+    `samples` / 256 searches start at the best of all trial combinations: random ones, the first `samples` rows of each
+    population, the far ends along nominal sensitivities, and the far ends along the slopes of a regression; `samples` / 128
+    start at any of them (see tolcontact.analyses.extreme_search). The best one continues in other random directions until it
+    gains no more. `unseen` is
     the estimate w (w + 1) / (n (n - 1)) for w distinct ends of n searches from random combinations (Boender, Rinnooy Kan,
     1987). The linear estimate is exact to first order in the deviations: large tilts may exceed it. Only certified realizations
     count. `progress` is called with the number of realizations simulated, and the approximate total. Arguments that all
@@ -239,11 +240,11 @@ def _starts(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return points (n, contributor), and their measures (n, state, measure).
 
-    The points are the centre, `samples` random ones, and the far ends along nominal slopes and along the slopes of a regression
-    of the corrected measures.
+    The points are the centre, `samples` random ones, as many rows of each population of measured parts, and the far ends along
+    nominal slopes and along the slopes of a regression of the corrected measures.
     """
     nominal_ends = _far_ends(region, region.slopes(linear.by_deviations))
-    points = np.vstack([region.middle, nominal_ends, region.scattered(rng, samples)])
+    points = np.vstack([region.middle, nominal_ends, region.scattered(rng, samples), *region.measured_rows(samples)])
     measured = evaluation.corrected(points)
     corrected = measured[:, terms.CORRECTED]
     resolved = np.isfinite(corrected).all(axis=1)
