@@ -16,6 +16,10 @@ MISTAKES = {
     "locators that do not fix the part": ({"top": COLLINEAR}, ['part "top"', "do not fix it", "condition number"]),
     "five locators": ({"top": COLLINEAR.replace(", (0, 10, 5)", "")}, ['part "top"', "5 locators", "six independent"]),
     "negative tolerance": ({"top": GOOD["top"].replace("10", "-10")}, ['part "top"', "-10", "0 or above"]),
+    "a truth value as a coordinate": (
+        {"measure": "    a.measure('height', top.point(0, True, 0), along='z')\n"},
+        ['measurement "height"', "finite numbers"],
+    ),
     "tolerance NaN": ({"top": GOOD["top"].replace("10", "math.nan")}, ['part "top"', "nan"]),
     "surfaces apart": (
         {"contact": GOOD["contact"].replace("'-z'", "'+z'").replace("points", "within=1.5, points")},

@@ -134,6 +134,8 @@ def test_a_population_is_in_the_archive():
         (lambda a: a.variable("top.A1", 1, drives={"top.A2": 1}), 'contributor "top.A1" is declared 2 times'),
         (lambda a: a.population({"top.A1": [0.1]}), "it has 1 row(s); a population needs two or more"),
         (lambda a: a.population({"top.A1": [0.1, "wide", 0.2]}), "row 2 of the column for top.A1 is no finite number"),
+        (lambda a: a.population({"top.A1": [0.1, True]}), "row 2 of the column for top.A1 is no finite number"),
+        (lambda a: a.population({"top.A1": [False, True]}), "row 1 of the column for top.A1 is no finite number"),
         (lambda a: a.population({"top.A1": [0.1, np.nan]}), "row 2 of the column for top.A1 is no finite number"),
     ],
 )

@@ -225,6 +225,18 @@ def test_directions_of_the_assembly_on_a_turned_part(directions, is_doubtful):
         assert "for this direction of the assembly write (1, 0, 0)" in text
 
 
+@pytest.mark.parametrize(
+    ("tolerance", "values", "is_doubtful"),
+    [(0.2, [0.05, -0.03, 0.08], False), (0.2, [50, -30, 80], True), (0, [50, -30, 80], True), (0, [0.05, -0.03, 0.08], False)],
+)
+def test_measured_parts_that_are_probably_in_micrometres(tolerance, values, is_doubtful, tmp_path):
+    a = model(tolerance=tolerance)
+    (tmp_path / "feet.csv").write_text("\n".join(["block.B1", *map(str, values)]))
+    a.population(tmp_path / "feet.csv")
+    expected = r'\[units\] population "feet.csv" \(test_nom.*\): the values of block.B1 are around 50 mm .* micrometres by 1000'
+    assert [bool(re.search(expected, text)) for text in warned(a) if text.startswith("[units]")] == [True] * is_doubtful
+
+
 def test_bodies_that_are_no_pair():
     a = model()
     a.part("stop", tc.Box(20, 20, 20), at=(98, 20, 0), fixed=True)

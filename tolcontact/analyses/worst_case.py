@@ -120,11 +120,10 @@ def worst_case(
     `samples` / 256 searches start at the best of all trial combinations: random ones, the first `samples` rows of each
     population, the far ends along nominal sensitivities, and the far ends along the slopes of a regression; `samples` / 128
     start at any of them (see tolcontact.analyses.extreme_search). The best one continues in other random directions until it
-    gains no more. `unseen` is
-    the estimate w (w + 1) / (n (n - 1)) for w distinct ends of n searches from random combinations (Boender, Rinnooy Kan,
-    1987). The linear estimate is exact to first order in the deviations: large tilts may exceed it. Only certified realizations
-    count. `progress` is called with the number of realizations simulated, and the approximate total. Arguments that all
-    analyses share, and their errors, are described in tolcontact.analyses.
+    gains no more. `unseen` is the estimate w (w + 1) / (n (n - 1)) for w distinct ends of n searches from random combinations
+    (Boender, Rinnooy Kan, 1987). The linear estimate is exact to first order in the deviations: large tilts may exceed it. Only
+    certified realizations count. `progress` is called with the number of realizations simulated, and the approximate total.
+    Arguments that all analyses share, and their errors, are described in tolcontact.analyses.
     """
     analysis = Analysis(
         terms.WORST_CASE, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,

@@ -130,7 +130,8 @@ def population(source: Any, columns: Mapping[str, str] | None, declared_at: str)
     """Return the Population of a CSV file, a DataFrame, an xarray Dataset of one dimension, or a mapping of columns.
 
     `columns` maps the label of each contributor to the name of its column; by default the two are equal. Entries that are not
-    numbers become NaN, and a fault of the population. Raises ValueError for an unreadable table or a missing column.
+    numbers, among them True and False, become NaN, and a fault of the population. Raises ValueError for an unreadable table or
+    a missing column.
     """
     pd = importlib.import_module("pandas")
     if isinstance(source, str | Path):
@@ -151,7 +152,8 @@ def population(source: Any, columns: Mapping[str, str] | None, declared_at: str)
         raise ValueError(
             f'population "{title}" has no column {missing[0]!r}; its columns are: {", ".join(map(str, table.columns))}'
         )
-    numbers = [pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=float) for name in names.values()]
+    entries = [table[name].astype(object).mask(table[name].map(type).isin([bool, np.bool_])) for name in names.values()]
+    numbers = [pd.to_numeric(column, errors="coerce").to_numpy(dtype=float) for column in entries]
     values = np.column_stack(numbers) if numbers else np.empty((len(table), 0))
     return Population(tuple(names), values, title, declared_at)
 

@@ -87,7 +87,7 @@ NOT_A_VECTOR: Vector = (math.nan, math.nan, math.nan)
 def vector(value: Any) -> Vector:
     """Return three floats; NaN if `value` is not a vector, so that `faults()` reports it with all others."""
     try:
-        x, y, z = (float(component) for component in value)
+        x, y, z = (math.nan if isinstance(component, bool) else float(component) for component in value)
     except (TypeError, ValueError):
         return NOT_A_VECTOR
     return (x, y, z)

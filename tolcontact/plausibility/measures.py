@@ -17,6 +17,7 @@ from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws, spread
 WIDE_SHARE = 0.5  # of a part's largest extent: the width of a zone
 MAX_TILT = math.radians(45)  # by the locators, at three sigma
 FAR_SIGMAS = 100.0  # limits this far from the nominal value do not matter
+SIX_SIGMA, MIN_ZONE, MAX_ZONES = 6.0, 0.01, 10.0  # of a zone; of a part's size, without a zone; largest values, in zones
 MIN_SHARE = 1e-6  # of that distance: smaller variation is rounding
 
 
@@ -81,6 +82,27 @@ def _tilt(nominal: NominalPart, place: str) -> str:
         f"{6 * sigmas.max():.3g} mm; move them apart (the closest ones are {apart[apart > 0].min():.3g} mm apart), "
         "or check the tolerances, which are in mm"
     )
+
+
+def population_units(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each population with a column whose values are far beyond the zone that they should come from.
+
+    A contributor without a zone has MIN_ZONE of the size of the largest part.
+    """
+    program = draws.program
+    largest = max(float(part.mesh.scale) for part in program.nominal.parts)
+    freedoms = {freedom.label: freedom for freedom in program.draws.contributors}
+    for population in program.nominal.assembly.populations:
+        for label, values in zip(population.columns, population.values.T, strict=True):
+            usual, freedom = float(np.median(np.abs(values))), freedoms[label]
+            zone = SIX_SIGMA * math.sqrt(freedom.variance) or (MIN_ZONE * largest if freedom.units == "mm" else math.inf)
+            if usual > MAX_ZONES * zone:
+                yield (
+                    f"{population.designation}: the values of {label} are around {usual:.4g} {freedom.units} (median of the "
+                    f"magnitudes), {usual / zone:.2g} times the zone of {zone:.3g} {freedom.units} of its tolerance; they are "
+                    "deviations from the nominal value, in mm: subtract the nominal value, or divide micrometres by 1000"
+                )
+                break
 
 
 def measure_limits(draws: TrialDraws) -> Iterator[str]:

@@ -9,12 +9,12 @@ from tolcontact.plausibility.bodies import body_overlaps, clashes, clashes_beyon
 from tolcontact.plausibility.declared_points import doubtful_units, far_points, unfit_directions
 from tolcontact.plausibility.effects import unfollowed_by_locators, unfollowed_by_measures, unused_features
 from tolcontact.plausibility.faces import measured_forms, partial_surfaces
-from tolcontact.plausibility.measures import measure_limits, measured_reach, rotations, wide_tolerances
+from tolcontact.plausibility.measures import measure_limits, measured_reach, population_units, rotations, wide_tolerances
 from tolcontact.plausibility.pairs import coarse_pairs, pair_clearances, pair_overlaps, unconstrained_rotations, unsure_seats
 from tolcontact.plausibility.trial_draws import TrialDraws
 
 KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
-    "units": (doubtful_units,),
+    "units": (doubtful_units, population_units),
     "face": (partial_surfaces,),
     "coarse": (coarse_pairs,),
     "angle": (rotations,),
