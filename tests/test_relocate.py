@@ -1,13 +1,17 @@
 """The best place of a locator: a plane's weights, a plane's minimum, contact, what cannot be."""
 
+import io
 import json
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 import tolcontact as tc
 from tests import cases
 from tests.helpers import call
+from tolcontact.report import analysis_text
+from tolcontact.vocabulary import RELOCATION
 
 FAST = {"solver": "daqp", "samples": 1024}
 
@@ -54,6 +58,21 @@ def test_fewer_are_outside_after_than_before():
     assert found["change"].sel(interval="upper") < 0 and found["point"].sel(stage="after", axis="x") > 80
     (before, *_), (after, *_) = found["reached"].values
     assert float(found["change"].sel(interval="estimate")) == pytest.approx(after - before)
+
+
+@pytest.mark.parametrize(
+    ("least", "between"), [("height: 6 sigma", ((0, 20, 0), (100, 50, 0))), ("height: ppm", ((0, 20, 0), (40, 30, 0)))]
+)
+def test_a_locator_at_the_best_place_stays_there(least, between):
+    """Above A3 the plate varies as A3 does, and by more if A3 stands anywhere else."""
+    found = tc.analyses.relocate(
+        plate((50, 50, 10), 0.06), "plate.A3", between=between, least=least, samples=256, solver="daqp"
+    )
+    assert found["point"].values.tolist() == [[50, 50, 0]] * 2 and [50, 50, 0] in found["tried"].values.tolist()
+    assert found["change"].values.tolist() == [0 if "ppm" in least else 1] * 3
+    console = Console(file=io.StringIO(), width=120)
+    console.print(analysis_text(RELOCATION, found))
+    assert "No position between the corners is better: the locator stays where it is." in console.file.getvalue()
 
 
 @pytest.mark.slow

@@ -44,11 +44,14 @@ def relocate(
         tried        (trial, axis)      all trial positions [mm]
         tried_value  (trial)            the statistic there; infinite where the model cannot be built
 
+    The locator stays where it is, with equal points before and after, if no trial is better, or if the fresh run does not
+    confirm the best one.
+
     `least` is "corner height: 6 sigma", or "corner height: ppm" (the share outside its limits). A coordinate that is the same
     in both corners does not change. The locator keeps its direction, so choose corners on the surface that it contacts. All
-    trials use the same draws: first a grid, then scipy's COBYQA starting at the best point of the grid. The statistic may have
-    several minima, or be flat: see `tried_value`. Each trial compiles a model. `progress` is called with the number of trials,
-    and their largest number.
+    trials use the same draws: first a grid and the present position, then scipy's COBYQA starting at the best of them. The
+    statistic may have several minima, or be flat: see `tried_value`. Each trial compiles a model. `progress` is called with the
+    number of trials, and their largest number.
     Arguments that all analyses share, and their errors, are described in tolcontact.analyses. Also raises OptionError for a
     locator, a box or a measure that does not exist.
     """
@@ -63,9 +66,12 @@ def relocate(
     if not np.isfinite(trials.values).any():
         lower, upper = trials.lower.tolist(), trials.upper.tolist()
         raise OptionError(f'"{locator}" cannot stand anywhere between {lower} and {upper}; choose other corners')
+    trials.try_present()
     trials.search()
     best = trials.points[int(np.nanargmin(trials.values))]
     (before, lost_before), (after, lost_after) = (trials.measured(point, fresh=True) for point in (trials.point, best))
+    if not goal.estimate(after).value < goal.estimate(before).value:
+        best, after, lost_after = trials.point, before, lost_before
     values = {
         "point": [trials.point, best],
         "reached": [goal.estimate(before), goal.estimate(after)],
@@ -109,6 +115,8 @@ class Goal:
 
     def change(self, before: np.ndarray, after: np.ndarray) -> Estimate:
         """Return the change from values (n,) to values of the same draws: a ratio of 6 sigma, or a difference of shares."""
+        if after is before:
+            return Estimate(*[float(self.is_spread)] * 3)
         if self.is_spread:
             return Estimate(*np.sqrt(two_samples.variance_ratio(Sample.of(after), Sample.of(before), paired=True)))
         hits = [Sample.of(self.limits.outside(x)) for x in (after, before)]
@@ -169,6 +177,11 @@ class TrialPositions:
         for shares in np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(self._sides)):
             self._try(shares)
 
+    def try_present(self) -> None:
+        """Try the declared position, which may lie outside the box."""
+        shares = (self.point - self.lower)[self._sides] / (self.upper - self.lower)[self._sides]
+        self._try(shares.clip(0.0, 1.0), self.point)
+
     def search(self) -> None:
         """Try further positions, starting at the best one."""
         start = self._shares[int(np.nanargmin(self.values))]
@@ -179,10 +192,14 @@ class TrialPositions:
             options={"maxfev": MAX_TRIALS, "initial_tr_radius": 0.5 / self._count, "final_tr_radius": POSITION_TOLERANCE},
         )  # fmt: skip
 
-    def _try(self, shares: np.ndarray) -> float:
-        """Return the value of the goal at shares (side,) of the sides; infinite if the model cannot be built."""
+    def _try(self, shares: np.ndarray, position: np.ndarray | None = None) -> float:
+        """Return the value of the goal at shares (side,) of the sides, or at a position (3,) [mm] that they are nearest to.
+
+        The value is infinite if the model cannot be built.
+        """
         point = self.lower + np.zeros(3)
         point[self._sides] += shares * (self.upper - self.lower)[self._sides]
+        point = point if position is None else position
         try:
             measured, _ = self.measured(point)
             value = self._goal.estimate(measured).value
@@ -192,7 +209,7 @@ class TrialPositions:
         self.points.append(point)
         self.values.append(value)
         if progress := self._analysis.progress:
-            progress(len(self.values), self._count ** len(self._sides) + MAX_TRIALS)
+            progress(len(self.values), self._count ** len(self._sides) + 1 + MAX_TRIALS)
         return value
 
 

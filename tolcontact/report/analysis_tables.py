@@ -297,8 +297,10 @@ def _relocation(dataset: xr.Dataset) -> AnalysisReport:
         f"{samples} realizations for each trial position;",
         f"{fresh} fresh ones for the figures below, with 95 % intervals.\n",
     ]
+    before, after = dataset["point"].values
+    stays = ["No position between the corners is better: the locator stays where it is.\n"] * bool((before == after).all())
     table = Table("", columns, rows, _lost(int(dataset["unresolved"].max())))
-    return AnalysisReport("Position of a locator", f"{grouped(dataset.sizes['trial'])} trial positions", notes, [table])
+    return AnalysisReport("Position of a locator", f"{grouped(dataset.sizes['trial'])} trial positions", notes + stays, [table])
 
 
 def _seating(dataset: xr.Dataset) -> AnalysisReport:
