@@ -10,7 +10,7 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.report.figures import grouped, number, percent, plain
 from tolcontact.report.table import Table
-from tolcontact.statistics.capability import FAILS, UNDECIDED, Verdict, verdict
+from tolcontact.statistics.capability import CONSTANT, FAILS, UNDECIDED, Verdict, verdict
 
 PPM_BELOW = 0.01  # if all shares are smaller, the table states them in ppm
 DIGITS_OF_COUNTS = 2  # significant digits of the number of realizations that would decide
@@ -85,7 +85,7 @@ def _row(measure: xr.Dataset, summary: xr.Dataset) -> ResultRow:
         str(measure["measure_units"].values),
         str(measure["measure_quantity"].values),
         verdict_text(opinion) + (reservation(summary) if opinion else ""),
-        None if opinion is None or opinion.word == UNDECIDED or reservation(summary) else opinion.word != FAILS,
+        None if opinion is None or opinion.word in (UNDECIDED, CONSTANT) or reservation(summary) else opinion.word != FAILS,
         nominal,
         lower,
         upper,
@@ -102,7 +102,10 @@ def _state_figures(of_state: xr.Dataset, units: str) -> StateFigures:
 
 def verdict_of(measure: xr.Dataset, realizations: int) -> Verdict | None:
     """Return the verdict on one measure of a summary; None without limits."""
-    return verdict(measure["statistic_value"].sel(state=terms.STATES[1], statistic=terms.OUTSIDE).values, realizations)
+    statistics = measure["statistic_value"]
+    spreads = statistics.sel(statistic=terms.STANDARD_DEVIATION, interval="estimate").values  # raw and corrected
+    varies = bool((spreads > float(measure[terms.MEASURE_LIMITS[2]].values)).any())
+    return verdict(statistics.sel(state=terms.STATES[1], statistic=terms.OUTSIDE).values, realizations, varies=varies)
 
 
 def verdict_text(opinion: Verdict | None) -> str:
@@ -111,8 +114,6 @@ def verdict_text(opinion: Verdict | None) -> str:
         return ""
     if opinion.word != UNDECIDED:
         return opinion.word
-    if not math.isfinite(opinion.more):
-        return f"{UNDECIDED}: too close to call"
     digits = DIGITS_OF_COUNTS - len(str(int(opinion.more)))
     return f"{UNDECIDED}: about {grouped(int(round(opinion.more, min(digits, 0))))} more realizations"
 
@@ -134,7 +135,8 @@ def verdict_lines(summary: xr.Dataset) -> Iterator[str]:
     for name in summary["measure"].values:
         measure = summary.sel(measure=name)
         if text := verdict_text(verdict_of(measure, summary.attrs["realizations"])):
-            yield f"{full_name(measure)}: {text}" + ("" if text.startswith(UNDECIDED) else " its limits") + reservation(summary)
+            is_about_limits = not text.startswith((UNDECIDED, CONSTANT))
+            yield f"{full_name(measure)}: {text}{' its limits' * is_about_limits}{reservation(summary)}"
 
 
 def overview_table(summary: xr.Dataset) -> Table:

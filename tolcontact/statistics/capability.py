@@ -35,12 +35,13 @@ from tolcontact.variation.plans import scrambled_points
 PERCENTS = 0.135, 50.0, 99.865
 TRIALS = 1 << 11  # simulated triples of percentiles; an interval covers 95 % of them
 ALLOWED_SHARE = 0.0027  # share of a normal distribution beyond three standard deviations: Ppk 1 on both sides
-MEETS, FAILS, UNDECIDED = "meets", "does not meet", "undecided"
+MEETS, FAILS, UNDECIDED, CONSTANT = "meets", "does not meet", "undecided", "does not vary"
+LIKELY_DISTANCE = 0.6745  # of a share from the allowed one, in standard errors, if the two seem equal: the median
 GROWTH = 1.25  # of the number of realizations between two trials
-MAX_REALIZATIONS = 1e8  # more are not proposed
 VERDICT_RULE = (
     f'"{MEETS}": the 95 % interval of the share out of specification, with contact, lies at or below {ALLOWED_SHARE:.2%}; '
-    f'"{FAILS}": it lies above; "{UNDECIDED}": it contains {ALLOWED_SHARE:.2%}'.replace("%", " %")
+    f'"{FAILS}": it lies above; "{UNDECIDED}": it contains {ALLOWED_SHARE:.2%}; '
+    f'"{CONSTANT}": all values are equal, with and without contact, and within the limits'.replace("%", " %")
 ).replace("95  %", "95 %")
 
 
@@ -176,20 +177,23 @@ def values_below(n: int) -> np.ndarray:
 class Verdict(NamedTuple):
     """The verdict on a measurement.
 
-    word   one of MEETS, FAILS, UNDECIDED
-    more   number of additional realizations that would probably decide; 0 if it is decided, infinite if too many
+    word   one of MEETS, FAILS, UNDECIDED, CONSTANT
+    more   number of additional realizations that would probably decide; 0 if it is decided
     """
 
     word: str
     more: float = 0.0
 
 
-def verdict(share: np.ndarray, realizations: int) -> Verdict | None:
-    """Return the verdict on a share (estimate, lower, upper) out of specification; None for a share that is not a number."""
+def verdict(share: np.ndarray, realizations: int, *, varies: bool = True) -> Verdict | None:
+    """Return the verdict on a share (estimate, lower, upper) out of specification; None for a share that is not a number.
+
+    A measure that does not vary needs no further realizations: it is CONSTANT within its limits, and fails outside of them.
+    """
     estimate, lower, upper = (float(value) for value in share)
     if not all(map(math.isfinite, (estimate, lower, upper))):
         return None
-    word = _word(lower, upper)
+    word = _word(lower, upper) if varies else FAILS if estimate > 0 else CONSTANT
     return Verdict(word, _more(estimate, realizations) if word == UNDECIDED else 0.0)
 
 
@@ -198,10 +202,15 @@ def _word(lower: float, upper: float) -> str:
 
 
 def _more(estimate: float, realizations: int) -> float:
-    """Return the number of additional independent realizations that would decide if the estimate did not change."""
-    count = float(realizations)
-    while count < MAX_REALIZATIONS:
+    """Return the number of additional independent realizations that would decide if the estimate did not change.
+
+    By chance an estimate may come so near to the allowed share that millions would be needed. It counts as no nearer than the
+    two are in half of such cases, so that the number settles.
+    """
+    distance = LIKELY_DISTANCE * math.sqrt(ALLOWED_SHARE / realizations)
+    if abs(estimate - ALLOWED_SHARE) < distance:
+        estimate = max(ALLOWED_SHARE + math.copysign(distance, estimate - ALLOWED_SHARE), 0.0)
+    count = GROWTH * realizations
+    while _word(*proportion_of(estimate * count, count)[1:]) == UNDECIDED:
         count *= GROWTH
-        if _word(*proportion_of(estimate * count, count)[1:]) != UNDECIDED:
-            return math.ceil(count - realizations)
-    return math.inf
+    return math.ceil(count - realizations)

@@ -33,8 +33,29 @@ def test_the_realizations_that_would_decide_are_enough_but_not_far_too_many():
     opinion = verdict(np.array(intervals.proportion_of(0, 200)), 200)
     needed = np.log(0.025) / np.log1p(-ALLOWED_SHARE)
     assert needed - 200 <= opinion.more <= 1.3 * needed
-    close = verdict(np.array(intervals.proportion_of(2700, 1_000_000)), 1_000_000)
-    assert close.word == UNDECIDED and verdict_text(close) == "undecided: too close to call"
+
+
+@pytest.mark.parametrize("count", [300, 1500, 6000, 100_000, 1_000_000])
+def test_the_number_that_would_decide_is_no_accident_of_a_share_that_seems_to_be_the_allowed_one(count):
+    """At the allowed share it is that of a median distance: z^2 / 0.6745^2, about 8.4 times as many realizations."""
+    for hits in np.arange(int(ALLOWED_SHARE * count), ALLOWED_SHARE * count + 2):
+        more = verdict(np.array(intervals.proportion_of(float(hits), float(count))), count).more
+        assert 1.8 * count < more < 12 * count
+
+
+def test_a_measure_that_does_not_vary_needs_no_more_realizations():
+    a = tc.Assembly("still")
+    block = a.part("block", tc.Box(50, 25, 10), rotation=(0.3, -1.2, 0.7))
+    a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=0)
+    other = a.part("other", tc.Box(50, 25, 10), at=(0, 100, 0))
+    a.locate(other, tc.three_two_one(other.face("-z"), other.face("-y"), other.face("-x")), tolerance=0.1)
+    a.measure("moves", other.point(0, 0, 0), along="z", tolerance=0.1)
+    for name, limits in {"within": (-0.1, 0.1), "beyond": (0.05, 0.1)}.items():
+        a.measure(name, block.point(50, 0, 0), along="x", limits=limits)
+    summary = tc.summarize(tc.run(a, samples=300, seed=1, solver="daqp"))
+    _, *lines = verdict_lines(summary)
+    assert lines == ["within: does not vary", "beyond: does not meet its limits"]
+    assert [row.is_good for row in result_rows(summary)][1:] == [None, False]
 
 
 def test_without_limits_there_is_no_verdict():
