@@ -41,7 +41,7 @@ def test_a_block_that_its_locators_hold_in_a_wall_is_not_assemblable(width, one_
 @pytest.mark.parametrize("solver", ["daqp", *nightly("qpoases")])
 @pytest.mark.parametrize("seed", [1, *nightly(2)])
 def test_a_status_does_not_hang_on_the_last_digit(seed, solver):
-    """CASES C8, in two frames and in blocks of two sizes: the same status in every row."""
+    """A U in a U without clearance, in two frames and in blocks of two sizes: the same status in every row."""
     _, still = simulate(cases.model("channel"), samples=3000, seed=seed, block=4096, solver=solver, method=EXACT)
     assert (still["status"] == Status.RESOLVED).all()
     _, small = simulate(cases.model("channel"), samples=1000, seed=seed, block=37, solver=solver, method=EXACT)

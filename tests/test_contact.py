@@ -112,7 +112,7 @@ def test_the_papers_set_alone_may_leave_penetration_and_the_closed_set_does_not(
 
 @pytest.mark.slow
 def test_planar_contact_is_flush():
-    """CASES C2: with three or more active points that are not collinear, every active gap becomes 0, to order eta."""
+    """With three or more active points that are not collinear, every active gap becomes 0, to order eta."""
     program, run = simulate(cases.ra1(), samples=1000, method=PAPER)
     (pair,) = program.nominal.pairs
     R, t = R_t(run["poses"])
@@ -133,7 +133,7 @@ def test_planar_contact_is_flush():
 
 @pytest.mark.parametrize("base_tolerance", [0, 6])
 def test_one_dimensional_contact(base_tolerance):
-    """CASES C1: max(0, g); with two varying parts the moving one ends at the larger of both heights."""
+    """The gap with contact is max(0, g); with two varying parts the moving one ends at the larger of both heights."""
     samples = 20_000
     _, run = simulate(cases.one_dimensional(base_tolerance), samples=samples, solver="daqp")
     labels = ["base.Z", "block.Z"]
@@ -158,7 +158,7 @@ METHODS = [
 @pytest.mark.slow
 @pytest.mark.parametrize("case", [*nightly(cases.ra1), cases.stack], ids=["ra1", "stack"])
 class TestInvariance:
-    """CASES C9. Seating: tests/test_seating.py."""
+    """Seating: tests/test_seating.py."""
 
     @pytest.mark.parametrize(
         "frame",

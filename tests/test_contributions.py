@@ -140,7 +140,7 @@ def test_what_only_contact_moves_has_no_linear_percentages(tmp_path):
         .isel(measure=0)
         .sel(state="corrected")
     )
-    # Root sum square of CASES C7, which is nearly linear: sensitivities times a sixth of the tolerances.
+    # Root sum square of the one-way clutch, which is nearly linear: sensitivities times a sixth of the tolerances.
     parts = np.array([11.910 * 0.1, 23.732 * 0.02, 11.821 * 0.025]) ** 2
     for label, part in zip(("hub.flat.offset", "roller.barrel.size", "ring.bore.size"), parts / parts.sum(), strict=True):
         estimate, lower, upper = shares["total"].sel(group=label).values

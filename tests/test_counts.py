@@ -12,7 +12,7 @@ SEATED = tc.Method(objective="seating", resolution="exact")
 
 
 def heights(program, run):
-    """Of the block of CASES C1 above its base [mm], raw."""
+    """Heights of a block above its base [mm], raw."""
     base, block = (run["deviations"][:, program.nominal.locators.labels.index(f"{name}.Z")] for name in ("base", "block"))
     return block - base
 

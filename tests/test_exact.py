@@ -72,7 +72,7 @@ def test_many_bodies_are_resolved(make, objective):
 @pytest.mark.slow
 @pytest.mark.parametrize("solver", ["qpoases", "daqp"])
 def test_opposed_faces_without_clearance(solver):
-    """CASES C8: one linear step cannot open all gaps, repeated ones always do. The pose there is a slide along y."""
+    """One linear step cannot open all gaps of a U in a U, repeated ones always do. The pose there is a slide along y."""
     samples = 10_000 if solver == "daqp" else 1000
     program, run = simulate(cases.model("channel"), samples=samples, solver=solver, method=EXACT)
     assert (run["status"] == Status.RESOLVED).all()

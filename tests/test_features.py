@@ -277,7 +277,7 @@ def test_shapes_of_single_precision_have_the_same_freedoms(shift, turn, tmp_path
     part.feature("rim", part.face(tc.select.Cylinder(radius=20)), tc.Position(0.2, "A|B"))
     a.measure("x", part.features[-1].axis(0), along="x")
     every = Draws(discretize(a)).contributors
-    assert [0.2 / each.spread for each in every] == pytest.approx([6.88] * 2 + [7.28 * np.sqrt(2)] * 4, rel=3e-3)
+    assert [0.2 / each.spread for each in every] == pytest.approx([6.88] * 2 + [7.270 * np.sqrt(2)] * 4, rel=3e-3)
     assert ["tilt" in each.label or "shift" in each.label for each in every] == [True] * 6
 
 

@@ -100,14 +100,14 @@ def test_tolerances_of_a_drawing_become_features_and_patterns(tmp_path):
 
 
 def test_spreads_are_those_of_the_zones(tmp_path):
-    """Closed forms of 99.73 % inside: an end of an axis t / 7.28, coordinates of a rectangle t / 11.77, a size t / 6.
+    """Closed forms of 99.73 % inside: an end of an axis t / 7.27, coordinates of a rectangle t / 11.77, a size t / 6.
 
     An end of an axis deviates by the sum of a shift and a tilt, which are equal.
     """
     spread = spreads(cover(drawing, tmp_path))
     assert spread["cover.cylinder 11.size"] == pytest.approx(0.03 / 6, rel=1e-4)
     axis = spread["cover.cylinder 11.shift x"]
-    assert axis == spread["cover.cylinder 11.tilt y"] == pytest.approx(0.2 / 7.28 / 2**0.5, rel=2e-3)
+    assert axis == spread["cover.cylinder 11.tilt y"] == pytest.approx(0.2 / 7.27 / 2**0.5, rel=2e-3)
     assert spread["cover.slot 12.offset"] == pytest.approx(0.3 / 11.77, rel=1e-3)
     assert spread["cover.plane 10.tilt y"] == pytest.approx(0.4 / 11.77, rel=1e-3)
     assert spread["cover.cylinders 3 2.size"] == pytest.approx(0.2 / 6, rel=1e-4)

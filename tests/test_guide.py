@@ -1,18 +1,20 @@
 """Guide and README: their examples run."""
 
 import doctest
-import io
 import re
+import runpy
+import shlex
+import shutil
 import types
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 
 import tolcontact as tc
-from tolcontact.report import summary_text
+from tests.helpers import call
 
-README = Path(__file__).parents[1] / "README.md"
+ROOT = Path(__file__).parents[1]
+README = ROOT / "README.md"
 CHAPTERS = (
     "declaration", "geometry", "pmi", "features", "fasteners", "discretization", "variation", "mechanics",
     "interference", "compilation",
@@ -38,8 +40,88 @@ def test_examples_of_the_guide_run(chapter):
     assert not failures, "".join(failures)
 
 
-def test_the_guide_has_no_other_chapters():
-    assert {path.stem for path in GUIDE.iterdir()} == set(CHAPTERS)
+PAGES = sorted(str(path.relative_to(GUIDE)) for path in GUIDE.rglob("*.md") if path.stem not in CHAPTERS)
+HEAVY = ("tutorials/bracket.md", "tutorials/seal.md")
+
+
+def fences(text):
+    """Return the fenced blocks of a Markdown text: their languages and lines."""
+    return re.findall(r"^```(\w+)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+def run_command(words, expected):
+    """Run a command of a page, and compare the lines that it prints with those of the page; "..." leaves lines out."""
+    if words[0] == "python":
+        runpy.run_path(words[1])
+        return
+    assert words[0] == "tolcontact"
+    printed = [" ".join(line.split()) for line in call(".", *words[1:]).stdout.splitlines()]
+    missing = [line for line in expected if line.strip() not in ("", "...") and " ".join(line.split()) not in printed]
+    assert not missing, "\n".join([shlex.join(words), *missing, "but it prints", *printed])
+
+
+def run_console(text):
+    for command, output in re.findall(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", text, re.MULTILINE):
+        run_command(shlex.split(command), output.splitlines())
+
+
+def run_page(text, folder, monkeypatch):
+    """Run all blocks of a page in a folder: scripts, sessions and commands."""
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("COLUMNS", "78")
+    (folder / "models").symlink_to(ROOT / "models")
+    for file in (GUIDE / "files").iterdir():
+        shutil.copy(file, folder)
+    names, failures = {"__name__": "page"}, []
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    for language, block in fences(text):
+        first = block.partition("\n")[0]
+        if language == "pycon":
+            test = doctest.DocTestParser().get_doctest(block, names, "page", None, 0)
+            runner.run(test, out=failures.append, clear_globs=False)
+            names = test.globs
+        elif language == "console":
+            run_console(block)
+        elif re.fullmatch(r"# from models/\w+\.py", first):
+            model = (ROOT / first.removeprefix("# from ")).read_text(encoding="utf-8")
+            excerpt = [line.strip() for line in block.splitlines()[1:] if line.strip() not in ("", "...")]
+            assert not [line for line in excerpt if line not in [of_model.strip() for of_model in model.splitlines()]]
+        elif language == "python":
+            if re.fullmatch(r"# \w+\.py", first):
+                (folder / first[2:]).write_text(block, encoding="utf-8")
+            exec(compile(block, first, "exec"), names)
+    assert not failures, "".join(failures)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "page", [pytest.param(page, marks=[pytest.mark.nightly] if page in HEAVY else []) for page in PAGES]
+)  # fmt: skip
+def test_a_page_of_the_guide_runs_as_it_says(page, tmp_path, monkeypatch):
+    run_page((GUIDE / page).read_text(encoding="utf-8"), tmp_path, monkeypatch)
+
+
+@pytest.mark.slow
+def test_the_readme_runs_as_it_says(tmp_path, monkeypatch):
+    run_page(README.read_text(encoding="utf-8"), tmp_path, monkeypatch)
+
+
+def test_the_front_of_the_guide_links_every_page_and_chapter():
+    front = (GUIDE / "index.md").read_text(encoding="utf-8")
+    links = re.findall(r"\]\(([^)#]+\.md)\)", front)
+    assert len(links) == len(set(links))
+    assert set(links) | {"index.md"} == {str(path.relative_to(GUIDE)) for path in GUIDE.rglob("*.md")}
+
+
+@pytest.mark.parametrize("page", [README, *sorted(GUIDE.rglob("*.md"))], ids=lambda page: page.stem)
+def test_links_and_pictures_of_a_page_exist(page):
+    links = re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
+    assert not [link for link in links if not re.match("https?:", link) and not (page.parent / link).exists()]
+
+
+def test_every_picture_of_the_guide_is_shown():
+    text = "".join(path.read_text(encoding="utf-8") for path in GUIDE.rglob("*.md"))
+    assert not [path.name for path in (GUIDE / "pictures").iterdir() if f"pictures/{path.name}" not in text]
 
 
 def test_front_names_every_chapter_in_order():
@@ -60,28 +142,5 @@ def test_front_names_every_public_name():
     assert all(names == set(getattr(tc, module).__all__) for module, names in named.items())
 
 
-def test_python_of_the_readme_runs_and_prints_its_table(tmp_path, monkeypatch, capsys):
-    readme = README.read_text(encoding="utf-8")
-    script, reading = re.findall(r"^```python\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
-    table = re.search(r"^```\n( +out of.*?)^```", readme, re.MULTILINE | re.DOTALL)[1]
-    monkeypatch.chdir(tmp_path)
-    Path("ra1.py").write_text(script)
-    with tc.run("ra1.py", samples=1000, seed=1, out="ra1.nc") as results:
-        console = Console(width=80, highlight=False, file=io.StringIO())
-        console.print(summary_text(tc.summarize(results)))
-    printed = {line.rstrip() for line in console.file.getvalue().splitlines()}
-    assert set(table.splitlines()) <= printed
-    names = {}
-    exec(compile(reading, "README.md", "exec"), names)
-    names["run"].close()
-    assert "corner height" in capsys.readouterr().out
-
-
-def test_readme_is_a_front():
-    assert len(README.read_text(encoding="utf-8").splitlines()) <= 100
-
-
-def test_links_of_the_readme_exist():
-    links = re.findall(r"\]\(([^)#]+)\)", README.read_text(encoding="utf-8"))
-    assert links
-    assert not [link for link in links if not (README.parent / link).exists()]
+def test_the_readme_is_a_front():
+    assert len(README.read_text(encoding="utf-8").splitlines()) <= 180

@@ -130,7 +130,7 @@ def of(run, program, label):
 
 @pytest.mark.parametrize("solver", ["daqp", "qpoases"])
 def test_a_clutch_jams_at_the_angle_of_its_formula(solver):
-    """CASES C7; to what a thousandth of the spring's force yields."""
+    """One-way clutch; to what a thousandth of the spring's force yields."""
     program, run = simulate(cases.model("clutch"), samples=1000, solver=solver, method=cases.model("clutch").method)
     assert (run["status"] == Status.RESOLVED).all()
     a = 27.645 + of(run, program, "hub.flat.offset")

@@ -1,21 +1,15 @@
 """What things show in a notebook, and what results are asked by name."""
 
 import html
-import json
 import re
-from pathlib import Path
 
-import nbformat
 import numpy as np
 import pytest
 import xarray as xr
-from nbclient import NotebookClient
 
 import tolcontact as tc
 from tests import cases
 from tests.test_report import data_of
-
-TOUR = Path(__file__).resolve().parents[1] / "studies" / "tour" / "tour.ipynb"
 
 
 @pytest.fixture(scope="module")
@@ -88,16 +82,3 @@ def test_what_results_do_not_have_is_said(ask, said, results):
 def test_archives_that_xarray_opens_have_the_verbs_too(archive):
     with xr.open_datatree(archive) as results:
         assert results.tolcontact.summary().attrs["realizations"] == 300
-
-
-@pytest.mark.nightly
-@pytest.mark.slow
-def test_the_tour_runs_from_declaration_to_decision(tmp_path, drawing):
-    notebook = nbformat.read(TOUR, as_version=4)
-    assert not any(cell.get("outputs") for cell in notebook.cells)  # what it shows is made when it is run
-    NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
-    shown = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
-    assert any("iframe" in output.get("data", {}).get("text/html", "") for output in shown)
-    assert any("image/png" in output.get("data", {}) for output in shown)
-    assert "error" not in {output.output_type for output in shown}
-    assert json.dumps(nbformat.validate(notebook)) == "null"

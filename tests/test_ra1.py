@@ -1,4 +1,4 @@
-"""RA1, the paper's Table 1 (CASES C3), and its first-order prediction."""
+"""RA1, the paper's Table 1, and its first-order prediction."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ BASE, TOP = [(5, 5), (95, 5), (50, 45)], [(55, 32.5), (95, 32.5), (75, 17.5)]
 
 
 def first_order(d):
-    """CASES C2 to first order: the base's plane where the faces cut each other, else the top's own height."""
+    """To first order the height is the base's plane where the faces cut each other, else the top's own height."""
     base, top = d[:, :3], d[:, 3:]
     gaps = [top @ plane_weights(TOP, x) - base @ plane_weights(BASE, x) for x in CORNERS]
     raw = top @ plane_weights(TOP, MEASURED)

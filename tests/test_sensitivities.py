@@ -46,7 +46,7 @@ def test_leverage_of_locators():
 
 
 def test_with_contact_they_are_those_of_the_plane_below(of_ra1):
-    """CASES C2: a top that touches follows the base alone."""
+    """A top that touches with planar faces lies flush on the base, and follows the base alone."""
     touched = of_ra1["by_contact"].sel(contact="touched")
     for k, weight in enumerate(plane_weights(BASE, MEASURED), start=1):
         assert float(touched.sel(contributor=f"base.A{k}", interval="estimate")) == pytest.approx(weight, abs=0.05)
@@ -55,7 +55,7 @@ def test_with_contact_they_are_those_of_the_plane_below(of_ra1):
 
 
 def test_one_dimensional_contact_is_followed_in_half_of_the_realizations():
-    """CASES C1: the derivative of max(0, g) is 0 or 1, each in half of the draws."""
+    """The derivative of max(0, g) is 0 or 1, each in half of the draws."""
     found = tc.analyses.sensitivities(cases.one_dimensional(0), samples=2000, solver="daqp").isel(measure=0)
     of = found.sel(contributor="block.Z")
     estimate, lower, upper = of["sensitivity"].sel(state="corrected").values
@@ -78,7 +78,7 @@ def test_intervals_cover():
 
 
 def test_a_clutch_follows_its_drawing_as_its_formula_says():
-    """CASES C7: (-11.910, -23.732, 11.821) degrees a mm; roller and ring vary in diameter. Means differ in the second order."""
+    """By hand (-11.910, -23.732, 11.821) degrees a mm; roller and ring vary in diameter. Means differ in the second order."""
     found = tc.analyses.sensitivities(cases.model("clutch"), samples=200, solver="daqp").isel(measure=0).sel(state="corrected")
     expected = {"hub.flat.offset": -11.910, "roller.barrel.size": -23.732 / 2, "ring.bore.size": 11.821 / 2}
     for label, slope in expected.items():

@@ -28,6 +28,9 @@ STUDIES = {
     "exact/tables.py": ["--samples", "20"],
     "form/measure.py": ["--samples", "10", "--figure", "gaps.png"],
     "paper/reproduce.py": ["--large", "2000", "--to", "."],
+    "pictures/contact.py": ["contact.svg"],
+    "pictures/cover_pmi.py": ["cover_pmi.stp"],
+    "pictures/draw.py": ["pictures"],
     "report/picture.py": ["ra1.png"],
     "robustness/files.py": ["--archives", "1", "--shapes", "2", "--models", "2", "--steps", "2", "--hostile-steps", "2"],
     "robustness/machines.py": ["--only", "environments", "--first", "2"],
@@ -47,12 +50,22 @@ EXTRAS = {
     "solvers/measure.py": ["qpsolvers"],
     "speed/measure.py": ["qpsolvers", "daqp"],
     "report/picture.py": ["playwright"],
+    "site/build.py": ["sphinx", "myst_parser", "furo"],
 }
 
 
 def test_no_script_is_forgotten():
     scripts = (ROOT / "studies").glob("*/*.py")
     assert {str(path.relative_to(ROOT / "studies")) for path in scripts if "__main__" in path.read_text()} == set(STUDIES)
+
+
+def test_pictures_of_the_guide_are_those_of_their_scripts(tmp_path):
+    guide = ROOT / "tolcontact" / "guide"
+    for script, arguments, folder in (("draw", [tmp_path], "pictures"), ("cover_pmi", [tmp_path / "cover_pmi.stp"], "files")):
+        done = run([sys.executable, ROOT / "studies" / "pictures" / f"{script}.py", *arguments], cwd=tmp_path, timeout=60)
+        assert done.returncode == 0, done.stderr
+        for file in (guide / folder).iterdir():
+            assert (tmp_path / file.name).read_text() == file.read_text(), file.name
 
 
 @pytest.mark.nightly

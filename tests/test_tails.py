@@ -14,7 +14,7 @@ from tests.helpers import PAPER, call, nightly
 
 
 def limited(limit):
-    """CASES C1, whose corrected height is max(0, g), g ~ N(0, 1), above nominal."""
+    """A block on a block, whose corrected height is max(0, g), g ~ N(0, 1), above nominal."""
     a = cases.one_dimensional(0)
     a.measure("kept", a.parts[1].point(5, 5, 10), along="z", limits=(None, limit))
     return a
@@ -46,7 +46,7 @@ def test_ra1_as_a_run_counts_it(method, samples):
 @pytest.mark.slow
 @pytest.mark.parametrize("limits", [(0.0, 4.0), (0.0, None)])
 def test_a_limit_at_a_stop_hides_nothing(limits):
-    """CASES C1: the height max(0, g), g ~ N(0, 1), is never below 0, and how seldom it is above 4 does not depend on that."""
+    """The height max(0, g), g ~ N(0, 1), is never below 0, and how seldom it is above 4 does not depend on that."""
     a = cases.one_dimensional(0)
     a.measure("kept", a.parts[1].point(5, 5, 10), along="z", limits=limits)
     found = tc.analyses.tails(a, samples=8000, seed=2, solver="daqp", method=PAPER)

@@ -20,6 +20,7 @@ ROOMS = {
     "clarabel": ("statics/force_cones.py",),
     "matplotlib": ("plot/",),
     "jinja2": ("report/html/",),
+    "markdown_it": ("report/html/guide.py",),
     "fast_simplification": ("report/html/scene.py",),
     "pyvista": ("plot/",),
     "numba": ("compiled.py",),

@@ -17,7 +17,7 @@ import tolcontact as tc
 from tolcontact.pmi.declared import DeclaredPmi
 
 FIXTURE = 0.05  # tolerance of the seats and of the locators of a fixture
-AXIS = 1 / 7.28  # standard deviation of an end of an axis in a round zone of width 1, of which 99.73 % are inside
+AXIS = 1 / 7.27  # standard deviation of an end of an axis in a round zone of width 1, of which 99.73 % are inside
 RECTANGLE = 1 / 11.77  # standard deviation of the middle of a rectangular plane in a zone of width 1
 SIZE = 1 / 6
 MAX_LABELS = 3  # of a group of contributors

@@ -1,20 +1,20 @@
-"""The site: guide and reference from docstrings, a gallery of the models, and every problem of the benchmarks, computed anew.
+"""The site: guide, reference of public names, a gallery of the models, and every problem of the benchmarks, computed anew.
 
-python -m studies.site.build FOLDER [--samples N]
+python -m studies.site.build FOLDER [--samples N]     needs the extras docs, plot and step
 """
 
 import argparse
 import ast
-import inspect
 import re
+import shutil
+import tempfile
+import types
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import jinja2
-import markupsafe
-import pdoc
 from PIL import Image
+from sphinx.cmd.build import build_main
 
 import tolcontact as tc
 from studies.benchmarks import pages
@@ -22,15 +22,12 @@ from studies.benchmarks.drawing import svg
 from studies.benchmarks.problem import Problem, problems
 from studies.benchmarks.run import COLUMNS, DIFFERS, UNSUPPORTED, solved
 from tolcontact.report.html import summary_table, write_page
-from tolcontact.report.html.page import HERE as REPORT
 
 HERE = Path(__file__).resolve().parent
-MODELS = HERE.parents[1] / "models"
+ROOT = HERE.parents[1]
+GUIDE, MODELS = ROOT / "tolcontact" / "guide", ROOT / "models"
 LINES = 10  # of a model
 PICTURE = (900, 600)  # pixels
-# The front of the guide, the chapters that it lists (but those among its own names), and the assertions.
-CHAPTERS = re.findall(r"\| `tolcontact\.(\w+)` \|", tc.__doc__ or "")
-REFERENCE = ("tolcontact", *(f"tolcontact.{name}" for name in [*CHAPTERS, "testing"] if name not in dir(tc)))
 
 
 def models() -> list[Path]:
@@ -38,7 +35,7 @@ def models() -> list[Path]:
     return [path for path in sorted(MODELS.glob("*.py")) if "def assembly(" in path.read_text(encoding="utf-8")]
 
 
-def shown(path: Path, folder: Path, samples: int) -> dict[str, Any]:
+def section_of_model(path: Path, source: Path, extra: Path, samples: int) -> str:
     """Return the section of a model: its question, a picture, its first lines, and its answer."""
     text = path.read_text(encoding="utf-8")
     question, _, rest = (ast.get_docstring(ast.parse(text)) or "").partition("\n\n")
@@ -46,57 +43,105 @@ def shown(path: Path, folder: Path, samples: int) -> dict[str, Any]:
     plotter = tc.plot.assembly(results, opacity=0.6)
     plotter.camera.zoom(1.3)
     picture = Image.fromarray(plotter.screenshot(None, return_img=True, window_size=PICTURE))
-    picture.save(folder / f"{path.stem}.webp", quality=70)
+    picture.save(source / f"{path.stem}.webp", quality=70)
     plotter.close()
     summary = results.tolcontact.summary()
-    write_page(results, summary, folder / f"{path.stem}.html")
-    body = text[text.index("def assembly(") :].splitlines()
-    return {
-        "name": path.stem,
-        "question": question.replace("\n", " "),
-        "text": rest.replace("\n", " "),
-        "picture": f"{path.stem}.webp",
-        "report": f"{path.stem}.html",
-        "lines": "\n".join([*body[:LINES], "    ..."]),
-        "answer": markupsafe.Markup(summary_table(summary)),
-    }
+    write_page(results, summary, extra / f"{path.stem}.html")
+    lines = "\n".join([*text[text.index("def assembly(") :].splitlines()[:LINES], "    ..."])
+    return "\n\n".join([
+        "## " + question.replace("\n", " "),
+        f"`models/{path.stem}.py`, <a href=\"{path.stem}.html\">live report</a>",
+        rest.replace("\n", " ").replace("$", "\\$"),
+        f"![The assembly {path.stem} with its locators, contact points and measurements]({path.stem}.webp)",
+        f"```python\n{lines}\n```",
+        f"<div class=\"wide\">\n{summary_table(summary)}\n</div>".replace("\n\n", "\n"),
+    ])  # fmt: skip
 
 
-def computed(problem: Problem) -> dict[str, Any]:
+def section_of_problem(problem: Problem, rows: Sequence[Sequence[str]]) -> str:
     """Return the section of a problem with its figures."""
-    rows = [figure.cells for figure in solved(problem).figures]
-    return {"problem": problem, "drawing": markupsafe.Markup(svg(problem.drawing)), "rows": rows}
+    table = [COLUMNS, ["---"] * len(COLUMNS), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
+    return "\n\n".join([
+        f"## {problem.title}",
+        svg(problem.drawing),
+        f"{problem.text} <a href=\"benchmarks/{problem.name}.html\">Reference solutions and model</a>",
+        "\n".join("| " + " | ".join(row) + " |" for row in table),
+    ])  # fmt: skip
+
+
+def reference() -> str:
+    """Return the page of all public names, by the tables of the front page of the package."""
+    entries = re.findall(r"^\|(.*?)\|(.*?)\|$", (tc.__doc__ or "").partition("## Names")[2], re.MULTILINE)[2:]
+    lines, module = ["# Names"], ""
+    for purpose, names in entries:
+        if purpose.strip():
+            module = "".join(f".{name}" for name in re.findall(r"`tc\.(\w+)`", purpose))
+            lines.append("## " + purpose.strip().capitalize())
+        for name in re.findall(r"`(\w+)`", names):
+            thing = getattr(eval(f"tc{module}", {"tc": tc}), name)
+            if isinstance(thing, types.ModuleType):
+                continue
+            kind = "class" if isinstance(thing, type) else "function"
+            members = "\n   :members:\n   :inherited-members: Exception, tuple, Enum, IntEnum, int" if kind == "class" else ""
+            lines.append(f"```{{eval-rst}}\n.. auto{kind}:: tolcontact{module}.{name}{members}\n```")
+    return "\n\n".join(lines)
+
+
+def front(names: Sequence[str]) -> str:
+    """Return the front of the guide, with the pages that each section links in its side bar."""
+    text = (GUIDE / "index.md").read_text(encoding="utf-8")
+    title, *sections = re.split(r"^## ", text, flags=re.MULTILINE)
+    result = [title]
+    for section in sections:
+        heading = section.partition("\n")[0]
+        links = [link.removesuffix(".md") for link in re.findall(r"\]\(([^)]+\.md)\)", section)]
+        if heading == "Reference":
+            links = [*links, *names]
+        result.append(f"{section}\n```{{toctree}}\n:hidden:\n:caption: {heading}\n\n" + "\n".join(links) + "\n```\n")
+    others = "gallery\nverification\nchanges"
+    return "## ".join(result) + f"\n```{{toctree}}\n:hidden:\n:caption: Evidence\n\n{others}\n```\n"
+
+
+def changes() -> str:
+    """Return the changes that the README lists."""
+    section = (ROOT / "README.md").read_text(encoding="utf-8").partition("\n## Changes\n")[2].partition("\n## ")[0]
+    return f"# Changes\n\n{section}"
 
 
 def build(folder: Path, samples: int, scripts: Sequence[Path], chosen: Sequence[Problem]) -> None:
-    """Write the pages of these models and problems into a folder, which is created if it is missing."""
-    folder.mkdir(parents=True, exist_ok=True)
-    pdoc.render.configure(show_source=False)
-    for analysis in dir(tc.analyses):  # a module has the name of its function, until the function is asked for
-        getattr(tc.analyses, analysis)
-    pdoc.pdoc(*REFERENCE, output_directory=folder / "reference")
-    pages.write(folder / "benchmarks", chosen)
-    sections = [computed(problem) for problem in chosen]
-    verdicts = [line[-1] for section in sections for line in section["rows"]]
-    _write(
-        folder / "verification.html", "Verification",
-        f"{len(verdicts)} figures of {len(sections)} problems, computed anew by tolcontact {tc.__version__}: "
-        f"{verdicts.count(DIFFERS)} differ from what is expected, and {verdicts.count(UNSUPPORTED)} are not supported. "
-        "Intervals of estimates cover 99.9 % of runs; other intervals are tolerances.", problems=sections,
-    )  # fmt: skip
-    _write(
-        folder / "gallery.html", "Gallery",
-        f"What each model asks, and what {samples} realizations answer, without contact (raw) and with it (corrected).",
-        models=[shown(path, folder, samples) for path in scripts],
-    )  # fmt: skip
-    _write(folder / "index.html", "tolcontact", (inspect.getdoc(tc) or "").partition("\n\n")[0])
-
-
-def _write(path: Path, title: str, said: str, **things: Any) -> None:
-    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(HERE), autoescape=True)
-    style = markupsafe.Markup((REPORT / "page.css").read_text(encoding="utf-8"))
-    page = environment.get_template("pages.html.j2").render(title=title, said=said, style=style, columns=COLUMNS, **things)
-    path.write_text(page, encoding="utf-8")
+    """Write the site of these models and problems into a folder. Raises RuntimeError if Sphinx warns of anything."""
+    with tempfile.TemporaryDirectory() as temporary:
+        source, extra = Path(temporary) / "source", Path(temporary) / "extra"
+        shutil.copytree(GUIDE, source)
+        (source / "_static").mkdir()
+        (extra / "benchmarks").mkdir(parents=True)
+        shutil.copy(HERE / "site.css", source / "_static")
+        shutil.copy(HERE / "conf.py", source)
+        pages.write(extra / "benchmarks", chosen)
+        figures = [[figure.cells for figure in solved(problem).figures] for problem in chosen]
+        verdicts = [row[-1] for rows in figures for row in rows]
+        written: dict[str, list[str]] = {
+            "verification": [
+                "# Verification",
+                f"{len(verdicts)} figures of {len(chosen)} problems, computed anew by tolcontact {tc.__version__}: "
+                f"{verdicts.count(DIFFERS)} differ from what is expected, and {verdicts.count(UNSUPPORTED)} are not supported. "
+                "Intervals of estimates cover 99.9 % of runs; other intervals are tolerances.",
+                *(section_of_problem(problem, rows) for problem, rows in zip(chosen, figures, strict=True)),
+            ],
+            "gallery": [
+                "# Gallery",
+                f"What each model asks, and what {samples} realizations answer, without contact (raw) and with it (corrected).",
+                *(section_of_model(path, source, extra, samples) for path in scripts),
+            ],
+            "names": [reference()],
+            "changes": [changes()],
+            "index": [front(["names"])],
+        }
+        for name, sections in written.items():
+            (source / f"{name}.md").write_text("\n\n".join(sections), encoding="utf-8")
+        options: list[Any] = ["-q", "-W", "--keep-going", "-D", f"html_extra_path={extra}"]
+        if build_main([str(option) for option in [*options, source, folder]]):
+            raise RuntimeError("the site has warnings; see above")
 
 
 def main() -> None:

@@ -22,7 +22,7 @@ def ra1(frame: Frame = STILL, points=202) -> tc.Assembly:
 
 
 def one_dimensional(base_tolerance: float) -> tc.Assembly:
-    """CASES C1: a block that only moves up and down, on a block that does the same or stands still."""
+    """A block that only moves up and down, on a block that does the same or stands still."""
     a = tc.Assembly("C1")
     base = a.part("base", tc.Box(10, 10, 10), at=(0, 0, -10))
     block = a.part("block", tc.Box(10, 10, 10))
@@ -128,7 +128,7 @@ def block_on_six(width: float, one_sided: int = 0) -> tc.Assembly:
 
 
 def square_pins(varies: str = "both") -> tc.Assembly:
-    """CASES C6: a plate with two square pins, free to slide along x only; each face of pins and slots is off and askew.
+    """A plate with two square pins, free to slide along x only; each face of pins and slots is off and askew.
 
     A face is a part of its own. Off by u with sigma t/6 and askew by gamma with sigma t/30 is the same as two independent
     deviations with sigma t/6 sqrt(2) at y = -5 and +5. A push along x finds its rest where both pins fit. Of "translations"

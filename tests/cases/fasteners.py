@@ -1,4 +1,4 @@
-"""Two supports on a plate, held by bolts in holes (CASES C4)."""
+"""Two supports on a plate, held by bolts in holes: extremes by hand."""
 
 import trimesh
 

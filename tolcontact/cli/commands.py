@@ -21,6 +21,7 @@ COMMANDS = {
         "Compare solvers, resolutions or objectives of a model on the same draws, or archives with each other.",
     ),
     "new": ("models", "Write a small model with comments as a starting point."),
+    "guide": ("models", "Open the installed guide in the browser: tutorials, how-tos, theory, reference, glossary."),
     "check": ("models", "Check a model and its options without a run; list all faults and probable mistakes."),
     "view": (
         "models",

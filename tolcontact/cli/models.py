@@ -1,4 +1,4 @@
-"""tolcontact new, tolcontact check, tolcontact view."""
+"""tolcontact new, tolcontact check, tolcontact view, tolcontact guide."""
 
 import json
 import tempfile
@@ -20,7 +20,7 @@ from tolcontact.declaration.values import key_faults
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError, OptionError, shown
 from tolcontact.geometry import parts_from
-from tolcontact.report import nominal_and_faults, write_page, write_view
+from tolcontact.report import nominal_and_faults, write_guide, write_page, write_view
 from tolcontact.workflow.accessor import summarize
 from tolcontact.workflow.models import DEFAULT_SOLVER, build
 
@@ -121,6 +121,14 @@ def view(
     typer.echo(f"page: {shown(str(out or path))}")
     if out is None:
         typer.launch(str(path))
+
+
+@common.app.command(epilog=common.examples("guide"))
+def guide() -> None:
+    """Open the installed guide in the browser: tutorials, how-tos, theory, reference, glossary."""
+    page = write_guide(temporary_page(Path("guide")).parent)
+    typer.echo(f"page: {shown(str(page))}")
+    typer.launch(str(page))
 
 
 def temporary_page(source: Path) -> Path:

@@ -5,6 +5,7 @@ from .html import (
     is_page as is_page,
     nominal_and_faults as nominal_and_faults,
     write_comparison as write_comparison,
+    write_guide as write_guide,
     write_page as write_page,
     write_view as write_view,
 )

@@ -14,7 +14,7 @@ from tolcontact.variation.plans import uniform
 
 @pytest.mark.slow
 def test_normal_scores_are_drawn_as_in_a_run():
-    """CASES C6, rotations alone; larger deviations do not make assembly possible again."""
+    """Two square pins in two slots, rotations alone; larger deviations do not make assembly possible again."""
     program = tc.build(cases.square_pins("rotations"), solver="daqp", method=SEATED)
     score = NotAssemblable(Engine(program, map_blocks))
     u = np.random.default_rng(3).standard_normal((24, len(program.draws.varying)))

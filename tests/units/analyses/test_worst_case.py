@@ -36,7 +36,7 @@ def few_searches(model, samples, method=None):
     [(False, 3, 1, 54, 52), *nightly((True, -3, 0, 47, 48.5), (True, 3, 1, 53, 51.5), (False, -3, 0, 46, 48))],
 )
 def test_fasteners_have_the_documented_extremes(is_fixed, pull, end, with_float, without):
-    """CASES C4. Forces decide where the float goes; the bound is that of any float."""
+    """Fixed and floating fasteners: extremes by hand. Forces decide where the float goes; the bound is that of any float."""
     found = few_searches(fasteners(is_fixed, pull), 32)
     assert values(found)[end] == pytest.approx(with_float, abs=2e-6)
     assert values(found, measure=1)[end] == pytest.approx(without, abs=2e-6)
@@ -47,7 +47,7 @@ def test_fasteners_have_the_documented_extremes(is_fixed, pull, end, with_float,
 
 @pytest.mark.slow
 def test_a_clutch_has_the_worst_cases_of_its_formula():
-    """CASES C7."""
+    """One-way clutch: the angle at its extremes is a closed form."""
     found = few_searches(cases.model("clutch"), 32)
     assert values(found) == pytest.approx([5.9574, 7.9385], abs=1e-4)
     last = found.deviations.isel(measure=0).sel(state="corrected", end="largest")
@@ -99,7 +99,7 @@ def test_influences_are_those_of_contact_too():
 
 
 def test_an_influence_that_shows_only_at_some_points_is_found_there():
-    """CASES C1: the height max(0, z) does not change between two points below, and does between one below and one above."""
+    """The height max(0, z) does not change between two points below, and does between one below and one above."""
     program = tc.build(cases.one_dimensional(0), solver="daqp", method=PAPER)
     area = AllowedRegion(program.draws, seed=1)
     influences = Influences(area, Evaluation(Engine(program, map_blocks), area), np.ones(1))
