@@ -134,7 +134,9 @@ def contributions(
     `samples` is the number of base realizations: samples (2 + groups) are simulated, and samples (1 + units) more for Shapley
     effects, in addition to the screening. The default follows from 60 000 realizations in total, and is between 512 and 4096.
     `progress` is called with the number of finished realizations and the total.
-    Arguments that all analyses share, and their errors, are described in tolcontact.analyses.
+    `model`, `samples`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see tolcontact.analyses).
+
+    `tc.analyses.contributions("model.nc", by="feature", solver="daqp")`
     """
     analysis = Analysis(
         terms.CONTRIBUTIONS, model, samples=MIN_SAMPLES if samples is None else samples, seed=seed, solver=solver,

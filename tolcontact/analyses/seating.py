@@ -38,7 +38,10 @@ def seating(model: Model | Program, *, into: str | Path | None = None) -> xr.Dat
     states mu=0 has no friction. Opposed contacts may press against each other as hard as the balance of forces permits, as in a
     drawer that jams. Whether a part actually stops short depends on how it was put down, which is unknown; the coefficient
     states whether it can. It is exact to 1e-6, or to 1e-3 where contacts can also press against each other without holding the
-    forces (see tolcontact.statics). Arguments that all analyses share, and their errors, are described in tolcontact.analyses.
+    forces (see tolcontact.statics).
+    `model` and `into` are as in all analyses (see tolcontact.analyses).
+
+    `tc.analyses.seating("model.py", into="model.nc")`
     """
     question = Question(terms.SEATING, model, solver=None, method=None, into=into)
     if not question.program.nominal.assembly.forces:

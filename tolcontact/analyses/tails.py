@@ -47,9 +47,11 @@ def tails(
     the result comes from the other three quarters. A probability of 0 with an upper bound means that the search ended below
     1e-9. Where two searches disagree, the interval covers both results, and more realizations are needed. A measure that is not
     a number in any realization has the probability NaN, as in `run`. Probabilities include unresolved realizations, with their
-    last poses. `progress` is called with the number of realizations simulated, and the approximate total. Arguments that all
-    analyses share, and their errors, are described in tolcontact.analyses. Also raises OptionError for a model that has no rare
-    event.
+    last poses. `progress` is called with the number of realizations simulated, and the approximate total.
+    `model`, `samples`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see tolcontact.analyses).
+    Raises OptionError for a model that has no rare event.
+
+    `tc.analyses.tails("model.nc")`
     """
     if isinstance(samples, int) and samples < MIN_SAMPLES:
         raise OptionError(f"samples is {samples!r}; expected at least {MIN_SAMPLES} realizations for an event")

@@ -123,7 +123,9 @@ def worst_case(
     gains no more. `unseen` is the estimate w (w + 1) / (n (n - 1)) for w distinct ends of n searches from random combinations
     (Boender, Rinnooy Kan, 1987). The linear estimate is exact to first order in the deviations: large tilts may exceed it. Only
     certified realizations count. `progress` is called with the number of realizations simulated, and the approximate total.
-    Arguments that all analyses share, and their errors, are described in tolcontact.analyses.
+    `model`, `samples`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see tolcontact.analyses).
+
+    `tc.analyses.worst_case("model.py", solver="daqp")`
     """
     analysis = Analysis(
         terms.WORST_CASE, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,

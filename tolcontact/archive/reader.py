@@ -21,7 +21,7 @@ from tolcontact.method import Method
 
 
 def open_archive(path: str | Path) -> xr.DataTree:
-    """Return an archive as a tree of labelled datasets that are read on demand.
+    """Return the archive at a `path` as a tree of labelled datasets that are read on demand: `tc.open_archive("run.nc")`.
 
     Raises ArchiveError if the file is missing, is not an archive of tolcontact, or is damaged: all but the realizations is
     read and compared with its checksums; `summarize` checks the realizations.
@@ -45,7 +45,7 @@ def open_unchecked(path: Path) -> xr.DataTree:
 
 
 def model_of(results: xr.DataTree) -> Assembly:
-    """Return the declared assembly, rebuilt from an archive."""
+    """Return the declared assembly, rebuilt from the `results` of a run: `tc.io.model_of(tc.open_archive("run.nc"))`."""
     try:
         document = json.loads(str(results["model"][terms.DECLARATION.name].values))
     except (KeyError, ValueError, RecursionError) as error:

@@ -107,7 +107,7 @@ def method_choices(**options: str | None) -> dict[str, str]:
 
 
 def main(assembly: "Callable[[], Assembly]") -> None:
-    """Run the script that defines `assembly`, with the options of `tolcontact run`."""
+    """Run the script that defines `assembly`, with the options of `tolcontact run`: `tc.main(assembly)` ends a script."""
     script = inspect.getsourcefile(assembly)
     command_line([*(["run", script] if script else []), *sys.argv[1:]])
 

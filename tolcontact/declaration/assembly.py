@@ -104,32 +104,58 @@ class Assembly(Declarations, Pictured, Checked):
     def part(
         self, name: str, geometry: Geometry, *, at: Any = (0, 0, 0), rotation: Any = (0, 0, 0), fixed: bool | None = None
     ) -> Part:  # fmt: skip
-        """Declare a part: its shape, its position `at` [mm] and rotation vector [rad] in the nominal assembly (see Part)."""
+        """Declare a part (see Part).
+
+        name       of the part; it also names groups of archives
+        geometry   its shape: tc.Box(x, y, z), tc.Pin(diameter, length) or tc.Mesh(file)
+        at         (x, y, z) [mm] of its frame in the nominal assembly; by default the origin
+        rotation   rotation vector [rad]; tc.degrees(0, 0, 90) is a quarter turn about z
+        fixed      True: contact does not move it; None (default): it is free if it is the moving side of a pair (see Part)
+
+        `block = model.part("block", tc.Box(60, 40, 20), at=(30, 20, 10))`
+        """
         expect(f'part "{name}": geometry', geometry, Geometry, "tc.Box(x, y, z) or tc.Mesh(file)")
         expect(f'part "{name}": fixed', fixed, bool | None, "True, False or None")
         return self._add("parts", Part(name, geometry, _vector(at), _vector(rotation), fixed, script_line()))
 
     def station(self, name: str) -> Station:
-        """Declare the next station of an assembly that is built in steps, and return it (see Station)."""
+        """Declare the next station, of this `name`, of an assembly that is built in steps: `weld = line.station("weld")`."""
         return self._add("stations", Station(name, script_line()).belonging_to(self))
 
     def variable(self, name: str, tolerance: Any, *, drives: Mapping[str, float], units: str = "mm") -> Variable:
-        """Declare a cause that drives several contributors, each by a factor (see Variable)."""
+        """Declare a cause that drives several contributors (see Variable).
+
+        name        of the cause
+        tolerance   full width of its range in its `units`, or a tc.Tolerance
+        drives      factor [mm per unit] of each contributor, by its label
+        units       of the cause, by default mm
+
+        `model.variable("warmth", 20, drives={"cover.width.size": 0.0007}, units="K")`
+        """
         variable = Variable(
             name=name, tolerance=_tolerance(tolerance), drives=dict(drives), units=units, declared_at=script_line()
         )
         return self._add("variables", variable)
 
     def correlate(self, labels: Sequence[str], matrix: Any) -> Correlation:
-        """Declare that contributors are correlated: a matrix, or one coefficient for two of them (see Correlation)."""
+        """Declare that contributors with these `labels` are correlated: a `matrix`, or one coefficient for two of them.
+
+        `model.correlate(["top.A1", "top.A2"], 0.5)`
+        """
         return self._add("correlations", _correlation(labels, matrix, script_line()))
 
     def population(self, source: Any, columns: Mapping[str, str] | None = None) -> Population:
-        """Declare that contributors are drawn from measured rows: a CSV file, a DataFrame, a Dataset (see Population)."""
+        """Declare that contributors are drawn from measured rows (see Population).
+
+        source    a CSV file, a DataFrame, a Dataset or a mapping of columns, with deviations [mm]
+        columns   label of the contributor of each column; by default the names of the columns are labels
+
+        `model.population("batch.csv", columns={"height": "block.top.offset"})`
+        """
         return self._add("populations", _population(source, columns, script_line()))
 
     def may_overlap(self, *parts: Part) -> Overlap:
-        """Declare that parts, any two of them, are meant to overlap (see Overlap)."""
+        """Declare that parts, any two of them, are meant to overlap, as in `model.may_overlap(shaft, hub)` (see Overlap)."""
         for part in parts:
             expect("may_overlap: an argument", part, Part, "parts, as in may_overlap(shaft, hub)")
         return self._add("overlaps", Overlap(parts, script_line()))

@@ -41,12 +41,17 @@ class Declarations:
         floating: bool = False,
         placing: Placing = "first order",
     ) -> Location:
-        """Locate a part by six locators, or by fewer if it is `floating`, on the ground or `on` another part (see Location).
+        """Locate a part by six locators, or by fewer if it is floating (see Location).
 
-        On a feature of another part, it also follows the deviations of that feature. A joint is located by points of its parts.
-        `tolerance` applies to each locator without a tolerance: the full width of its zone [mm], limit deviations ("±0.1",
-        "+0.1/-0.05"), a Tolerance, or a frozen scipy.stats distribution.
-        `placing` is "first order", "exact" or "best fit".
+        part        the part; or a joint, which is located by points of its parts
+        scheme      tc.three_two_one(...), or a list of tc.Locator
+        tolerance   of each locator without one: the full width of its zone [mm], limit deviations ("±0.1", "+0.1/-0.05"), a
+                    Tolerance, or a frozen scipy.stats distribution
+        on          part that it is located on, or a feature of it, whose deviations it follows; by default the ground
+        floating    True: contact and forces hold it in the directions that its locators leave open
+        placing     "first order" (default), "exact", or "best fit" for more than six locators
+
+        `model.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=5), tolerance=0.2)`
         """
         expect("locate: the first argument", part, Part | Joint, "a part")
         expect(
@@ -77,7 +82,19 @@ class Declarations:
         mu: float | None = None,
         stiffness: float | None = None,
     ) -> ContactPair:
-        """Declare that points of the `moving` face stay outside the `reference` face (see ContactPair)."""
+        """Declare that points of the `moving` face stay outside the `reference` face (see ContactPair).
+
+        name        of the pair
+        moving      face or feature with the contact points
+        reference   face or feature that they stay outside of
+        points      number of points, or "vertices" of the mesh; by default as many as the geometry needs
+        spacing     distance of points [mm], in place of their number
+        within      largest distance [mm] of the nominal faces at a point; by default a tenth of the part's diagonal
+        mu          coefficient of friction, for tc.analyses.seating alone
+        stiffness   [N/mm] of a compliant pair; by default the faces are rigid
+
+        `model.contact("seat", moving=lid.face("-z"), reference=base.face("+z"), spacing=5)`
+        """
         for side, face in (("moving", moving), ("reference", reference)):
             expect(f'contact "{name}": {side}', face, Face | Feature, 'part.face("+z"), or a feature')
         pair = ContactPair(
@@ -87,7 +104,10 @@ class Declarations:
         return self._add("pairs", pair)
 
     def force(self, name: str, *, at: Point, vector: Any) -> Force:
-        """Declare a force `vector` [N], in the assembly frame, at a point of a part (see Force)."""
+        """Declare a force of a `name`: its `vector` [N], in the assembly frame, `at` a point of a part (see Force).
+
+        It acts with the objective "seating": `model.force("weight", at=lid.point(50, 30, 4), vector=(0, 0, -20))`.
+        """
         expect(f'force "{name}": at', at, Point, "part.point(x, y, z)")
         line, station = script_line(), self._station
         return self._add("forces", Force(name=name, at=at, vector=_vector(vector), declared_at=line, station=station))
@@ -104,9 +124,18 @@ class Declarations:
         absolute: bool | None = None,
         units: str | None = None,
     ) -> Measure:
-        """Declare a measure of a point, of two points, of a measurement, or of a CasADi expression of the poses (see Measure).
+        """Declare a measure (see Measure).
 
-        `units` apply to an expression, by default mm. A measurement has its own.
+        name        of the measure
+        of          a point, a measurement such as tc.Gap(...), or a function of the poses that returns a CasADi expression
+        to          a second point: the measure is a distance, in place of a displacement
+        along       direction "x", "y", "z" or a vector, of a displacement or a distance
+        tolerance   width of its limits about the nominal value [mm or rad], or "+0.2/-0.1"
+        limits      (lower, upper) values in place of a tolerance; None for an open side
+        absolute    True: values are coordinates or distances; False: they are differences from nominal
+        units       of an expression, by default mm; a measurement has its own
+
+        `model.measure("flush", lid.point(100, 30, 4), to=base.point(100, 30, 24), along="x", limits=(-0.2, 0.2))`
         """
         axis = None if along is None else direction(along)
         if units is None:

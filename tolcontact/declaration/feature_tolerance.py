@@ -74,6 +74,10 @@ class ToleranceKind(Readable):
     around: tuple[str, ...] = ()
 
     def __call__(self, width: float, datums: str = "", **options: Unpack[ToleranceOptions]) -> "GeometricTolerance":
+        """Return a tolerance of a full `width` [mm] to `datums`, as in `tc.Position(0.2, "A|B|C", material="M")`.
+
+        GeometricTolerance describes the options and their defaults.
+        """
         return GeometricTolerance(self, width, datums, **options)
 
     @property

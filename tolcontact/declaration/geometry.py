@@ -11,7 +11,7 @@ from tolcontact.errors import shown
 
 @dataclass(frozen=True, repr=False)
 class Box(Checked):
-    """A block from the origin of its part's frame to (x, y, z) [mm]."""
+    """A block from the origin of its part's frame to (x, y, z) [mm], as in `tc.Box(100, 50, 10)`."""
 
     x: float
     y: float
@@ -25,7 +25,10 @@ class Box(Checked):
 
 @dataclass(frozen=True, repr=False)
 class Pin(Checked):
-    """A round pin about the z axis of its part's frame, from z = -length to 0 [mm]; a `head` of a bolt is above z = 0."""
+    """A round pin about the z axis of its part's frame, as in `tc.Pin(8, 20)`.
+
+    Its `diameter` and `length` are in mm; it reaches from z = -length to 0. The `head` of a bolt is above z = 0.
+    """
 
     diameter: float
     length: float

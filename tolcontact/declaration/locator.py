@@ -28,6 +28,7 @@ FIRST_ORDER, EXACT, BEST_FIT = PLACINGS = get_args(Placing)
 class Locator(Checked):
     """A point of a part [mm], a direction into the part, and the deviation along it, in the part's own frame.
 
+    `tc.Locator("A1", (5, 5, 0), "z", 0.2)` has the name "A1", which is unique in its part, and a zone of full width 0.2 mm.
     A positive deviation moves the part along `direction`. `tolerance=None` takes the tolerance of the `locate` call. A
     `one_sided` locator is a support: the part may lift off it along `direction`, but not pass through it. The objective
     "locator stiffness" uses the `stiffness` [N/mm] of two-sided locators, by default 1. Under the objective "seating" a locator
@@ -120,7 +121,11 @@ class ThreeTwoOne(Checked):
 def three_two_one(
     primary: Face | Feature, secondary: Face | Feature, tertiary: Face | Feature, *, inset: float = 0.0
 ) -> ThreeTwoOne:
-    """Return a 3-2-1 locating scheme: three points on `primary`, two on `secondary`, one on `tertiary` (see ThreeTwoOne)."""
+    """Return a 3-2-1 locating scheme: three points on `primary`, two on `secondary`, one on `tertiary` (see ThreeTwoOne).
+
+    The points are `inset` mm inside the edges of the faces, by default on the edges:
+    `tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=5)`.
+    """
     return ThreeTwoOne(face_of(primary), face_of(secondary), face_of(tertiary), inset)
 
 

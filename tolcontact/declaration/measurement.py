@@ -102,6 +102,8 @@ class _OfStation(Measurement):
 class Gap(_OfStation):
     """The distance of a station, a point of one part, from a face of another, perpendicular to this face.
 
+    `tc.Gap(door.point(0, 40, 300), body.face("-x"))`
+
     The face is extended beyond its ends: as its plane, cylinder, cone, sphere or torus, or as its tangent plane at the point
     nearest to the nominal station if its surface is of no such kind. The gap is negative if the station is inside the material.
     """
@@ -111,6 +113,8 @@ class Gap(_OfStation):
 
 class Flush(_OfStation):
     """The height of a station, a point of one part, over a neighbouring outer face of another, perpendicular to this face.
+
+    `tc.Flush(door.point(0, 40, 300), body.face("+y"))`
 
     The face is extended beyond its ends, as for a Gap.
     """
@@ -148,7 +152,7 @@ class _OfTwoFaces(Measurement):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Clearance(_OfTwoFaces):
-    """The shortest distance of two faces of different parts, negative where they overlap.
+    """The shortest distance of two faces of different parts, negative where they overlap: `tc.Clearance(first, second)`.
 
     For planes it is the smallest height, perpendicular to the second face, in their overlap region at the current pose; in
     their nominal overlap region if they do not overlap there, or if their rims have more than 2500 pairs of edges. For a ball
@@ -191,7 +195,7 @@ class MeanGap(_OfTwoFaces):
 class AxisDistance(_OfTwoFaces):
     """The distance of the axes of two cylinders or cones; the axis of a sphere is its centre.
 
-    By default it is the shortest distance of the two axes, each as long as its face.
+    `tc.AxisDistance(hole, pin)` is the shortest distance of the two axes, each as long as its face.
 
     across   a direction: the distance of the points where both axes, extended if needed, pierce the plane across it through the
              midpoint of the first axis
@@ -216,7 +220,7 @@ class Angle(_OfTwoFaces):
     """The angle [rad] between two planes or axes, by the normals of planes and the axes of cylinders and cones.
 
     Planes and lines have no sense: the second direction is reversed if it is more than a right angle from the first one
-    nominally. Without `about` it is the angle between the two directions in space, from 0 on.
+    nominally. Without `about`, as in `tc.Angle(top, base)`, it is the angle between the two directions in space, from 0 on.
 
     about   a direction, fixed in the assembly frame: the rotation about it that makes the first direction coincide with the
             second one, both seen along it, from -pi to pi
@@ -265,31 +269,31 @@ class Combination(Measurement):
 
 
 class Minimum(Combination):
-    """The least of several measurements."""
+    """The least of several measurements, or of measures by name: `tc.Minimum(tc.Gap(...), tc.Gap(...))`."""
 
     kind = "minimum"
 
 
 class Maximum(Combination):
-    """The largest of several measurements."""
+    """The largest of several measurements, or of measures by name: `tc.Maximum("gap top", "gap bottom")`."""
 
     kind = "maximum"
 
 
 class Mean(Combination):
-    """The mean of several measurements."""
+    """The mean of several measurements, or of measures by name: `tc.Mean("gap top", "gap bottom")`."""
 
     kind = "mean"
 
 
 class Sum(Combination):
-    """The sum of several measurements."""
+    """The sum of several measurements, or of measures by name: `tc.Sum("step", "flush")`."""
 
     kind = "sum"
 
 
 class Difference(Combination):
-    """The first of two measurements, less the second one."""
+    """The first of two measurements, or measures by name, less the second one: `tc.Difference("left", "right")`."""
 
     kind = "difference"
 
@@ -308,6 +312,7 @@ MEASUREMENTS = {measurement.kind: measurement for measurement in _KINDS}
 def stations(start: Point, end: Point, count: int) -> tuple[Point, ...]:
     """Return `count` points of a part, evenly from `start` to `end`: the stations of a seam.
 
+    `tc.stations(door.point(0, 40, 0), door.point(0, 40, 700), 5)`
     Points on a feature move with its deviation. Raises TypeError or ValueError for points of two parts or features.
     """
     if not (isinstance(start, Point) and isinstance(end, Point) and start.position and end.position):

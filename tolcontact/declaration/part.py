@@ -58,10 +58,10 @@ class Part(Declaration):
         datum: str | None = None,
         association: Association = "outside",
     ) -> "Feature":
-        """Name a face, or two that are opposed, with its tolerances: `part.feature("H1", face, tc.Size(...), datum="B")`.
+        """Name a face, or two that are opposed, with its tolerances: `part.feature("H1", face, tc.Size(8, 0.1), datum="B")`.
 
-        `association` is how a plane with tilt or form becomes a datum: "outside" or "least squares" (see
-        `tolcontact.features`).
+        The `name` is unique in the part; `constituents` are one face or two, and tolerances. `datum` is a letter.
+        `association` is how a plane with tilt or form becomes a datum: "outside" (default) or "least squares".
         """
         for constituent in constituents:
             if not isinstance(constituent, Face | Control):
@@ -81,8 +81,8 @@ class Part(Declaration):
     ) -> "Pattern":
         """Name several like faces with their common tolerances: `part.pattern("H", face, face, tc.Position(0.2, "A"))`.
 
-        A member is a face, or two that are opposed, as in (face, face). Members of a pattern that is a datum alone may also be
-        unlike, or features that have tolerances of their own (see Pattern).
+        Its `constituents` are members, which get the `name` and a number, and tolerances; `datum` is a common letter. Members
+        are faces, or pairs (face, face). Members of a datum alone may be unlike, or features with tolerances (see Pattern).
         """
         members: list[tuple[Face, ...] | Feature] = []
         for constituent in constituents:
@@ -107,20 +107,20 @@ class Part(Declaration):
         return declared
 
     def datum_targets(self, letter: str, *points: "Point") -> "DatumTargets":
-        """Declare a datum by points on features: `part.datum_targets("A", pad.point(0, 0, 0), ...)` (see DatumTargets)."""
+        """Declare datum `letter` by `points` on features: `part.datum_targets("A", pad.point(0, 0, 0))` (see DatumTargets)."""
         for point in points:
             if not isinstance(point, Point):
                 raise TypeError(f'datum "{letter}": {type(point).__name__} is no point; expected feature.point(x, y, z)')
         return self.add(DatumTargets(letter, points, script_line()))
 
     def point(self, x: float, y: float, z: float) -> "Point":
-        """Return the point (x, y, z) [mm] of this part, in its own frame."""
+        """Return the point (x, y, z) [mm] of this part, in its own frame, as in `part.point(10, 0, 5)`."""
         return Point(self, vector((x, y, z)))
 
     def face(self, *selections: Side | str | Sequence[int] | Picker | Selection) -> "Face":
-        """Return the triangles of this part that meet every criterion; without any, the whole surface.
+        """Return the triangles of this part that meet all `selections`, as in `part.face("+z")`; without any, all.
 
-        A criterion is a direction ("+x" to "-z": all triangles whose outward normal points there in the part's own
+        A selection is a direction ("+x" to "-z": all triangles whose outward normal points there in the part's own
         frame), one of `tc.select` (`Facing`, `Inside` a box, `Near` another part, `Cylinder`, `Largest`, `Brep`: a face of a
         STEP file), the indices of triangles, or a function `(centres, normals) -> mask` of arrays (triangle, 3) [mm, -].
         """

@@ -22,7 +22,7 @@ FACE_GROUPS = get_args(FaceGroup)
 
 @dataclass(frozen=True, repr=False)
 class Facing(Readable):
-    """Triangles whose outward normal is within `angle` [rad] of `direction`: "+x" to "-z", or a vector."""
+    """Triangles whose outward normal is within `angle` [rad] of `direction`: `tc.select.Facing((0, 1, 1), 0.1)`."""
 
     direction: Direction
     angle: float = FACE_ANGLE
@@ -76,7 +76,10 @@ class Picked(Checked):
 
 @dataclass(frozen=True, repr=False)
 class Inside(Readable):
-    """The surface inside the box from `lower` to `upper` [mm]; triangles that cross its sides are cut there."""
+    """The surface inside the box from `lower` to `upper` [mm]; triangles that cross its sides are cut there.
+
+    `part.face("+z", tc.select.Inside((0, 0, 9), (50, 50, 11)))`
+    """
 
     lower: Vector
     upper: Vector
@@ -98,7 +101,7 @@ class Inside(Readable):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Near(Checked):
-    """Flat faces, and triangles of curved ones, that face `part` and come within `within` [mm] of it nominally."""
+    """Flat faces, and triangles of curved ones, that face `part` and come `within` [mm] of it: `tc.select.Near(pin, 0.2)`."""
 
     part: Any  # a Part, whose module imports this one
     within: float
@@ -111,7 +114,7 @@ class Near(Checked):
 
 @dataclass(frozen=True, repr=False)
 class Brep(Readable):
-    """Faces of the B-rep of a STEP file, each by number (`tolcontact faces` lists them), by name, or by a point [mm].
+    """Faces of the B-rep of a STEP file: `which` are numbers (`tolcontact faces` lists them), names, or points [mm].
 
     With `whole`, each one selects all faces that make up its surface: the two halves of a hole, or the parts of a bore that
     keyways interrupt. With `whole="slot"` it selects the two planes and the two round ends of its slot, and with
@@ -165,7 +168,10 @@ def _brep_words(which: int | str | Vector) -> str:
 
 @dataclass(frozen=True, repr=False)
 class Cylinder(Checked):
-    """Cylindrical faces: of one `radius` [mm] only, and of holes (`inner=True`) or pins (`inner=False`) only."""
+    """Cylindrical faces: of one `radius` [mm] only, and of holes (`inner=True`) or pins (`inner=False`) only.
+
+    `tc.select.Cylinder(4, inner=True)` chooses holes of radius 4 mm; by default all cylinders are chosen.
+    """
 
     radius: float | None = None
     inner: bool | None = None

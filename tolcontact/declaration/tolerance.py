@@ -32,6 +32,7 @@ class Tolerance(Readable):
     The range may be written as on drawings: "±0.1" has the range 0.2, and "+0.1/-0.05" or (-0.05, 0.1) the range 0.15 with a
     shift of 0.025. `shift` [mm] moves the whole distribution. `cp` and `cpk` are the capability of a process with a normal
     distribution: 6 sigma = range / cp, and the mean moves up by a further range / 2 * (1 - cpk / cp).
+    `tc.Tolerance(0.6, "uniform")` and `tc.Tolerance(0.6, cp=1.33, cpk=1.0)` are examples.
     `distribution` may also be a frozen continuous distribution of `scipy.stats`. It defines the spread alone; leave
     `range` out.
     """

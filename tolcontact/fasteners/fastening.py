@@ -90,8 +90,11 @@ def fasten(
 ) -> Part:
     """Declare a fastener in the holes of several parts of a scene, and return its part.
 
+    `tc.fasten(model, "screw", 10, through=[hole], into=thread, seat=cover.face("+z"))`
+
     scene      the assembly, or the station of its location, contacts and force
-    fastener   its diameter or its tc.Size, and a part is made; or a part, or the face of its shank
+    name       of the part
+    fastener   its diameter [mm] or its tc.Size, and a part is made; or a part, or the face of its shank
     through    the holes that it passes through, from its head on
     into       a threaded or press-fit hole, which holds it; without one it floats in the clearance of its holes
     seat       the plane under its head

@@ -57,7 +57,10 @@ class BodyInFile(Readable):
 
 
 def bodies_in(path: str | Path) -> tuple[BodyInFile, ...]:
-    """Return the bodies of a STEP file, in its order. Raises OptionError if it cannot be read."""
+    """Return the bodies of the STEP file at a `path`, in its order, as in `tc.io.bodies_in("parts.stp")`.
+
+    Raises OptionError if it cannot be read.
+    """
     return _bodies(_listed_product(path))
 
 
@@ -66,8 +69,9 @@ def _bodies(product: Product) -> tuple[BodyInFile, ...]:
 
 
 def faces_in(path: str | Path, body: str | int | None = None) -> tuple[FaceInFile, ...]:
-    """Return the B-rep faces of a body of a STEP file; `body` may be left out if there is only one.
+    """Return the B-rep faces of a body of the STEP file at a `path`, as in `tc.io.faces_in("parts.stp", "bolt")`.
 
+    The `body` is a name or a number from 1, and may be left out if there is only one.
     Raises OptionError if the file cannot be read, or has no such body.
     """
     mesh = _part(_listed_product(path), body)
@@ -128,7 +132,9 @@ def parts_from(
     fixed: bool | Sequence[str] | None = None,
     chord: float | None = None,
 ) -> "PartsOfFile":
-    """Declare bodies of a STEP file as parts of a model, each in its pose, and return the parts by their names.
+    """Declare bodies of the STEP file at a `path` as parts of a `model`, each in its pose, and return the parts by their names.
+
+    `parts = tc.io.parts_from(model, "gearbox.stp", fixed=["housing"])`
 
     All bodies are declared, or only the bodies in `names`. A part has the name of its body in the file, without the characters
     that are not permitted in part names; where a name repeats, the second body is "name (2)" and so on. The part's own frame is

@@ -60,6 +60,8 @@ class DeclaredFile(Readable):
 def features_from_pmi(part: Part) -> DeclaredPmi:
     """Declare the features of a part that the PMI of its STEP file states, and return them with all that is not declared.
 
+    `print(tc.io.features_from_pmi(model.part("cover", tc.Mesh("cover.stp"))))`
+
     The part has to come from a STEP file of AP242. Faces of one surface are one feature, and so are the two planes of a slot or
     a tab whose size or position is toleranced. A feature is named after the letter of its datum, else after its kind and the
     number of its first face, as in "cylinder 12". Features that the part has already stay as they are.

@@ -28,8 +28,9 @@ _TESSELLATED = ("TESSELLATED_SOLID", "TESSELLATED_SHELL", "TESSELLATED_CLOSED_SH
 
 
 def read_pmi(path: str | Path) -> Pmi:
-    """Return the geometric tolerances, dimensions and datums that a STEP file of AP242 (edition 1 to 3) states.
+    """Return the geometric tolerances, dimensions and datums that a STEP file of AP242 (edition 1 to 3) at a `path` states.
 
+    `tc.io.read_pmi("cover.stp").tolerances`
     Raises OptionError if it cannot be read, and for AP242 edition 4 and other kinds of files.
     """
     records = Records(_content(Path(path)), str(path))

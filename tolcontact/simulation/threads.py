@@ -55,7 +55,9 @@ def simulate_blocks(
     threads: int | None = None,
     draws: Sampler | None = None,
 ) -> Iterator[Block]:
-    """Yield realizations `start` to `samples` in blocks (of `block_rows` by default), in order.
+    """Yield realizations `start` to `samples` of a `seed` in blocks (of `block` rows, by default `block_rows`), in order.
+
+    `for block in tc.simulate_blocks(tc.build("model.py"), samples=1000, seed=1): print(len(block.status))`
 
     Realization k is the same in any run. Its deviations come from `draws`, by default from the program's draws. At most two
     blocks for each of the `threads` (by default one for each processor) are in memory.

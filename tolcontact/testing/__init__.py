@@ -39,7 +39,9 @@ MAX_GAPS = 500_000  # per pass
 
 
 def assert_resolved(results: Results) -> None:
-    """Assert that every realization has a certificate: its status is `untouched` or `resolved`.
+    """Assert that every realization of `results` has a certificate: its status is `untouched` or `resolved`.
+
+    `tc.testing.assert_resolved("run.nc")`, or the results of tc.run.
 
     Raises AssertionError with the number of all other realizations, by status, and the first of each status.
     """
@@ -54,6 +56,7 @@ def assert_resolved(results: Results) -> None:
 def assert_no_clashes(results: Results) -> None:
     """Assert that all bodies were tested in every realization, and none without declared contact penetrate each other.
 
+    `tc.testing.assert_no_clashes(results)`
     Raises AssertionError with the number of realizations with clashes, or without a test, and the first of them.
     """
     with _opened(results) as tree:
@@ -70,6 +73,8 @@ def assert_no_clashes(results: Results) -> None:
 
 def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) -> None:
     """Assert that the archived points, poses and deviations give the least gaps `gap_min` (realization, state, pair) [mm].
+
+    `tc.testing.assert_gaps_recompute(results)`
 
     A referee recomputes the gaps from the archive alone: n'(x_m - x_r), with x = R p + t, p a nominal contact point of the
     moving or the reference part, and n the nominal normal rotated with the reference part; the deviation of the unilateral
@@ -115,6 +120,7 @@ def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) ->
 def assert_datums_recompute(results: Results) -> None:
     """Assert that the archived tangent datum planes of features with form deviation are correct, and outside the material.
 
+    `tc.testing.assert_datums_recompute(results)`
     A linear programme finds the plane with the least distance from the archived heights of each face, from the archive alone.
     Raises AssertionError with the first realization that has another plane, and if the archive has no deviations.
     """
@@ -130,7 +136,9 @@ def assert_datums_recompute(results: Results) -> None:
 
 
 def assert_same_run(a: Results, b: Results, *, variables: Sequence[str] | None = None) -> None:
-    """Assert that two runs have the same values in every realization, to the last bit (NaN equals NaN).
+    """Assert that runs `a` and `b` have the same values in every realization, to the last bit (NaN equals NaN).
+
+    `tc.testing.assert_same_run("run.nc", "again.nc")`
 
     The comparison covers the labels, and all variables of realizations, or the named ones: "measured", "gap_min", ...
     Attributes, history, solver and displacement fields are not compared.

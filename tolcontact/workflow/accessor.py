@@ -17,6 +17,7 @@ from tolcontact.statistics import Summary, summarize as summary_of, touching
 def summarize(results: xr.DataTree | str | Path) -> Summary:
     """Return the statistics of results, or of the archive at a path (see tolcontact.statistics.summarize).
 
+    `tc.summarize("run.nc").statistic_value.sel(measure="gap", state="corrected", statistic="6 sigma")`
     Raises ArchiveError if realizations differ from what was written, or if fewer than two are finished.
     """
     if isinstance(results, str | Path):

@@ -43,6 +43,8 @@ def compare(
 ) -> xr.Dataset:
     """Simulate the same realizations of a model (see `build`) with each solver and method.
 
+    `solvers`, `samples` and `seed` are as in `run`; `tc.compare("model.py", ["qpoases", "daqp"], samples=1000)`.
+
     Differences are relative to the first one, in the corrected state. Labels along the dimension `solver` name the solver and
     the choices that differ between the methods.
 
@@ -177,6 +179,7 @@ def _corners(vertices: np.ndarray) -> np.ndarray:
 def compare_runs(runs: Mapping[str, xr.DataTree] | Sequence[str | Path]) -> xr.Dataset:
     """Compare runs with the first one (see tolcontact.statistics.compare_runs): results by name, or paths of archives.
 
+    `tc.compare_runs({"as drawn": results, "better pins": other})`
     Raises ArchiveError for a missing or damaged archive, and OptionError for fewer than two runs or for runs
     without a common measure.
     """
@@ -217,6 +220,7 @@ def study(
 ) -> xr.Dataset:
     """Return the realizations of every model with every seed and method (see `simulate`), along the dimension `design`.
 
+    `samples`, `seeds`, `solver` and `methods` are as in `run`, one or several: `tc.study([first, other], 1000, seeds=[1, 2])`.
     `models` maps names to models; without names, the names of the assemblies are used. Variables are lazy: a computation over
     all designs is one dask graph, which simulates only the chunks that it needs.
     The coordinates `model`, `seed`, `resolution`, `objective` and `solver` describe each design. Where a design lacks a label,

@@ -30,6 +30,8 @@ def simulate(
 ) -> xr.Dataset:
     """Return the realizations of a run as a lazy dataset with the variables of archives; nothing is simulated yet.
 
+    `model`, `solver` and `method` are as in `run`: `tc.simulate("model.py", 100_000).measured.mean("realization").compute()`.
+
     `samples` is the number of realizations, or an xarray.DataArray of deviations (realization, contributor), in memory or
     chunked. Contributors of that array are labelled, or are in the order of the model; labels of realizations are kept. The
     `seed` has no effect on it.

@@ -28,6 +28,8 @@ def build(model: Model, *, solver: Solver = DEFAULT_SOLVER, method: Choice | Non
     The model of an archive has the method of its run. `method` replaces the model's own; a mapping, such as
     {"resolution": "exact"}, replaces single choices.
     A NominalWarning names probable mistakes in the nominal assembly (see tolcontact.plausibility).
+    `solver` is a name of tolcontact.compilation, by default "qpoases". A program may be run several times:
+    `program = tc.build("model.py", solver="daqp", method={"objective": "seating"}); tc.run(program, samples=1000)`.
     Raises ModelError with all faults of the model, and OptionError for a solver or a method that cannot be used.
     """
     assembly, method_of_run = _loaded(model) if isinstance(model, str | Path) else (assembly_of(model), None)
@@ -38,7 +40,10 @@ def build(model: Model, *, solver: Solver = DEFAULT_SOLVER, method: Choice | Non
 
 
 def check(model: Model, *, solver: Solver = DEFAULT_SOLVER, method: Choice | None = None) -> tuple[str, ...]:
-    """Return every fault of a model; the tuple is empty if the model can be built (see `build`)."""
+    """Return every fault of a model, with `solver` and `method` as in `build`; empty if it can be built.
+
+    `for fault in tc.check("model.py"): print(fault)`
+    """
     try:
         build(model, solver=solver, method=method)
     except ModelError as error:
@@ -47,7 +52,7 @@ def check(model: Model, *, solver: Solver = DEFAULT_SOLVER, method: Choice | Non
 
 
 def write_model(model: Model, path: str | Path) -> None:
-    """Write a model as JSON to `path`: its declarations (see tolcontact.declaration).
+    """Write a model as JSON to `path`, as in `tc.io.write_model("model.py", "model.json")` (see tolcontact.declaration).
 
     Shapes are stated as file names, relative to the folder of `path` if they are in it. Faces that a function selects become
     triangles, and functions of poses become the steps of their expressions.

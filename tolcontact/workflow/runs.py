@@ -133,7 +133,8 @@ def run(
 
     `model` is anything that `build` takes or returns. A Program has its solver and method already; the default solver is
     qpoases, and the default method is the model's own.
-    `out` is the path of the archive. Without it, the results stay in memory.
+    The same `seed` gives the same draws, also with other methods and numbers of `samples`.
+    `out` is the path of the archive; `overwrite` replaces a file there. Without it, the results stay in memory.
     `keep` states what the archive stores for each realization: "measures" (with gaps, status and residuals), "poses" (also the
     poses), or "all" (also the deviations). Displacement fields always come from all realizations.
     `fields` is the number of realizations that the magnitudes of displacement fields cover, starting from the first: a number,
@@ -151,6 +152,8 @@ def run(
     `progress` is called with the number of finished realizations. An interrupted run (Ctrl-C) leaves an archive that can be
     read and resumed; its fields cover the finished realizations.
     Raises ModelError, OptionError, or ArchiveError before anything is simulated or written; ClusterError if workers fail.
+
+    `results = tc.run("model.py", samples=10_000, seed=1, solver="daqp", out="model.nc")`
     """
     settings = Run(seed, samples, keep, surfaces, fields, plan)
     options = {"solver": solver, "method": method, "until": until, "client": client, "progress": progress}

@@ -1,0 +1,36 @@
+"""An editor shows what an argument means: docstrings name every argument, and have an example."""
+
+import inspect
+import re
+import types
+
+import pytest
+
+import tolcontact as tc
+
+MODULES = {"tc": tc, "tc.analyses": tc.analyses, "tc.io": tc.io, "tc.testing": tc.testing}
+DECLARING = {  # the methods of a script
+    tc.Assembly: "part locate contact force measure station variable correlate population may_overlap",
+    tc.Part: "feature pattern datum_targets point face",
+}
+
+
+def functions():
+    for prefix, module in MODULES.items():
+        for name in module.__all__:
+            if isinstance(getattr(module, name), types.FunctionType):
+                yield f"{prefix}.{name}", getattr(module, name)
+    for owner, names in DECLARING.items():
+        for name in names.split():
+            yield f"tc.{owner.__name__}.{name}", getattr(owner, name)
+
+
+FUNCTIONS = dict(functions())
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_docstring_names_every_argument_and_has_an_example(name):
+    text = inspect.getdoc(FUNCTIONS[name])
+    arguments = [argument for argument in inspect.signature(FUNCTIONS[name]).parameters if argument != "self"]
+    assert not [argument for argument in arguments if not re.search(rf"\b{argument}\b", text)]
+    assert re.search(r"`[^`]*\b\w+\([^`]*\)[^`]*`|>>> ", text), "it has no example, such as `model.part(...)`"
