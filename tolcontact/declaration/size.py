@@ -24,9 +24,10 @@ class Size(Checked):
 
     `tc.Size(8.1, +0.05, -0.02)` has the `nominal` size 8.1, and the limits 8.08 and 8.15; `tc.Size(8.1, 0.05)` has 8.05 and
     8.15. The limits may be written as on drawings: `tc.Size(8.1, "+0.05/-0.02")`, `tc.Size(8.1, "±0.05")`, and `tc.Size(8,
-    "H7")` with a `tolerance_class` of ISO 286-1. Sizes vary about the midpoint of the limits by `distribution` (see tc.Tolerance). `moves` states which of two
-    planes moves with the size: "both" by half each (default), or the "first" or "second" alone. `cp` and `cpk` are the
-    capability of its process: by default six standard deviations equal `upper` less `lower`, with the mean in their middle.
+    "H7")` with a `tolerance_class` of ISO 286-1. Sizes vary about the midpoint of the limits by `distribution` (see
+    tc.Tolerance). `moves` states which of two planes moves with the size: "both" by half each (default), or the "first" or
+    "second" alone. `cp` and `cpk` are the capability of its process: by default six standard deviations equal `upper` less
+    `lower`, with the mean in their middle.
     """
 
     kind: ClassVar[str] = "size"
