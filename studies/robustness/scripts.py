@@ -5,10 +5,12 @@ message. What closes standard error itself, or changes a library, is not tried: 
 """
 
 import argparse
+import ast
 import csv
 import io
 import json
 import random
+import re
 import tempfile
 from pathlib import Path
 
@@ -18,6 +20,10 @@ import xarray as xr
 
 from studies.robustness.attempts import Table, attempt
 from studies.robustness.files import stand
+from studies.robustness.step_texts import damaged
+from tests.pmi_records import Annotated
+from tests.test_cad import COVER
+from tests.test_features_from_pmi import drawing
 
 LETTERS = (
     "=", "+", "-", "@", "'", '"', "\\", "{", "}", "%s", "{{1}}", "<script>", "</script>", "&lt;", "[bold]", "#N/A", "#REF!",
@@ -62,6 +68,10 @@ BEHAVIOUR = (
     "os.environ.clear()", "os.umask(0o777)", "model.part('third', tc.Box(1, 1, 1))",
     "model.measure('late', block.point(0, 0, 0), along='z')", "time.sleep(0.1)", "sys.settrace(lambda *_: None)",
     "sys.setprofile(lambda *_: None)", "warnings.warn('a\\x1bb')",
+)  # fmt: skip
+READERS = (
+    ("pmi", "a.step"), ("pmi", "a.step", "--csv"), ("pmi", "a.step", "--json"), ("pmi", "a.step", "--script"),
+    ("bodies", "a.step"),
 )  # fmt: skip
 VALUES = (
     "None", "'text'", "[]", "[1, 2]", "float('nan')", "float('inf')", "1j", "np.zeros(3)", "casadi.MX.sym('x')",
@@ -120,6 +130,48 @@ def names(count: int, rng: random.Random, folder: Path, table: Table) -> None:
         table.add("hostile names", fault or "as they are", f"{document!r}: {ending.error[-400:]}", is_fault=bool(fault))
 
 
+def pmi(count: int, rng: random.Random, folder: Path, table: Table) -> None:
+    """Read a STEP file with hostile texts or damaged numbers by five readers; a script must be no other program."""
+    drawing(file := Annotated(COVER.read_text()))
+    sound = Path(file.write(folder / "sound.step")).read_bytes()
+    texts = list(re.finditer(rb"'((?:[^'\n]|'')*)'", sound))
+    for _ in range(count):
+        kind, content = ("texts", sound) if rng.random() < 0.6 else damaged(sound, rng)
+        if kind == "texts":
+            for match in sorted(rng.sample(texts, 40), key=lambda match: -match.start()):
+                words = "".join(rng.choices([*LETTERS, '"""; raise SystemExit(9); """'], k=rng.randint(1, 4)))
+                content = (
+                    content[: match.start(1)] + words.replace("'", "''").encode("utf-8", "replace") + content[match.end(1) :]
+                )
+        (folder / "a.step").write_bytes(content)
+        for options in READERS:
+            ending = attempt([*options], folder)
+            fault = ending.fault
+            if not fault and ending.code == 0:
+                fault = _said(options[-1], ending.out)
+            words = f"{kind}: {' '.join(options)}: {ending.error[-500:]}"
+            table.add(f"PMI, {kind}", fault or ("refused" if ending.code == 2 else "read"), words, is_fault=bool(fault))
+
+
+def _said(option: str, said: str) -> str:
+    """Return what is wrong with what a reader printed; empty if nothing is."""
+    if option == "--csv":
+        return _formula(csv.reader(io.StringIO(said)))
+    if option == "--json":
+        json.loads(said)
+    if option == "--script":
+        tree = ast.parse(said)
+        calls = {node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
+        kinds = {type(node).__name__ for node in tree.body}
+        if (
+            calls
+            or not kinds <= {"Expr", "Import", "FunctionDef", "If"}
+            or any(isinstance(node, ast.Raise) for node in ast.walk(tree))
+        ):
+            return "another program"
+    return ""
+
+
 def _formula(rows: object) -> str:
     """Return what a spreadsheet would run or take for an error in some rows; empty if nothing."""
     texts = [cell for row in rows for cell in row if isinstance(cell, str)]
@@ -162,11 +214,11 @@ def functions(count: int, rng: random.Random, folder: Path, table: Table) -> Non
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    for name in ("names", "functions"):
+    for name in ("names", "pmi", "functions"):
         parser.add_argument(f"--{name}", type=int, default=0)
     parser.add_argument("--seed", type=int, default=0)
     options, table = parser.parse_args(), Table()
-    for kind in (names, functions):
+    for kind in (names, pmi, functions):
         with tempfile.TemporaryDirectory() as folder:
             kind(getattr(options, kind.__name__), random.Random(options.seed), Path(folder), table)
     print("\n".join(table.lines()))
