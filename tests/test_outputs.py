@@ -1,10 +1,16 @@
 """Outputs of commands: none is an input, another output, or a file that is no such output."""
 
+import os
+import tempfile
+import time
+
 import pytest
+from filelock import FileLock
 
 import tolcontact as tc
 from tests import cases
 from tests.helpers import call
+from tolcontact.temporary import LOCK, PREFIX, temporary_folder
 
 MODEL = """import tolcontact as tc
 from tests import cases
@@ -38,3 +44,20 @@ def test_a_comparison_replaces_none_of_the_runs_that_it_compares(tmp_path):
     done = call(tmp_path, "compare", "a.nc", "b.nc", "--out", "link.nc", "--overwrite")
     assert done.returncode == 2 and '"link.nc" would be the input and the archive' in done.stderr
     assert (tmp_path / "a.nc").read_bytes() == before
+
+
+def test_the_folder_of_a_killed_run_is_removed_and_that_of_a_run_in_progress_stays(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    killed, young, used, other = (tmp_path / name for name in (f"{PREFIX}killed", f"{PREFIX}young", f"{PREFIX}used", "other"))
+    for folder in (killed, young, used, other):
+        folder.mkdir()
+        (folder / "results.nc").write_bytes(b"x")
+        if folder != young:
+            os.utime(folder, (time.time() - 1000,) * 2)
+    (tmp_path / f"{PREFIX}link").symlink_to(other)
+    with FileLock(used / LOCK):
+        os.utime(used, (time.time() - 1000,) * 2)
+        with temporary_folder() as folder:
+            assert not killed.exists()
+            assert all((path / "results.nc").exists() for path in (young, used, other))
+    assert not folder.exists()

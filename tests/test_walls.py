@@ -66,11 +66,11 @@ APART = {
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
     "version", "errors", "texts", "user_functions", "input_files", "system", "interrupts", "readable", "child",
-    "stored_coordinates", "shape_worker", "kernel", "vocabulary", "realizations",
-    "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "select", "geometry",
-    "features", "fasteners", "pmi", "discretization", "interference", "variation", "mechanics",
-    "compilation", "statics", "contact", "simulation", "plausibility", "statistics", "archive", "report", "plot", "workflow",
-    "io", "analyses", "testing", "cli", "__init__", "__main__",
+    "stored_coordinates", "shape_worker", "kernel", "vocabulary", "realizations", "arrays", "method", "poses", "limits",
+    "code_cache", "replacing", "temporary", "compiled", "declaration", "select", "geometry", "features", "fasteners", "pmi",
+    "discretization", "interference", "variation", "mechanics", "compilation", "statics", "contact", "simulation",
+    "plausibility", "statistics", "archive", "report", "plot", "workflow", "io", "analyses", "testing", "cli", "__init__",
+    "__main__",
 )  # fmt: skip
 
 

@@ -2,7 +2,6 @@
 
 import functools
 import re
-import tempfile
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +15,7 @@ from tolcontact.cli.progress import shown_progress, stopped
 from tolcontact.errors import OptionError, shown
 from tolcontact.simulation.cluster import client_of
 from tolcontact.statistics import Summary
+from tolcontact.temporary import temporary_folder
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.accessor import summarize
 from tolcontact.workflow.models import DEFAULT_SOLVER
@@ -82,7 +82,7 @@ def run(
         stopped(out, done := [0, samples]),
         shown_progress(model.stem, samples, quiet=quiet) as show,
         client_of(workers, scheduler) as client,
-        tempfile.TemporaryDirectory() as folder,
+        temporary_folder() as folder,
     ):
 
         def progress(rows: int) -> None:
@@ -92,7 +92,7 @@ def run(
         path = write_run(
             functools.partial(output.titled_model, model, titles),
             Run(seed, samples, keep, surfaces, int(fields) if re.fullmatch(r"[0-9]{1,18}", fields) else fields, plan),
-            out or Path(folder) / "results.nc", solver=solver, method=method, overwrite=overwrite and out is not None,
+            out or folder / "results.nc", solver=solver, method=method, overwrite=overwrite and out is not None,
             resume=resume, until=until, client=client, progress=progress,
         )  # fmt: skip
         summary, shortfall = _summed_up(path, until, report)

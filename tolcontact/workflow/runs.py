@@ -2,7 +2,6 @@
 
 import logging
 import math
-import tempfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -21,6 +20,7 @@ from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses, warn_of
 from tolcontact.statistics import STATISTICS, estimate_of
 from tolcontact.statistics.measure_statistics import HALF_WIDTH, StatisticRequest
+from tolcontact.temporary import temporary_folder
 from tolcontact.vocabulary import FIELD_CHOICES, KEPT, OUTSIDE, PLANS, PPM, FieldChoice, Kept, Plan
 from tolcontact.workflow.accessor import Results
 from tolcontact.workflow.forecast import announce
@@ -168,8 +168,8 @@ def _results_in_memory(model: Model | Program, settings: Run, options: dict[str,
         if is_set:
             raise OptionError(f"{option} needs an archive, and none is named; name one: out=...")
     with (
-        tempfile.TemporaryDirectory() as folder,
-        open_unchecked(write_run(model, settings, Path(folder) / "results.nc", **options)) as tree,
+        temporary_folder() as folder,
+        open_unchecked(write_run(model, settings, folder / "results.nc", **options)) as tree,
     ):
         return tree.load()
 
