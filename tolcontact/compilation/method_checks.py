@@ -6,7 +6,7 @@ import numpy as np
 
 from tolcontact.declaration.locator import FIRST_ORDER
 from tolcontact.discretization import ContactPoints, Nominal
-from tolcontact.errors import ModelError
+from tolcontact.errors import Faults
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.groups import Group
 from tolcontact.method import Method
@@ -20,37 +20,34 @@ def check_method(nominal: Nominal, method: Method) -> None:
 
 def _check_placing(nominal: Nominal, method: Method) -> None:
     """Raise ModelError for placed parts under forces, if they are located by springs or by too many locators."""
-    faults = [
+    faults = Faults(
         f'part "{part.name}": its locators are placed by "{part.locators.placing}", and if forces press, they have to be at '
         "most six, without a stiffness; leave placing out, or declare the part fixed=True"
         for index, part in enumerate(nominal.parts)
         if index in part.movers and part.locators.placing != FIRST_ORDER and method.minimizes.presses
         if len(part.locators) > FREEDOMS or part.locators.springy.any()
-    ]
-    if faults:
-        raise ModelError(nominal.assembly.name, faults)
+    )
+    faults.refuse(nominal.assembly.name)
 
 
 def _check_springs(nominal: Nominal, method: Method) -> None:
     """Raise ModelError for a stiffness without effect, or without forces and repeated steps, which it needs."""
-    faults = [
+    faults = Faults(
         f'locator "{part.locators.labels[index]}": it has a stiffness, but part "{part.name}" is fixed=True, so forces do not '
         "move it; leave stiffness out, or declare the part fixed=False"
         for part in nominal.parts
         for index in (np.flatnonzero(part.locators.springy)[:1] if not part.free else ())
-    ]
-    if faults:
-        raise ModelError(nominal.assembly.name, faults)
+    )
+    faults.refuse(nominal.assembly.name)
     if method.minimizes.presses and method.is_exact:
         return
-    faults = [
+    faults = Faults(
         f'{_compliant_name(pair)} has a stiffness, which needs the objective "seating" and the resolution "exact"; '
         f'here they are "{method.objective}" and "{method.resolution}"; choose those, or leave stiffness out'
         for pair in nominal.pairs
         if pair.is_springy
-    ]
-    if faults:
-        raise ModelError(nominal.assembly.name, faults)
+    )
+    faults.refuse(nominal.assembly.name)
 
 
 def _compliant_name(pair: ContactPoints) -> str:
@@ -62,13 +59,12 @@ def _compliant_name(pair: ContactPoints) -> str:
 def check_forces(nominal: Nominal, groups: Sequence[Group]) -> None:
     """Raise ModelError for an objective that needs forces without any, or with a force on a part that contact cannot move."""
     moved = {part for group in groups for part, mobility in zip(group.parts, group.mobilities, strict=True) if mobility.movers}
-    faults = [
+    faults = Faults(
         f'force "{force.name}" acts on part "{force.at.part.name}", which contact cannot move, but the objective is "seating"; '
         "leave the force out, or declare the part free, with its contacts"
         for force in nominal.assembly.forces
         if nominal.part_index(force.at.part, force.station) not in moved
-    ]
+    )
     if not nominal.assembly.forces:
-        faults = ['objective "seating" needs a force, and none is declared; declare one with assembly.force(...)']
-    if faults:
-        raise ModelError(nominal.assembly.name, faults)
+        faults.append('objective "seating" needs a force, and none is declared; declare one with assembly.force(...)')
+    faults.refuse(nominal.assembly.name)

@@ -230,7 +230,7 @@ class ArchivedPair:
     def gaps(self, rows: Rows, piece: slice) -> np.ndarray:
         """Return the gaps (realization, state, point) [mm] of a piece of the realizations.
 
-        Raises NotKeptError, with the name of a required variable that the archive does not have.
+        Raises MissingVariableError, with the name of a required variable that the archive does not have.
         """
         moving, reference = (_pose(rows, piece, part) for part in (self.moving_part, self.reference_part))
         deviations = _needed(rows, terms.DEVIATION.name, piece) if self._needs_deviations else np.zeros((1, 0))
