@@ -4,7 +4,9 @@
 """
 
 from tolcontact.simulation.block import Block, outcomes, simulate_block
-from tolcontact.simulation.threads import block_rows, map_blocks, simulate_blocks
+from tolcontact.simulation.threads import ProgramFunction, block_rows, map_blocks, simulate_blocks
 from tolcontact.system.machine import processors
 
-__all__ = ["Block", "block_rows", "map_blocks", "outcomes", "processors", "simulate_block", "simulate_blocks"]
+__all__ = [
+    "Block", "ProgramFunction", "block_rows", "map_blocks", "outcomes", "processors", "simulate_block", "simulate_blocks",
+]  # fmt: skip

@@ -7,6 +7,7 @@ share a small run. Pieces do not depend on each other, either.
 
 import contextlib
 import functools
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -36,13 +37,11 @@ class Sampler(Protocol):
     def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray: ...
 
 
-@runtime_checkable
-class BoundToProgram(Protocol):
+class ProgramFunction(ABC):
     """A function of blocks that also needs their program, and receives it in the process that simulates them."""
 
-    def bound_to(self, program: Program) -> Callable[[Block], Any]:
-        """Return the function of a block."""
-        ...
+    @abstractmethod
+    def __call__(self, program: Program, block: Block) -> Any: ...
 
 
 def simulate_blocks(
@@ -81,11 +80,11 @@ def map_blocks(
 ) -> Iterator[T]:
     """Yield the result of `function` for each block of `simulate_blocks`, in order; it is called in the simulating thread.
 
-    A function that also needs the program has a method `bound_to` (see BoundToProgram). Resolvers are taken from the list
-    `unused` if it has any, and put back at the end.
+    A ProgramFunction is called with the program, too. Resolvers are taken from the list `unused` if it has any, and put back
+    at the end.
     """
-    if isinstance(function, BoundToProgram):
-        function = function.bound_to(program)
+    if isinstance(function, ProgramFunction):
+        function = functools.partial(function, program)
     threads, block = threads or processors(), block or block_rows(program)
     starts = range(start, samples, block)
     count = len(starts[:-1]) + sum(len(_pieces(begin, samples, block)) for begin in starts[-1:])

@@ -1,8 +1,6 @@
 """Lazy realizations: a dataset whose chunks dask simulates when they are needed."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +11,7 @@ from tolcontact.archive import Run, labelled, row_values, run_settings, sizes_of
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.method import Solver
-from tolcontact.simulation import Block
+from tolcontact.simulation import Block, ProgramFunction
 from tolcontact.simulation.lazy import chunk_rows, dask_arrays, lazy_draws, lazy_realizations
 from tolcontact.workflow.models import Choice, Model, check_counts, program_of
 
@@ -78,7 +76,7 @@ def simulate(
 
 
 @dataclass(frozen=True)
-class _Records:
+class _Records(ProgramFunction):
     """Conversion of a block to records (realization,) with fields of a name, kind and shape."""
 
     fields: tuple[tuple[str, str, tuple[int, ...]], ...]
@@ -86,10 +84,6 @@ class _Records:
     @property
     def kind(self) -> np.dtype:
         return np.dtype(list(self.fields))
-
-    def bound_to(self, program: Program) -> Callable[[Block], np.ndarray]:
-        """Return the function of a block of that program."""
-        return partial(self, program)
 
     def __call__(self, program: Program, block: Block) -> np.ndarray:
         records = np.empty(len(block), self.kind)

@@ -1,7 +1,5 @@
 """Sums over the realizations of a run: displacement fields, and counts of touching contact points."""
 
-import functools
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -14,7 +12,7 @@ from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation import Program
 from tolcontact.contact import kernel
 from tolcontact.discretization import Nominal, raised_places
-from tolcontact.simulation import Block
+from tolcontact.simulation import Block, ProgramFunction
 from tolcontact.statistics import BlockSums, DisplacementFields, TouchingShares
 from tolcontact.vocabulary import CORRECTED
 
@@ -85,7 +83,7 @@ ReducedBlock = tuple[dict[str, np.ndarray], BlockTotals]
 
 
 @dataclass(frozen=True, eq=False)
-class _BlockReduction:
+class _BlockReduction(ProgramFunction):
     """Reduction of a block, where it is simulated, to stored rows and sums.
 
     kept      labels of the stored variables
@@ -95,10 +93,6 @@ class _BlockReduction:
     kept: tuple[str, ...]
     fields: DisplacementFields
     counted: int
-
-    def bound_to(self, program: Program) -> Callable[[Block], ReducedBlock]:
-        """Return the function of a block of that program."""
-        return functools.partial(self, program)
 
     def __call__(self, program: Program, block: Block) -> ReducedBlock:
         counts = count_in_block(program, block, self.counted)
