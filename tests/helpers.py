@@ -9,6 +9,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 
@@ -139,6 +140,16 @@ def contents(path, group=None):
     found = xr.load_dataset(path, group=group).drop_vars(CHECKPOINTS, errors="ignore")
     found.attrs.pop("history", None)
     return found
+
+
+def assert_same_archive(found, expected):
+    """Every variable of two archives, to the last bit; which checkpoint was the last depends on time."""
+    with xr.open_datatree(found) as one, xr.open_datatree(expected) as other:
+        assert one.groups == other.groups
+        for group in one.groups:
+            for name in other[group].data_vars:
+                if name not in CHECKPOINTS:
+                    np.testing.assert_array_equal(one[group][name].values, other[group][name].values, err_msg=f"{group} {name}")
 
 
 def model_in(path):
