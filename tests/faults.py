@@ -35,7 +35,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 # Packages and modules that get no faults, by name: they do not compute results. All others are tested.
-SPARED = {"declaration", "geometry", "features", "discretization", "vocabulary", "workflow", "report", "plot", "cli", "testing"}
+SPARED = {"declaration", "vocabulary", "workflow", "report", "plot", "cli", "testing"}
 SPARED |= {"method", "errors", "child", "compiled", "readable", "version", "__main__", "__init__"}
 SPARED |= {"quiet", "inspection", "archive_lock", "reader"}
 WEIGHTS = {"contact": 4, "compilation": 3, "statistics": 3, "archive": 3, "simulation": 2, "mechanics": 2}  # others 1
