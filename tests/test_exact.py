@@ -59,12 +59,13 @@ def test_many_bodies_are_resolved(make, objective):
     assert (run["gap_min"][:, RAW].min(axis=1) < -0.01).all()
     far = run["status"] == Status.DOUBTFUL
     assert (run["status"][~far] == Status.RESOLVED).all()
-    # Of a block that hardly penetrates "active points" hold next to nothing: it may slide off its neighbours.
-    assert far.sum() <= (3 if make.__name__ == "<lambda>" and objective == "active points" else 0)
+    # "active points" hold a block by the points that penetrate: one that touches nothing as placed may slide off.
+    assert not far.any() or (make.__name__ == "<lambda>" and objective == "active points")
     for k in np.flatnonzero(far):
-        R, t = (after - before for before, after in (each for each in R_t(run["poses"][k])))
+        R, t = (after - before for before, after in R_t(run["poses"][k]))
         slid = [np.linalg.norm(pair.P_m @ R[pair.moving].T + t[pair.moving], axis=1).max() for pair in program.nominal.pairs]
-        assert max(slid) > 0.5 * 40  # half a block
+        block = int(np.argmax(slid))  # which joint `block` sets down, and joint `block` + 1 loads
+        assert slid[block] > 0.5 * 40 and (run["gap_min"][k, RAW, block : block + 2] > 0).all()
     assert certified(program, run).min() > -1e-9
     assert (run["carrying"].sum(axis=1) > 0).all()
 
