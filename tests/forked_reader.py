@@ -4,6 +4,7 @@ A process of its own takes a third of a second to import them, and tests open hu
 """
 
 import json
+import os
 import subprocess
 import threading
 from pathlib import Path
@@ -15,7 +16,7 @@ OWN = ("PYTEST_CURRENT_TEST", "PYTHONPATH")  # variables that may differ without
 
 
 class ForkedReader:
-    """Runs Python files as `subprocess.run` does, in the environment of the first call."""
+    """Runs Python files as `watch.run` does, in the environment of the first call."""
 
     def __init__(self):
         self._process, self._lock = None, threading.Lock()
@@ -23,6 +24,8 @@ class ForkedReader:
 
     def reads(self, command, options):
         """Whether a command inspects an archive, in no other environment."""
+        if not hasattr(os, "fork"):
+            return False
         is_inspection = isinstance(command, list) and len(command) > 3 and str(command[2]).endswith("archive/inspection.py")
         return is_inspection and shared(options.get("env") or {}) == self._environment
 
@@ -33,7 +36,7 @@ class ForkedReader:
                 self._process = subprocess.Popen(script("forking_reader"), env=environment(), text=True, **pipes)
             print(json.dumps([str(Path.cwd()), *map(str, command[2:])]), file=self._process.stdin, flush=True)
             code, out, err = json.loads(self._process.stdout.readline())
-        return subprocess.CompletedProcess(command, code, out.encode("latin-1"), err.encode("latin-1"))
+        return code, out.encode("latin-1"), err.encode("latin-1"), ""
 
     def close(self):
         if self._process is not None:

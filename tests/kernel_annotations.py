@@ -83,7 +83,7 @@ def kernel_annotations(path: str | Path) -> KernelAnnotations:
     screening.screen(path, DEFAULT_LIMITS.triangles)
     seconds = int(DEFAULT_LIMITS.seconds + DEFAULT_LIMITS.seconds_per_mb * path.stat().st_size / 1e6)
     try:
-        output = run_child(PROGRAM, str(path.absolute()), str(DEFAULT_LIMITS.memory), str(seconds), seconds=seconds)
+        output = run_child(PROGRAM, str(path.absolute()), memory=DEFAULT_LIMITS.memory, seconds=seconds)
     except ChildDiedError as error:
         raise GeometryFault(f"the kernel could not read the PMI: {error}") from error
     content = json.loads(output)

@@ -1,6 +1,5 @@
 """Archives that were damaged, or made to mislead: one message, and nothing else happens."""
 
-import subprocess
 from pathlib import Path
 
 import netCDF4
@@ -15,6 +14,7 @@ from tests.helpers import COMMAND, call, model_in, nightly, run, script
 from tests.hostile import HOSTILE, make
 from tolcontact import vocabulary
 from tolcontact.errors import ArchiveError
+from tolcontact.system import watch
 
 CRASHES = ("measured is text",)  # the netCDF library, so only where it is another process's
 # What is shown as it is written: checksums detect damage, not values that somebody wrote with the netCDF library.
@@ -46,12 +46,12 @@ def once(forked_reader, monkeypatch):
     answers = {}
 
     def answer(command, **_):
-        question = (*command, Path(command[-2]).read_bytes())
+        question = (*command, Path(command[-3]).read_bytes())
         if question not in answers:
             answers[question] = forked_reader.run(command)
         return answers[question]
 
-    monkeypatch.setattr(subprocess, "run", answer)
+    monkeypatch.setattr(watch, "run", answer)
 
 
 @pytest.mark.slow

@@ -48,6 +48,7 @@ LAZY = {
     "pandas": ("declaration/dependence.py",),
     "trimesh": ("geometry/files/worker.py",),  # in a process that mostly reads STEP files
     "openpyxl": ("report/spreadsheet.py",),
+    "psutil": ("system/",),  # where the system limits no process
     "tolcontact.kernel.step_document": ("geometry/files/worker.py",),  # in a process of its own
     "tolcontact.fasteners": ("__init__.py",),  # when a script asks
     "tolcontact.pmi": ("__init__.py",),  # when a script asks

@@ -1,17 +1,14 @@
 """Child processes for files of unknown origin: a library may crash, stall or take too much memory there."""
 
 import os
-import subprocess
 import sys
 from pathlib import Path
 
+from tolcontact.system import watch
 from tolcontact.system.exit_codes import TIME_LIMIT, crash
 from tolcontact.system.resources import limit_resources
 
-__all__ = ["STALL_FACTOR", "TIME_LIMIT", "ChildDiedError", "Refusal", "crash", "environment", "limit_resources", "run_child"]
-
-# Times the processor time that a child may take: one that lives longer does not wait for a processor, it hangs.
-STALL_FACTOR = 10
+__all__ = ["TIME_LIMIT", "ChildDiedError", "Refusal", "crash", "environment", "limit_resources", "run_child"]
 
 
 class Refusal(Exception):
@@ -22,26 +19,16 @@ class ChildDiedError(Exception):
     """The process did not finish; the message states why."""
 
 
-def run_child(script: Path, *arguments: str, seconds: float) -> str:
-    """Run a Python file, which should begin with `limit_resources`, and return its standard output.
+def run_child(script: Path, argument: str, *, memory: int, seconds: int) -> str:
+    """Run a Python file, and return its standard output. Its further arguments are its limits, for `limit_resources`.
 
-    Raises ChildDiedError if it takes STALL_FACTOR times as long as `seconds` (a busy machine does not make a file a damaged
-    one: the limit of its processor time is the file's own), or ends by a signal or an error.
+    Raises ChildDiedError if it is ended at a limit, or ends by a signal or an error.
     """
-    try:
-        completed = subprocess.run(
-            [sys.executable, "-P", os.fspath(script), *arguments],
-            env=environment(),
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            timeout=STALL_FACTOR * seconds,
-            check=False,
-        )
-    except subprocess.TimeoutExpired as error:
-        raise ChildDiedError(f"reading it took longer than {STALL_FACTOR * seconds:.0f} s") from error
-    if completed.returncode:
-        raise ChildDiedError(_reason(completed))
-    return completed.stdout.decode("utf-8", "surrogateescape")
+    command = [sys.executable, "-P", os.fspath(script), argument, str(memory), str(seconds)]
+    code, output, errors, limit = watch.run(command, memory=memory, seconds=seconds, env=environment())
+    if code or limit:
+        raise ChildDiedError(_reason(code, errors, limit))
+    return output.decode("utf-8", "surrogateescape")
 
 
 def environment() -> dict[str, str]:
@@ -54,12 +41,12 @@ def environment() -> dict[str, str]:
     }
 
 
-def _reason(completed: subprocess.CompletedProcess) -> str:
-    if completed.returncode == TIME_LIMIT:
+def _reason(code: int, errors: bytes, limit: str) -> str:
+    if limit == "time" or code == TIME_LIMIT:
         return "reading it took too long"
-    if name := crash(completed.returncode):
-        return f"the library that reads it crashed ({name.partition(',')[0]})"
-    message = (completed.stderr.decode("utf-8", "replace").strip().splitlines() or ["no message"])[-1]
-    if message.startswith("MemoryError"):
+    message = (errors.decode("utf-8", "replace").strip().splitlines() or ["no message"])[-1]
+    if limit == "memory" or message.startswith("MemoryError"):
         return "reading it takes too much memory"
+    if name := crash(code):
+        return f"the library that reads it crashed ({name.partition(',')[0]})"
     return f"the library that reads it failed ({message})"

@@ -14,15 +14,15 @@ import re
 import subprocess
 import sys
 import tempfile
-import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from tolcontact.child import STALL_FACTOR, environment
+from tolcontact.child import environment
 from tolcontact.errors import GeometryFault, clipped
 from tolcontact.system.exit_codes import TIME_LIMIT, crash
+from tolcontact.system.watch import Watch
 
 PROGRAM = Path(__file__).parent / "geometry" / "files" / "worker.py"
 LOAD_KERNEL = "--kernel"  # argument of the program: load the CAD kernel before the first job
@@ -50,6 +50,11 @@ class Job:
     has_face_names: bool = False
     has_solids: bool = False
     has_pmi: bool = False
+
+    @property
+    def memory_fault(self) -> str:
+        """The fault of a file that takes too much memory, as the rest of a sentence that begins with its name."""
+        return f"takes more than {self.memory / 2**30:.3g} GiB of memory to read; it is damaged, or far too fine"
 
 
 class UnfinishedRead(GeometryFault):
@@ -89,10 +94,7 @@ class Worker:
             process.stdin.close()
 
     def read(self, title: object, job: Job) -> Any:
-        """Return what the process reads for a job. Raises GeometryFault about the file with a title if it ends first.
-
-        The process limits its own processor time. On a busy machine it may take STALL_FACTOR times as long.
-        """
+        """Return what the process reads for a job. Raises GeometryFault about the file with a title if it ends first."""
         try:
             if self.process is None:
                 self.start()
@@ -100,27 +102,25 @@ class Worker:
             raise GeometryFault(f'"{title}": its reader process cannot be started ({error})') from error
         process = self.process
         assert process is not None and process.stdin is not None and process.stdout is not None
-        timer = threading.Timer(MAX_START_SECONDS + STALL_FACTOR * job.seconds, process.kill)
-        timer.daemon = True
-        timer.start()
-        try:
-            pickle.dump(job, process.stdin)
-            process.stdin.flush()
-            return pickle.load(process.stdout)
-        except (EOFError, OSError, pickle.UnpicklingError):
-            fault = self._fault(title, process.wait(), not timer.is_alive(), job.seconds)
-        finally:
-            timer.cancel()
+        with Watch(process, memory=job.memory, seconds=job.seconds, start=MAX_START_SECONDS) as watch:
+            try:
+                pickle.dump(job, process.stdin)
+                process.stdin.flush()
+                return pickle.load(process.stdout)
+            except (EOFError, OSError, pickle.UnpicklingError):
+                code = process.wait()
         with self:
-            raise fault
+            raise self._fault(title, code, watch.limit, job)
 
-    def _fault(self, title: object, code: int, is_late: bool, seconds: float) -> GeometryFault:
-        """Return the fault of the file at which the process ended with an exit code, or was killed since it took too long."""
-        if is_late or code == TIME_LIMIT:
+    def _fault(self, title: object, code: int, limit: str, job: Job) -> GeometryFault:
+        """Return the fault of the file at which the process ended with an exit code, or was ended at a limit."""
+        if limit == "time" or code == TIME_LIMIT:
             return UnfinishedRead(
-                f'"{title}" took too long: it was not read within {seconds:.0f} s of processor time; it is far too fine, or '
-                "damaged (look for coordinates that are far off); export it again"
+                f'"{title}" took too long: it was not read within {job.seconds:.0f} s of processor time; it is far too fine, '
+                "or damaged (look for coordinates that are far off); export it again"
             )
+        if limit == "memory":
+            return GeometryFault(f'"{title}" {job.memory_fault}')
         if name := crash(code):
             return UnfinishedRead(
                 f'"{title}" cannot be read: it crashed its reader process ({name}); it is damaged, or beyond the CAD kernel; '

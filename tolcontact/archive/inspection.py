@@ -83,9 +83,10 @@ def check_archive(path: Path) -> None:
 def inspect(path: Path) -> None:
     """Raise ArchiveError if a file is not an archive, is damaged, or claims what it cannot hold."""
     check_name(path)
-    seconds = math.ceil(MAX_SECONDS + SECONDS_PER_GB * path.stat().st_size / 1e9)
+    size = path.stat().st_size
+    seconds = math.ceil(MAX_SECONDS + SECONDS_PER_GB * size / 1e9)
     try:
-        fault = run_child(Path(__file__), os.fspath(path), str(seconds), seconds=seconds)
+        fault = run_child(Path(__file__), os.fspath(path), memory=MEMORY + 4 * size, seconds=seconds)
     except ChildDiedError as error:
         raise ArchiveError(f'"{path}" is damaged, or not an archive of tolcontact: {error}') from error
     if fault:
@@ -258,6 +259,5 @@ def _check_declaration(stored: netCDF4.Variable) -> None:
 
 
 if __name__ == "__main__":
-    _file = Path(sys.argv[1])
-    limit_resources(MEMORY + 4 * _file.stat().st_size, seconds=int(sys.argv[2]))
-    sys.stdout.write(_fault(_file))
+    limit_resources(int(sys.argv[2]), seconds=int(sys.argv[3]))
+    sys.stdout.write(_fault(Path(sys.argv[1])))

@@ -1,7 +1,10 @@
 """The machine: its processors and its memory."""
 
-import ctypes
 import os
+
+import lazy_loader
+
+psutil = lazy_loader.load("psutil")  # on Windows
 
 
 def processors() -> int:
@@ -9,23 +12,8 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-class _MemoryStatus(ctypes.Structure):
-    """MEMORYSTATUSEX of Windows."""
-
-    _fields_ = (
-        ("dwLength", ctypes.c_ulong),
-        ("dwMemoryLoad", ctypes.c_ulong),
-        *((name, ctypes.c_ulonglong) for name in ("ullTotalPhys", "ullAvailPhys", "ullTotalPageFile", "ullAvailPageFile")),
-        *((name, ctypes.c_ulonglong) for name in ("ullTotalVirtual", "ullAvailVirtual", "ullAvailExtendedVirtual")),
-    )
-
-
-def machine_memory() -> int | None:
-    """Return the memory [byte] of this machine; None where the system does not tell."""
+def machine_memory() -> int:
+    """Return the memory [byte] of this machine."""
     if hasattr(os, "sysconf"):
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    windows = getattr(ctypes, "windll", None)
-    status = _MemoryStatus(dwLength=ctypes.sizeof(_MemoryStatus))
-    if windows is None or not windows.kernel32.GlobalMemoryStatusEx(ctypes.byref(status)):
-        return None
-    return int(status.ullTotalPhys)
+    return int(psutil.virtual_memory().total)

@@ -5,19 +5,21 @@ import math
 import sys
 import time
 
+import lazy_loader
+
+psutil = lazy_loader.load("psutil")  # on Windows
 try:
     import resource
 except ImportError:  # on Windows, where nothing is limited
     resource = None  # type: ignore[assignment]
 
+# What `limit_resources` limits here; a watch over the process limits the rest.
+ENFORCED = frozenset(() if resource is None else ("time",) if sys.platform == "darwin" else ("time", "memory"))
 _PEAK_UNIT = 1 if sys.platform == "darwin" else 1024  # bytes; of the peak memory that the system states
 
 
 def limit_resources(memory: int, *, seconds: float | None = None) -> None:
-    """Limit this process to `memory` [byte] and to `seconds` of processor time from now on, and let it leave no core.
-
-    Windows limits nothing, and macOS does not limit memory.
-    """
+    """Limit this process to `memory` [byte] and to `seconds` of processor time from now on, and let it leave no core."""
     if resource is None:
         return
     limits = {resource.RLIMIT_AS: memory, resource.RLIMIT_CORE: 0}
@@ -40,4 +42,6 @@ def address_space() -> int | None:
 
 def peak_memory() -> int | None:
     """Return the largest memory [byte] that this process has used so far; None where the system does not tell."""
-    return None if resource is None else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _PEAK_UNIT
+    if resource is None:
+        return getattr(psutil.Process().memory_info(), "peak_wset", None)
+    return int(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _PEAK_UNIT)

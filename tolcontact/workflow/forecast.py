@@ -56,7 +56,7 @@ def check_memory(samples: int, kept: int) -> None:
     """Raise OptionError if the machine has too little memory for `kept` numbers in each of `samples` realizations."""
     needed = np.dtype(float).itemsize * samples * kept
     memory = machine_memory()
-    if memory is not None and needed > memory:
+    if needed > memory:
         raise OptionError(
             f"{samples} realizations need {size_in_words(needed)} of memory, and this machine has {size_in_words(memory)}; "
             "ask for fewer samples"

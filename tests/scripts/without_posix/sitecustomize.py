@@ -10,6 +10,8 @@ import signal
 import sys
 from pathlib import Path
 
+import psutil  # noqa: F401  (its parts for Linux need what is taken away below)
+
 FLAGS = "O_NOFOLLOW O_CLOEXEC O_DIRECTORY O_NOCTTY O_SYNC"
 USERS = "geteuid getegid getgid getgroups getpgid getpgrp setpgid setsid setuid setgid chown lchown fchown fchmod"
 SYSTEM = "sysconf sysconf_names confstr sched_getaffinity getloadavg fork forkpty mkfifo mknod nice killpg wait3 wait4"

@@ -153,16 +153,11 @@ def result(job: Job) -> Arrays | dict[str, Any] | int | str:
             count = len(content["faces"])
         return content if count <= job.triangles else count
     except MemoryError:
-        return too_large(job)
+        return job.memory_fault
     except Refusal as refusal:
         return str(refusal)
     except Exception as error:  # any error is reported as a fault of the file
         return f"is damaged, or of an unknown kind ({type(error).__name__}: {error}); export it again"
-
-
-def too_large(job: Job) -> str:
-    """Return the fault of a file that takes too much memory."""
-    return f"takes more than {job.memory / 2**30:.3g} GiB of memory to read; it is damaged, or far too fine"
 
 
 def work() -> None:
@@ -178,7 +173,7 @@ def work() -> None:
             try:
                 content = pickle.dumps(result(job), protocol=pickle.HIGHEST_PROTOCOL)
             except MemoryError:
-                content = pickle.dumps(too_large(job))
+                content = pickle.dumps(job.memory_fault)
             results.write(content)
             results.flush()
 
