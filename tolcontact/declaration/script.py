@@ -37,7 +37,7 @@ def read_json(path: Path) -> Assembly:
     """
     try:
         check_inputs([path], MAX_BYTES)
-        document = json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_unique)
+        document = json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=_unique)
     except (OSError, ValueError, RecursionError) as error:
         raise ScriptError(f'model "{path}" cannot be read as JSON: {error}') from error
     try:
