@@ -3,7 +3,6 @@
 import contextlib
 import io
 import os
-import pty
 import re
 import sys
 from pathlib import Path
@@ -149,7 +148,7 @@ def test_tables_are_as_wide_as_the_terminal(archive):
 @pytest.mark.slow
 def test_on_a_terminal_a_bar_shows_how_far_a_run_is(tmp_path):
     command = [*COMMAND, "run", MODELS / "ra1.py", "--samples", "20000", "--solver", "daqp", "--surfaces", "0"]
-    screen, terminal = pty.openpty()
+    screen, terminal = pytest.importorskip("pty", reason="a terminal of POSIX").openpty()
     process, shown = start(command, cwd=tmp_path, stderr=terminal), b""
     os.close(terminal)
     with contextlib.suppress(OSError):  # the other end is closed

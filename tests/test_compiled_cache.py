@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import tolcontact
-from tests.helpers import finish, nightly, script, start
+from tests.helpers import finish, nightly, posix_only, script, start
 
 pytestmark = pytest.mark.slow
 
@@ -77,6 +77,7 @@ def test_all_that_is_written_lies_in_the_cache_folder(tmp_path):
 
 
 @pytest.mark.parametrize("home", ["own", *nightly("not writable", "writable", "missing")])
+@posix_only
 def test_another_user_may_use_it(home, nobody, tmp_path):
     """Who can read the package, but not write to it."""
     folder = tmp_path / "home"

@@ -7,8 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.helpers import run
+from tests.helpers import posix_only, run
 from tolcontact import code_cache
+from tolcontact.system.kind import IS_POSIX
+
+pytestmark = posix_only
 
 NOBODY = 65534
 CODE = b"code"
@@ -25,7 +28,7 @@ def folder(monkeypatch, tmp_path):
 
 
 def is_root():
-    return os.geteuid() == 0
+    return IS_POSIX and os.geteuid() == 0
 
 
 @pytest.mark.parametrize("umask", [0, 0o022, 0o077])

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from tests.helpers import run
+from tests.helpers import posix_only, run
 
 BEGIN = """
 import os, signal, sys, time
@@ -34,6 +34,7 @@ PLACES = {
 }  # fmt: skip
 
 
+@posix_only
 @pytest.mark.parametrize("place", PLACES)
 def test_one_signal_is_enough(place):
     code, number = PLACES[place]
@@ -41,6 +42,7 @@ def test_one_signal_is_enough(place):
     assert (done.returncode, done.stdout, done.stderr) == (128 + number, "", "stopped\n")
 
 
+@posix_only
 @pytest.mark.parametrize(
     "code",
     [
@@ -54,6 +56,7 @@ def test_a_second_one_ends_what_ignored_the_first(code):
     assert (done.returncode, done.stdout) == (130, "") and done.stderr.endswith("stopped\n")
 
 
+@posix_only
 def test_where_nothing_is_to_be_cleaned_up_one_ends_the_process():
     code = "try: stop()\n        finally: print('cleaned')"
     done = run([sys.executable, "-c", f"{BEGIN.replace('stoppable()', 'stoppable(at_once=True)')}        {code}{END}"])
@@ -67,6 +70,7 @@ def test_without_a_signal_everything_is_as_before():
     assert run([sys.executable, "-c", f"import signal\n{code}"]).returncode == 0
 
 
+@posix_only
 def test_too_little_address_space_is_said_where_libraries_would_hang():
     code = "import resource, os, sys; resource.setrlimit(resource.RLIMIT_AS, (10**9,) * 2); "
     code += "os.execv(sys.executable, [sys.executable, '-m', 'tolcontact', '--version'])"
@@ -74,6 +78,7 @@ def test_too_little_address_space_is_said_where_libraries_would_hang():
     assert done.returncode == 2 and "address space" in done.stderr and "Traceback" not in done.stderr
 
 
+@posix_only
 def test_closed_streams_do_no_harm_to_the_next_files(tmp_path):
     archive = tmp_path / "run.nc"
     command = f"{sys.executable} -m tolcontact run models/ra1.py --samples 20 --out {archive} 0<&- 1>&- 2>&-"

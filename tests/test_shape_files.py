@@ -9,6 +9,7 @@ import pytest
 import trimesh
 
 import tolcontact as tc
+from tests.helpers import posix_only
 from tests.shapes import BLOCK, refusal, shape
 from tests.step_files import step_block
 from tolcontact.errors import GeometryFault
@@ -86,7 +87,7 @@ def test_a_gltf_file_finds_its_numbers_beside_it(tmp_path):
     assert shape(tc.Mesh(tmp_path / "block.gltf", units="mm")).volume == pytest.approx(6000)
 
 
-@pytest.mark.skipif(os.name != "posix", reason="a pipe with a name")
+@posix_only
 def test_materials_of_an_obj_file_are_left_alone(tmp_path):
     os.mkfifo(tmp_path / "endless.mtl")
     named = b"mtllib endless.mtl\nmtllib /etc/hostname\no Geh\xe4use\nusemtl a\n" + OBJ

@@ -2,7 +2,6 @@
 
 import contextlib
 import io
-import os
 import pickle
 import re
 import signal
@@ -16,7 +15,7 @@ import numpy as np
 import pytest
 
 import tolcontact as tc
-from tests.helpers import finish, run, script, start
+from tests.helpers import finish, posix_only, run, script, start
 from tests.shapes import BLOCK, refusal, shape
 from tests.step_files import Step, step_block
 from tolcontact import shape_worker
@@ -112,7 +111,7 @@ def test_each_file_is_read_once_and_one_process_reads_them_all(tmp_path, monkeyp
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(os.name != "posix", reason="signals")
+@posix_only
 def test_the_reader_ends_with_an_interrupted_process(tmp_path):
     (tmp_path / "endless.step").write_text(stalling())
     process = start(script("read_shapes", 50, "endless.step"), cwd=tmp_path)

@@ -10,7 +10,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import COMMAND, PAPER, SCRIPTS, contents, finish, nightly, run, start
+from tests.helpers import COMMAND, PAPER, SCRIPTS, contents, finish, nightly, posix_only, run, start
 from tolcontact.errors import ArchiveError
 
 
@@ -93,6 +93,7 @@ def test_an_interrupted_run_says_how_far_it_is_has_its_fields_and_goes_on(tmp_pa
         assert one.identical(other), group
 
 
+@posix_only
 @pytest.mark.slow
 @pytest.mark.parametrize(("by", "code"), [(signal.SIGINT, 130), *nightly((signal.SIGTERM, 143))])
 def test_a_command_that_is_stopped_says_how_to_go_on_and_leaves_nothing_else(by, code, tmp_path):
@@ -110,6 +111,7 @@ def test_a_command_that_is_stopped_says_how_to_go_on_and_leaves_nothing_else(by,
     assert "of 10 000 000 realizations are done; continue with --resume" in summary.stdout
 
 
+@posix_only
 @pytest.mark.slow
 def test_a_run_that_is_stopped_before_it_began_leaves_nothing(tmp_path):
     begun = begin(tmp_path, "--samples", 10_000, "--out", "never.nc")

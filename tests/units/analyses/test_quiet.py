@@ -4,9 +4,11 @@ import ctypes
 import os
 import threading
 
+from tests.helpers import posix_only
 from tolcontact.analyses.farthest_pose import muted_c_stdout
 
 
+@posix_only
 def test_only_c_code_is_muted_and_only_while_a_thread_is_inside(capfd):
     library = ctypes.CDLL(None)
     entered, printed = threading.Event(), threading.Event()

@@ -18,7 +18,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import COMMAND, PAPER, assert_same_archive, call, nightly, start
+from tests.helpers import COMMAND, PAPER, assert_same_archive, call, nightly, posix_only, start
 from tolcontact.errors import ClusterError
 from tolcontact.simulation import cluster
 from tolcontact.simulation.cluster import local_cluster, running_cluster
@@ -91,6 +91,7 @@ def test_searches_and_comparisons_are_those_of_one_process(client):
     assert found.drop_vars("seconds").identical(expected.drop_vars("seconds")) and (found["seconds"] > 0).all()
 
 
+@posix_only
 @pytest.mark.parametrize("seed", [0, *nightly(1)])
 def test_a_worker_may_be_killed(seed, client, tmp_path):
     lot = random.Random(seed)
@@ -109,6 +110,7 @@ def test_a_worker_may_be_killed(seed, client, tmp_path):
     assert_same_archive(path, whole)
 
 
+@posix_only
 @pytest.mark.parametrize("seed", [1, *nightly(0)])
 def test_a_killed_run_goes_on_with_other_workers_and_leaves_none_behind(seed, tmp_path):
     path, whole = tmp_path / "run.nc", tmp_path / "whole.nc"
@@ -250,6 +252,7 @@ def test_nothing_of_a_cluster_is_served_to_other_machines(client):
     assert addresses <= {"127.0.0.1", "::1"} and addresses
 
 
+@posix_only
 def test_ctrl_c_in_a_terminal_is_for_the_command_and_not_for_its_workers(client):
     """The terminal sends it to all of them."""
     workers = [child for child in psutil.Process().children() if "spawn_main" in " ".join(child.cmdline())]

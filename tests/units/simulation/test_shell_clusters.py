@@ -13,7 +13,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import assert_same_archive, call
+from tests.helpers import assert_same_archive, call, posix_only
 from tolcontact.errors import ClusterError
 from tolcontact.simulation import cluster
 from tolcontact.simulation.cluster import running_cluster
@@ -56,6 +56,7 @@ def worker(begin, port):
     return begin("worker", f"tcp://127.0.0.1:{port}", "--nthreads", 1, "--no-dashboard")
 
 
+@posix_only
 def test_a_scheduler_and_workers_in_shells(dask_processes, tmp_path):
     port = free_port()
     first = scheduler(dask_processes, port)
@@ -127,6 +128,7 @@ def test_a_slow_network_changes_nothing(dask_processes, tmp_path):
     assert_same_archive(tmp_path / "run.nc", tmp_path / "whole.nc")
 
 
+@posix_only
 def test_a_run_that_all_workers_left_ends(dask_processes):
     port = free_port()
     scheduler(dask_processes, port)

@@ -1,7 +1,5 @@
 """Intervals that cover, fields that equal the plain sums."""
 
-import resource
-
 import numpy as np
 import pytest
 from scipy import stats
@@ -66,6 +64,7 @@ def test_a_sample_that_is_read_in_pieces_gives_the_same_as_one_that_is_sorted(ti
 
 def test_a_full_disk_is_an_error_that_names_the_folder():
     large = Sample(lambda: iter([np.zeros(10_000)]), max_sorted=100)
+    resource = pytest.importorskip("resource", reason="limits of POSIX")
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limit[1]))
     try:
