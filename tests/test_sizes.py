@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests.cases import STILL, Frame
 from tests.helpers import nightly
+from tolcontact.testing import assert_gaps_recompute
 
 TURNED = Frame(turn=(0.5, -0.7, 1.1), shift=(100, -50, 7))
 ROUNDING = 1e-9  # mm: parts shift alone, so that sums are exact
@@ -96,6 +97,56 @@ def test_a_stack_of_any_parts_is_as_high_as_these_are_thick(seed):
     rng = np.random.default_rng(seed)
     ways = [str(way) for way in rng.choice([*WAYS, *PROFILES], rng.integers(1, 7))]
     assert_rest_is_the_sum(stack(ways, frame=Frame(turn=rng.normal(size=3)), link=rng.choice(["faces", "points"])))
+
+
+def test_both_faces_of_a_part_may_have_profiles():
+    """Discs with a step, to which the profiles of both faces refer: each is as thick as both deviations outward say."""
+    a, below = tc.Assembly("discs"), None
+    shape = tc.Mesh(trimesh.creation.revolve([(0, 0), (40, 0), (40, 5), (30, 5), (30, 10), (0, 10)], sections=12))
+    for k in range(3):
+        disc = a.part(f"s{k}", shape, at=(0, 0, 10 * k))
+        disc.feature("step", disc.face("+z", tc.select.Inside((-50, -50, 4), (50, 50, 6))), datum="A")
+        profile = tc.Profile(0.1, "A", rule="translation")
+        under = disc.feature("under", disc.face("-z"), profile)
+        over = disc.feature("over", disc.face("+z", tc.select.Inside((-50, -50, 9), (50, 50, 11))), profile)
+        feet = [
+            tc.Locator(f"A{number}", under.point(*p), "z") for number, p in enumerate([(20, 0, 0), (-9, 9, 0), (-9, -9, 0)])
+        ]
+        a.locate(disc, [*feet, *SIDES], tolerance=0, on=below)
+        below = over
+    a.measure("height", over.point(0, 5, 10), along="z")
+    assert effects(a) == []
+    results = tc.run(a, samples=8, surfaces=0, fields="none", keep="all")
+    labels = [f"s{k}.{face}.offset" for k in range(3) for face in ("under", "over")]
+    heights = results["sample"].deviation.sel(contributor=labels).values.sum(axis=1)
+    assert np.abs(results.measured.sel(state="raw", measure="height").values - heights).max() < ROUNDING
+
+
+@pytest.mark.parametrize("moves", ["both", "first", "second"])
+def test_measured_sizes_add_up(moves):
+    a, names = tc.Assembly("measured"), [f"thickness {k}" for k in range(3)]
+    for k, name in enumerate(names):
+        part = a.part(f"s{k}", tc.Box(50, 25, 10), at=(0, 0, 10 * k), fixed=True)
+        w = part.feature("w", part.face("-z"), part.face("+z"), tc.Size(10, 0.05, moves=moves))
+        a.measure(name, w.point(5, 5, 0), to=w.point(40, 5, 10), along="z", absolute=False)
+    a.measure("sum", tc.Sum(*names))
+    results = tc.run(a, samples=8, surfaces=0, fields="none", keep="all")
+    sizes = results["sample"].deviation.values.sum(axis=1)
+    assert np.abs(results.measured.sel(state="raw", measure="sum").values - sizes).max() < ROUNDING
+
+
+def test_supports_follow_the_face_that_they_stand_on_and_an_archive_says_so():
+    a = tc.Assembly("supported", method=tc.Method(objective="seating"))
+    base, block = a.part("base", tc.Box(50, 25, 10), fixed=True), a.part("block", tc.Box(50, 25, 10), at=(0, 0, 10))
+    w = base.feature("w", base.face("+z"), base.face("-z"), tc.Size(10, 0.05))
+    feet = [tc.Locator(f"A{k}", p, "z", one_sided=True) for k, p in enumerate(FEET)]
+    a.locate(block, [*feet, *SIDES], tolerance=0, on=w)
+    a.force("weight", at=block.point(20, 12, 5), vector=(0, 0, -10))
+    a.measure("height", block.point(20, 12, 5), along="z")
+    results = tc.run(a, samples=8, surfaces=0, fields="none", keep="all")
+    heights = results["sample"].deviation.sel(contributor="base.w.size").values / 2
+    assert np.abs(results.measured.sel(state="corrected", measure="height").values - heights).max() < 1e-7
+    assert_gaps_recompute(results)
 
 
 @pytest.mark.parametrize("frame", [STILL, *nightly(TURNED)], ids=lambda frame: "still" if frame is STILL else "turned")

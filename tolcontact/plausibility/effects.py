@@ -67,13 +67,15 @@ def unfollowed_by_locators(draws: TrialDraws) -> Iterator[str]:
 
 def unused_features(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence on the features whose tolerances displace nothing that is measured, located or in contact."""
-    program, nominal = draws.program, draws.program.nominal
-    used, numbers = _used_columns(program), {label: number for number, label in enumerate(nominal.contributors)}
-    unused = []
-    for pattern in nominal.patterns:
-        columns = [numbers[freedom.label] for freedom in pattern.freedoms if freedom.source in (FEATURE, FORM)]
-        if columns and not used[columns].any() and draws.deviations[:, columns].std(axis=0).any():
-            unused.append(pattern.declared)
+    nominal = draws.program.nominal
+    numbers = {label: number for number, label in enumerate(nominal.contributors)}
+    columns = {
+        pattern.declared: [numbers[freedom.label] for freedom in pattern.freedoms if freedom.source in (FEATURE, FORM)]
+        for pattern in nominal.patterns
+    }
+    varied = {declared: drawn for declared, drawn in columns.items() if draws.deviations[:, drawn].std(axis=0).any()}
+    used = _used_columns(draws.program) if varied else np.zeros(0)
+    unused = [declared for declared, drawn in varied.items() if not used[drawn].any()]
     if unused:
         names = ", ".join(f'"{declared.name}" of {declared.part.name}' for declared in unused[1 : 1 + LISTED])
         others = f", nor do those of {len(unused) - 1} more ({names}{', ...' * (len(unused) > LISTED + 1)})" if names else ""
