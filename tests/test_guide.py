@@ -12,6 +12,7 @@ import pytest
 
 import tolcontact as tc
 from tests.helpers import call
+from tolcontact.report import write_guide
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
@@ -117,6 +118,17 @@ def test_the_front_of_the_guide_links_every_page_and_chapter():
 def test_links_and_pictures_of_a_page_exist(page):
     links = re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
     assert not [link for link in links if not re.match("https?:", link) and not (page.parent / link).exists()]
+
+
+def test_the_installed_guide_is_written_as_pages_whose_links_exist(tmp_path):
+    front = write_guide(tmp_path)
+    assert front == tmp_path / "index.html"
+    for page in GUIDE.rglob("*.md"):
+        written = tmp_path / page.relative_to(GUIDE).with_suffix(".html")
+        text = written.read_text(encoding="utf-8")
+        links = re.findall(r'(?:href|src)="([^"#:]+)"', text)
+        assert not [link for link in links if not (written.parent / link).exists()], page.name
+    assert "<code>t / \\sigma</code>" in (tmp_path / "theory" / "tolerances.html").read_text(encoding="utf-8")
 
 
 def test_every_picture_of_the_guide_is_shown():

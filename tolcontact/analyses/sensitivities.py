@@ -45,9 +45,8 @@ def sensitivities(
     of both sides and of a jump between them. The linearized resolution may cause jumps, and so may points that enter the
     objective "active points". (2 contributors + 1) samples are simulated. `progress` is called with the number of finished
     realizations and the total.
-    `model`, `samples`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see tolcontact.analyses).
-
-    `tc.analyses.sensitivities("model.py", samples=500)`
+    `model`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see tolcontact.analyses):
+    `tc.analyses.sensitivities("model.py", samples=500)`.
     """
     analysis = Analysis(
         terms.SENSITIVITIES, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
