@@ -347,7 +347,7 @@ FAULTS = {
 @pytest.mark.parametrize("mistake", FAULTS)
 def test_a_fastener_that_does_not_fit_is_refused_in_one_sentence(mistake):
     options, expected = FAULTS[mistake]
-    a, other = tc.Assembly("model"), tc.Assembly("other model")
+    a, other = tc.Assembly("model", method=tc.Method()), tc.Assembly("other model")
     base = plate(a, "base", 0, {(0, 0): 8.5, (20, 0): 11}, fixed=True)
     cover = plate(a, "cover", 1, {(0, 0): 11, (20, 0): 11})
     rod = a.part("rod", tc.Pin(10, 20), at=(0, 100, 0))

@@ -14,7 +14,7 @@ import tolcontact as tc
 from tests.helpers import SCRIPTS, model_in, run
 from tolcontact.errors import ArchiveError
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
-from tolcontact.vocabulary import FORMAT
+from tolcontact.vocabulary import BY_REALIZATION, FORMAT, LOCATOR_OFFSET
 
 STORED = Path(__file__).parent / f"archives/format_{FORMAT}.nc.gz"
 # Of the corner, raw and corrected.
@@ -74,7 +74,8 @@ def test_it_is_resumed_but_not_with_points_that_count_otherwise(stored, tmp_path
     with pytest.raises(tc.TolcontactError, match="weighting = active points, now it is active points, by area"):
         tc.run(model_in(stored), samples=16, out=other, resume=True, **settings)
     tc.run(model_in(stored), samples=16, out=stored, resume=True, **settings).close()
-    assert_same_run(stored, tc.run(model_in(stored), samples=16, **settings))
+    written = [variable.name for variable in BY_REALIZATION if variable is not LOCATOR_OFFSET]  # which is newer than the archive
+    assert_same_run(stored, tc.run(model_in(stored), samples=16, **settings), variables=written)
 
 
 def test_an_archive_of_another_format_is_neither_read_nor_resumed_and_left_alone(stored):

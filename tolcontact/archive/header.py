@@ -18,6 +18,8 @@ from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.features import FaceDeviation
 from tolcontact.geometry import known_surfaces, surface_arrays
 from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING, coordinate_spacing
+from tolcontact.simulation.locator_offsets import locator_variations
+from tolcontact.simulation.other_objectives import compared_objectives, empty_by_objective
 from tolcontact.vocabulary import ArchiveVariable
 
 
@@ -53,6 +55,10 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
     new.add_all(file.createGroup("contact"), contact_values(program) | empty_touching(points))
     _write_sample(new, file.createGroup("sample"), program, deviations=Row("sample", terms.DEVIATION) in rows)
     new.add_all(file.createGroup("surface"), empty_checks(run.surfaces, len(nominal.pairs)))
+    if objectives := compared_objectives(program):
+        group = file.createGroup(terms.OBJECTIVES_GROUP)
+        new.add(group, terms.BY_OBJECTIVE_LABEL, objectives)
+        new.add_all(group, empty_by_objective(program))
     for part, numbers in zip(nominal.last_parts, sums, strict=True):
         _write_field(new, file.createGroup(terms.field_of(part.name)), part, numbers)
     new.write()
@@ -79,6 +85,7 @@ def _write_rows(new: Definitions, file: netCDF4.Dataset, program: Program, rows:
     for variable, units in units_of_rows(program).items():
         file[variable.name].units = units
     new.add(file, terms.SUMMED_ROWS, 0)
+    new.add(file, terms.LOCATOR_VARIATION, locator_variations(program)[program.nominal.last_indices])
 
 
 def _write_stations(new: Definitions, file: netCDF4.Dataset, nominal: Nominal, rows: Sequence[Row]) -> None:

@@ -37,7 +37,8 @@ ATTRIBUTES = dict.fromkeys(("title", "history", "versions", *terms.METHOD_ATTRIB
 }  # fmt: skip
 NEEDED = {  # variables of groups that summaries and models are read from
     "": (
-        *(v for v in terms.ROWS if v not in terms.POSES), terms.MEASURE_NOMINAL, terms.MEASURE_TOLERANCE, terms.MEASURE_UNITS,
+        *(v for v in terms.ROWS if v not in (*terms.POSES, terms.LOCATOR_OFFSET)), terms.MEASURE_NOMINAL,
+        terms.MEASURE_TOLERANCE, terms.MEASURE_UNITS,
         terms.LOWER_LIMIT, terms.UPPER_LIMIT, terms.MEASURE_ACCURACY, terms.QUANTITY, terms.SUMMED_ROWS,
     ),
     "contact": (terms.MOVING_PART, terms.REFERENCE_PART, *terms.TOUCHING),
@@ -51,7 +52,7 @@ NEEDED = {  # variables of groups that summaries and models are read from
 OF_FIELD = (terms.FIELD_VERTICES, terms.FIELD_FACES, *terms.FIELDS, terms.FIELD_SUMS)
 TOGETHER = (terms.ROUND, terms.KNOWN_SURFACES, terms.FEATURE_FACES, terms.FORMS, terms.TANGENTS, terms.OF_STATIONS)
 KINDS_OF_SURFACES = (terms.ROUND[1], terms.KNOWN_SURFACES[1])
-CHECKED_GROUPS = ("", "model", "contact", "sample", "surface", "field", terms.STATIONS_GROUP)
+CHECKED_GROUPS = ("", "model", "contact", "sample", "surface", "field", terms.OBJECTIVES_GROUP, terms.STATIONS_GROUP)
 VARIABLES = {  # by name; no two variables of an archive differ that have one name
     variable.name: variable
     for module in (archive, variation)

@@ -56,6 +56,7 @@ def row_values(block: Block, labels: Collection[str], nominal: Nominal) -> dict[
         values |= _station_values(block, nominal)
         poses = block.poses[:, :, nominal.last_indices]
         values |= {Row("", terms.ROTATION): pose.rotation(poses), Row("", terms.TRANSLATION): pose.translation(poses)}
+        values[Row("", terms.LOCATOR_OFFSET)] = block.locator_offset[:, nominal.last_indices]
     rows = [row for row in kept_rows(nominal, "all") if row.label in labels]
     return {row.label: np.ascontiguousarray(values[row], dtype=row.variable.kind) for row in rows}
 

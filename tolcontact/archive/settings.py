@@ -12,7 +12,6 @@ import numpy as np
 from tolcontact import vocabulary as terms
 from tolcontact.compilation import ACCURACY, Program
 from tolcontact.declaration.document import to_document
-from tolcontact.method import Method
 from tolcontact.simulation import block_rows
 
 _LIBRARIES = ("tolcontact", "casadi", "numpy", "scipy", "trimesh", "xarray", "netCDF4")
@@ -90,9 +89,9 @@ def _weighting(program: Program) -> str:
 
 def _method_origin(program: Program) -> str:
     """Return whether the method comes from the model, the defaults, or options of the run."""
-    declared = program.nominal.assembly.method
-    if program.method == (declared or Method()):
-        return "defaults" if declared is None else "model"
+    assembly = program.nominal.assembly
+    if program.method == assembly.effective_method:
+        return "defaults" if assembly.method is None else "model"
     return "options"
 
 

@@ -124,8 +124,9 @@ class ArchiveWriter:
         self._parts, self._pairs = [part.name for part in program.nominal.last_parts], len(program.nominal.pairs)
         self._stations, self._checked = [scene.station for scene in program.nominal.scenes], run.surfaces
         self._checkpoint_interval, self._since, self._resumed = run.checkpoint_interval, time.monotonic(), ""
-        self.kept = kept_rows(program.nominal, run.keep)
         with open_netcdf(path, "r") as file:
+            rows = kept_rows(program.nominal, run.keep)  # an earlier version wrote fewer
+            self.kept = tuple(row for row in rows if row.variable.name in (file[row.group] if row.group else file).variables)
             self.rows = self._start_row = int(file[terms.SUMMED_ROWS.name][...])
             self.samples, self._block_rows = max(run.samples, int(file.samples)), int(file.block_rows)
             sums = [file[terms.field_of(part)][terms.FIELD_SUMS.name][...] for part in self._parts]
@@ -239,8 +240,23 @@ class ArchiveWriter:
         values = empty_checks(self._checked, self._pairs)
         for variable, array in zip(terms.SURFACE, (rows, *findings, at_random), strict=True):
             values[variable][: len(rows)] = array
+        self.write_group("surface", values)
+
+    def first_outcomes(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the corrected measures (row, measure) and the statuses (row,) of the first rows."""
+        with open_netcdf(self._current, "r") as file:
+            return file[terms.MEASURED.name][:count, terms.CORRECTED], file[terms.STATUS.name][:count]
+
+    def has_objectives(self) -> bool:
+        """Return whether the archive holds, or has no room for, results under other objectives."""
+        with open_netcdf(self._current, "r") as file:
+            group = file.groups.get(terms.OBJECTIVES_GROUP)
+            return group is None or bool((group[terms.STATUS_BY_OBJECTIVE.name][0] >= 0).all())
+
+    def write_group(self, group: str, values: Mapping[terms.ArchiveVariable, Any]) -> None:
+        """Write the values of variables in a group."""
         with _as_archive_error(self._path), open_netcdf(self._current, "r+") as file:
-            overwrite(file, "surface", values)
+            overwrite(file, group, values)
 
 
 @contextlib.contextmanager

@@ -24,6 +24,10 @@ from tolcontact.report import nominal_and_faults, write_guide, write_page, write
 from tolcontact.workflow.accessor import summarize
 from tolcontact.workflow.models import DEFAULT_SOLVER, build
 
+PRESS = (
+    "advice: pins or bolts stand in holes, and no force holds the parts together, so contact may lift or tilt them; declare "
+    'what does (a weight, a clamp): assembly.force(...), with objective "seating"'
+)
 STARTER = Path(__file__).with_name("starter.py")
 
 
@@ -80,6 +84,8 @@ def check(
         typer.echo(f"  contact {pair.name}: {program.contact_in_words(k)}")
     if program.stored_coordinates:
         typer.echo(f"  {program.stored_coordinates}")
+    if not program.nominal.assembly.forces and any(pair.round and not pair.round.are_beside for pair in program.nominal.pairs):
+        typer.echo(f"  {PRESS}")
     common.show_warnings(doubts)
     count = {0: "", 1: ", 1 warning"}.get(len(doubts), f", {len(doubts)} warnings")
     typer.echo(f"no faults found{count}")

@@ -88,6 +88,11 @@ class Assembly(Declarations, Pictured, Checked):
     def assembly(self) -> "Assembly":
         return self
 
+    @property
+    def effective_method(self) -> Method:
+        """The method of the assembly; without one, the default, by which declared forces seat the parts."""
+        return self.method or Method(objective="seating" if self.forces else "")
+
     def replaced(self, **lists: Iterable[Any]) -> "Assembly":
         """Return a copy with other lists, as in replaced(parts=..., pairs=...). Raises TypeError for other names."""
         copy = Assembly(self.name, method=self.method, title_block=self.title_block, mu=self.mu)

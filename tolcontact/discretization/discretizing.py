@@ -31,7 +31,6 @@ from tolcontact.features.freedoms import DATUM
 from tolcontact.geometry.faces import Meshes
 from tolcontact.geometry.files.reading import Shape, read_files
 from tolcontact.geometry.shapes import field_surface, placement_of, shape
-from tolcontact.method import Method
 
 log = logging.getLogger(__name__)
 
@@ -50,7 +49,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
     is_sound = not faults
     assembly = assembly.in_station_order if is_sound else assembly
     meshes = _shapes(assembly, faults)
-    presses = (assembly.method or Method()).minimizes.presses if presses is None else presses
+    presses = assembly.effective_method.minimizes.presses if presses is None else presses
     scenes = scenes_of(assembly, presses=presses) if is_sound or not assembly.stations else ()
     entries = [(scene, part) for scene in scenes for part in scene.assembly.parts]
     parts = [_nominal_part(scene, part, meshes, faults) for scene, part in entries]

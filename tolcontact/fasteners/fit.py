@@ -183,8 +183,8 @@ def _push_faults(assembly: Assembly, holes: Mapping[str, Face], pushed: Any) -> 
         yield f"pushed is {pushed!r}; expected a force (x, y, z) in N that is not zero"
     elif INTO in holes:
         yield f"pushed has no effect on a fastener that the hole in {INTO} holds; leave it out, or push a part"
-    elif assembly.method is None or assembly.method.objective != "seating":
+    elif assembly.method is not None and not assembly.method.minimizes.presses:
         yield (
             'pushed is a force, which only the objective "seating" uses; state it in the model: '
-            'tc.Assembly(..., method=tc.Method(objective="seating"))'
+            'tc.Assembly(..., method=tc.Method(objective="seating")), or leave the method out'
         )

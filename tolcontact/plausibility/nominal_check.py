@@ -10,7 +10,14 @@ from tolcontact.plausibility.declared_points import doubtful_units, far_points, 
 from tolcontact.plausibility.effects import unfollowed_by_locators, unfollowed_by_measures, unused_features
 from tolcontact.plausibility.faces import measured_forms, partial_surfaces
 from tolcontact.plausibility.measures import measure_limits, measured_reach, population_units, rotations, wide_tolerances
-from tolcontact.plausibility.pairs import coarse_pairs, pair_clearances, pair_overlaps, unconstrained_rotations, unsure_seats
+from tolcontact.plausibility.pairs import (
+    coarse_pairs,
+    pair_clearances,
+    pair_overlaps,
+    unconstrained_rotations,
+    unsure_seats,
+    unused_forces,
+)
 from tolcontact.plausibility.trial_draws import TrialDraws
 
 KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
@@ -27,6 +34,7 @@ KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
     "rotation": (unconstrained_rotations,),
     "limits": (measure_limits,),
     "reach": (measured_reach,),
+    "force": (unused_forces,),
     "friction": (unsure_seats,),
     "form": (measured_forms,),
     "effect": (unfollowed_by_measures, unfollowed_by_locators, unused_features),

@@ -98,6 +98,17 @@ def unconstrained_rotations(draws: TrialDraws) -> Iterator[str]:
                 )
 
 
+def unused_forces(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence if the model declares forces, and its objective uses none."""
+    method, forces = draws.program.method, draws.program.nominal.assembly.forces
+    if forces and not method.minimizes.presses:
+        names = ", ".join(f'"{force.name}"' for force in forces)
+        yield (
+            f'{"forces" if len(forces) > 1 else "force"} {names}: without effect, since objective "{method.objective}" uses no '
+            'forces; choose objective "seating", or leave them out'
+        )
+
+
 def _face_pairs(draws: TrialDraws) -> Iterator[tuple[int, ContactPoints, float]]:
     """Yield the pairs of faces with their numbers, and the gaps [mm] that are rounding or error of triangles."""
     smallest = draws.program.nominal.assembly.smallest_zone()

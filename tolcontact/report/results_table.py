@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
+from tolcontact.report.convention_text import unexplained_offsets
 from tolcontact.report.figures import grouped, number, percent, plain
 from tolcontact.report.table import Table
 from tolcontact.statistics.capability import CONSTANT, FAILS, UNDECIDED, Verdict, verdict
@@ -119,9 +120,13 @@ def verdict_text(opinion: Verdict | None) -> str:
 
 
 def reservation(summary: xr.Dataset) -> str:
-    """Return the text after each verdict if parts without declared contact penetrate each other; otherwise ""."""
-    share = summary["clash_share"].values
-    return f"; but parts lie in each other in {percent(share)} of realizations" if share[0] > 0 else ""
+    """Return the text after each verdict that holds only for realizations that are as they should be; otherwise ""."""
+    share, texts = summary["clash_share"].values, []
+    if share[0] > 0:
+        texts.append(f"; but parts lie in each other in {percent(share)} of realizations")
+    if parts := unexplained_offsets(summary):
+        texts.append(f"; but contact moved parts far off their locators: {', '.join(parts)} of realizations")
+    return "".join(texts)
 
 
 def full_name(measure: xr.Dataset) -> str:

@@ -10,6 +10,7 @@ from rich.padding import Padding
 from rich.text import Text
 
 from tolcontact import vocabulary as terms
+from tolcontact.report.convention_text import convention_lines, offset_lines, offset_table
 from tolcontact.report.figures import NO_INTERVAL, grouped, limits_text, number, percent, settled, share
 from tolcontact.report.results_table import full_name, overview_table, verdict_lines
 from tolcontact.report.table import Table
@@ -49,9 +50,10 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
     yield Text("\ncontact", style="bold")
     for line in contact_lines(summary, count):
         yield Padding(Text(line), (0, 0, 0, 2), expand=False)
-    if summary.sizes["pair"]:
+    tables = [pair_table(summary) if summary.sizes["pair"] else None, offset_table(summary)]
+    for table in filter(None, tables):
         yield Text()
-        yield pair_table(summary)
+        yield table
 
 
 def capability_text(summary: xr.Dataset) -> Group:
@@ -150,6 +152,8 @@ def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
     median, largest = summary["iterations"].values
     steps = f", {median:g} steps (median), {largest:g} at most" if summary.attrs["resolution"] == "exact" else ""
     yield f"resolution: {summary.attrs['resolution']}{steps}; objective: {summary.attrs['objective']}"
+    yield from convention_lines(summary)
+    yield from offset_lines(summary)
     if shifted := summary.attrs["datum_shifts"]:
         yield f"datum shift of {shifted}: not drawn; contact of the datum features determines it"
     if stored := summary.attrs["stored_coordinates"]:

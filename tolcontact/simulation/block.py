@@ -15,6 +15,7 @@ from tolcontact.contact.record import Record, join_groups, untouched_numbers
 from tolcontact.mechanics import ENTRIES
 from tolcontact.readable import Readable
 from tolcontact.simulation.bodies import watched_bodies
+from tolcontact.simulation.locator_offsets import locator_offsets
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 
@@ -87,6 +88,7 @@ class Block(Record, Readable):
     clash_depth   (n,) [mm]: penetration of the deepest of these pairs, NaN if it is not measured; clash_part, clash_other (n,)
                   are the indices of its parts in the assembly, -1 if there is none. Without such a pair they name parts with
                   declared contact that make the answer doubtful
+    locator_offset  (n, part) [mm]: how far contact moved a part off its rigid two-sided locators
     status        (n,), Status: with stations, the status of the worst station
     station_status  (n, station), Status
 
@@ -106,6 +108,7 @@ class Block(Record, Readable):
     clash_depth: Float[Array, " n"] = field(metadata={"variable": terms.CLASH_DEPTH})
     clash_part: Int[Array, " n"] = field(metadata={"variable": terms.CLASH_PART})
     clash_other: Int[Array, " n"] = field(metadata={"variable": terms.CLASH_OTHER})
+    locator_offset: Float[Array, "n part"] = field(metadata={"variable": terms.LOCATOR_OFFSET})
     status: Int[Array, " n"] = field(metadata={"variable": terms.STATUS})
     station_status: Int[Array, "n station"]
 
@@ -148,6 +151,7 @@ class Block(Record, Readable):
             clash_depth=np.zeros(count),
             clash_part=np.full(count, -1),
             clash_other=np.full(count, -1),
+            locator_offset=np.zeros((count, raw.shape[1])),
             status=np.full(count, terms.Status.UNTOUCHED, dtype=np.int8),
             station_status=np.full((count, stations), terms.Status.UNTOUCHED, dtype=np.int8),
         )
@@ -225,6 +229,7 @@ def simulate_block(
     worst = outcomes_by_stage.max(axis=1)
     touched = worst > Outcome.UNTOUCHED
     block.measured[touched, CORRECTED], _ = _observe(program, block.poses[touched, CORRECTED], deviations[touched])
+    block.locator_offset[touched] = locator_offsets(program.nominal, block.poses[touched])
     statuses = _statuses(program.method.is_exact)
     block.status[:], block.station_status[:] = statuses[worst], statuses[outcomes_by_stage[:, : len(program.stations)]]
     return block

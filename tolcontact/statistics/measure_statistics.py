@@ -115,7 +115,7 @@ def measure_estimates(rows: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndar
     for number, limits_of_measure in enumerate(limits(rows)):
         raw, corrected = (MeasuredValues(rows, number, state, limits_of_measure) for state in terms.STATES)
         statistics.append([[statistic(x) for statistic in STATISTICS.values()] for x in (raw, corrected)])
-        changes.append(_changes(raw.sample, corrected.sample))
+        changes.append(changes_of(raw.sample, corrected.sample))
         stops.append(_stops(corrected))
     return np.array(statistics), np.array(changes), np.array(stops, dtype=object)
 
@@ -126,7 +126,8 @@ def _stops(x: MeasuredValues) -> str:
     return " and ".join(side for side, limit, left in named if np.isfinite(limit) and not np.isfinite(left))
 
 
-def _changes(raw: Sample, corrected: Sample) -> list[Estimate]:
+def changes_of(raw: Sample, corrected: Sample) -> list[Estimate]:
+    """Return the `CHANGES` of a measure between two samples of the same realizations."""
     ratio = intervals.variance_ratio(corrected, raw)
     estimates = {
         terms.SHIFT: intervals.mean(corrected - raw),

@@ -9,7 +9,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.errors import ArchiveError
 from tolcontact.readable import Pictured
 from tolcontact.realizations import finished, pieces, statuses
-from tolcontact.statistics import contact, intervals
+from tolcontact.statistics import contact, convention, intervals
 from tolcontact.statistics.contact import surface_values
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.measure_statistics import STATISTICS, MeasuredValues, limits, measure_estimates
@@ -54,6 +54,11 @@ def summarize(results: xr.DataTree) -> Summary:
     carried         (pair, interval)                     share of realizations with a pair under load
     reaction        (pair, of_reaction, interval)        mean and percentiles of its reaction, in the objective's units
     together        (combination, interval)              share of realizations with exactly these pairs under load
+    locator_offset  (part, of_offset, interval)          how far contact moved a part off its two-sided locators [mm]
+    offset_beyond   (part, interval)                     share of realizations with more than these locators vary,
+    offset_unexplained (part, interval)                  and certified with more than that and the largest raw penetration
+    change_by_objective (by_objective, measure, change_of, interval)   change if another objective decided, from
+    compared_by_objective (by_objective)                 that number of the same realizations
     iterations      (of_iterations)                      median and largest number of linear steps of touched realizations
     field_extreme   (part, state, extreme, interval)     least and largest 6 sigma of the displacement magnitude [mm]
     field_realizations                                   number of realizations in the displacement fields,
@@ -80,6 +85,8 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
         terms.CHANGE: changes,
         **_status_values(rows, rigid),
         **_contact_values(rows, combinations),
+        **convention.offset_values(rows),
+        **convention.changes_by_objective(results),
         terms.STEPS: _steps(rows),
         terms.PENETRATION: _penetration(rows, rigid),
         **clashes,
@@ -89,7 +96,9 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
     units = {terms.PAIR_REACTION: {"units": rows[terms.REACTION.name].attrs["units"]}}
     return xr.Dataset(
         {variable.name: variable.entry(array, **units.get(variable, {})) for variable, array in values.items()},
-        _coordinates(rows, combinations) | {terms.MEASURE_STOPS: (terms.MEASURE, stops), terms.CLASH: clash_names},
+        _coordinates(rows, combinations)
+        | {terms.MEASURE_STOPS: (terms.MEASURE, stops), terms.CLASH: clash_names}
+        | {terms.BY_OBJECTIVE: convention.other_objectives(results)},
         {
             "title": results.attrs["title"],
             "realizations": count,
@@ -135,6 +144,7 @@ def _coordinates(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int
         terms.PAIR: rows[terms.PAIR].values,
         terms.OF_REACTION: list(terms.REACTION_STATISTICS),
         terms.COMBINATION: [" + ".join(pairs) or "none" for pairs, _ in combinations],
+        terms.OF_OFFSET: list(terms.OFFSET_PERCENTILES),
         terms.OF_ITERATIONS: list(terms.MIDDLES),
         terms.EXTREME: list(terms.EXTREMES),
         terms.MEASURE_UNITS.name: (terms.MEASURE, rows[terms.MEASURE_UNITS.name].values),

@@ -6,6 +6,7 @@ from tolcontact.vocabulary.labels import (
     AXIS,
     BODY_AXIS,
     BOUND,
+    BY_OBJECTIVE,
     COMPONENT,
     MEASURE,
     PAIR,
@@ -98,6 +99,11 @@ STATUS = variable(
     None,
     {"flag_values": [*range(len(STATUS_MEANINGS))], "flag_meanings": " ".join(STATUS_MEANINGS)},
 )
+LOCATOR_OFFSET = variable(
+    "f8 locator_offset(realization, part)",
+    "largest distance by which contact moved a part off a rigid two-sided locator, along the locator; 0: it has none",
+    "mm",
+)
 ROWS = (
     MEASURED,
     TRANSLATION,
@@ -115,12 +121,18 @@ ROWS = (
     CLASH_DEPTH,
     CLASH_PART,
     CLASH_OTHER,
+    LOCATOR_OFFSET,
     STATUS,
 )
 POSES = (TRANSLATION, ROTATION)
 
 BY_REALIZATION = (*ROWS, DEVIATION)
 
+LOCATOR_VARIATION = variable(
+    "f8 locator_variation(part)",
+    "largest deviation of a rigid two-sided locator of a part: half its range, with those of its features; NaN: it has none",
+    "mm",
+)
 MEASURE_NOMINAL = variable("f8 measure_nominal(measure)", "value of the measure in the nominal assembly")
 MEASURE_TOLERANCE = variable("f8 measure_tolerance(measure)", "full width of the allowed zone; NaN if it is open")
 LOWER_LIMIT = variable("f8 measure_lower_limit(measure)", "least allowed value of the measure; NaN if that side is open")
@@ -220,6 +232,14 @@ def field_of(part: str) -> str:
     """Return the path of a part's displacement field."""
     return f"field/{group_of(part)}"
 
+
+OBJECTIVES_GROUP, ROW_OF_OBJECTIVES = "objectives", "row"
+BY_OBJECTIVE_LABEL = label(BY_OBJECTIVE, "objective of the corrected pose; the first one is the objective of the run")
+MEASURED_BY_OBJECTIVE = variable(
+    f"f8 measured_by_objective({BY_OBJECTIVE}, {ROW_OF_OBJECTIVES}, {MEASURE})",
+    "corrected measures of the first realizations under each objective; NaN: none",
+)
+STATUS_BY_OBJECTIVE = variable(f"i1 status_by_objective({BY_OBJECTIVE}, {ROW_OF_OBJECTIVES})", "their outcomes; -1: none", None)
 
 STATIONS_GROUP, STATION_PART = "station", "station_part"
 

@@ -20,6 +20,7 @@ REACTION_PERCENTILES = (5, 50, 95)
 OF_REACTION, COMBINATION = "of_reaction", "combination"
 REACTION_STATISTICS = (MEAN, *(f"{percent} %" for percent in REACTION_PERCENTILES))  # labels of `of_reaction`
 CLASH = "clash"  # two parts that lie in each other, as "part / part"
+OF_OFFSET, OFFSET_PERCENTILES = "of_offset", {"median": 50, "99 %": 99}
 MIDDLES = ("median", "largest")  # labels of `of_iterations`
 MEASURE_LIMITS = (*(f"measure_{bound}" for bound in BOUNDS), "measure_accuracy")  # coordinates: see Limits
 MEASURE_STOPS = "measure_stops"  # coordinate: the sides at which corrected values stop, such as "lower"
@@ -57,6 +58,24 @@ CLASH_SHARE = variable(
 CLASH_COUNT = variable("i8 clash_count(clash)", "number of realizations whose deepest interference is between two parts", "1")
 CLASH_LARGEST_DEPTH = variable("f8 clash_largest_depth(clash)", "their largest depth of interference; NaN: not measured", "mm")
 CLASH_DECLARED = variable("i1 clash_declared(clash)", "1: their contact is declared, and these realizations are doubtful", "1")
+OFFSET = variable(
+    "f8 locator_offset(part, of_offset, interval)",
+    "how far contact moved a part off its rigid two-sided locators; NaN: it has none, or cannot move",
+    "mm",
+)
+OFFSET_BEYOND = variable("f8 offset_beyond(part, interval)", "share of realizations with more than these locators vary", "1")
+OFFSET_UNEXPLAINED = variable(
+    "f8 offset_unexplained(part, interval)",
+    "share of realizations that are certified with more than these locators vary and parts penetrated without contact",
+    "1",
+)
+BY_OTHER_OBJECTIVE = variable(
+    "f8 change_by_objective(by_objective, measure, change_of, interval)",
+    "corrected measures under another objective against the objective of the run, from the same realizations",
+)
+COMPARED_BY_OBJECTIVE = variable(
+    "i8 compared_by_objective(by_objective)", "number of these realizations: certified under both objectives", "1"
+)
 PENETRATION = variable("f8 penetration(state)", "largest true penetration of any contact point", "mm")
 DEEPEST_SURFACE = variable(
     "f8 surface_penetration()", "largest depth of a face in the other body, of the realizations that were checked", "mm"

@@ -113,7 +113,7 @@ def method_of(assembly: Assembly, method: Choice | None, default: Method | None 
 
     `default` replaces the assembly's own method.
     """
-    default = default or assembly.method or Method()
+    default = default or assembly.effective_method
     if method is None or isinstance(method, Method):
         return method or default
     if not isinstance(method, Mapping):

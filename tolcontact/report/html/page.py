@@ -21,6 +21,7 @@ from tolcontact.replacing import replacing
 from tolcontact.report.analysis_tables import analysis_report, archived_analysis
 from tolcontact.report.comparison_text import change_table, runs_lines, value_table
 from tolcontact.report.contributor_shares import ContributorShares, contributor_shares
+from tolcontact.report.convention_text import offset_table
 from tolcontact.report.figures import grouped, limits_text
 from tolcontact.report.html.charts import bars_of, charts_of, compared_charts, relations_of
 from tolcontact.report.html.scene import gap_rows, scene_of, view_of
@@ -93,6 +94,7 @@ def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock |
         "model": model_tables(results),
         "contact": list(contact_lines(summary, summary.attrs["realizations"])),
         "pairs": pair_table(summary) if summary.sizes["pair"] else None,
+        "offsets": offset_table(summary),
         "reactions": terms.reaction_words(summary["reaction"].attrs["units"]).explanation,
         "tables": list(tables_of(results)),
         "contributions": (indices := contributions_of(results)),

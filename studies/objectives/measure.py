@@ -1,0 +1,143 @@
+"""Mean and 6 sigma of six models by each objective, and seated by the forces that a person would name.
+
+Usage: python -m studies.objectives.measure [--samples N] [--models NAME ...] [--to FOLDER]
+"""
+
+import argparse
+import runpy
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import tolcontact as tc
+from tolcontact.discretization import discretize
+from tolcontact.method import OBJECTIVES
+
+HERE = Path(__file__).resolve().parent
+MODELS = ("ra1", "ra2", "door", "cover", "tower", "lid")
+RESOLUTIONS = {"ra1": ("linearized", "exact"), "ra2": ("linearized",)}  # of others, their own
+SEATED = "seating"
+BEGIN, END = "<!-- table -->\n", "<!-- end of table -->"
+
+
+class Result(NamedTuple):
+    """A measure by one objective: mean and 6 sigma with their intervals, and the share of certified realizations."""
+
+    model: str
+    measure: str
+    objective: str
+    mean: np.ndarray
+    spread: np.ndarray
+    certified: float
+
+
+def model(name: str) -> tc.Assembly:
+    return runpy.run_path(str(HERE.parents[1] / "models" / f"{name}.py"))["assembly"]()
+
+
+def pressed(assembly: tc.Assembly) -> tc.Assembly:
+    """Return the model with supports as primary locators of each free part, and a force that presses it onto them.
+
+    The force acts along the primary locators, at their centre, as a weight does on a part that lies on them.
+    """
+    nominal, locations, forces = discretize(assembly), [], []
+    for location in assembly.locations:
+        part = nominal.parts[nominal.part_index(location.part)]
+        if not part.movers or location.floating:
+            locations.append(location)
+            continue
+        R, t = part.placement
+        points, directions = (part.locators.points - t) @ R, part.locators.directions @ R
+        primary = [k for k in range(len(points)) if np.dot(directions[k], directions[0]) > 0.99]
+        scheme = [
+            tc.Locator(label.rpartition(".")[2], tuple(p), tuple(n), tolerance, one_sided=k in primary)
+            for k, (label, p, n, tolerance) in enumerate(
+                zip(part.locators.labels, points, directions, part.locators.tolerances, strict=True)
+            )
+        ]
+        locations.append(replace(location, scheme=tuple(scheme), tolerance=None))
+        forces.append((part, points[primary].mean(axis=0), -10 * part.locators.directions[0]))
+    seated = assembly.replaced(locations=locations)
+    for part, point, vector in forces:
+        seated.force(f"weight of {part.name}", at=part.part.point(*point), vector=tuple(vector))
+    return seated
+
+
+def results(name: str, samples: int) -> list[Result]:
+    """Return the results of each measure of a model by each objective."""
+    rows = []
+    assembly = model(name)
+    for resolution in RESOLUTIONS.get(name, (assembly.effective_method.resolution,)):
+        for objective in OBJECTIVES:
+            choices = {"resolution": resolution, "objective": objective}
+            if resolution == "exact" and name == "ra1":
+                choices["search"] = "bounded"
+            declared = pressed(assembly) if objective == SEATED else assembly
+            run = tc.run(declared, samples=samples, seed=1, solver="daqp", method=choices, surfaces=0, fields="none")
+            summary = tc.summarize(run)
+            certified = float(np.isin(run.status.values, (0, 1)).mean())
+            for measure in summary.measure.values:
+                values = summary.statistic_value.sel(measure=measure, state="corrected")
+                mean, spread = values.sel(statistic="mean").values, values.sel(statistic="6 sigma").values
+                rows.append(Result(f"{name}, {resolution}", str(measure), objective, mean, spread, certified))
+            print(*rows[-1], flush=True)
+    return rows
+
+
+def figure(values: np.ndarray) -> str:
+    """Return a value with its interval, rounded by the width of the interval."""
+    digits = max(0, int(np.ceil(-np.log10(max(values[2] - values[1], 1e-9)))) + 1)
+    return f"{values[0]:.{digits}f} [{values[1]:.{digits}f}, {values[2]:.{digits}f}]"
+
+
+def table(rows: list[Result]) -> str:
+    lines = ["| model, measure | objective | mean | 6 sigma | certified |", "|---|---|---|---|---|"]
+    for k, row in enumerate(rows):
+        is_new = k == 0 or (row.model, row.measure) != (rows[k - 1].model, rows[k - 1].measure)
+        label = f"{row.model}: {row.measure}" if is_new else ""
+        certified = f"{100 * row.certified:.4g} %"
+        lines.append(f"| {label} | {row.objective} | {figure(row.mean)} | {figure(row.spread)} | {certified} |")
+    return "\n".join(lines) + "\n"
+
+
+def draw(rows: list[Result], path: Path) -> None:
+    """Draw mean and 6 sigma of the first measure of each model, as multiples of 6 sigma by all points."""
+    names = list(dict.fromkeys(row.model for row in rows))
+    figure, axes = plt.subplots(1, 2, figsize=(9, 0.6 + 0.45 * len(names)), sharey=True, layout="constrained")
+    for number, name in enumerate(names):
+        of_model = [row for row in rows if row.model == name]
+        shown = {row.objective: row for row in of_model if row.measure == of_model[0].measure}
+        unit = shown["all points"].spread[0]
+        for k, (objective, row) in enumerate(shown.items()):
+            for axis, value in zip(axes, (row.mean, row.spread), strict=True):
+                errors = np.abs(value[1:, None] - value[0]) / unit
+                label = objective if number == 0 and axis is axes[0] else None
+                y = number + 0.15 * (k - 1.5)
+                axis.errorbar(value[0] / unit, y, xerr=errors, fmt="osD^"[k], color=f"C{k}", label=label, markersize=4)
+    axes[0].set_yticks(range(len(names)), [f"{name}: {next(r.measure for r in rows if r.model == name)}" for name in names])
+    axes[0].invert_yaxis()
+    axes[0].set_xlabel("mean / 6 sigma by all points")
+    axes[1].set_xlabel("6 sigma / 6 sigma by all points")
+    figure.legend(loc="outside upper center", ncols=4, frameon=False)
+    figure.savefig(path, dpi=110)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--samples", type=int, default=2000, help="realizations by each objective; five times as many of ra1")
+    parser.add_argument("--models", nargs="+", default=MODELS, choices=MODELS)
+    parser.add_argument("--to", type=Path, default=HERE, help="folder of the figure, and of a README with the table")
+    options = parser.parse_args()
+    rows = [row for name in options.models for row in results(name, options.samples * (5 if name == "ra1" else 1))]
+    draw(rows, options.to / "objectives.png")
+    readme = (HERE / "README.md").read_text(encoding="utf-8")
+    before, rest = readme.split(BEGIN)
+    text = before + BEGIN + table(rows) + END + rest.partition(END)[2]
+    (options.to / "README.md").write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
