@@ -74,7 +74,9 @@ def test_it_is_resumed_but_not_with_points_that_count_otherwise(stored, tmp_path
     with pytest.raises(tc.TolcontactError, match="weighting = active points, now it is active points, by area"):
         tc.run(model_in(stored), samples=16, out=other, resume=True, **settings)
     tc.run(model_in(stored), samples=16, out=stored, resume=True, **settings).close()
-    written = [variable.name for variable in BY_REALIZATION if variable is not LOCATOR_OFFSET]  # which is newer than the archive
+    written = [
+        variable.name for variable in BY_REALIZATION if variable is not LOCATOR_OFFSET
+    ]  # which is newer than the archive
     assert_same_run(stored, tc.run(model_in(stored), samples=16, **settings), variables=written)
 
 

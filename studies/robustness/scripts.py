@@ -7,15 +7,17 @@ message. What closes standard error itself, or changes a library, is not tried: 
 import argparse
 import ast
 import csv
+import importlib
 import io
 import json
 import random
 import re
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import openpyxl
 import xarray as xr
 
 from studies.robustness.attempts import Table, attempt
@@ -123,7 +125,7 @@ def names(count: int, rng: random.Random, folder: Path, table: Table) -> None:
             fault = _formula(
                 [
                     [cell.value for cell in row if cell.data_type != "s"]
-                    for sheet in openpyxl.load_workbook(folder / "m.xlsx")
+                    for sheet in importlib.import_module("openpyxl").load_workbook(folder / "m.xlsx")
                     for row in sheet
                 ]
             )
@@ -172,7 +174,7 @@ def _said(option: str, said: str) -> str:
     return ""
 
 
-def _formula(rows: object) -> str:
+def _formula(rows: Iterable[Iterable[Any]]) -> str:
     """Return what a spreadsheet would run or take for an error in some rows; empty if nothing."""
     texts = [cell for row in rows for cell in row if isinstance(cell, str)]
     bad = [text for text in texts if text.lstrip(" ")[:1] in ("=", "+", "-", "@") and not _is_number(text)]

@@ -131,7 +131,8 @@ def is_finite(value: Vector) -> bool:
 
 def is_length(value: Any) -> bool:
     """Return True for a finite number, up to MAX_NUMBER either way; a truth value is not a number."""
-    return isinstance(value, numbers.Real) and not isinstance(value, bool) and abs(value) <= MAX_NUMBER
+    number: Any = value  # the type of numbers.Real knows no comparison
+    return isinstance(value, numbers.Real) and not isinstance(value, bool) and abs(number) <= MAX_NUMBER
 
 
 def script_line() -> str:
