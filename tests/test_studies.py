@@ -27,6 +27,7 @@ STUDIES = {
     "certificates/judge.py": ["--scenes", "3", "--samples", "20"],
     "exact/tables.py": ["--samples", "20"],
     "form/measure.py": ["--samples", "10", "--figure", "gaps.png"],
+    "objectives/measure.py": ["--samples", "20", "--models", "ra1", "lid", "--to", "."],
     "paper/reproduce.py": ["--large", "2000", "--to", "."],
     "pictures/contact.py": ["contact.svg"],
     "pictures/cover_pmi.py": ["cover_pmi.stp"],
