@@ -107,6 +107,21 @@ def test_realizations_are_counted_by_what_became_of_them(run):
     assert found.attrs["realizations"] == found.attrs["samples"] == 10  # that somebody took
 
 
+def test_realizations_that_cannot_be_assembled_are_out_of_specification_and_in_no_other_statistic(run):
+    values, status = np.arange(10.0) / 100, [RESOLVED] * 10
+    status[3] = status[8] = NOT_ASSEMBLABLE
+    corrected, exists = np.where(np.equal(status, RESOLVED), values, 1e7), np.equal(status, RESOLVED)
+    reaction = np.where(exists, 2.0, 1e7)[:, None] * [1.0, 3.0]
+    found = summary_of(run, measured=measured(run, "top", values, corrected), status=status, reaction=reaction)
+    estimates = found["statistic_value"].sel(measure="top", interval="estimate")
+    assert estimates.sel(state="raw", statistic="mean") == pytest.approx(values.mean())
+    assert estimates.sel(state="corrected", statistic="mean") == pytest.approx(values[exists].mean())
+    assert estimates.sel(statistic="outside limits").values.tolist() == [0.0, 0.2]
+    assert estimates.sel(state="corrected", statistic="above limit").item() == 0.0
+    assert found["change"].sel(measure="top", change_of="shift of the mean", interval="estimate") == 0.0
+    assert found["reaction"].sel(of_reaction="mean", interval="estimate").values.tolist() == [2.0, 6.0]
+
+
 @pytest.mark.parametrize("wrong", [-2, 5, 6])
 def test_a_status_without_a_meaning_is_damage(wrong, run):
     with pytest.raises(ArchiveError, match="some statuses are unknown"):

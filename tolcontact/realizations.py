@@ -24,6 +24,23 @@ def statuses(rows: xr.Dataset) -> Iterator[np.ndarray]:
         yield status
 
 
+def assembled(*runs: xr.Dataset) -> tuple[xr.Dataset, ...]:
+    """Return the realizations of runs without those that one of them cannot assemble: their corrected state does not exist.
+
+    The rest of a sampling plan counts as independent realizations, since its replicates are no longer complete.
+    """
+    exists = np.all([np.concatenate([*map(is_assembled, statuses(rows))]) for rows in runs], axis=0)
+    if exists.all():
+        return runs
+    kept = {terms.REALIZATION: np.flatnonzero(exists)}
+    return tuple(rows.isel(kept).assign_attrs(sampler=terms.MONTE_CARLO) for rows in runs)
+
+
+def is_assembled(status: np.ndarray) -> np.ndarray:
+    """Return which realizations can be assembled, by their statuses."""
+    return np.asarray(status != terms.Status.NOT_ASSEMBLABLE)
+
+
 def finished(results: xr.DataTree) -> int:
     """Return the number of realizations. Raises ArchiveError for a status that has no meaning."""
     return sum(map(len, statuses(results.to_dataset())))

@@ -307,7 +307,7 @@ def breakdown(samples: int) -> None:
                     run = Run(seed=1, samples=samples // 4, keep="measures", surfaces=0, fields="all")
                     writer = ArchiveWriter(path, program, run, fields.sizes)
                     for block in blocks:
-                        fields.merge(fields.sums(block.poses, block.start))
+                        fields.merge(fields.sums(block.poses, block.start, block.status))
                         writer.append(row_values(block, [row.label for row in writer.kept], program.nominal))
                     with writer.completed({}):
                         pass

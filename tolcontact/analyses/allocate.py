@@ -34,7 +34,7 @@ FIRST_RADIUS, LAST_RADIUS = 0.5, 0.015  # of the trust region of a step, in loga
 COMMON_FACTORS = np.geomspace(MIN_FACTOR, MAX_FACTOR, 13)  # of all ranges, where requirements cannot be met
 PENALTY = 10.0  # for missed margins, as a multiple of the cost that these margins save to first order
 MIN_GAIN, LAST_GAIN = 1e-4, 1e-3  # of the cost: smallest gain of an accepted step; smallest gain that leads to another step
-VERIFICATIONS = 4
+VERIFICATIONS, AIM_GAIN = 6, 1.2  # fresh runs; the share of a missing margin that the next search aims for
 Cost = float | Callable[[float], float]
 
 
@@ -51,8 +51,9 @@ def allocate(
         kept         (requirement, stage, interval)      the share outside the limits, or the Ppk, in a fresh run of
                                                          4 samples realizations, with its 95 % interval
         required     (requirement)                       the required share or Ppk
-        met          (requirement)                       1: met in the fresh run after; 0: it cannot be met, and `kept` is the
-                                                         best value that was reached
+        met          (requirement)                       1: the whole interval of the fresh run after keeps the requirement;
+                                                         0: no tolerances that were tried have such an interval, and `kept` is
+                                                         the best one
         idle         (group)                             1: no influence on any requirement at any range; it keeps its range
         effect       (measure, of_effect, group, interval)  change of 6 sigma, and of the share outside, if a group's zones were
                                                          a tenth narrower: which to tighten first
@@ -66,10 +67,10 @@ def allocate(
     resolved realization with all of them at either end. Each step replaces the margins of the requirements by functions of
     squared ranges with the same values and slopes, on the same draws; slopes come only from resolved realizations near the
     limits. SLSQP minimizes the cost within a trust region (a sequential separable approximation; Svanberg, 1987). The region
-    shrinks when a step fails; a step also fails if more realizations are then not assemblable than may be outside. If the fresh
-    run misses a requirement, the search continues with a larger margin. Effects come from samples / 4 realizations, or
-    4 samples / groups if that is less, but at least 512. `progress` is called with the number of realizations simulated, and
-    the approximate total. `model`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see
+    shrinks when a step fails; a step also fails if more realizations are then not assemblable than may be outside. If the
+    interval of the fresh run does not keep a requirement, the search continues with a larger margin. Effects come from
+    samples / 4 realizations, or 4 samples / groups if that is less, but at least 512. `progress` is called with the number of
+    realizations simulated, and the approximate total. `model`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see
     tolcontact.analyses): `tc.analyses.allocate("model.py", "gap: ppm 1000", by="part")`. Raises OptionError if no range varies.
     """
     analysis = Analysis(
@@ -166,16 +167,16 @@ def _allocated(search: "Search", expected: int) -> tuple[np.ndarray, list[list[E
     for number in range(VERIFICATIONS):
         logs, searched = search.least_cost(logs, searched, aims)
         fresh = trials.trial(np.exp(logs), verification=2 + number)
-        margins = _margins(requirements, fresh.corrected)
-        if (margins >= 0).all():
+        missing = -_sure_margins(requirements, fresh.corrected)
+        if (missing <= 0).all():
             break
-        aims += np.maximum(-margins, 0.0)
+        aims += AIM_GAIN * np.where(np.isfinite(missing), np.maximum(missing, 0.0), 0.0)
         trials.engine.total += expected
     else:
         logs = search.least_missing(logs)
         search.release(logs, trials.trial(np.exp(logs)))
         fresh = trials.trial(np.exp(logs), verification=2 + VERIFICATIONS)
-    return logs, [before, _estimates(requirements, fresh)], _margins(requirements, fresh.corrected) >= 0
+    return logs, [before, _estimates(requirements, fresh)], _sure_margins(requirements, fresh.corrected) >= 0
 
 
 def _estimates(requirements: Sequence[Requirement], trial: Trial) -> list[Estimate]:
@@ -184,6 +185,10 @@ def _estimates(requirements: Sequence[Requirement], trial: Trial) -> list[Estima
 
 def _margins(requirements: Sequence[Requirement], corrected: np.ndarray) -> np.ndarray:
     return np.array([requirement.margin(corrected[:, requirement.measure]) for requirement in requirements])
+
+
+def _sure_margins(requirements: Sequence[Requirement], corrected: np.ndarray) -> np.ndarray:
+    return np.array([requirement.sure_margin(corrected[:, requirement.measure]) for requirement in requirements])
 
 
 @dataclass(eq=False)

@@ -20,8 +20,8 @@ from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Engine
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
-from tolcontact.statistics.capability import by_percentiles, share_outside
-from tolcontact.statistics.intervals import Estimate, mean
+from tolcontact.statistics.capability import by_percentiles, share_outside, without_stops
+from tolcontact.statistics.intervals import Estimate, mean, proportion_of
 from tolcontact.statistics.measure_statistics import VALUE, StatisticRequest
 from tolcontact.statistics.sample import Sample
 from tolcontact.variation import Draws
@@ -85,16 +85,29 @@ class Requirement:
         """Return the margin of values (n,) above the requirement, in the measure's units; negative if they do not meet it.
 
         For a share the margin is a quantile of the distances within the limits. It changes continuously with the values,
-        while a count of values outside jumps.
+        while a count of values outside jumps. Limits that are stops need no margin (see without_stops).
+        """
+        return self._share_margin(x, self.value) if self.is_share else self._capability_margin(x, self.value)
+
+    def sure_margin(self, x: np.ndarray) -> float:
+        """Return the margin of the 95 % interval of the share, or of the Ppk: 0 or more if it keeps the requirement.
+
+        x   (n,) values of a fresh run
         """
         if self.is_share:
-            return -float(np.quantile(self.limits.excess(x), 1 - self.value))
+            hits = np.arange(int(self.value * len(x)) + 1)
+            permitted = hits[[proportion_of(int(k), len(x)).upper <= self.value for k in hits]]
+            return self._share_margin(x, permitted.max() / len(x)) if len(permitted) else -math.inf
+        value, lower, _ = self.estimate(x)
+        return self._capability_margin(x, self.value + value - lower) if lower > 0 else -math.inf
+
+    def _share_margin(self, x: np.ndarray, share: float) -> float:
+        return -float(np.quantile(without_stops(Sample.of(x), self.limits).excess(x), 1 - share))
+
+    def _capability_margin(self, x: np.ndarray, index: float) -> float:
+        lower, upper, _ = without_stops(Sample.of(x), self.limits)
         tail, middle, head = np.quantile(x, [TAIL, 0.5, HEAD])
-        sides = [
-            self.limits.upper - middle - self.value * (head - middle),
-            middle - self.limits.lower - self.value * (middle - tail),
-        ]
-        return float(min(sides))
+        return float(np.nanmin([upper - middle - index * (head - middle), middle - lower - index * (middle - tail)]))
 
     def decisive(self, x: np.ndarray) -> np.ndarray:
         """Return the indices of the values (n,) that determine the margin: values beyond it, and values near it.
@@ -102,13 +115,14 @@ class Requirement:
         The median of a Ppk is treated as constant.
         """
         count = max(math.ceil(DECISIVE * self.share * len(x)), MIN_DECISIVE)
-        orders = [np.argsort(-self.limits.excess(x))] if self.is_share else [np.argsort(x), np.argsort(-x)]
+        limits = without_stops(Sample.of(x), self.limits)
+        orders = [np.argsort(-limits.excess(x))] if self.is_share else [np.argsort(x), np.argsort(-x)]
         return np.concatenate([order[:count] for order in orders])
 
     def shortfall(self, x: np.ndarray) -> float:
-        """Return the shortfall of values (n,) as a share of the required value; 0 if they meet the requirement."""
-        reached = self.estimate(x).value
-        missing = reached - self.value if self.is_share else self.value - reached
+        """Return the shortfall of the bound of values (n,) as a share of the required value; 0 if it meets the requirement."""
+        _, lower, upper = self.estimate(x)
+        missing = upper - self.value if self.is_share else self.value - lower
         return max(missing / self.value, 0.0) if np.isfinite(missing) else np.inf
 
     def estimate(self, x: np.ndarray) -> Estimate:

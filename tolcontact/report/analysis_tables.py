@@ -259,7 +259,7 @@ def _allocation(dataset: xr.Dataset) -> AnalysisReport:
         )
     for (name, _, after), is_met in zip(requirements, dataset["met"].values, strict=True):
         if not is_met:
-            notes.append(f'"{name}" is not met by any tolerances allowed; the best found: {after}.\n')
+            notes.append(f'"{name}": no tolerances were found whose 95 % interval keeps it; the best: {after}.\n')
     return AnalysisReport("Allocation", f"{grouped(dataset.attrs['samples'])} realizations", notes, tables)
 
 

@@ -141,7 +141,7 @@ def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
     conflicts = [f"{pair} ({int(n)})" for pair, n in zip(summary["pair"].values, summary["conflicts"].values, strict=True) if n]
     if conflicts:
         share = percent(summary["not_assemblable"].values)
-        yield f"not assemblable: {share}; the statistics include poses of least penetration"
+        yield f"not assemblable: {share}; these count as out of specification, and other statistics with contact leave them out"
         yield f"pairs in conflict there: {', '.join(conflicts)}"
     if unconverged := by_status["not_converged"]:
         yield f"not converged: {unconverged} of {count}; the statistics include their last poses"

@@ -33,6 +33,8 @@ from tolcontact.statistics.sample import Sample
 from tolcontact.variation.plans import scrambled_points
 
 PERCENTS = 0.135, 50.0, 99.865
+MIN_AT_STOP = 2  # values at a limit that is a stop
+MIN_TAIL = 2730  # realizations that bound a tail of 0.135 %
 TRIALS = 1 << 11  # simulated triples of percentiles; an interval covers 95 % of them
 ALLOWED_SHARE = 0.0027  # share of a normal distribution beyond three standard deviations: Ppk 1 on both sides
 MEETS, FAILS, UNDECIDED, CONSTANT = "meets", "does not meet", "undecided", "does not vary"
@@ -45,30 +47,37 @@ VERDICT_RULE = (
 ).replace("95  %", "95 %")
 
 
-def share_below(x: Sample, limits: Limits) -> Estimate:
-    """Return the share of values below the lower limit, with its exact interval; undefined if that side is open."""
-    return proportion(x.map(limits.below)) if np.isfinite(limits.lower) else UNDEFINED
+def share_below(x: Sample, limits: Limits, missing: int = 0) -> Estimate:
+    """Return the share of values below the lower limit, with its exact interval; undefined if that side is open.
+
+    There are `missing` values more, of realizations that cannot be assembled.
+    """
+    return proportion(x.map(limits.below).followed_by(missing * [False])) if np.isfinite(limits.lower) else UNDEFINED
 
 
-def share_above(x: Sample, limits: Limits) -> Estimate:
-    """Return the share of values above the upper limit, with its exact interval; undefined if that side is open."""
-    return proportion(x.map(limits.above)) if np.isfinite(limits.upper) else UNDEFINED
+def share_above(x: Sample, limits: Limits, missing: int = 0) -> Estimate:
+    """Return the share of values above the upper limit (see share_below)."""
+    return proportion(x.map(limits.above).followed_by(missing * [False])) if np.isfinite(limits.upper) else UNDEFINED
 
 
-def share_outside(x: Sample, limits: Limits) -> Estimate:
-    """Return the share of values beyond the limits, with its exact interval; undefined without limits."""
-    return UNDEFINED if limits.are_open else proportion(x.map(limits.outside))
+def share_outside(x: Sample, limits: Limits, missing: int = 0) -> Estimate:
+    """Return the share out of specification, with its exact interval; undefined without limits.
+
+    These are values beyond the limits, and the `missing` ones: a product that cannot be assembled is a nonconforming one.
+    """
+    return UNDEFINED if limits.are_open else proportion(x.map(limits.outside).followed_by(missing * [True]))
 
 
 def without_stops(x: Sample, limits: Limits) -> Limits:
-    """Return the limits without stops. At a stop no value lies beyond, and the outer percentile is the limit itself.
+    """Return the limits without stops. At a stop no value lies beyond, and at least two values are the limit itself.
 
-    Such a limit would have an index of exactly 1 for any values in between.
+    Two equal values have probability 0 unless contact keeps them there. The index of such a limit would depend on how many
+    values are there alone: it is 1, for any values in between, if these are more than 0.135 %.
     """
-    low, _, high = (percentile.value for percentile in percentiles(x.map(limits.settled), PERCENTS))
-    if low == limits.lower and not _is_any(x.map(limits.below)):
+    at_limits = np.sum([[(piece == limit).sum() for limit in limits[:2]] for piece in x.map(limits.settled).pieces()], axis=0)
+    if at_limits[0] >= MIN_AT_STOP and not _is_any(x.map(limits.below)):
         limits = limits._replace(lower=-math.inf)
-    if high == limits.upper and not _is_any(x.map(limits.above)):
+    if at_limits[1] >= MIN_AT_STOP and not _is_any(x.map(limits.above)):
         limits = limits._replace(upper=math.inf)
     return limits
 
@@ -94,11 +103,15 @@ def by_percentiles(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
         worst, best = _pp(lows[0], highs[2], limits), _pp(highs[0], lows[2], limits)
         pp = _with_interval(_pp(low, high, limits), worst, [best])
     if not limits.are_open:
-        # Sides that are equally near must not bias their minimum: its upper bound is the least of all upper bounds.
+        # Sides that are equally near must not bias their minimum: its upper bound is the least of all upper bounds. A small
+        # sample may have missed that one limit is a stop; then only the other side counts.
+        may_be_stops = x.count < MIN_TAIL and not _is_any(x.map(limits.outside))
         worst = np.stack([_sides(lows[0], middle, highs[2], limits) for middle in (lows[1], highs[1])])
         best = np.stack([_sides(highs[0], middle, lows[2], limits) for middle in (lows[1], highs[1])])
         worst_of_all = np.fmin.reduce(worst, axis=(0, 1))
-        ppk = _with_interval(np.min(_sides(low, median, high, limits)), worst_of_all, list(np.fmax.reduce(best, axis=0)))
+        best_sides = list(np.fmax.reduce(best, axis=0))
+        best_of_all = [np.fmax.reduce(best_sides)] if may_be_stops else best_sides
+        ppk = _with_interval(np.min(_sides(low, median, high, limits)), worst_of_all, best_of_all)
     return pp, ppk
 
 

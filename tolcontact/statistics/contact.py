@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.realizations import pieces
+from tolcontact.realizations import assembled, pieces
 from tolcontact.statistics import intervals
 from tolcontact.statistics.sample import Sample
 from tolcontact.vocabulary import ArchiveVariable
@@ -25,8 +25,13 @@ def loaded(rows: xr.Dataset) -> np.ndarray:
 
 
 def reactions(rows: xr.Dataset) -> np.ndarray:
-    """Return mean and percentiles of the reaction of each pair over all realizations, (pair, of_reaction, interval)."""
-    estimates = []
+    """Return mean and percentiles of the reaction of each pair, (pair, of_reaction, interval).
+
+    Realizations that cannot be assembled have no reactions, and are left out.
+    """
+    estimates, (rows,) = [], assembled(rows)
+    if not rows.sizes[terms.REALIZATION]:
+        return np.full((rows.sizes[terms.PAIR], 1 + len(terms.REACTION_PERCENTILES), len(terms.ESTIMATE)), np.nan)
     for pair in range(rows.sizes[terms.PAIR]):
         reaction = rows[[terms.REACTION.name]].isel({terms.PAIR: pair})
         x = Sample(lambda rows=reaction: (np.asarray(piece[terms.REACTION.name].values) for piece in pieces(rows)))  # type: ignore[misc]

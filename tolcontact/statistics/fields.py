@@ -14,6 +14,7 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.discretization import Nominal
+from tolcontact.realizations import is_assembled
 from tolcontact.statistics import intervals, kernel
 from tolcontact.vocabulary import CORRECTED, RAW, ArchiveVariable
 
@@ -44,8 +45,10 @@ class FieldSums:
         return FieldSums, (len(self.magnitude), self.numbers)  # the others are views of these
 
     def merge(self, addend: "FieldSums") -> None:
-        """Add the sums of at least one following realization (Chan et al.; Pébay, 2008)."""
+        """Add the sums of following realizations (Chan et al.; Pébay, 2008)."""
         n, m = self.count, addend.count
+        if not m:
+            return
         share = m / (n + m)
         step = addend.mean - self.mean
         self.scatter += addend.scatter + n * share * np.einsum("ia,ib->iab", step, step)
@@ -105,10 +108,17 @@ class DisplacementFields:
             for part, states, sums in zip(self._parts, self._states, numbers, strict=True)
         ]
 
-    def sums(self, poses: np.ndarray, start: int) -> BlockSums:
-        """Return the sums of one block, from realization `start` on, at poses (n, state, part, 12). Threads may share it."""
+    def sums(self, poses: np.ndarray, start: int, status: np.ndarray) -> BlockSums:
+        """Return the sums of one block, from realization `start` on, at poses (n, state, part, 12). Threads may share it.
+
+        Corrected poses of realizations that cannot be assembled, by their `status` (n,), are left out.
+        """
+        exists = np.array([np.ones(len(status), dtype=bool), is_assembled(status)])
         return [
-            [part.sums(poses[:, state, index], max(0, count - start)) for state in states]
+            [
+                part.sums(poses[exists[state], state, index], int(exists[state, : max(0, count - start)].sum()))
+                for state in states
+            ]
             for index, part, states, count in zip(self._indices, self._parts, self._states, self._magnitudes, strict=True)
         ]
 
@@ -137,10 +147,12 @@ class _Surface:
     def sums(self, poses: np.ndarray, count: int) -> FieldSums:
         """Return the sums over poses (n, 12); magnitudes only over the first `count`, and no point sums if that is 0."""
         sums, A = FieldSums(len(self) if count else 0), np.empty((len(poses), 3, 4))
+        if not len(poses):
+            return sums
         kernel.affine_parts(poses, self._centre, A)
         kernel.add_scatter(A, sums.mean, sums.scatter)
         sums.count[:] = len(A)
-        if count and len(A):
+        if count:
             self._add_magnitudes(A[:count], sums)
         return sums
 
@@ -170,8 +182,8 @@ class _Surface:
         variables = (terms.FIELD_MEAN, terms.FIELD_SIX_SIGMA, terms.FIELD_INTERVAL)
         return {
             **{variable: np.array([field[k] for field in fields]) for k, variable in enumerate(variables)},
-            terms.FIELD_REALIZATIONS: int(states[0].count[0]),
-            terms.MAGNITUDE_REALIZATIONS: int(states[0].magnitude_count[0]),
+            terms.FIELD_REALIZATIONS: int(states[-1].count[0]),
+            terms.MAGNITUDE_REALIZATIONS: int(states[-1].magnitude_count[0]),
         }
 
     def _state_field(self, sums: FieldSums) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -185,4 +197,6 @@ class _Surface:
             magnitude, estimate = sums.magnitude, np.array(intervals.variance_from_moments(n, moment2, moment4))
         magnitude_six_sigma, lower, upper = 6 * np.sqrt(estimate)
         mean = np.column_stack([self._v @ sums.mean.T, magnitude])
+        if not sums.count:
+            mean, sigma = np.full_like(mean, np.nan), np.full_like(sigma, np.nan)
         return mean, np.column_stack([6 * sigma, magnitude_six_sigma]), np.column_stack([lower, upper])

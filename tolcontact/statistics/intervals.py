@@ -35,8 +35,10 @@ UNDEFINED = Estimate(math.nan, math.nan, math.nan)
 
 
 def mean(x: np.ndarray | Sample) -> Estimate:
-    """Return the mean with Student's t interval."""
+    """Return the mean with Student's t interval. There is none if too few values are apart from a stop."""
     x = Sample.of(x)
+    if not x.determines_moments:
+        return Estimate(x.mean, math.nan, math.nan)
     deviation = np.sqrt(x.moments[0] * x.count / (x.count - 1))
     half = float(student(x.count - 1) * deviation / np.sqrt(x.count)) * x.widening
     return Estimate(x.mean, x.mean - half, x.mean + half)
@@ -66,7 +68,7 @@ def from_standardized_influence(x: Sample, estimate: float, influence: Sequence[
 
     The polynomial is given by its coefficients, starting with the constant. There is no interval if the sample is too small.
     """
-    if x.count < MIN_VARIANCE:
+    if x.count < MIN_VARIANCE or not x.determines_moments:
         return Estimate(float(estimate), math.nan, math.nan)
     scale, square = np.sqrt(x.moments[0]), np.convolve(influence, influence)
     squares, fourths = (  # sums over the standardized values, without rounding below 0
@@ -107,11 +109,12 @@ def kurtosis(x: np.ndarray | Sample) -> Estimate:
 def variance(x: np.ndarray | Sample) -> Estimate:
     """Return the variance with the interval of Hall's transformation (1992), which accounts for the skewness of squares.
 
-    Small samples use Bonett's interval if it is wider (see variance_from_moments); the smallest have none.
+    Small samples use Bonett's interval if it is wider (see variance_from_moments); the smallest have none, and so have samples
+    with too few values apart from a stop.
     """
     x = Sample.of(x)
     estimate, *bonett = (float(value) for value in variance_from_moments(x.count, *x.moments))
-    if x.count < MIN_VARIANCE:
+    if x.count < MIN_VARIANCE or not x.determines_moments:
         return Estimate(estimate, math.nan, math.nan)
     if not estimate > 0:
         return Estimate(estimate, *bonett)
@@ -195,7 +198,7 @@ def variance_ratio(sample: np.ndarray | Sample, baseline: np.ndarray | Sample) -
     squares = sum(float((piece**2).sum()) for piece in influence.pieces())
     fourths = sum(float((piece**4).sum()) for piece in influence.pieces())
     ratio, n = variance_sample / variance_baseline, sample.count
-    if n < MIN_VARIANCE:
+    if n < MIN_VARIANCE or not (sample.determines_moments and baseline.determines_moments):
         return Estimate(ratio, math.nan, math.nan)
     # The correction for small samples is Bonett's for one variance.
     half = from_influence(0.0, squares + 3, n, fourths).upper * influence.widening
@@ -222,7 +225,7 @@ def variance_from_moments(count: int, moment2: ArrayLike, moment4: ArrayLike) ->
 
 def is_constant(x: Sample, accuracy: float = 0.0) -> bool:
     """Return whether the spread of a sample may be due to rounding, or to a solver with a finite accuracy."""
-    return not x.moments[0] > max(8 * np.finfo(float).eps * abs(x.mean), accuracy) ** 2
+    return not x.moments[0] > max(8 * np.finfo(float).eps * abs(x.mean), accuracy, x.accuracy) ** 2
 
 
 class _QuantileRanks(NamedTuple):

@@ -11,11 +11,13 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
+from tolcontact.realizations import assembled
 from tolcontact.statistics import capability, intervals
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.statistics.sample import Sample, measured_sample
 
 NUMBER = r"(?P<value>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
+MIN_VALUES = 2
 NO_VALUE, VALUE, HALF_WIDTH = "", rf" *{NUMBER}", rf" *(?:\+-|±) *{NUMBER} *(?P<percent>%)?"  # may follow the statistic
 
 
@@ -56,10 +58,16 @@ class StatisticRequest:
 
 
 class MeasuredValues:
-    """The values of a measure in one state, with its limits; intermediate results of several statistics are computed once."""
+    """The values of a measure in one state, with its limits; intermediate results of several statistics are computed once.
+
+    Corrected values of realizations that cannot be assembled do not exist. Statistics leave them out, and the share outside
+    the limits counts them as outside; all shares are of all realizations.
+    """
 
     def __init__(self, rows: xr.Dataset, measure: int, state: str, limits: Limits) -> None:
-        self.sample: Sample = measured_sample(rows, measure, state)
+        (existing,) = (rows,) if state == terms.STATES[terms.RAW] else assembled(rows)
+        self.sample: Sample = measured_sample(existing, measure, state)
+        self.missing = rows.sizes[terms.REALIZATION] - existing.sizes[terms.REALIZATION]
         self.limits = limits
 
     @cached_property
@@ -80,9 +88,15 @@ class MeasuredValues:
         """Pp and Ppk for a normal distribution."""
         return capability.as_normal(self.sample, self.limits)
 
-    def share(self, share: Callable[[Sample, Limits], Estimate]) -> Estimate:
+    def share(self, share: Callable[[Sample, Limits, int], Estimate]) -> Estimate:
         """Return a share of values beyond limits; undefined if a value is not a number."""
-        return share(self.sample, self.limits) if np.isfinite(self.sample.mean) else UNDEFINED
+        return share(self.sample, self.limits, self.missing) if np.isfinite(self.sample.mean) else UNDEFINED
+
+    def estimate(self, statistic: str) -> Estimate:
+        """Return one of `STATISTICS`; undefined, except for the share outside, if fewer than two values exist."""
+        if self.sample.count >= MIN_VALUES:
+            return STATISTICS[statistic](self)
+        return UNDEFINED if statistic != terms.OUTSIDE or self.limits.are_open else intervals.proportion_of(1, 1)
 
 
 STATISTICS: dict[str, Callable[[MeasuredValues], Estimate]] = {
@@ -107,27 +121,31 @@ def measure_estimates(rows: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndar
     """Return statistics, changes and stops of all measures; the values of one measure are in memory at a time.
 
     statistics  (measure, state, statistic, interval)  all `STATISTICS`
-    changes     (measure, change_of, interval)         from raw to corrected
+    changes     (measure, change_of, interval)         from raw to corrected, over realizations that can be assembled
     stops       (measure,)                             the sides, "lower" or "upper" or both, at which corrected values stop
                                                        (see without_stops)
     """
-    statistics, changes, stops = [], [], []
+    statistics, changes, stops, (existing,) = [], [], [], assembled(rows)
     for number, limits_of_measure in enumerate(limits(rows)):
         raw, corrected = (MeasuredValues(rows, number, state, limits_of_measure) for state in terms.STATES)
-        statistics.append([[statistic(x) for statistic in STATISTICS.values()] for x in (raw, corrected)])
-        changes.append(changes_of(raw.sample, corrected.sample))
+        statistics.append([[x.estimate(statistic) for statistic in STATISTICS] for x in (raw, corrected)])
+        before = raw.sample if existing is rows else measured_sample(existing, number, terms.STATES[terms.RAW])
+        changes.append(changes_of(before, corrected.sample))
         stops.append(_stops(corrected))
     return np.array(statistics), np.array(changes), np.array(stops, dtype=object)
 
 
 def _stops(x: MeasuredValues) -> str:
-    kept = capability.without_stops(x.sample, x.limits) if np.isfinite(x.sample.mean) else x.limits
+    has_values = x.sample.count >= MIN_VALUES and np.isfinite(x.sample.mean)
+    kept = capability.without_stops(x.sample, x.limits) if has_values else x.limits
     named = zip(terms.BOUNDS, x.limits, kept, strict=False)
     return " and ".join(side for side, limit, left in named if np.isfinite(limit) and not np.isfinite(left))
 
 
 def changes_of(raw: Sample, corrected: Sample) -> list[Estimate]:
     """Return the `CHANGES` of a measure between two samples of the same realizations."""
+    if corrected.count < MIN_VALUES:
+        return [UNDEFINED] * len(terms.CHANGES)
     ratio = intervals.variance_ratio(corrected, raw)
     estimates = {
         terms.SHIFT: intervals.mean(corrected - raw),

@@ -11,7 +11,7 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
-from tolcontact.realizations import pieces
+from tolcontact.realizations import assembled, is_assembled, pieces, statuses
 from tolcontact.statistics import intervals, two_samples
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.statistics.sample import Sample, measured_sample
@@ -137,30 +137,50 @@ def _changes(
     if draws != terms.OTHER_DRAWS:
         counts = [min(counts)] * 2
     rows = [
-        tree.to_dataset()[[terms.MEASURED.name]].isel({terms.REALIZATION: slice(count)})
+        tree.to_dataset()[[terms.MEASURED.name, terms.STATUS.name, terms.MEASURE_ACCURACY.name]].isel(
+            {terms.REALIZATION: slice(count)}
+        )
         for tree, count in zip((run, reference), counts, strict=True)
     ]
     is_paired, changes, furthest = draws != terms.OTHER_DRAWS, [], []
+    nothing = [UNDEFINED] * len(terms.CHANGES_OF_RUNS)
+    existing = assembled(*rows) if is_paired else [*itertools.chain(*map(assembled, rows))]
     for state, measure in itertools.product(terms.STATES, measures):
-        sample, baseline = (measured_sample(each, each[terms.MEASURE].values.tolist().index(measure), state) for each in rows)
+        is_raw = state == terms.STATES[terms.RAW]
+        numbers = [run_rows[terms.MEASURE].values.tolist().index(measure) for run_rows in rows]
+        sample, baseline = itertools.starmap(
+            measured_sample, zip(rows if is_raw else existing, numbers, itertools.repeat(state), strict=False)
+        )
         selections = [summary.sel(measure=measure) for summary in summaries]
         limits = [Limits(*(float(selection[name]) for name in terms.MEASURE_LIMITS)) for selection in selections]
-        changes.append(_estimates(sample, baseline, limits, paired=is_paired))
+        hits = [_hits(*arguments, state) for arguments in zip(rows, numbers, limits, strict=True)]
+        has_values = min(sample.count, baseline.count) > 1
+        changes.append(_estimates(sample, baseline, hits, paired=is_paired) if has_values else nothing)
         pairs = zip(sample.pieces(), baseline.pieces(), strict=True) if draws == terms.SAME_DRAWS else ()
         furthest.append(max((float(np.abs(a - b).max()) for a, b in pairs), default=np.nan))
     shape = (len(terms.STATES), len(measures))
     return draws, np.array(changes).reshape(*shape, *np.shape(changes[0])), np.array(furthest).reshape(shape)
 
 
-def _estimates(sample: Sample, baseline: Sample, limits: list[Limits], *, paired: bool) -> list[Estimate]:
-    """Return the changes from a baseline to a sample, each with its own limits."""
+def _hits(rows: xr.Dataset, measure: int, limits: Limits, state: str) -> Sample | None:
+    """Return which realizations are out of specification; None without limits. With contact, they can also be not assembled."""
+    values = measured_sample(rows, measure, state)
+    if limits.are_open or state == terms.STATES[terms.RAW]:
+        return None if limits.are_open else values.map(limits.outside)
+    return Sample(
+        lambda: (limits.outside(x) | ~is_assembled(y) for x, y in zip(values.pieces(), statuses(rows), strict=True)),
+        values.replicate,
+    )
+
+
+def _estimates(sample: Sample, baseline: Sample, hits: list[Sample | None], *, paired: bool) -> list[Estimate]:
+    """Return the changes from a baseline to a sample, with those out of specification in both."""
     if not (np.isfinite(sample.mean) and np.isfinite(baseline.mean)):
         return [UNDEFINED] * len(terms.CHANGES_OF_RUNS)
-    hits = [x.map(limits_of_x.outside) for x, limits_of_x in zip((sample, baseline), limits, strict=True)]
-    are_open = any(limits_of_x.are_open for limits_of_x in limits)
+    limited = [x for x in hits if x is not None]
     estimates = {
         terms.SHIFT: two_samples.shift(sample, baseline, paired=paired),
         terms.SPREAD_RATIO: intervals.root(two_samples.variance_ratio(sample, baseline, paired=paired)),
-        terms.SHARE_SHIFT: UNDEFINED if are_open else two_samples.share_shift(*hits, paired=paired),
+        terms.SHARE_SHIFT: two_samples.share_shift(*limited, paired=paired) if len(limited) == len(hits) else UNDEFINED,
     }
     return [estimates[name] for name in terms.CHANGES_OF_RUNS]

@@ -1,5 +1,6 @@
 """A sample that is read piece by piece, as often as needed, so that it need not fit into memory."""
 
+import itertools
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache, cached_property
@@ -15,6 +16,7 @@ from tolcontact.realizations import pieces
 MAX_SORTED_VALUES = 1 << 20  # larger samples are not sorted in memory
 MAX_KEPT_VALUES = 1 << 20  # more values are read from the file for each statistic
 MIN_REPLICATES = 16
+MIN_APART = 20  # values apart from a stop: moments of fewer have no interval
 ROUNDING = 1e-20  # of the variance of realizations: a smaller variance between replicates counts as 0
 STANDARDIZED_MOMENTS = 17  # the fourth powers of influences on the fourth moment, and the zeroth
 
@@ -23,12 +25,16 @@ class Sample:
     """One number for each realization, in `pieces`: a function that yields arrays (realization,) from the start at each call.
 
     `replicate` successive realizations are one replicate, independent of all others; 1 if all realizations are independent.
+    Values that differ by no more than `accuracy` are equal. `cause` is the same measure without contact, if it is
+    known.
     """
 
     def __init__(
-        self, pieces: Callable[[], Iterable[np.ndarray]], replicate: int = 1, max_sorted: int = MAX_SORTED_VALUES
-    ) -> None:
+        self, pieces: Callable[[], Iterable[np.ndarray]], replicate: int = 1, max_sorted: int = MAX_SORTED_VALUES,
+        accuracy: float = 0.0, cause: "Sample | None" = None,
+    ) -> None:  # fmt: skip
         self.pieces, self.replicate, self.max_sorted = pieces, replicate, max_sorted
+        self.accuracy, self.cause = accuracy, cause
 
     @classmethod
     def of(cls, x: "np.ndarray | Sample") -> "Sample":
@@ -36,11 +42,18 @@ class Sample:
         return x if isinstance(x, Sample) else cls(lambda: [x])
 
     def __sub__(self, subtrahend: "Sample") -> "Sample":
-        return Sample(lambda: (a - b for a, b in zip(self.pieces(), subtrahend.pieces(), strict=True)), self.replicate)
+        return Sample(
+            lambda: (a - b for a, b in zip(self.pieces(), subtrahend.pieces(), strict=True)), self.replicate,
+            accuracy=self.accuracy + subtrahend.accuracy, cause=self.cause or subtrahend.cause,
+        )  # fmt: skip
 
     def map(self, function: Callable[[np.ndarray], np.ndarray]) -> "Sample":
         """Return the sample of an elementwise function of the values."""
         return Sample(lambda: (function(piece) for piece in self.pieces()), self.replicate)
+
+    def followed_by(self, values: Sequence[float]) -> "Sample":
+        """Return the sample with more values at its end."""
+        return Sample(lambda: itertools.chain(self.pieces(), [np.array(values)]), self.replicate) if values else self
 
     @property
     def widening(self) -> float:
@@ -67,6 +80,19 @@ class Sample:
             return 0.0
         student_over_normal = float(special.stdtrit(replicates - 1, 0.975) / special.ndtri(0.975))
         return student_over_normal * float(np.sqrt(variance / self.moments[0]))
+
+    @cached_property
+    def determines_moments(self) -> bool:
+        """Whether enough values are apart from a stop, the value of more than one realization that is also the median.
+
+        The interval of a moment relies on the values apart from it. If there are none, the moment is certain only if the
+        measure does not vary without contact, either.
+        """
+        median = self.ordered([self.count // 2])[0]
+        at_stop = sum(int((np.abs(piece - median) <= self.accuracy).sum()) for piece in self.pieces())
+        if at_stop == self.count:
+            return self.cause is not None and self.cause.moments[0] <= max(ROUNDING * self.cause.mean**2, self.accuracy**2)
+        return at_stop <= 1 or self.count - at_stop >= MIN_APART
 
     @cached_property
     def count(self) -> int:
@@ -135,4 +161,10 @@ def measured_sample(rows: xr.Dataset, measure: int, state: str) -> Sample:
         return (piece[terms.MEASURED.name].values for piece in pieces(column))
 
     is_kept = rows.sizes[terms.REALIZATION] <= MAX_KEPT_VALUES
-    return Sample(cache(lambda: list(read())) if is_kept else read, terms.REPLICATE if is_planned else 1)
+    sample = Sample(
+        cache(lambda: list(read())) if is_kept else read, terms.REPLICATE if is_planned else 1,
+        accuracy=float(rows[terms.MEASURE_ACCURACY.name].values[measure]),
+    )  # fmt: skip
+    raw = terms.STATES[terms.RAW]
+    sample.cause = sample if state == raw else measured_sample(rows, measure, raw)
+    return sample

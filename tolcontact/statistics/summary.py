@@ -30,7 +30,8 @@ class Summary(xr.Dataset):  # type: ignore[no-untyped-call]
 def summarize(results: xr.DataTree) -> Summary:
     """Return the statistics of a run, each as (estimate, lower, upper) with a 95 % interval.
 
-    statistic_value (measure, state, statistic, interval) in the measure's units; shares are of 1
+    statistic_value (measure, state, statistic, interval) in the measure's units; shares are of 1. In the corrected state,
+                                  realizations that cannot be assembled count as outside the limits, and are left out otherwise
     change          (measure, change_of, interval)         from raw to corrected, over the same realizations
     touched         (interval)                           share of realizations that contact touched
     by_status       (status_meaning)                     number of realizations
@@ -118,7 +119,7 @@ def estimate_of(results: xr.DataTree, measure: str, statistic: str) -> Estimate:
     """Return one of `STATISTICS` of a corrected measure."""
     rows = results.to_dataset().isel({terms.REALIZATION: slice(finished(results))})
     number = rows[terms.MEASURE].values.tolist().index(measure)
-    return STATISTICS[statistic](MeasuredValues(rows, number, terms.STATES[terms.CORRECTED], limits(rows)[number]))
+    return MeasuredValues(rows, number, terms.STATES[terms.CORRECTED], limits(rows)[number]).estimate(statistic)
 
 
 def in_conflict(rows: xr.Dataset, rigid: np.ndarray) -> np.ndarray:

@@ -23,6 +23,8 @@ def shift(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:
         return intervals.mean(sample - baseline)
     squared_errors = [x.moments[0] / (x.count - 1) * x.widening**2 for x in (sample, baseline)]
     difference, total = sample.mean - baseline.mean, sum(squared_errors)
+    if not (sample.determines_moments and baseline.determines_moments):
+        return Estimate(difference, math.nan, math.nan)
     if not total > 0:
         return Estimate(difference, difference, difference) if math.isfinite(difference) else UNDEFINED
     freedom = total**2 / sum(error**2 / (x.count - 1) for error, x in zip(squared_errors, (sample, baseline), strict=True))
@@ -31,16 +33,19 @@ def shift(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:
 
 
 def variance_ratio(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:
-    """Return the ratio of the variances on the log scale; if not paired, with Bonett's standard errors of both."""
+    """Return the ratio of the variances; if not paired, from the intervals of both on the log scale (Zou and Donner, 2008).
+
+    If the lower bound of the second variance is 0, the ratio has no upper bound.
+    """
     if paired:
         return intervals.variance_ratio(sample, baseline)
     if intervals.is_constant(sample) or intervals.is_constant(baseline):
         return UNDEFINED
     variances = [intervals.variance(x) for x in (sample, baseline)]
-    # On the log scale the bounds of each variance are at equal distances from their middle.
-    halves = [math.log(variance.upper / variance.lower) / 2 for variance in variances]
-    ratio, factor = variances[0].value / variances[1].value, math.exp(math.hypot(*halves))
-    return Estimate(ratio, ratio / factor, ratio * factor)
+    (value, lower, upper), (base, base_lower, base_upper) = np.array(variances)
+    with np.errstate(divide="ignore"):
+        below, above = np.hypot(np.log([value / lower, upper / value]), np.log([base_upper / base, base / base_lower]))
+    return Estimate(value / base, float(value / base * np.exp(-below)), float(value / base * np.exp(above)))
 
 
 def share_shift(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:

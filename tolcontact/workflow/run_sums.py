@@ -96,7 +96,7 @@ class _BlockReduction(ProgramFunction):
 
     def __call__(self, program: Program, block: Block) -> ReducedBlock:
         counts = count_in_block(program, block, self.counted)
-        return row_values(block, self.kept, program.nominal), (self.fields.sums(block.poses, block.start), counts)
+        return row_values(block, self.kept, program.nominal), (self.fields.sums(block.poses, block.start, block.status), counts)
 
 
 class RunSums:

@@ -9,7 +9,7 @@ from tests import cases
 from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.discretization import discretize
 from tolcontact.errors import TolcontactError
-from tolcontact.statistics import DisplacementFields, intervals
+from tolcontact.statistics import DisplacementFields, intervals, two_samples
 from tolcontact.statistics.sample import Sample
 
 SAMPLES, REPEATS = 1000, 1000
@@ -79,12 +79,52 @@ def test_a_percentile_beyond_the_sample_has_no_bound():
     assert lower == -np.inf and np.isfinite(upper)
 
 
-def test_a_constant_has_no_spread():
+def test_equal_values_are_certain_only_if_the_measure_does_not_vary_without_contact():
     for value in (3.0, 17.3, 0.1):
         x = np.full(1000, value)
-        assert intervals.mean(x) == (value, value, value)
-        assert intervals.variance(x) == (0, 0, 0)
+        for cause, spread in ((x, 0.0), (np.arange(1000.0), np.nan), (None, np.nan)):
+            sample = Sample(lambda x=x: [x], cause=None if cause is None else Sample.of(cause))
+            assert intervals.mean(sample) == pytest.approx((value, value + spread, value + spread), nan_ok=True)
+            assert intervals.variance(sample) == pytest.approx((0, spread, spread), nan_ok=True)
         assert np.isnan(intervals.variance_ratio(x, np.arange(1000.0))).all()
+
+
+DISTRIBUTIONS = {
+    "normal": stats.norm.ppf, "lognormal": stats.lognorm(1).ppf, "exponential": stats.expon.ppf, "uniform": stats.uniform.ppf,
+    "t5": stats.t(5).ppf, "Pareto": stats.pareto(3.5).ppf, "two modes": lambda p: stats.norm.ppf(2 * p % 1) + 8 * (p > 0.5),
+    **{f"stop {share}": lambda p, share=share: np.maximum(0, stats.norm.ppf(p) - stats.norm.ppf(share))
+       for share in (0.5, 0.93, 0.99)},
+    "two stops": lambda p: np.clip(stats.norm.ppf(p), -1, 1), "discrete": lambda p: np.floor(3 * p**4),
+}  # fmt: skip
+MOMENTS = {
+    "mean": lambda x, y: intervals.mean(x), "variance": lambda x, y: intervals.variance(x),
+    "skewness": lambda x, y: intervals.skewness(x), "kurtosis": lambda x, y: intervals.kurtosis(x),
+    "shift": lambda x, y: two_samples.shift(x, y, paired=False),
+    "ratio": lambda x, y: two_samples.variance_ratio(x, y, paired=False),
+    "paired ratio": lambda x, y: two_samples.variance_ratio(x, y, paired=True),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DISTRIBUTIONS)
+def test_no_interval_has_zero_length_and_solvers_agree_on_the_values_at_a_stop(name):
+    for size in (20, 100, 300, 2000):
+        for seed in range(5):
+            rng = np.random.default_rng([seed, size])
+            x, y = DISTRIBUTIONS[name](rng.random((2, size)))
+            scatter = rng.normal(0, 1e-13, size)
+            exact, scattered = ([Sample(lambda v=v: [v], accuracy=1e-8) for v in (x + e, y + e)] for e in (0.0, scatter))
+            for statistic, estimate in MOMENTS.items():
+                found, other = estimate(*exact), estimate(*scattered)
+                assert found.lower != found.upper, (statistic, size, seed)
+                assert other == pytest.approx(found, rel=1e-6, abs=1e-9, nan_ok=True), (statistic, size, seed)
+
+
+@pytest.mark.parametrize(("share", "size"), [(0.93, 300), (0.99, 300), (0.99, 1000), (0.998, 5000)])
+def test_the_mean_at_a_stop_is_covered_or_has_no_interval(share, size):
+    quantile = DISTRIBUTIONS["stop 0.5"]
+    truth = quantile((np.arange(1_000_000) + 0.5) / 1e6, share).mean()
+    found = [intervals.mean(quantile(np.random.default_rng([k, size]).random(size), share)) for k in range(200)]
+    assert np.mean([estimate.lower > truth or estimate.upper < truth for estimate in found]) <= 0.075
 
 
 @pytest.mark.slow
@@ -129,7 +169,7 @@ def test_fields_equal_the_plain_sums_over_realizations(magnitudes):
     poses = random_poses(nominal, 700, np.random.default_rng(2))
     fields = DisplacementFields(nominal, str(magnitudes))
     for first, last in ((0, 1), (1, 400), (400, 700)):
-        fields.merge(fields.sums(poses[first:last], first))
+        fields.merge(fields.sums(poses[first:last], first, np.ones(last - first)))
     for index, (part, field) in enumerate(zip(nominal.parts, fields.fields(), strict=True)):
         assert field[terms.FIELD_REALIZATIONS] == 700 and field[terms.MAGNITUDE_REALIZATIONS] == magnitudes
         for state in (0, 1) if part.movers else (0,):
@@ -151,9 +191,9 @@ def test_sums_of_fields_go_on_from_where_they_were():
     whole, half, rest = (DisplacementFields(nominal, "50") for _ in range(3))
     for fields, spans in ((whole, [(0, 20), (20, 40), (40, 60)]), (half, [(0, 20), (20, 40)])):
         for first, last in spans:
-            fields.merge(fields.sums(poses[first:last], first))
+            fields.merge(fields.sums(poses[first:last], first, np.ones(last - first)))
     rest.resume_from(half.numbers)
-    rest.merge(rest.sums(poses[40:], 40))
+    rest.merge(rest.sums(poses[40:], 40, np.ones(20)))
     assert all(np.array_equal(one, other) for one, other in zip(whole.numbers, rest.numbers, strict=True))
 
 
@@ -161,7 +201,7 @@ def test_without_magnitudes_components_stay_exact():
     nominal = discretize(cases.ra1())
     poses = random_poses(nominal, 30, np.random.default_rng(3))
     fields = DisplacementFields(nominal, "none")
-    fields.merge(fields.sums(poses, 0))
+    fields.merge(fields.sums(poses, 0, np.ones(30)))
     field = fields.fields()[1]
     u = displacements(nominal.parts[1], poses[:, 1, 1])
     assert np.abs(field[terms.FIELD_SIX_SIGMA][1, :, :3] - 6 * u[..., :3].std(axis=0, ddof=1)).max() < 1e-9
