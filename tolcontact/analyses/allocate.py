@@ -70,7 +70,7 @@ def allocate(
     shrinks when a step fails; a step also fails if more realizations are then not assemblable than may be outside. If the
     interval of the fresh run does not keep a requirement, the search continues with a larger margin. Effects come from
     samples / 4 realizations, or 4 samples / groups if that is less, but at least 512. `progress` is called with the number of
-    realizations simulated, and an approximate total. Raises OptionError if no range varies. `model`, `seed`, `solver`, `method`,
+    simulated realizations, and about their total. Raises OptionError if no range varies. `model`, `seed`, `solver`, `method`,
     `into` and `client` are as in all analyses: `tc.analyses.allocate("model.py", "gap: ppm 1000", by="part")`.
     """
     analysis = Analysis(

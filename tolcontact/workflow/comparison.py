@@ -44,7 +44,6 @@ def compare(
     """Simulate the same realizations of a model (see `build`) with each solver and method.
 
     `solvers`, `samples` and `seed` are as in `run`; `tc.compare("model.py", ["qpoases", "daqp"], samples=1000)`.
-
     Differences are relative to the first one, in the corrected state. Labels along the dimension `solver` name the solver and
     the choices that differ between the methods.
 
@@ -57,8 +56,7 @@ def compare(
         both_resolved      (solver)                   number of realizations that the differences cover
 
     With a `client` of dask.distributed its workers simulate (see tolcontact.simulation); all results except `seconds` are the
-    same to the last bit.
-    Raises OptionError for a solver that cannot be used or is named twice, and ModelError for a model with faults.
+    same to the last bit. Raises OptionError for a solver that cannot be used or is named twice, ModelError for a wrong model.
     """
     check_counts(samples=samples, seed=seed)
     assembly = assembly_of(model)
