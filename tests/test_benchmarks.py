@@ -8,6 +8,7 @@ import pytest
 from rich.console import Console
 
 from studies.benchmarks import pages, run as benchmarks
+from studies.benchmarks.answers import Estimate
 from studies.benchmarks.drawing import svg
 from studies.benchmarks.problem import FOLDER, names, problems, read
 from tests.helpers import nightly, run
@@ -38,10 +39,39 @@ def test_two_ways_without_the_package_confirm_expected_values(chosen):
 
 def test_a_wrong_value_is_an_exit_code():
     problem = read("worst_clutch")
-    assert benchmarks.report([problem], Console(quiet=True)) == 0
+    assert benchmarks.report([benchmarks.solved(problem)], Console(quiet=True)) == 0
     least, largest = problem.quantities
     wrong = replace(problem, quantities=(least, replace(largest, expected=largest.expected + 1e-4)))
-    assert benchmarks.report([wrong], Console(quiet=True)) == 1
+    assert benchmarks.report([benchmarks.solved(wrong)], Console(quiet=True)) == 1
+
+
+def test_an_interval_wider_than_a_factor_of_two_is_no_agreement():
+    (probability,) = read("forty_parts").quantities
+    figures = [
+        benchmarks.Figure(probability, Estimate(probability.expected, probability.expected / wide, probability.expected * wide))
+        for wide in (1.7, 1.9, 30.0)
+    ]
+    assert [figure.verdict for figure in figures] == [benchmarks.AGREES, benchmarks.TOO_WIDE, benchmarks.TOO_WIDE]
+
+
+def test_the_table_of_the_readme_has_every_problem_with_a_whole_interval_around_what_is_expected():
+    rows = benchmarks.rows()
+    for problem in problems():
+        _, _, expected, computed, interval, verdict, *_ = [cell.strip() for cell in rows[problem.name].split("|")[1:-1]]
+        assert float(expected) == pytest.approx(problem.quantities[0].expected, rel=1e-5, abs=1e-12), problem.name
+        assert verdict == (benchmarks.UNSUPPORTED if problem.unsupported else benchmarks.AGREES), problem.name
+        if not problem.unsupported and " to " in interval:
+            lower, upper = map(float, interval.split(" to "))
+            assert lower <= float(computed) <= upper, problem.name
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::tolcontact.errors.NominalWarning")
+@pytest.mark.parametrize("name", QUICK)
+def test_the_table_of_the_readme_is_what_its_script_writes(name):
+    written = benchmarks.row(benchmarks.solved(read(name)))
+    assert benchmarks.rows()[name].split("|")[:7] == written.split("|")[:7]
 
 
 def test_an_unknown_problem_is_named():
