@@ -57,6 +57,7 @@ def main() -> None:
             done = call(folder, *command)
             if done.returncode:
                 sys.exit(f"{command}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
+            print("done:", *command[:2], flush=True)
         for module, command, extra in EXTRAS:
             if importlib.util.find_spec(module) is None:
                 done = call(folder, *command)

@@ -69,16 +69,15 @@ def archive(tmp_path_factory):
 def forked_reader():
     """Archives are inspected by forks of one process, where a test does not change the environment."""
     from tests.forked_reader import ForkedReader  # noqa: PLC0415  (the hook must be there first)
-    from tolcontact.system import watch  # noqa: PLC0415
 
-    reader, run = ForkedReader(), watch.run
+    reader, run = ForkedReader(), subprocess.run
 
     def run_or_fork(command, *arguments, **options):
         return reader.run(command) if reader.reads(command, options) else run(command, *arguments, **options)
 
-    watch.run = run_or_fork
+    subprocess.run = run_or_fork
     yield reader
-    watch.run = run
+    subprocess.run = run
     reader.close()
 
 

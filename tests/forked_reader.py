@@ -16,7 +16,7 @@ OWN = ("PYTEST_CURRENT_TEST", "PYTHONPATH")  # variables that may differ without
 
 
 class ForkedReader:
-    """Runs Python files as `watch.run` does, in the environment of the first call."""
+    """Runs Python files as `subprocess.run` does, in the environment of the first call."""
 
     def __init__(self):
         self._process, self._lock = None, threading.Lock()
@@ -36,7 +36,7 @@ class ForkedReader:
                 self._process = subprocess.Popen(script("forking_reader"), env=environment(), text=True, **pipes)
             print(json.dumps([str(Path.cwd()), *map(str, command[2:])]), file=self._process.stdin, flush=True)
             code, out, err = json.loads(self._process.stdout.readline())
-        return code, out.encode("latin-1"), err.encode("latin-1"), ""
+        return subprocess.CompletedProcess(command, code, out.encode("latin-1"), err.encode("latin-1"))
 
     def close(self):
         if self._process is not None:

@@ -1,5 +1,6 @@
 """Archives that were damaged, or made to mislead: one message, and nothing else happens."""
 
+import subprocess
 from pathlib import Path
 
 import netCDF4
@@ -14,7 +15,6 @@ from tests.helpers import COMMAND, call, model_in, nightly, run, script
 from tests.hostile import HOSTILE, make
 from tolcontact import vocabulary
 from tolcontact.errors import ArchiveError
-from tolcontact.system import watch
 
 CRASHES = ("measured is text",)  # the netCDF library, so only where it is another process's
 # What is shown as it is written: checksums detect damage, not values that somebody wrote with the netCDF library.
@@ -51,7 +51,7 @@ def once(forked_reader, monkeypatch):
             answers[question] = forked_reader.run(command)
         return answers[question]
 
-    monkeypatch.setattr(watch, "run", answer)
+    monkeypatch.setattr(subprocess, "run", answer)
 
 
 @pytest.mark.slow

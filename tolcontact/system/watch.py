@@ -16,6 +16,7 @@ from tolcontact.system.resources import ENFORCED
 psutil = lazy_loader.load("psutil")  # where the system sets no limits
 
 STALL_FACTOR = 10  # times the processor time: a process that lives longer does not wait for a processor, it hangs
+_IS_ENFORCED = ENFORCED >= {"time", "memory"}
 _INTERVAL = 0.1  # s between two looks
 
 
@@ -43,7 +44,7 @@ class Watch:
         self._thread.join()
 
     def _look(self) -> None:
-        usage = None if ENFORCED >= {"time", "memory"} else psutil.Process(self._process.pid)
+        usage = None if _IS_ENFORCED else psutil.Process(self._process.pid)
         used = _processor_time(usage)
         while not self._is_done.wait(_INTERVAL if usage else self._last - time.monotonic()):
             try:
@@ -65,6 +66,12 @@ def _processor_time(usage: Any) -> float:
 def run(command: list[str], *, memory: int, seconds: float, **options: Any) -> tuple[int, bytes, bytes, str]:
     """Run a command under a watch; return its exit code, its output and errors, and the limit at which it was ended, if any."""
     pipes: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    if _IS_ENFORCED:
+        try:
+            done = subprocess.run(command, **pipes, **options, timeout=STALL_FACTOR * seconds, check=False)
+        except subprocess.TimeoutExpired:
+            return 1, b"", b"", "time"
+        return done.returncode, done.stdout, done.stderr, ""
     with subprocess.Popen(command, **pipes, **options) as process, Watch(process, memory=memory, seconds=seconds) as watch:
         try:
             output, errors = process.communicate()
