@@ -43,11 +43,11 @@ def tails(
     In an event a corrected measure is beyond its limits by more than its accuracy, or, in an exact resolution, parts cannot be
     assembled. The score of the former is the measure, and each limit has its own search; the latter only has a search by
     inflation of all deviations. By default all events share 60 000 realizations, with 10 000 to 40 000 for each. A quarter of
-    the samples suffices where the upper bound of the interval is at most 1.5 times the lower one, or at most 1e-7; otherwise
-    the result comes from the other three quarters. A probability of 0 with an upper bound means that the search ended below
-    1e-9. Where two searches disagree, the interval covers both results, and more realizations are needed. A measure that is not
-    a number in any realization has the probability NaN, as in `run`. Probabilities include unresolved realizations, with their
-    last poses. `progress` is called with the number of realizations simulated, and the approximate total.
+    the samples suffices where the upper bound of the interval is at most 1.5 times the lower one; otherwise the result comes
+    from the other three quarters. A probability of 0 with an upper bound means that the search ended below 1e-9. Where two
+    searches disagree, the interval covers both results, and more realizations are needed. A measure that is not a number in any
+    realization has the probability NaN, as in `run`. Probabilities include unresolved realizations, with their last poses.
+    `progress` is called with the number of realizations simulated, and the approximate total.
     `model`, `samples`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see tolcontact.analyses).
     Raises OptionError for a model that has no rare event.
 

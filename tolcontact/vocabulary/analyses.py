@@ -190,7 +190,7 @@ ZONE_WIDTH = "tolerance (full width of the zone)"
 GLOSSARY = {
     WITHOUT_CONTACT: "Parts stand where their locators put them, even if they penetrate each other.",
     WITH_CONTACT: "Contact has moved the parts until none penetrates another.",
-    OUT_OF_SPECIFICATION: "The share of realizations beyond a limit of the measurement.",
+    OUT_OF_SPECIFICATION: "The share of realizations beyond a limit of the measurement or, with contact, not assemblable.",
     CONTRIBUTORS.lower(): "All that varies: deviations of locators and of features, and causes that drive several of them.",
     "realization": "One simulated assembly, with its own random deviations.",
     "Ppk": "The distance from the median to a limit, divided by the distance from the median to the percentile of 0.135 % or "

@@ -30,8 +30,7 @@ MIN_GAIN = 0.01  # of the mean log-likelihood: smallest gain that justifies anot
 ITERATIONS = 10
 FEW_DIMENSIONS, NOISE = 10, 5.0  # with more dimensions, this many standard errors of a centre are noise
 PILOT, MIN_COUNTED = 0.05, 50  # share of all realizations; number of hits among them above which the event is counted
-FIRST_SHARE, MIN_FIRST = 0.25, 3500  # share of realizations, and their number
-NO_CONCERN = 1e-7  # upper bound that suffices
+FIRST_SHARE = 0.25  # of all realizations
 SUFFICIENT, MIN_SUFFICIENT = 1.5, 4000  # upper over lower bound that suffices, with this many realizations
 SEARCHABLE, MIN_PILOT, MIN_FEW = 10_000, 500, 3  # with fewer realizations, counting beats searches even with few hits
 SEARCHES = (0.25, 0.3)  # of all realizations: by levels, by inflation
@@ -126,15 +125,14 @@ class Tail(NamedTuple):
 def sufficient_tail(score: Score, dimensions: int, *, samples: int, rng: np.random.Generator, leads: bool = True) -> Tail:
     """Return the `tail_probability` from at most about `samples` realizations.
 
-    A quarter of them suffices if the searches agree, and the upper bound is at most 1e-7, or 1.5 times the lower one. The
-    latter needs many realizations, since few may miss regions of the event. Otherwise the result comes from the remaining
-    realizations alone.
+    A quarter of them suffices if the searches agree, and the upper bound is at most 1.5 times the lower one. This needs many
+    realizations, since few may miss regions of the event. Otherwise the result comes from the remaining realizations alone. A
+    small probability does not suffice: to stop because a bound is small selects the answers that are too small.
     """
     look = int(FIRST_SHARE * samples)
-    if look >= MIN_FIRST:
+    if look >= MIN_SUFFICIENT:
         tail = tail_probability(score, dimensions, samples=look, rng=rng, leads=leads)
-        sufficient = SUFFICIENT * tail.probability.lower if look >= MIN_SUFFICIENT else 0.0
-        if tail.disagreement == 1.0 and tail.probability.upper <= max(sufficient, NO_CONCERN):
+        if tail.disagreement == 1.0 and 0.0 < tail.probability.upper <= SUFFICIENT * tail.probability.lower:
             return tail
         samples -= look
     return tail_probability(score, dimensions, samples=samples, rng=rng, leads=leads)
