@@ -101,15 +101,15 @@ def test_scaled_draws_are_draws_of_other_ranges():
     assert np.array_equal(one.scaled(scale)(seed=3, start=0, stop=50), other(seed=3, start=0, stop=50))
 
 
-def test_a_fresh_run_that_misses_what_is_required_costs_no_more_than_it_must():
-    """One range: 6 standard deviations of the sum are 1 / 0.9 mm. The first of the fresh runs says 0.89, by chance."""
+def test_the_bound_of_a_fresh_run_keeps_what_is_required_and_costs_little_more_than_it_must():
+    """One range: 6 standard deviations of the sum are 1 / 0.9 mm."""
     totals = set()
     found = tc.analyses.allocate(
         pile(0.6, 0.3), "top: Ppk 0.9", costs={"p0.Z": 1.0}, samples=8192, seed=7, solver="daqp",
         progress=lambda _, total: totals.add(total),
     )  # fmt: skip
-    assert len(totals) == 2 and float(found.kept.sel(stage="after", interval="estimate")[0]) >= 0.9
-    assert float(found.factor.sel(group="p0.Z")) == pytest.approx(np.sqrt((1 / 0.9) ** 2 - 0.3**2) / 0.6, rel=0.05)
+    assert len(totals) >= 2 and float(found.kept.sel(stage="after", interval="lower")[0]) >= 0.9
+    assert 0.92 < float(found.factor.sel(group="p0.Z")) / (np.sqrt((1 / 0.9) ** 2 - 0.3**2) / 0.6) <= 1.0
 
 
 def test_groups_without_a_cost_keep_their_ranges_and_a_cost_may_be_a_curve():
@@ -218,9 +218,9 @@ def test_a_tolerance_that_decides_nothing_before_it_is_wider_gets_the_range_of_l
         constraints={"type": "ineq", "fun": log_share},
     )  # fmt: skip
     x = [widths["b.X1"], widths["b.X2"]]
-    assert 0.6 / x[0] + 0.3 / x[1] < 1.04 * least.fun and least.x[1] > 0.33
-    assert x[1] == pytest.approx(least.x[1], rel=0.12)
-    assert -np.expm1(log_share(x) + np.log(0.998)) < 0.0029  # of 20 000 fresh ones 0.002 lie outside, +- 0.0006
+    # At most 28 of 20 000 fresh ones may lie outside for a bound of 0.002: the range of 0.0014 costs 5 % more.
+    assert 0.6 / x[0] + 0.3 / x[1] < 1.15 * least.fun and least.x[1] > 0.33
+    assert -np.expm1(log_share(x) + np.log(0.998)) <= 0.002
 
 
 def test_groups_without_influence_keep_their_ranges_and_those_at_a_limit_are_named(tmp_path):

@@ -255,8 +255,10 @@ class Search:
                 break
             if slopes is None:
                 slopes = self._slopes(logs, trial)
-                penalty = PENALTY * self.cost(logs) / max(float(np.abs(slopes).sum()), 1e-300)
-            candidate = self._step(margins, slopes, logs, radius)
+                scales = np.abs(slopes).sum(axis=1)  # margins in mm and in rad count alike
+                scales[scales == 0] = 1.0
+                penalty = PENALTY * self.cost(logs) / scales
+            candidate = self._step(margins / scales, slopes / scales[:, None], logs, radius)
             candidate_trial = self.trials.trial_within(np.exp(candidate), most_unresolved)
             if candidate_trial is None:
                 radius /= 2
@@ -278,15 +280,15 @@ class Search:
 
         Margins lead to points where a quantile is near its limit, which may be far from most values.
         """
-        common = [np.where(self.is_free, log, 0.0) for log in np.log(COMMON_FACTORS)]
+        common = [np.where(self.is_free, log, 0.0) for log in np.log(COMMON_FACTORS[::-1])]  # the widest that miss nothing
         return min([logs, *common], key=self._missing)
 
     def _missing(self, logs: np.ndarray) -> float:
         corrected = self.trials.trial(np.exp(logs)).corrected
         return math.fsum(requirement.shortfall(corrected[:, requirement.measure]) for requirement in self.requirements)
 
-    def _merit(self, logs: np.ndarray, margins: np.ndarray, penalty: float) -> float:
-        return self.cost(logs) + penalty * float(np.maximum(-margins, 0).sum())
+    def _merit(self, logs: np.ndarray, margins: np.ndarray, penalty: np.ndarray) -> float:
+        return self.cost(logs) + float(penalty @ np.maximum(-margins, 0))
 
     def _slopes(self, logs: np.ndarray, trial: Trial) -> np.ndarray:
         """Return derivatives (requirement, group) of the margins, by central differences; 0 for groups that do not change.
