@@ -19,7 +19,6 @@ from tolcontact.compilation import compile_program
 from tolcontact.declaration import script as models_as_data
 from tolcontact.discretization import discretize
 from tolcontact.simulation import Block, simulate_blocks
-from tolcontact.system.kind import IS_POSIX
 from tolcontact.workflow.models import DEFAULT_SOLVER, assembly_of, method_of
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -27,7 +26,7 @@ SCRIPTS = ROOT / "tests" / "scripts"
 COMMAND = [sys.executable, "-m", "tolcontact"]
 
 posix_only = pytest.mark.skipif(
-    not IS_POSIX, reason="users with numbers, signals between processes and named pipes are of POSIX"
+    os.name != "posix", reason="users with numbers, signals between processes and named pipes are of POSIX"
 )
 
 WAITING = 300  # s after which a process that a test waits for is ended; a loaded machine needs many times what an idle one does

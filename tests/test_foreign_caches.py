@@ -9,7 +9,6 @@ import pytest
 
 from tests.helpers import posix_only, run
 from tolcontact import code_cache
-from tolcontact.system.kind import IS_POSIX
 
 pytestmark = posix_only
 
@@ -28,7 +27,7 @@ def folder(monkeypatch, tmp_path):
 
 
 def is_root():
-    return IS_POSIX and os.geteuid() == 0
+    return os.name == "posix" and os.geteuid() == 0
 
 
 @pytest.mark.parametrize("umask", [0, 0o022, 0o077])
