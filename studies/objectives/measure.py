@@ -93,7 +93,8 @@ def results(name: str, samples: int) -> list[Result]:
 def figure(values: np.ndarray) -> str:
     """Return a value with its interval, rounded by the width of the interval."""
     digits = max(0, int(np.ceil(-np.log10(max(values[2] - values[1], 1e-3)))) + 1)
-    return f"{values[0]:.{digits}f} [{values[1]:.{digits}f}, {values[2]:.{digits}f}]"
+    value, lower, upper = (f"{round(float(number), digits) + 0.0:.{digits}f}" for number in values)  # no -0
+    return f"{value} [{lower}, {upper}]"
 
 
 def table(rows: list[Result]) -> str:
