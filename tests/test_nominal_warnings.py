@@ -195,7 +195,7 @@ def test_other_contact_may_close_a_wide_gap():
 def test_forces_close_gaps():
     a = model(at=(20, 12.5, 13))
     a.force("weight", at=a.parts[1].point(25, 12, 5), vector=(0, 0, -1))
-    for objective, expected in (("all points", ["gap"]), ("seating", [])):
+    for objective, expected in (("all points", ["gap", "force"]), ("seating", [])):
         pressed = a.replaced()
         pressed.method = tc.Method(objective=objective)
         assert kinds(pressed) == expected

@@ -11,7 +11,6 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import FIXED, PAPER
 from tolcontact.report import summary_text
-from tolcontact.report.results_table import verdict_lines
 
 SAMPLES = 1000  # runs from this number on are compared with other objectives
 
@@ -119,7 +118,7 @@ def test_a_lid_that_is_lifted_until_its_holes_clear_the_dowels_is_reported():
     """Without the seat nothing says that it cannot lie askew in the base; RA1's top goes no further than explained."""
     summary = tc.summarize(tc.run(pinned(seat=False), samples=40, solver="daqp", surfaces=0, method=FIXED))
     assert summary.offset_unexplained.sel(part="lid", interval="lower") > 0.1
-    assert "contact moved parts far off their locators: lid" in next(iter(verdict_lines(summary)))
+    assert "contact moved parts far off their locators: lid" in " ".join(printed(summary).split())
     assert "advice: say what holds them" in printed(summary)
     usual = tc.summarize(tc.run(cases.model("ra1"), samples=100, surfaces=0))
     assert usual.offset_unexplained.sel(part="top", interval="estimate") == 0
