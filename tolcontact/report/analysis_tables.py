@@ -96,9 +96,9 @@ def _shares(dataset: xr.Dataset) -> Iterator[Table]:
         shares = dataset.isel(group=group)
         # Without contact, measures are nearly additive: first-order and total shares hardly differ.
         cells = [
-            percent(shares["total"].isel(state=terms.RAW).values),
-            percent(shares["first"].isel(state=terms.CORRECTED).values),
-            percent(shares["total"].isel(state=terms.CORRECTED).values),
+            _share(shares["total"].isel(state=terms.RAW)),
+            _share(shares["first"].isel(state=terms.CORRECTED)),
+            _share(shares["total"].isel(state=terms.CORRECTED)),
         ]
         linear = float(shares["linear"])
         rows.append([str(shares["group"].values), *cells, f"{100 * linear:.1f} %" if math.isfinite(linear) else "-"])
@@ -116,12 +116,17 @@ def _shares(dataset: xr.Dataset) -> Iterator[Table]:
     yield Table(measure, columns, rows, remarks, is_detail=True)
     effects = dataset["shapley"].sel(interval="estimate")
     rows = [
-        [str(dataset["unit"].values[k]), *(percent(dataset["shapley"].sel(state=s).values[k]) for s in terms.STATES)]
+        [str(dataset["unit"].values[k]), *(_share(dataset["shapley"].sel(state=s).isel(unit=k)) for s in terms.STATES)]
         for k in _by_size(dataset["shapley"])
         if not abs(float(effects.isel(unit=k).max())) < SMALL_SHARE
     ]
     title = f"{measure}: Shapley effects, which divide what is correlated"
     yield Table(title, ["", *terms.STATE_WORDS], rows, missed, is_detail=True)
+
+
+def _share(values: xr.DataArray) -> str:
+    """Return a share of a variance (interval,) in percent, at most 100 %: estimates scatter beyond."""
+    return percent(np.minimum(values.values, 1.0))
 
 
 def _by_size(shares: xr.DataArray) -> np.ndarray:
@@ -169,7 +174,7 @@ def _slopes(dataset: xr.Dataset) -> Table:
 
 def _worst_case(dataset: xr.Dataset) -> AnalysisReport:
     notes = [
-        "Worst-case minimum and maximum over all combinations that the tolerances allow.",
+        "Worst-case minimum and maximum over all combinations that the tolerances allow; correlations are ignored.",
         "found: the worst combination that searches found; `searches` says how many of them met there.",
         "linear: tolerances times sensitivities at the nominal assembly, as in a stack-up; with contact,",
         "the farthest that parts can be without penetration, if contact or locators hold them.",
@@ -219,7 +224,8 @@ def _tails(dataset: xr.Dataset) -> AnalysisReport:
     for event in dataset["event"].values:
         ppm = [1e6 * float(value) for value in dataset["probability"].sel(event=event).values]
         estimate, lower, upper = (grouped(round(value)) if value >= 1000 else f"{value:.3g}" for value in ppm)
-        rows.append([str(event), "-" if math.isnan(ppm[0]) else f"{estimate} [{lower}, {upper}]"])
+        figures = f"{estimate} [{lower}, {upper}]" if ppm[0] else f"none found: at most {upper}"
+        rows.append([str(event), "-" if math.isnan(ppm[0]) else figures])
     count = f"{grouped(int(dataset['simulated'].sum()))} realizations"
     notes = ["Probabilities in ppm, with contact, by searches and importance sampling; 95 % intervals."]
     for event, factor in zip(dataset["event"].values, dataset["disagreement"].values, strict=True):
