@@ -73,3 +73,19 @@ def test_the_table_of_tails_says_what_is_not_defined(tmp_path):
     assert "lg outside limits: the measurement is not a number in some realizations" in done.stdout
     assert "Traceback" not in (failed := call(tmp_path, "worst", script)).stderr and failed.returncode == 2
     assert failed.stderr.startswith('error: "x": measurement "lg": not a finite number')
+
+
+@pytest.mark.parametrize(("limits", "code", "word"), [("limits=(-1, 1)", 1, "verdict"), ("units='mm'", 0, "statistics")])
+def test_a_measure_that_is_not_a_number_says_so(tmp_path, limits, code, word):
+    (script := tmp_path / "block.py").write_text(f"""import casadi, tolcontact as tc
+def assembly():
+    a = tc.Assembly("block")
+    block = a.part("block", tc.Box(50, 25, 10))
+    a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=5), tolerance=0.1)
+    a.measure("u", lambda p: casadi.sqrt(p.rotation(block)[2, 0]), {limits})
+    return a
+""")
+    done = call(tmp_path, "run", script, "--samples", "200", "--solver", "daqp")
+    line = next(line for line in done.stdout.splitlines() if line.startswith("u: "))
+    assert line.startswith("u: not a number in ") and line.endswith(f" of the realizations, so it has no {word}")
+    assert 40 < float(line.split()[5]) < 60 and done.returncode == code and "invalid value" not in done.stderr

@@ -77,11 +77,15 @@ def _is_same(path: Path, other: Path) -> bool:
 
 
 def print_summary(summary: xr.Dataset) -> None:
-    """Print the summary of a run. Raises typer.Exit with code 1 if too many realizations were not resolved."""
+    """Print the summary of a run. Raises typer.Exit with code 1 if too many realizations were not resolved.
+
+    The same holds if a measurement with limits is not a number in some realizations.
+    """
     console().print(report.summary_text(summary))
     failed = sum(int(summary[BY_STATUS.name][status]) for status in UNRESOLVED)
     if failed > FAILED_SHARE * summary.attrs["realizations"]:
         typer.echo(f"error: {failed} realizations were not resolved, more than {FAILED_SHARE:.1%} of all", err=True)
+    if failed > FAILED_SHARE * summary.attrs["realizations"] or report.has_no_verdict(summary):
         raise typer.Exit(1)
 
 

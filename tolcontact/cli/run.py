@@ -71,7 +71,7 @@ def run(
     """Simulate a model with and without contact, and print the statistics of its measurements.
 
     The exit code is 1 if more than 0.1 % of the realizations were not resolved (not converged, not assemblable, or doubtful),
-    and if an interval is not as narrow as --until states.
+    if a measurement with limits is not a number in some, and if an interval is not as narrow as --until states.
     """
     report = _checked_page(model, out, report, overwrite=overwrite, resume=resume)
     method = common.method_choices(resolution=resolution, objective=objective)

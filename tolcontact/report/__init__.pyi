@@ -10,5 +10,6 @@ from .html import (
     write_view as write_view,
 )
 from .notebook import results_html as results_html
+from .results_table import has_no_verdict as has_no_verdict
 from .spreadsheet import write_spreadsheet as write_spreadsheet
 from .summary_text import capability_text as capability_text, summary_text as summary_text

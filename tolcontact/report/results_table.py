@@ -9,7 +9,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.report.convention_text import unexplained_offsets
-from tolcontact.report.figures import grouped, number, percent, plain
+from tolcontact.report.figures import grouped, limits_text, number, percent, plain
 from tolcontact.report.table import Table
 from tolcontact.statistics.capability import CONSTANT, FAILS, UNDECIDED, Verdict, verdict
 
@@ -136,12 +136,27 @@ def full_name(measure: xr.Dataset) -> str:
 
 
 def verdict_lines(summary: xr.Dataset) -> Iterator[str]:
-    """Yield the verdict on each measurement that has limits."""
+    """Yield the verdict on each measurement that has limits, and why a measurement has none of its figures."""
     for name in summary["measure"].values:
         measure = summary.sel(measure=name)
+        if share := int(measure[terms.NOT_A_NUMBER].values) / summary.attrs["realizations"]:
+            yield f"{full_name(measure)}: not a number in {_rounded_share(share)} of the realizations, so it has no " + (
+                "verdict" if limits_text(measure) else "statistics"
+            )
         if text := verdict_text(verdict_of(measure, summary.attrs["realizations"])):
             is_about_limits = not text.startswith((UNDECIDED, CONSTANT))
             yield f"{full_name(measure)}: {text}{' its limits' * is_about_limits}{reservation(summary)}"
+
+
+def _rounded_share(share: float) -> str:
+    """Return a share in percent with two digits, never rounded to 0 or to all."""
+    return f"{100 * share:.2g} %" if share == 1 or share < 0.995 else "more than 99 %"
+
+
+def has_no_verdict(summary: xr.Dataset) -> bool:
+    """Return whether a measurement with limits is not a number in some realizations."""
+    has_limits = np.isfinite([summary[name].values for name in terms.MEASURE_LIMITS[:2]]).any(axis=0)
+    return bool((has_limits & (summary[terms.NOT_A_NUMBER].values > 0)).any())
 
 
 def overview_table(summary: xr.Dataset) -> Table:

@@ -117,22 +117,25 @@ STATISTICS: dict[str, Callable[[MeasuredValues], Estimate]] = {
 }
 
 
-def measure_estimates(rows: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return statistics, changes and stops of all measures; the values of one measure are in memory at a time.
+def measure_estimates(rows: xr.Dataset) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+    """Return statistics, changes and notes of all measures; the values of one measure are in memory at a time.
 
     statistics  (measure, state, statistic, interval)  all `STATISTICS`
     changes     (measure, change_of, interval)         from raw to corrected, over realizations that can be assembled
-    stops       (measure,)                             the sides, "lower" or "upper" or both, at which corrected values stop
+    notes       MEASURE_STOPS (measure,)               the sides, "lower" or "upper" or both, at which corrected values stop
                                                        (see without_stops)
+                NOT_A_NUMBER (measure,)                number of corrected values that are not a number
     """
-    statistics, changes, stops, (existing,) = [], [], [], assembled(rows)
+    statistics, changes, stops, undefined, (existing,) = [], [], [], [], assembled(rows)
     for number, limits_of_measure in enumerate(limits(rows)):
         raw, corrected = (MeasuredValues(rows, number, state, limits_of_measure) for state in terms.STATES)
         statistics.append([[x.estimate(statistic) for statistic in STATISTICS] for x in (raw, corrected)])
         before = raw.sample if existing is rows else measured_sample(existing, number, terms.STATES[terms.RAW])
         changes.append(changes_of(before, corrected.sample))
         stops.append(_stops(corrected))
-    return np.array(statistics), np.array(changes), np.array(stops, dtype=object)
+        undefined.append(sum(int((~np.isfinite(piece)).sum()) for piece in corrected.sample.pieces()))
+    notes = {terms.MEASURE_STOPS: np.array(stops, dtype=object), terms.NOT_A_NUMBER: np.array(undefined, dtype=np.int64)}
+    return np.array(statistics), np.array(changes), notes
 
 
 def _stops(x: MeasuredValues) -> str:

@@ -102,7 +102,10 @@ class Sample:
     def mean(self) -> float:
         # Summed relative to the first value: the mean of equal numbers equals them to the last bit.
         origin = float(next(piece[0] for piece in self.pieces() if len(piece)))
-        return origin + float(sum((piece - origin).sum() for piece in self.pieces()) / self.count)
+        if not np.isfinite(origin):
+            return np.nan
+        with np.errstate(invalid="ignore"):  # of infinite values
+            return origin + float(sum((piece - origin).sum() for piece in self.pieces()) / self.count)
 
     @cached_property
     def moments(self) -> tuple[float, float]:

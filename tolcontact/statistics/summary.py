@@ -79,7 +79,7 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
         raise ArchiveError(f"{count} realizations are finished, too few for statistics; continue with --resume")
     rows = results.to_dataset().isel({terms.REALIZATION: slice(count)})
     combinations, smallest = contact.combinations(rows), _smallest_range(results, rows)
-    statistics, changes, stops = measure_estimates(rows)
+    statistics, changes, notes = measure_estimates(rows)
     rigid, (clashes, clash_names) = _is_rigid(results), contact.clashes(rows)
     values = {
         terms.STATISTIC_VALUE: statistics,
@@ -98,8 +98,8 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
     return xr.Dataset(
         {variable.name: variable.entry(array, **units.get(variable, {})) for variable, array in values.items()},
         _coordinates(rows, combinations)
-        | {terms.MEASURE_STOPS: (terms.MEASURE, stops), terms.CLASH: clash_names}
-        | {terms.BY_OBJECTIVE: convention.other_objectives(results)},
+        | {name: (terms.MEASURE, values) for name, values in notes.items()}
+        | {terms.CLASH: clash_names, terms.BY_OBJECTIVE: convention.other_objectives(results)},
         {
             "title": results.attrs["title"],
             "realizations": count,

@@ -23,6 +23,7 @@ CLASH = "clash"  # two parts that lie in each other, as "part / part"
 OF_OFFSET, OFFSET_PERCENTILES = "of_offset", {"median": 50, "99 %": 99}
 MIDDLES = ("median", "largest")  # labels of `of_iterations`
 MEASURE_LIMITS = (*(f"measure_{bound}" for bound in BOUNDS), "measure_accuracy")  # coordinates: see Limits
+NOT_A_NUMBER = "measure_not_a_number"  # coordinate: the number of realizations whose value with contact is not a number
 MEASURE_STOPS = "measure_stops"  # coordinate: the sides at which corrected values stop, such as "lower"
 
 
