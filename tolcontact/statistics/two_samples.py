@@ -51,23 +51,32 @@ def variance_ratio(sample: Sample, baseline: Sample, *, paired: bool) -> Estimat
 def share_shift(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:
     """Return the difference of two shares, from samples of booleans.
 
-    The interval is Wald's after small additions to the counts: half a realization for each kind of pair if the samples are
-    paired (Agresti and Min, 2005), one hit and one miss in each sample if not (Agresti and Caffo, 2000).
+    If the samples are paired, the distances of the exact bounds of the shares that are gained and lost add up like errors
+    (Zou and Donner, 2008); both shares are correlated. If not, the interval is Wald's after one hit and one miss more in each
+    sample (Agresti and Caffo, 2000).
     """
     if paired:
         change = sample.map(lambda piece: piece.astype(float)) - baseline.map(lambda piece: piece.astype(float))
-        gained, lost = (sum(int((piece == sign).sum()) for piece in change.pieces()) for sign in (1, -1))
         weight = _weight(change)
         n = weight * change.count
-        middle, changed = weight * (gained - lost) / (n + 2), weight * (gained + lost) + 1
-        error = math.sqrt(max(changed / (n + 2) - middle**2, 0) / (n + 2))
-        return _bounded((gained - lost) / change.count, middle, error)
+        counts = [weight * sum(int((piece == sign).sum()) for piece in change.pieces()) for sign in (1, -1)]
+        gained, lost = (intervals.proportion_of(count, n) for count in counts)
+        least = _hypotenuse(gained.value - gained.lower, lost.upper - lost.value, gained.value, lost.value)
+        most = _hypotenuse(gained.upper - gained.value, lost.value - lost.lower, gained.value, lost.value)
+        difference = gained.value - lost.value
+        return Estimate(difference, max(difference - least, -1.0), min(difference + most, 1.0))
     hits = [x.map(lambda piece: piece.astype(float)) for x in (sample, baseline)]
     weights = [_weight(x) for x in hits]
     counts = [weight * x.count for weight, x in zip(weights, hits, strict=True)]
     shares = [(n * x.mean + 1) / (n + 2) for n, x in zip(counts, hits, strict=True)]
     error = math.sqrt(sum(p * (1 - p) / (n + 2) for p, n in zip(shares, counts, strict=True)))
     return _bounded(hits[0].mean - hits[1].mean, shares[0] - shares[1], error)
+
+
+def _hypotenuse(one: float, other: float, gained: float, lost: float) -> float:
+    """Return the error of the difference of two shares of the same sample, from the error of each."""
+    correlation = math.sqrt(gained * lost / ((1 - gained) * (1 - lost))) if gained * lost > 0 else 0.0
+    return math.sqrt(one**2 + other**2 + 2 * correlation * one * other)
 
 
 def _weight(x: Sample) -> float:

@@ -34,6 +34,15 @@ def test_intervals_of_independent_samples_cover(name):
     assert 463 <= inside <= 490
 
 
+def test_the_interval_of_a_few_changes_covers():
+    """Of 300 realizations 2 leave the limits on average, and none returns: without changes the difference may still be 1 %."""
+    covered = 0
+    for gained in np.random.default_rng(1).binomial(300, 2 / 300, 500):
+        estimate = two_samples.share_shift(Sample.of(np.arange(300) < gained), Sample.of(np.zeros(300, bool)), paired=True)
+        covered += estimate.lower <= 2 / 300 <= estimate.upper
+    assert covered >= 0.95 * 500
+
+
 def test_intervals_of_paired_shares_cover():
     generator, inside = np.random.default_rng(6), 0
     for _ in range(500):
