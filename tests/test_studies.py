@@ -36,6 +36,7 @@ STUDIES = {
     "robustness/files.py": ["--archives", "1", "--shapes", "2", "--models", "2", "--steps", "2", "--hostile-steps", "2"],
     "robustness/machines.py": ["--only", "environments", "--first", "2"],
     "robustness/processes.py": ["--killed", "1", "--writers", "1"],
+    "robustness/scripts.py": ["--names", "1", "--pmi", "1", "--functions", "2"],
     "robustness/signals.py": ["--tries", "3"],
     "round/measure.py": ["20"],
     "scale/scale.py": ["--samples", "20000", "--kills", "2"],
