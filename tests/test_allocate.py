@@ -112,6 +112,13 @@ def test_the_bound_of_a_fresh_run_keeps_what_is_required_and_costs_little_more_t
     assert 0.92 < float(found.factor.sel(group="p0.Z")) / (np.sqrt((1 / 0.9) ** 2 - 0.3**2) / 0.6) <= 1.0
 
 
+@pytest.mark.slow
+def test_equal_parts_get_equal_ranges():
+    """Four blocks of the same cost: none differs by more than the noise of slopes from a few hundred realizations."""
+    factors = tc.analyses.allocate(pile(*[0.6] * 4), "top: ppm 2700", samples=8192, seed=4, solver="daqp").factor.values
+    assert factors.max() < 1.15 * factors.min()
+
+
 def test_groups_without_a_cost_keep_their_ranges_and_a_cost_may_be_a_curve():
     found = tc.analyses.allocate(
         pile(0.6, 0.3, 0.9), "top: Ppk 0.9", costs={"p2": lambda factor: 5 / factor**2}, by="part", samples=8192, solver="daqp"

@@ -304,7 +304,9 @@ class Search:
         for group, wider, narrower in zip(groups, *of_signs, strict=True):
             wide, narrow = corrected.copy(), corrected.copy()
             wide[wider.rows], narrow[narrower.rows] = wider.corrected, narrower.corrected
-            slopes[:, group] = (_margins(self.requirements, wide) - _margins(self.requirements, narrow)) / (2 * STEP)
+            for row, requirement in enumerate(self.requirements):
+                margins = [requirement.smooth_margin(x[:, requirement.measure]) for x in (wide, narrow)]
+                slopes[row, group] = (margins[0] - margins[1]) / (2 * STEP)
         return slopes
 
     def _changes(self, logs: np.ndarray, trial: Trial) -> ChangedRows:

@@ -27,9 +27,10 @@ from tolcontact.statistics.sample import Sample
 from tolcontact.variation import Draws
 from tolcontact.vocabulary import PPK, PPM
 
-TAIL, HEAD = 0.00135, 0.99865
+TAIL = 0.00135
 ROUNDING = 1e-9
-MIN_DECISIVE, DECISIVE = 64, 4  # values that determine a margin: at least, and in multiples of the values beyond it
+MIN_DECISIVE, DECISIVE = 128, 8  # values that determine a margin: at least, and in multiples of the values beyond it
+SPREAD = 4.0  # of the shares whose quantiles are averaged for slopes: a single quantile rests on too few realizations
 MIN_HITS = 10  # realizations outside the limits needed to estimate a share
 EXAMPLES = ("corner height: ppm 1000", "gap: Ppk 1.33")
 STEP = 0.1  # of ranges, for differences
@@ -89,6 +90,12 @@ class Requirement:
         """
         return self._share_margin(x, self.value) if self.is_share else self._capability_margin(x, self.value)
 
+    def smooth_margin(self, x: np.ndarray) -> float:
+        """Return the margin with the means of quantiles around those of `margin`, for slopes."""
+        spread = min(SPREAD, self.share**-0.5)
+        shares = self.share * np.geomspace(1 / spread, spread, 16)
+        return self._share_margin(x, shares) if self.is_share else self._capability_margin(x, self.value, shares)
+
     def sure_margin(self, x: np.ndarray) -> float:
         """Return the margin of the 95 % interval of the share, or of the Ppk: 0 or more if it keeps the requirement.
 
@@ -101,12 +108,12 @@ class Requirement:
         value, lower, _ = self.estimate(x)
         return self._capability_margin(x, self.value + value - lower) if lower > 0 else -math.inf
 
-    def _share_margin(self, x: np.ndarray, share: float) -> float:
-        return -float(np.quantile(without_stops(Sample.of(x), self.limits).excess(x), 1 - share))
+    def _share_margin(self, x: np.ndarray, shares: float | np.ndarray) -> float:
+        return -float(np.quantile(without_stops(Sample.of(x), self.limits).excess(x), 1 - shares).mean())
 
-    def _capability_margin(self, x: np.ndarray, index: float) -> float:
+    def _capability_margin(self, x: np.ndarray, index: float, shares: float | np.ndarray = TAIL) -> float:
         lower, upper, _ = without_stops(Sample.of(x), self.limits)
-        tail, middle, head = np.quantile(x, [TAIL, 0.5, HEAD])
+        tail, middle, head = np.quantile(x, shares).mean(), np.median(x), np.quantile(x, 1 - shares).mean()
         return float(np.nanmin([upper - middle - index * (head - middle), middle - lower - index * (middle - tail)]))
 
     def decisive(self, x: np.ndarray) -> np.ndarray:
