@@ -11,7 +11,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.report.convention_text import unexplained_offsets
 from tolcontact.report.figures import grouped, limits_text, number, percent, plain
 from tolcontact.report.table import Table
-from tolcontact.statistics.capability import CONSTANT, FAILS, UNDECIDED, Verdict, verdict
+from tolcontact.statistics.capability import CONSTANT, FAILS, KEPT, UNDECIDED, Verdict, verdict
 
 PPM_BELOW = 0.01  # if all shares are smaller, the table states them in ppm
 DIGITS_OF_COUNTS = 2  # significant digits of the number of realizations that would decide
@@ -85,8 +85,10 @@ def _row(measure: xr.Dataset, summary: xr.Dataset) -> ResultRow:
         full_name(measure),
         str(measure["measure_units"].values),
         str(measure["measure_quantity"].values),
-        verdict_text(opinion) + (reservation(summary) if opinion else ""),
-        None if opinion is None or opinion.word in (UNDECIDED, CONSTANT) or reservation(summary) else opinion.word != FAILS,
+        verdict_text(opinion) + (_remarks(measure, summary) if opinion else ""),
+        None
+        if opinion is None or opinion.word in (UNDECIDED, CONSTANT) or _kept(measure) or reservation(summary)
+        else opinion.word != FAILS,
         nominal,
         lower,
         upper,
@@ -129,6 +131,26 @@ def reservation(summary: xr.Dataset) -> str:
     return "".join(texts)
 
 
+def _remarks(measure: xr.Dataset, summary: xr.Dataset) -> str:
+    """Return the text after a verdict: what contact keeps within the limits, what cannot be assembled, and the reservation."""
+    share = summary["not_assemblable"].values
+    failures = f" (out of specification: {percent(share)} that cannot be assembled)" if share[0] > 0 else ""
+    return f"{_kept(measure)}{failures}{reservation(summary)}"
+
+
+def _kept(measure: xr.Dataset) -> str:
+    """Return which share of values contact keeps at a limit that is a stop; "" if none would be beyond it without contact."""
+    raw = measure["statistic_value"].sel(state=terms.STATES[terms.RAW])
+    sides = {side: raw.sel(statistic=statistic).values for side, statistic in zip(SIDES, terms.SHARES[:2], strict=True)}
+    stops = dict(zip(SIDES, terms.BOUNDS, strict=True))
+    kept = [
+        f"{percent(share)} {side}"
+        for side, share in sides.items()
+        if stops[side] in str(measure[terms.MEASURE_STOPS].values) and share[0] > 0
+    ]
+    return f", {KEPT}: without contact {' and '.join(kept)}" if kept else ""
+
+
 def full_name(measure: xr.Dataset) -> str:
     """Return the name of one measure of a summary, with its station if the assembly has stations."""
     name, station = str(measure[terms.MEASURE].values), terms.MEASURE_STATION.name
@@ -145,7 +167,7 @@ def verdict_lines(summary: xr.Dataset) -> Iterator[str]:
             )
         if text := verdict_text(verdict_of(measure, summary.attrs["realizations"])):
             is_about_limits = not text.startswith((UNDECIDED, CONSTANT))
-            yield f"{full_name(measure)}: {text}{' its limits' * is_about_limits}{reservation(summary)}"
+            yield f"{full_name(measure)}: {text}{' its limits' * is_about_limits}{_remarks(measure, summary)}"
 
 
 def _rounded_share(share: float) -> str:

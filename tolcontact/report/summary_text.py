@@ -1,26 +1,31 @@
 """The summary of a run as text."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import xarray as xr
 from rich.console import Group
 from rich.padding import Padding
 from rich.text import Text
+from scipy import special
 
 from tolcontact import vocabulary as terms
 from tolcontact.report.convention_text import convention_lines, offset_lines, offset_table
 from tolcontact.report.figures import NO_INTERVAL, grouped, limits_text, number, percent, settled, share
 from tolcontact.report.results_table import full_name, overview_table, verdict_lines
 from tolcontact.report.table import Table
+from tolcontact.statistics.intervals import CONFIDENCE
 
 RAW, CORRECTED = terms.STATES
 CHANGE_OF_STATISTIC = {"mean": terms.SHIFT, "6 sigma": terms.SPREAD_RATIO, "variance": terms.VARIANCE_RATIO}
 SHORT_LABELS = {"standard deviation": "std. dev.", terms.BELOW: "below the lower limit", terms.ABOVE: "above the upper limit",
                 terms.OUTSIDE: terms.OUT_OF_SPECIFICATION}  # fmt: skip
 PERCENTILE_COUNTERPART = {terms.PP_NORMAL: terms.PP, terms.PPK_NORMAL: terms.PPK}
-APART = "* differs from the index by percentiles: the measurement is not normally distributed"
+APART = (
+    "* differs from the index by percentiles by more than chance explains: the measurement is not normally distributed\n"
+    "(95 % confidence for all measurements of this run together)"
+)
 WITHOUT = (
     f"{NO_INTERVAL} no interval: std. dev., 6 sigma and variance need 10 realizations; skewness\n"
     "and kurtosis need 1000, and a kurtosis below 3.5"
@@ -40,7 +45,7 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
     yield Text(f"{terms.ESTIMATES_NOTE}.\nChanges are from the same draws.\n")
     yield overview_table(summary)
     yield from map(Text, verdict_lines(summary))
-    yield from (measure_table(summary.sel(measure=measure)) for measure in summary["measure"].values)
+    yield from (measure_table(summary.sel(measure=measure), summary.sizes["measure"]) for measure in summary["measure"].values)
     magnitudes = int(summary["magnitude_realizations"])
     yield Text("\n6 sigma of the displacement magnitude over the surface of each part (mm)", style="bold")
     if magnitudes < count:
@@ -70,23 +75,33 @@ def _limits(summary: xr.Dataset) -> Iterator[Text | Table]:
         if not limits_text(measure):
             yield Text(f"\n{title}", style="bold")
             continue
-        table = measure_table(measure.sel(statistic=[*terms.SHARES, *terms.CAPABILITY]))
+        table = measure_table(measure.sel(statistic=[*terms.SHARES, *terms.CAPABILITY]), summary.sizes["measure"])
         yield replace(table, title=title, columns=table.columns[:-1], rows=[row[:-1] for row in table.rows])
 
 
-def measure_table(measure: xr.Dataset) -> Table:
-    """Return all estimates of a measurement in both states, with their changes and the meaning of marks in its cells."""
+def measure_table(measure: xr.Dataset, measures: int) -> Table:
+    """Return all estimates of one of `measures` measurements in both states, with their changes and the meaning of marks."""
     units, quantity = str(measure["measure_units"].values), str(measure["measure_quantity"].values)
     subtitle = ", ".join(text for text in (quantity, limits_text(measure)) if text)
-    title, rows = f"{full_name(measure)} ({units}){': ' if subtitle else ''}{subtitle}", _measure_rows(measure)
+    title, rows = f"{full_name(measure)} ({units}){': ' if subtitle else ''}{subtitle}", _measure_rows(measure, measures)
     cells = [cell for row in rows for cell in row]
     marks = {APART: any(cell.startswith("*") for cell in cells), WITHOUT: any(NO_INTERVAL in cell for cell in cells)}
     return Table(title, ["", *terms.STATE_WORDS, "change"], rows, [note for note, is_there in marks.items() if is_there])
 
 
-def _measure_rows(measure: xr.Dataset) -> list[list[str]]:
+def _is_apart(estimate: Sequence[float], other: Sequence[float], tests: int) -> bool:
+    """Return whether two estimates differ by more than chance explains, in all of `tests` comparisons together (Bonferroni).
+
+    Both intervals are stretched from the level of a single figure to the joint one, as for a normal distribution.
+    """
+    stretch = special.ndtri(1 - (1 - CONFIDENCE) / (2 * tests)) / special.ndtri((1 + CONFIDENCE) / 2)
+    (low, low_lower, low_upper), (high, high_lower, _) = sorted((tuple(estimate), tuple(other)))
+    return bool(math.isfinite(low_lower) and high - low > stretch * (low_upper - low + high - high_lower))
+
+
+def _measure_rows(measure: xr.Dataset, measures: int) -> list[list[str]]:
     """Return rows of label, both states and change of a measurement; * marks an index that differs from the percentile one."""
-    rows = []
+    rows, tests = [], measures * len(terms.STATES) * len(PERCENTILE_COUNTERPART)
     estimates = dict(
         zip(measure["statistic"].values, measure["statistic_value"].transpose("statistic", ...).values, strict=True)
     )
@@ -100,8 +115,8 @@ def _measure_rows(measure: xr.Dataset) -> list[list[str]]:
         label, figures = SHORT_LABELS.get(statistic, statistic), [number(value) for value in values]
         if statistic in PERCENTILE_COUNTERPART:
             counterpart = estimates[PERCENTILE_COUNTERPART[statistic]]
-            for k, ((_, lower, upper), (_, other_lower, other_upper)) in enumerate(zip(values, counterpart, strict=True)):
-                if lower > other_upper or other_lower > upper:
+            for k, pair in enumerate(zip(values, counterpart, strict=True)):
+                if _is_apart(*pair, tests):
                     figures[k] = f"* {figures[k]}"
         change = ""
         if statistic in CHANGE_OF_STATISTIC:

@@ -40,10 +40,13 @@ ALLOWED_SHARE = 0.0027  # share of a normal distribution beyond three standard d
 MEETS, FAILS, UNDECIDED, CONSTANT = "meets", "does not meet", "undecided", "does not vary"
 LIKELY_DISTANCE = 0.6745  # of a share from the allowed one, in standard errors, if the two seem equal: the median
 GROWTH = 1.25  # of the number of realizations between two trials
+KEPT = "kept by contact"
 VERDICT_RULE = (
-    f'"{MEETS}": the 95 % interval of the share out of specification, with contact, lies at or below {ALLOWED_SHARE:.2%}; '
+    f'"{MEETS}": the 95 % interval of the share out of specification, with contact, lies at or below {ALLOWED_SHARE:.2%} '
+    "(for each measurement alone; a one-sided test with an error of 2.5%); "
     f'"{FAILS}": it lies above; "{UNDECIDED}": it contains {ALLOWED_SHARE:.2%}; '
-    f'"{CONSTANT}": all values are equal, with and without contact, and within the limits'.replace("%", " %")
+    f'"{CONSTANT}": all values are equal, with and without contact, and within the limits; '
+    f'"{KEPT}": the limit is a stop, and no value is beyond it with contact'.replace("%", " %")
 ).replace("95  %", "95 %")
 
 
@@ -140,19 +143,24 @@ def _side(x: Sample, index: float, sign: float) -> Estimate:
 
 def _pp(low: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.divide(limits.upper - limits.lower, np.maximum(np.subtract(high, low), 0.0))
+        return np.divide(limits.upper - limits.lower, _width(low, high, limits))
 
 
 def _sides(low: np.ndarray | float, median: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> list[np.ndarray]:
     """Return the index of each side that has a limit."""
     lower, upper, _ = limits
     with np.errstate(divide="ignore", invalid="ignore"):
-        upper_width, lower_width = np.maximum(np.subtract(high, median), 0.0), np.maximum(np.subtract(median, low), 0.0)
         sides = [
-            (lower, np.divide(np.subtract(median, lower), lower_width)),
-            (upper, np.divide(np.subtract(upper, median), upper_width)),
+            (lower, np.divide(np.subtract(median, lower), _width(low, median, limits))),
+            (upper, np.divide(np.subtract(upper, median), _width(median, high, limits))),
         ]
     return [index for limit, index in sides if np.isfinite(limit)]
+
+
+def _width(low: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> np.ndarray:
+    """Return widths; a width within the accuracy, as between values at a stop, is 0."""
+    width = np.subtract(high, low)
+    return np.where(width > limits.accuracy, width, 0.0)
 
 
 def _with_interval(estimate: np.ndarray, worst: np.ndarray, best: Sequence[np.ndarray]) -> Estimate:

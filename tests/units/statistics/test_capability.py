@@ -159,3 +159,12 @@ def test_intervals_of_skewed_measures_in_few_realizations_cover_as_often_as_the_
         found = [intervals.root(intervals.variance(Sample.of(sample)), times=6) for sample in samples]
         covered = np.mean([low <= 6 * distribution.std() <= high for _, low, high in found])
         assert covered == pytest.approx(stated / 100, abs=0.02)  # four standard errors
+
+
+def test_ppk_at_a_stop_does_not_depend_on_the_share_that_rests_there():
+    """0.2 % rest at the lower limit, hardly more than the percentile of 0.135 %: Ppk is that of the upper limit in all."""
+    stop, rng = stats.norm.ppf(0.002), np.random.default_rng(4)
+    for _ in range(12):
+        x = Sample.of(np.maximum(stop, rng.standard_normal(5000)))
+        value, lower, upper = capability.by_percentiles(x, Limits(stop, 9.0, 1e-8))[1]
+        assert lower <= value <= upper and 2.5 < value < 3.5

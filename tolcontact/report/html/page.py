@@ -207,7 +207,7 @@ def _details(summary: xr.Dataset, shares: Sequence[ContributorShares]) -> list[d
     details = []
     for name, contributors in zip(summary["measure"].values, shares, strict=True):
         measure = summary.sel(measure=name)
-        table = measure_table(measure)
+        table = measure_table(measure, summary.sizes["measure"])
         details.append(
             {
                 "name": str(name),
