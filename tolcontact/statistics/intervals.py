@@ -35,13 +35,19 @@ UNDEFINED = Estimate(math.nan, math.nan, math.nan)
 
 
 def mean(x: np.ndarray | Sample) -> Estimate:
-    """Return the mean with Student's t interval. There is none if too few values are apart from a stop."""
+    """Return the mean with Student's t interval, widened by the interval of Hall's transformation for skewed values.
+
+    There is none if too few values are apart from a stop.
+    """
     x = Sample.of(x)
     if not x.determines_moments:
         return Estimate(x.mean, math.nan, math.nan)
-    deviation = np.sqrt(x.moments[0] * x.count / (x.count - 1))
-    half = float(student(x.count - 1) * deviation / np.sqrt(x.count)) * x.widening
-    return Estimate(x.mean, x.mean - half, x.mean + half)
+    if not x.moments[0] > 0:
+        return Estimate(x.mean, x.mean, x.mean) if math.isfinite(x.mean) else UNDEFINED
+    deviation, t = math.sqrt(x.moments[0] * x.count / (x.count - 1)), student(x.count - 1) * x.widening
+    skew, half = float(x.standardized_moments[3]), t * deviation / math.sqrt(x.count)
+    lower, upper = (x.mean - deviation * _back(sign * t, skew, x.count) for sign in (1, -1))
+    return Estimate(x.mean, min(lower, x.mean - half), max(upper, x.mean + half))
 
 
 def student(freedom: float) -> float:
