@@ -103,7 +103,7 @@ def test_the_first_draws_have_the_results_of_runs_with_the_other_objectives(comp
 
 def test_the_summary_names_the_convention_and_the_means_by_others(compared):
     text = printed(tc.summarize(compared))
-    assert "convention: contact moves parts as little as it can, by the points that penetrated (the paper's choice)" in text
+    assert "convention: parts move as little as possible, measured where they penetrated" in text
     (line,) = [line for line in text.splitlines() if "corner height: mean" in line]
     assert 'by "all points"' in line and 'by "locator stiffness"; here 0.46' in line
 

@@ -174,7 +174,8 @@ def _slopes(dataset: xr.Dataset) -> Table:
 
 def _worst_case(dataset: xr.Dataset) -> AnalysisReport:
     notes = [
-        "Worst-case minimum and maximum over all combinations that the tolerances allow; correlations are ignored.",
+        "Worst-case minimum and maximum over all combinations that the tolerances allow.",
+        "Correlations are ignored.",
         "found: the worst combination that searches found; `searches` says how many of them met there.",
         "linear: tolerances times sensitivities at the nominal assembly, as in a stack-up; with contact,",
         "the farthest that parts can be without penetration, if contact or locators hold them.",

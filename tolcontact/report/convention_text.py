@@ -13,10 +13,10 @@ from tolcontact.statistics.convention import ACCURACY
 MAX_LINES = 8  # about figures that depend on the objective
 NOTICED = 0.01  # share of realizations with offsets that nothing explains
 CONVENTIONS = {  # what decides the pose of a part that contact moves
-    "all points": "contact moves parts as little as it can, by all points of their contact faces",
-    "active points": "contact moves parts as little as it can, by the points that penetrated (the paper's choice)",
+    "all points": "parts move as little as possible, measured at all contact points",
+    "active points": "parts move as little as possible, measured where they penetrated",
     "locator stiffness": "locators hold parts like springs, and contact pushes them off",
-    "seating": "the declared forces press parts onto their contacts; two-sided locators hold",
+    "seating": "forces press parts on their contacts; two-sided locators hold",
 }
 
 

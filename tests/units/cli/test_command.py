@@ -44,4 +44,4 @@ def test_a_long_run_is_told_once_what_takes_less_time(long_wait, quiet, lines, c
 def test_every_command_has_examples_that_name_it():
     for command in app.registered_commands:
         name = command.name or command.callback.__name__
-        assert command.epilog.startswith("Examples:") and f"tolcontact {name} " in command.epilog
+        assert command.epilog.startswith("Examples:") and f"tolcontact {name} " in f"{command.epilog} "

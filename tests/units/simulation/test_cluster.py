@@ -184,7 +184,7 @@ def test_a_worker_with_other_versions_is_refused_by_name(library, client):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--workers", "0"), "workers is 0; expected a whole number, at least 1"),
+        (("--workers", "0"), "workers is 0; expected a whole number from 1"),
         (("--workers", "2", "--scheduler", "tcp://127.0.0.1:1"), "choose one of --workers and --scheduler"),
         *nightly((("--scheduler", "tcp://127.0.0.1:1"), 'no dask scheduler answers at "tcp://127.0.0.1:1"')),
         (("--scheduler", "nowhere"), 'no dask scheduler answers at "nowhere"'),
