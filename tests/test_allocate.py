@@ -225,8 +225,9 @@ def test_a_tolerance_that_decides_nothing_before_it_is_wider_gets_the_range_of_l
         constraints={"type": "ineq", "fun": log_share},
     )  # fmt: skip
     x = [widths["b.X1"], widths["b.X2"]]
-    # At most 28 of 20 000 fresh ones may lie outside for a bound of 0.002: the range of 0.0014 costs 5 % more.
-    assert 0.6 / x[0] + 0.3 / x[1] < 1.15 * least.fun and least.x[1] > 0.33
+    # At most 28 of 20 000 fresh ones may lie outside for a bound of 0.002: ranges for 0.0014 cost 3 % more.
+    assert 0.6 / x[0] + 0.3 / x[1] < 1.1 * least.fun and least.x[1] > 0.33
+    assert x[1] == pytest.approx(least.x[1], rel=0.12)
     assert -np.expm1(log_share(x) + np.log(0.998)) <= 0.002
 
 

@@ -27,7 +27,7 @@ def called(function: Callable[..., Any], *arguments: Any) -> Any:
     Raises FunctionError for whatever it raises, sys.exit included, and if it closed a standard stream. Ctrl-C passes.
     """
     streams, errors = (sys.stdin, sys.stdout, sys.stderr), np.geterr()
-    folder = Path.cwd() if Path().exists() else None
+    folder = _working_folder()
     is_main = threading.current_thread() is threading.main_thread()
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)} if is_main else {}
     recursion, modules, token = sys.getrecursionlimit(), list(sys.path), _IS_RUNNING.set(True)
@@ -55,6 +55,13 @@ def called(function: Callable[..., Any], *arguments: Any) -> Any:
     if any(stream is not None and stream.closed for stream in streams[1:]):
         raise FunctionError("closed a standard stream; other results are printed to it")
     return result
+
+
+def _working_folder() -> Path | None:
+    try:
+        return Path.cwd()
+    except FileNotFoundError:  # it has been removed
+        return None
 
 
 def refuse_in_functions() -> None:

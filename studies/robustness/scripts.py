@@ -33,6 +33,7 @@ LETTERS = (
     "\U0001f600", "\U0010ffff", "Ä", "電", "ß", "ﬁ", "İ", "٣", "²", " ", "a", "Z", "0", ",", ";", "|", ":", "/",
     "cmd|'/C calc'!A0", "1e5", "TRUE", "nan",
 )  # fmt: skip
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|[+-]?inf", re.IGNORECASE)
 CONTROL = "\t\x85\u2028\u2029\u202e"
 SCRIPT = """import casadi, gc, os, signal, sys, threading, time, warnings
 import numpy as np
@@ -177,16 +178,8 @@ def _said(option: str, said: str) -> str:
 def _formula(rows: Iterable[Iterable[Any]]) -> str:
     """Return what a spreadsheet would run or take for an error in some rows; empty if nothing."""
     texts = [cell for row in rows for cell in row if isinstance(cell, str)]
-    bad = [text for text in texts if text.lstrip(" ")[:1] in ("=", "+", "-", "@") and not _is_number(text)]
+    bad = [text for text in texts if text.lstrip(" ")[:1] in ("=", "+", "-", "@") and not NUMBER.fullmatch(text)]
     return f"formula {bad[0]!r}" if bad else ""
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def functions(count: int, rng: random.Random, folder: Path, table: Table) -> None:

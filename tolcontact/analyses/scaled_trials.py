@@ -7,6 +7,7 @@ largest ranges of influential groups many realizations are slow; so blocks of re
 such groups before the next.
 """
 
+import bisect
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -102,9 +103,9 @@ class Requirement:
         x   (n,) values of a fresh run
         """
         if self.is_share:
-            hits = np.arange(int(self.value * len(x)) + 1)
-            permitted = hits[[proportion_of(int(k), len(x)).upper <= self.value for k in hits]]
-            return self._share_margin(x, permitted.max() / len(x)) if len(permitted) else -math.inf
+            counts = range(len(x) + 1)
+            permitted = bisect.bisect_right(counts, self.value, key=lambda hits: proportion_of(hits, len(x)).upper) - 1
+            return self._share_margin(x, permitted / len(x)) if permitted >= 0 else -math.inf
         value, lower, _ = self.estimate(x)
         return self._capability_margin(x, self.value + value - lower) if lower > 0 else -math.inf
 

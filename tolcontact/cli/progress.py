@@ -11,6 +11,7 @@ from pathlib import Path
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Column
 
 from tolcontact import interrupts
 from tolcontact.errors import shown
@@ -56,7 +57,7 @@ def shown_progress(
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
-        MofNCompleteColumn(),
+        MofNCompleteColumn(table_column=Column(min_width=2 * len(str(total)) + 1)),
         TextColumn("{task.fields[pace]}"),
     )
     bar = Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal)
@@ -75,7 +76,8 @@ def shown_progress(
                     f"{shown(name)}: about {duration(remaining)} left; fewer --samples take less time, with wider intervals"
                 )
                 console.print(advice, markup=False, highlight=False, soft_wrap=True)
-        bar.update(task, completed=done, total=total, description=shown(name), pace=speed)
+        # What follows a quick run may announce something else before the bar is drawn again.
+        bar.update(task, completed=done, total=total, description=shown(name), pace=speed, refresh=done == total)
         if bar.disable and not quiet and time.monotonic() - last > interval:
             last = time.monotonic()
             typer.echo(f"{shown(name)}: {grouped(done)} of {grouped(total)}{', ' if speed else ''}{speed}", err=True)

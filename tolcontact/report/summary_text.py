@@ -16,6 +16,7 @@ from tolcontact.report.figures import NO_INTERVAL, grouped, limits_text, number,
 from tolcontact.report.results_table import full_name, overview_table, verdict_lines
 from tolcontact.report.table import Table
 from tolcontact.statistics.intervals import CONFIDENCE
+from tolcontact.statistics.sample import MIN_APART
 
 RAW, CORRECTED = terms.STATES
 CHANGE_OF_STATISTIC = {"mean": terms.SHIFT, "6 sigma": terms.SPREAD_RATIO, "variance": terms.VARIANCE_RATIO}
@@ -27,8 +28,9 @@ APART = (
     "(95 % confidence for all measurements of this run together)"
 )
 WITHOUT = (
-    f"{NO_INTERVAL} no interval: std. dev., 6 sigma and variance need 10 realizations; skewness\n"
-    "and kurtosis need 1000, and a kurtosis below 3.5"
+    f"{NO_INTERVAL} no interval: std. dev., 6 sigma and variance need 10 realizations, and at a stop\n"
+    f"these and the mean need {MIN_APART} values apart from it; skewness and kurtosis need 1000\n"
+    "realizations, and a kurtosis below 3.5"
 )
 
 

@@ -32,10 +32,12 @@ def locator_offsets(nominal: Nominal, poses: Float[Array, "n state part 12"]) ->
     """
     offsets = np.zeros((len(poses), len(nominal.parts)))
     for index, part in enumerate(nominal.parts):
-        for locator in np.flatnonzero(part.locators.exact) if part.movers else ():
-            owner = part.owners[locator] if part.owners else index
+        exact = np.flatnonzero(part.locators.exact) if part.movers else np.zeros(0, dtype=int)
+        owners = np.array(part.owners)[exact] if part.owners else np.full(len(exact), index)
+        for owner in np.unique(owners):
+            own = exact[owners == owner]
             X = poses[:, :, owner] if part.parent is None else pose.relative(poses[:, :, owner], poses[:, :, part.parent])
-            points = pose.apply(X, part.locators.points[locator, None])[:, :, 0]
-            along = points @ part.locators.directions[locator]
-            np.maximum(offsets[:, index], np.abs(along[:, CORRECTED] - along[:, RAW]), out=offsets[:, index])
+            moved = pose.apply(X[:, CORRECTED] - X[:, RAW], part.locators.points[own])  # which is linear in the pose
+            along = np.abs(np.einsum("nlx,lx->nl", moved, part.locators.directions[own]))
+            np.maximum(offsets[:, index], along.max(axis=1), out=offsets[:, index])
     return offsets

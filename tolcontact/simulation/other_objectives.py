@@ -7,7 +7,7 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.compilation import Program, compile_program
-from tolcontact.errors import ModelError
+from tolcontact.errors import ModelError, OptionError
 from tolcontact.method import OBJECTIVES
 from tolcontact.simulation.block import outcomes
 from tolcontact.vocabulary import CORRECTED, ArchiveVariable
@@ -50,7 +50,7 @@ def by_objective(
     for k, name in enumerate(compared_objectives(program)[1:], start=1):
         try:
             other = compile_program(program.nominal, program.solver.name, program.method.with_choices(objective=name))
-        except ModelError:  # compliant contact needs forces
+        except (ModelError, OptionError):  # compliant contact needs forces, and some solvers have fewer objectives
             continue
         results = list(blocks(outcomes, replace(other, draws=program.draws), samples=ROWS, seed=seed))
         measured_by[k] = np.concatenate([states[:, CORRECTED] for states, _ in results])

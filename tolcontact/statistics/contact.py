@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.realizations import assembled, pieces
+from tolcontact.realizations import EXISTS, assembled, pieces
 from tolcontact.statistics import intervals
 from tolcontact.statistics.sample import Sample
 from tolcontact.vocabulary import ArchiveVariable
@@ -30,7 +30,7 @@ def reactions(rows: xr.Dataset) -> np.ndarray:
     Realizations that cannot be assembled have no reactions, and are left out.
     """
     estimates, (rows,) = [], assembled(rows)
-    if not rows.sizes[terms.REALIZATION]:
+    if EXISTS in rows.coords and not rows[EXISTS].values.any():
         return np.full((rows.sizes[terms.PAIR], 1 + len(terms.REACTION_PERCENTILES), len(terms.ESTIMATE)), np.nan)
     for pair in range(rows.sizes[terms.PAIR]):
         reaction = rows[[terms.REACTION.name]].isel({terms.PAIR: pair})

@@ -67,7 +67,7 @@ class MeasuredValues:
     def __init__(self, rows: xr.Dataset, measure: int, state: str, limits: Limits) -> None:
         (existing,) = (rows,) if state == terms.STATES[terms.RAW] else assembled(rows)
         self.sample: Sample = measured_sample(existing, measure, state)
-        self.missing = rows.sizes[terms.REALIZATION] - existing.sizes[terms.REALIZATION]
+        self.missing = rows.sizes[terms.REALIZATION] - self.sample.count
         self.limits = limits
 
     @cached_property
