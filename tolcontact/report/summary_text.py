@@ -28,8 +28,8 @@ APART = (
     "(95 % confidence for all measurements of this run together)"
 )
 WITHOUT = (
-    f"{NO_INTERVAL} no interval: std. dev., 6 sigma and variance need 10 realizations, and at a stop\n"
-    f"these and the mean need {MIN_APART} values apart from it; skewness and kurtosis need 1000\n"
+    f"{NO_INTERVAL} no interval: std. dev., 6 sigma and variance need 10 realizations; at a stop\n"
+    f"these and the mean need {MIN_APART} values off it; skewness and kurtosis need 1000\n"
     "realizations, and a kurtosis below 3.5"
 )
 
