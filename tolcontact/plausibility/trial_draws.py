@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from tolcontact import poses as pose
-from tolcontact.arrays import Array, Float
+from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation import Program
 from tolcontact.compilation.bounded_pairs import TRIAL_SEED, push
 from tolcontact.interference import Clash
@@ -42,6 +42,10 @@ class TrialDraws:
         finite = np.isfinite(relative).all(axis=(1, 2))
         poses = placed.reshape(len(deviations), len(program.nominal.parts), pose.ENTRIES)
         return cls(program, deviations[finite], relative[finite], observed["measured"][finite], poses[finite])
+
+    def some(self, rows: Int[Array, " k"]) -> "TrialDraws":
+        """Return some of these draws, rows (k,)."""
+        return TrialDraws(self.program, self.deviations[rows], self.relative[rows], self.measured[rows], self.poses[rows])
 
     def nominal_gaps(self, k: int) -> Float[Array, " point"]:
         """Return the gaps (point,) [mm] of pair k in the nominal assembly."""
