@@ -9,7 +9,7 @@ import trimesh
 
 from tolcontact.declaration.values import Vector
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere, Torus
-from tolcontact.geometry.face_groups import FaceOnSurface, hollow_cylinders, interruptions, patterns, slots
+from tolcontact.geometry.face_groups import MARGIN, FaceOnSurface, hollow_cylinders, interruptions, patterns, slots
 from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
 from tolcontact.geometry.files import BREP, STATED_FACES
 from tolcontact.geometry.files.step_shapes import FaceMeasure, StatedFace
@@ -81,9 +81,9 @@ def _grouped(mesh: trimesh.Trimesh, faces: Sequence[FaceInFile], surfaces: Seque
     touching = np.unique(np.sort(neighbours[neighbours[:, 0] != neighbours[:, 1]], axis=1), axis=0)
     wholes = _wholes(mesh, touching, surfaces)
     faces = [replace(face, whole=whole) for face, whole in zip(faces, wholes, strict=True)]
-    cylinders = hollow_cylinders(mesh, faces, surfaces)
-    slot_of = {number: slot for slot in slots(faces, cylinders, touching) for number in slot}
-    pattern_of = {number: pattern for pattern in patterns(cylinders) for number in pattern}
+    cylinders, margin = hollow_cylinders(faces, surfaces), MARGIN * float(mesh.scale)
+    slot_of = {number: slot for slot in slots(faces, cylinders, touching, margin) for number in slot}
+    pattern_of = {number: pattern for pattern in patterns(mesh, cylinders, surfaces, margin) for number in pattern}
     return [replace(face, slot=slot_of.get(face.number, ()), pattern=pattern_of.get(face.number, ())) for face in faces]
 
 
