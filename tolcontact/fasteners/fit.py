@@ -12,12 +12,12 @@ from tolcontact.errors import GeometryFault
 from tolcontact.fasteners.placed_faces import Axis, axis_of, outer_cylinders, placed_cylinder
 from tolcontact.features import PlaneFeature
 from tolcontact.features.feature_geometry import CylinderFeature
+from tolcontact.geometry.tolerances import SQUARE
 
 INTO, SEAT = "into", "seat"  # labels of faces, in addition to "through[0]" and so on
 FREE_END = 0.25  # of the diameter: how far a made shank reaches out of the parts
 ROUNDING = 1e-6  # of a diameter: what counts as nothing
 PRESSED = 1e-3  # of a diameter: distance allowed between the axes of a part and of the hole that it goes into
-MAX_LEAN = 1e-4  # [rad] between the axis of a fastener and the normal of its seat
 
 Holes = Mapping[str, CylinderFeature]  # by their labels, from the head on
 
@@ -41,7 +41,7 @@ class Fit:
 
     def faults(self, seat: Face | None) -> Iterator[str]:
         """Yield why the shank does not stand in its holes, or its head on the face of the seat."""
-        if self.seat and np.linalg.norm(np.cross(self.seat.normal, self.axis.head)) > MAX_LEAN:
+        if self.seat and np.linalg.norm(np.cross(self.seat.normal, self.axis.head)) > SQUARE:
             yield f"{SEAT}: face {seat} is not square to the axis of the holes; expected the plane under the head"
             return
         for label, hole in self.holes.items():

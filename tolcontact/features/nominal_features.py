@@ -13,10 +13,11 @@ from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.freedoms import DATUM, FEATURE, FORM, Freedom
 from tolcontact.features.nominal_feature import FaceDeviation, NominalFeature, Placement, moving_faces
-from tolcontact.features.nominal_pattern import MIXED, RELATIVE, SIZE_TOLERANCE, NominalPattern, check_alike
+from tolcontact.features.nominal_pattern import MIXED, RELATIVE, NominalPattern, check_alike
 from tolcontact.features.tolerance_kinds import form_field_of, form_tolerance
 from tolcontact.features.tolerance_layers import tolerance_layers
 from tolcontact.geometry.faces import FaceArea, Meshes, face_area, patch
+from tolcontact.geometry.tolerances import SAME_SIZE
 
 MIN_SHARE = 1e-6  # of a face's area: a smaller common part of two faces does not count
 
@@ -211,7 +212,7 @@ def _check_size(feature: Feature, geometry: FeatureGeometry) -> None:
     size = feature.size
     if size is None or not isinstance(geometry, FeatureOfSize):
         raise GeometryFault(f"a size is for cylinders, spheres and two opposed planes, and it is {geometry.in_words}")
-    if abs(geometry.size - size.nominal) > SIZE_TOLERANCE * geometry.size:
+    if abs(geometry.size - size.nominal) > SAME_SIZE * geometry.size:
         raise GeometryFault(
             f"its size is {geometry.size:.9g} mm as shaped, and {size.nominal:g} mm in its tolerance; state the size of the "
             "shape, with the limits about it"

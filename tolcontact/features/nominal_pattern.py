@@ -14,8 +14,8 @@ from tolcontact.features.datum_frames import DatumFrame, DatumShift
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize, PlaneFeature
 from tolcontact.features.freedoms import Freedom
 from tolcontact.features.nominal_feature import NominalFeature
+from tolcontact.geometry.tolerances import SAME_SIZE
 
-SIZE_TOLERANCE = 1e-6  # relative: largest difference between sizes that count as equal
 MIN_LENGTH = 1e-4  # of the coordinates of a motion of 1 mm that affects a pattern
 MIXED, RELATIVE = "mixed", "relative"
 MOTIONS = ("common shift x", "common shift y", "common shift z", "common turn x", "common turn y", "common turn z")
@@ -145,7 +145,7 @@ def check_alike(members: Sequence[FeatureGeometry]) -> None:
     for number, member in enumerate(members[1:], start=2):
         is_alike = type(member) is type(first)
         if is_alike and isinstance(member, FeatureOfSize) and isinstance(first, FeatureOfSize):
-            is_alike = member.is_inner == first.is_inner and abs(member.size - first.size) <= SIZE_TOLERANCE * first.size
+            is_alike = member.is_inner == first.is_inner and abs(member.size - first.size) <= SAME_SIZE * first.size
         if not is_alike:
             raise GeometryFault(
                 f"its member 1 is {_described(first)}, and member {number} is {_described(member)}; the members of a pattern "

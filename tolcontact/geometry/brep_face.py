@@ -14,11 +14,10 @@ from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
 from tolcontact.geometry.files import BREP, STATED_FACES
 from tolcontact.geometry.files.step_shapes import FaceMeasure, StatedFace
 from tolcontact.geometry.fitting import fit_surface
-from tolcontact.geometry.tolerances import ROUNDING
+from tolcontact.geometry.tolerances import RESIDUALS, ROUNDING
 from tolcontact.geometry.triangle_mesh import smooth_pieces
 
 FIT_TOLERANCE = 1e-3  # [mm] largest distance of the vertices of a face from its surface
-RESIDUAL_FACTOR = 10  # times the residuals of two faces: largest distance between parts of one surface
 PIECES = "pieces"
 DESCRIPTIONS = "descriptions"
 ON_SURFACES = "on_surfaces"
@@ -119,7 +118,7 @@ def are_one_surface(mesh: trimesh.Trimesh, face: FaceOnSurface, neighbour: FaceO
         return False
     vertices = np.asarray(mesh.vertices)[np.unique(np.asarray(mesh.faces)[next_triangles])]
     distance = float(np.abs(surface.distance(vertices)[0]).max())
-    return distance <= RESIDUAL_FACTOR * (surface.residual + next_surface.residual) + ROUNDING * float(mesh.scale)
+    return distance <= RESIDUALS * (surface.residual + next_surface.residual) + ROUNDING * float(mesh.scale)
 
 
 def _is_outside(mesh: trimesh.Trimesh, surface: AnalyticSurface, triangles: np.ndarray) -> bool:

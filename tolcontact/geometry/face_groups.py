@@ -17,11 +17,9 @@ import trimesh
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, axes_across, azimuths
 from tolcontact.geometry.body_overlap import SolidBody
 from tolcontact.geometry.face_in_file import FaceInFile
-from tolcontact.geometry.tolerances import SAME_PLACE
+from tolcontact.geometry.tolerances import RESIDUALS, SAME_PLACE, SQUARE
 
-MAX_TILT = 1e-4  # [rad] between directions that count as parallel
 MARGIN = 1e-5  # of a part's size: difference of lengths that count as equal
-RESIDUAL_FACTOR = 10  # times the residual of a fitted cylinder: the same
 MAX_HOLE_GAP = 3.0  # [rad] around the axis: the end of a slot has a gap of pi
 MIN_COMMON_SHARE = 0.5  # of the shorter face of an interrupted surface along the axis
 DIRECTIONS = 360  # samples around the axis
@@ -111,7 +109,7 @@ def slots(faces: Sequence[FaceInFile], cylinders: Mapping[Group, Cylinder], touc
     return [
         tuple(sorted(itertools.chain(*pair, *planes)))
         for pair, planes in walls.items()
-        if any(np.linalg.norm(normals[left] + normals[right]) < MAX_TILT for left, right in itertools.combinations(planes, 2))
+        if any(np.linalg.norm(normals[left] + normals[right]) < SQUARE for left, right in itertools.combinations(planes, 2))
     ]
 
 
@@ -138,12 +136,12 @@ def _whole(face: FaceInFile) -> Group:
 def _are_equal(left: Cylinder, right: Cylinder, margin: float) -> bool:
     """Return whether two cylinders have the same radius, and parallel axes."""
     difference, tilt = abs(left.radius - right.radius), float(np.linalg.norm(np.cross(left.axis, right.axis)))
-    return difference < margin + RESIDUAL_FACTOR * (left.residual + right.residual) and tilt < MAX_TILT
+    return difference < margin + RESIDUALS * (left.residual + right.residual) and tilt < SQUARE
 
 
 def _is_tangent(cylinder: Cylinder, plane: FaceInFile, margin: float) -> bool:
     """Return whether a plane that faces the axis is tangent to a cylinder."""
     normal = np.array(plane.direction)
     height = float((cylinder.origin - np.array(plane.point)) @ normal)
-    is_parallel = abs(float(cylinder.axis @ normal)) < MAX_TILT
-    return is_parallel and abs(height - cylinder.radius) < margin + RESIDUAL_FACTOR * cylinder.residual
+    is_parallel = abs(float(cylinder.axis @ normal)) < SQUARE
+    return is_parallel and abs(height - cylinder.radius) < margin + RESIDUALS * cylinder.residual
