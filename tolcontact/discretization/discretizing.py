@@ -8,17 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tolcontact.declaration import (
-    Assembly,
-    DatumTargets,
-    Face,
-    Feature,
-    Location,
-    Locator,
-    Part,
-    ThreeTwoOne,
-    Tolerance,
-)
+from tolcontact.declaration import Assembly, Face, Feature, Location, Locator, Part, ThreeTwoOne, Tolerance
 from tolcontact.declaration.locator import FIRST_ORDER, USUAL_STIFFNESS
 from tolcontact.discretization.contact_points import contact_points, support_pairs
 from tolcontact.discretization.locators import FACES_OF_SCHEME, Locators, NominalPart, scheme_locators
@@ -119,14 +109,10 @@ def _shapes(assembly: Assembly, faults: Faults) -> dict[Part, Shape]:
 
 def _add_features(assembly: Assembly, indices: Mapping[Part, int], meshes: Meshes, features: Features, faults: Faults) -> None:
     for part in assembly.parts:
-        index = indices[part]
         ordered, circular = datum_order(part)
         for declared in ordered:
             place = f'part "{part.name}": {designation(declared.noun, declared)}'
-            if isinstance(declared, DatumTargets):
-                faults.attempt(place, features.add_targets, declared, index)
-            else:
-                faults.attempt(place, features.add, declared, index, meshes)
+            faults.attempt(place, features.add, declared, indices[part], meshes)
         if circular:
             names = ", ".join(f'"{declared.name}"' for declared in circular)
             faults.append(

@@ -8,7 +8,7 @@ import numpy as np
 
 from tolcontact.declaration import DatumTargets, Face, Feature, Pattern
 from tolcontact.errors import GeometryFault
-from tolcontact.features.datum_frames import DatumShift, padded
+from tolcontact.features.datum_frames import DatumShift, Declared, padded
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.freedoms import DATUM, FEATURE, FORM, Freedom
@@ -48,8 +48,11 @@ class Features:
         """Return a copy, so that further features do not change these."""
         return replace(self, patterns=list(self.patterns), features=dict(self.features), _targets=dict(self._targets))
 
-    def add(self, declared: Feature | Pattern, part: int, meshes: Meshes) -> None:
-        """Add a feature or a pattern whose datums have been added before. Raises GeometryFault."""
+    def add(self, declared: Declared, part: int, meshes: Meshes) -> None:
+        """Add a feature, a pattern or datum targets, whose datums and features have been added before. Raises GeometryFault."""
+        if isinstance(declared, DatumTargets):
+            self._add_targets(declared, part)
+            return
         new = [member for member in declared.members if member not in self.features]
         if isinstance(declared, Pattern) and (lost := [member.name for member in declared.borrowed if member in new]):
             raise GeometryFault(f'its member "{lost[0]}" could not be made; mend that feature first')
@@ -87,7 +90,7 @@ class Features:
         members = tuple(self.features[member] for member in declared.members)
         self.patterns.append(replace(pattern, members=members, freedoms=tuple(freedoms), shifts=tuple(shifts), form=form))
 
-    def add_targets(self, targets: DatumTargets, part: int) -> None:
+    def _add_targets(self, targets: DatumTargets, part: int) -> None:
         """Add a datum whose features have been added before. Raises GeometryFault for a target that is not on its feature."""
         if lost := [feature.name for feature in targets.features if feature not in self.features]:
             raise GeometryFault(f'its feature "{lost[0]}" could not be made; mend that feature first')
