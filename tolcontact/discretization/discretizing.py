@@ -4,7 +4,6 @@ import difflib
 import logging
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -213,7 +212,8 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: Faults) -> N
     common = location.tolerance if location else None
     nominal = _locators(scene, location, locators, common, part)
     if location is not None and location.floating:
-        nominal = replace(nominal, floating=(_centroid(mesh) @ R_WP.T + t_WP, float(mesh.scale)))
+        centroid = mesh.area_faces @ mesh.triangles_center / mesh.area
+        nominal = replace(nominal, floating=(centroid @ R_WP.T + t_WP, float(mesh.scale)))
     if len(nominal):
         place = designation("joint", location) if location and location.joint else designation("part", part)
         faults.attempt(place, nominal.check_independent)
@@ -233,11 +233,6 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: Faults) -> N
         station=scene.station,
         owners=tuple(scene.index(locator.part or part) for locator in locators) if location and location.joint else (),
     )
-
-
-def _centroid(mesh: Any) -> np.ndarray:
-    """Return the centroid (3,) of a mesh's surface."""
-    return mesh.area_faces @ mesh.triangles_center / mesh.area
 
 
 def _locators(

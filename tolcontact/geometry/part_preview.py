@@ -1,6 +1,5 @@
 """Previews of parts before a run: shapes in their poses, and code that selects each face."""
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -50,7 +49,9 @@ def preview(part: Part) -> PartPreview | None:
     face_of, _ = number_faces(mesh)
     faces = describe_faces(mesh)
     snippets = tuple(_snippet(mesh, face_of, face) for face in faces)
-    groups = tuple(tuple(_group_snippets(face)) for face in faces)
+    groups = tuple(
+        tuple(_brep_snippet(face, f'whole="{word}"') for word in FACE_GROUPS if getattr(face, word)) for face in faces
+    )
     return PartPreview(mesh, R, vertices, np.asarray(mesh.faces), face_of, faces, snippets, groups)
 
 
@@ -72,12 +73,6 @@ def _snippet(mesh: trimesh.Trimesh, face_of: np.ndarray, face: FaceInFile) -> st
 
 def _brep_snippet(face: FaceInFile, option: str) -> str:
     return f"face(tc.select.Brep({', '.join(filter(None, [_vector(np.array(face.point)), option]))}))"
-
-
-def _group_snippets(face: FaceInFile) -> Iterator[str]:
-    for word in FACE_GROUPS:
-        if getattr(face, word):
-            yield _brep_snippet(face, f'whole="{word}"')
 
 
 def _box(mesh: trimesh.Trimesh, mask: np.ndarray) -> str:
