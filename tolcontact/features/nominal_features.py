@@ -13,7 +13,7 @@ from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.freedoms import DATUM, FEATURE, FORM, Freedom
 from tolcontact.features.nominal_feature import FaceDeviation, NominalFeature, Placement, moving_faces
-from tolcontact.features.nominal_pattern import MIXED, RELATIVE, NominalPattern, check_alike
+from tolcontact.features.nominal_pattern import MIXED, RELATIVE, NominalPattern, unlike_members
 from tolcontact.features.tolerance_kinds import form_field_of, form_tolerance
 from tolcontact.features.tolerance_layers import tolerance_layers
 from tolcontact.geometry.faces import FaceArea, Meshes, face_area, patch
@@ -62,8 +62,8 @@ class Features:
         pattern = NominalPattern(
             declared, tuple(recognized.get(member) or self.features[member] for member in declared.members)
         )
-        if declared.tolerances:
-            check_alike(pattern.geometries)
+        if declared.tolerances and (fault := unlike_members(pattern.geometries)):
+            raise GeometryFault(fault)
         # The order of the freedoms is the order of their columns: displacements, datum shifts, sizes, modes of forms.
         start = self.first_column + len(self.freedoms)
         pattern = replace(pattern, layers=tolerance_layers(pattern, self.datums(part), start))

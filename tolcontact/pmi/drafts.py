@@ -18,7 +18,7 @@ from tolcontact.features import Features, datum_order
 from tolcontact.features.datum_frames import Declared
 from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, SlabFeature
 from tolcontact.features.feature_recognition import feature_geometry
-from tolcontact.features.nominal_pattern import check_alike
+from tolcontact.features.nominal_pattern import unlike_members
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.files import Shape
 from tolcontact.pmi import declarable
@@ -144,7 +144,7 @@ def _patterns(drafts: Mapping[Place, Draft], datums: Collection[frozenset[Place]
         places, members = frozenset(group), [drafts[place] for place in group]
         is_divided = any(places & datum and places != datum for datum in datums)
         geometries = tuple(geometry for member in members for geometry in member.geometries)
-        if len(members) > 1 and not is_divided and _are_alike(geometries):
+        if len(members) > 1 and not is_divided and not unlike_members(geometries):
             kind, number = members[0].name.split()
             faces = tuple(faces for member in members for faces in member.faces)
             yield Draft(f"{kind}s {number}", faces, geometries, stated=members[0].stated), places
@@ -156,14 +156,6 @@ def _keeps_together(claim: Claim) -> bool:
     return isinstance(stated, Tolerance) and (
         stated.kind == "position" or stated.refines is not None or "common zone" in stated.modifiers
     )
-
-
-def _are_alike(geometries: Sequence[FeatureGeometry]) -> bool:
-    try:
-        check_alike(geometries)
-    except GeometryFault:
-        return False
-    return True
 
 
 def _common_datum(claim: Claim, drafts: Mapping[Place, Draft]) -> Draft:
