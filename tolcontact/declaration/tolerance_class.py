@@ -126,7 +126,9 @@ class ToleranceClass:
         if letter == "js":
             lower = -width / 2
         elif letter == "j":
-            lower = self._upper_limit_of_j(nominal) - width if self.is_hole else -self._lower_limit_of_j(nominal)
+            limits = _UPPER_LIMITS_OF_J if self.is_hole else _LOWER_LIMITS_OF_J
+            limit = self._value(limits.get(self.grade, ""), RANGES, nominal)
+            lower = limit - width if self.is_hole else -limit
         elif letter in _BELOW:
             distance = self._distance(letter, nominal)
             lower = distance if self.is_hole else -distance - width
@@ -169,12 +171,6 @@ class ToleranceClass:
             return -9.0  # the exception of Table 2
         finer = GRADES[GRADES.index(self.grade) - 1]
         return self._width(nominal) - ToleranceClass(self.letters, finer)._width(nominal) - distance
-
-    def _lower_limit_of_j(self, nominal: float) -> float:
-        return self._value(_LOWER_LIMITS_OF_J.get(self.grade, ""), RANGES, nominal)
-
-    def _upper_limit_of_j(self, nominal: float) -> float:
-        return self._value(_UPPER_LIMITS_OF_J.get(self.grade, ""), RANGES, nominal)
 
     @property
     def _number(self) -> int:

@@ -17,28 +17,25 @@ from tolcontact.errors import CONTROL_CHARACTERS, shown
 MAX_NAME = 500  # characters
 MAX_NUMBER = 1e15  # of a length [mm], a force, a stiffness: nothing overflows
 MAX_GROUP_NAME = 255  # bytes in UTF-8: the netCDF library's NC_MAX_NAME is 256, with which some groups cannot be written
+_TEXT = re.compile(".*")
 _KEY = re.compile(r"\w(?:[^/]*[^/\s])?")
 
 
-def text_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
-    """Yield the faults of names that are only shown."""
+def text_faults(
+    kind: str, names: Sequence[Any], pattern: re.Pattern[str] = _TEXT, expected: str = "without control characters"
+) -> Iterator[str]:
+    """Yield the faults of names that are only shown, or have to match another `pattern`, which is `expected` in words."""
     for name in dict.fromkeys(names):
-        if fault := _length_fault(kind, name):
-            yield fault
-        elif not is_line(name):
-            yield f"{kind} {name!r}: a name must be text without control characters (the archive uses it)"
+        if isinstance(name, str) and len(name) > MAX_NAME:
+            yield f"{kind} {name[:40]!r}...: the name has {len(name)} characters; expected at most {MAX_NAME}"
+        elif not (is_line(name) and pattern.fullmatch(name)):
+            yield f"{kind} {name!r}: a name must be text {expected} (the archive uses it)"
 
 
 def key_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
     """Yield the faults of names that identify things in the archive."""
-    for name in dict.fromkeys(names):
-        if fault := _length_fault(kind, name):
-            yield fault
-        elif not (is_line(name) and _KEY.fullmatch(name)):
-            yield (
-                f"{kind} {name!r}: a name must be text that starts with a letter, digit or underscore, contains "
-                'no "/" and no control character, and does not end in a space (the archive uses it)'
-            )
+    expected = 'that starts with a letter, digit or underscore, contains no "/" and no control character, and does not end in a'
+    yield from text_faults(kind, names, _KEY, f"{expected} space")
     yield from repetitions(kind, names)
 
 
@@ -52,13 +49,6 @@ def group_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
                     f"{kind} {name[:40]!r}...: the name takes {size} bytes in UTF-8; expected at most {MAX_GROUP_NAME} "
                     "(the archive has groups of that name)"
                 )
-
-
-def _length_fault(kind: str, name: Any) -> str:
-    """Return the fault of a name that is too long; empty if it is not."""
-    if not isinstance(name, str) or len(name) <= MAX_NAME:
-        return ""
-    return f"{kind} {name[:40]!r}...: the name has {len(name)} characters; expected at most {MAX_NAME}"
 
 
 def repetitions(kind: str, names: Sequence[Any]) -> Iterator[str]:

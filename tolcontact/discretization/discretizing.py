@@ -4,21 +4,10 @@ import difflib
 import logging
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from tolcontact.declaration import (
-    Assembly,
-    DatumTargets,
-    Face,
-    Feature,
-    Location,
-    Locator,
-    Part,
-    ThreeTwoOne,
-    Tolerance,
-)
+from tolcontact.declaration import Assembly, Face, Feature, Location, Locator, Part, ThreeTwoOne, Tolerance
 from tolcontact.declaration.locator import FIRST_ORDER, USUAL_STIFFNESS
 from tolcontact.discretization.contact_points import contact_points, support_pairs
 from tolcontact.discretization.locators import FACES_OF_SCHEME, Locators, NominalPart, scheme_locators
@@ -119,14 +108,10 @@ def _shapes(assembly: Assembly, faults: Faults) -> dict[Part, Shape]:
 
 def _add_features(assembly: Assembly, indices: Mapping[Part, int], meshes: Meshes, features: Features, faults: Faults) -> None:
     for part in assembly.parts:
-        index = indices[part]
         ordered, circular = datum_order(part)
         for declared in ordered:
             place = f'part "{part.name}": {designation(declared.noun, declared)}'
-            if isinstance(declared, DatumTargets):
-                faults.attempt(place, features.add_targets, declared, index)
-            else:
-                faults.attempt(place, features.add, declared, index, meshes)
+            faults.attempt(place, features.add, declared, indices[part], meshes)
         if circular:
             names = ", ".join(f'"{declared.name}"' for declared in circular)
             faults.append(
@@ -227,7 +212,8 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: Faults) -> N
     common = location.tolerance if location else None
     nominal = _locators(scene, location, locators, common, part)
     if location is not None and location.floating:
-        nominal = replace(nominal, floating=(_centroid(mesh) @ R_WP.T + t_WP, float(mesh.scale)))
+        centroid = mesh.area_faces @ mesh.triangles_center / mesh.area
+        nominal = replace(nominal, floating=(centroid @ R_WP.T + t_WP, float(mesh.scale)))
     if len(nominal):
         place = designation("joint", location) if location and location.joint else designation("part", part)
         faults.attempt(place, nominal.check_independent)
@@ -247,11 +233,6 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: Faults) -> N
         station=scene.station,
         owners=tuple(scene.index(locator.part or part) for locator in locators) if location and location.joint else (),
     )
-
-
-def _centroid(mesh: Any) -> np.ndarray:
-    """Return the centroid (3,) of a mesh's surface."""
-    return mesh.area_faces @ mesh.triangles_center / mesh.area
 
 
 def _locators(

@@ -1,7 +1,7 @@
 """Expansion of a fastener into a part, its location, contact pairs and a force."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,32 +12,39 @@ from tolcontact.declaration.part import face_of
 from tolcontact.declaration.values import script_line
 from tolcontact.errors import Faults, GeometryFault
 from tolcontact.fasteners.fit import INTO, SEAT, Fit, check_types, made_fit, part_fit, reference_faults, station_faults
-from tolcontact.fasteners.placed_faces import PlacedCylinder, PlacedPlane, meshes_of, placed_cylinder, placed_plane, placement
+from tolcontact.fasteners.placed_faces import meshes_of, placed_cylinder, placed_plane
+from tolcontact.features import PlaneFeature
+from tolcontact.features.feature_geometry import CylinderFeature
 from tolcontact.geometry.faces import face_area
-from tolcontact.geometry.shapes import HEAD_WIDTH
+from tolcontact.geometry.shapes import HEAD_WIDTH, placement_of
 
 DIGITS = 12  # of places [mm]: what is beyond is rounding
 SAME_FACE = 1 - 1e-6  # share of its area that a face has in common with the face of its feature
 
 
-def locate(scene: Assembly | Station, name: str, part: Part, fit: Fit) -> None:
-    """Locate a fastener in the hole that holds it, or let it float: with its head on its seat, or held at an end alone."""
-    if INTO in fit.holes:
-        ground = _feature_of(fit.holes[INTO].face, f"{name} hole")
+def locate(
+    scene: Assembly | Station, name: str, part: Part, fit: Fit, faces: Mapping[str, Face], seat: Face | None
+) -> None:  # fmt: skip
+    """Locate a fastener in the hole that holds it, or let it float: with its head on its seat, or held at an end alone.
+
+    `faces` are the walls of its holes by label, from its head on.
+    """
+    if INTO in faces:
+        ground = _feature_of(faces[INTO], f"{name} hole")
         scene.locate(part, list(_hole_locators(part, fit, fit.holes[INTO])), on=ground)
-    elif fit.seat is not None:
-        ground = _feature_of(fit.seat.face, f"{name} seat")
+    elif seat is not None and fit.seat is not None:
+        ground = _feature_of(seat, f"{name} seat")
         scene.locate(part, list(_seat_locators(part, fit, fit.seat)), on=ground, floating=True)
     else:
-        first = next(iter(fit.holes.values()))
+        first = next(iter(faces.values()))
         end = _locator(part, "end", fit.axis.at(fit.reach[1]), fit.axis.head)
-        scene.locate(part, [end], on=first.face.part, floating=True)
+        scene.locate(part, [end], on=first.part, floating=True)
 
 
-def _hole_locators(part: Part, fit: Fit, hole: PlacedCylinder) -> Iterator[Locator]:
+def _hole_locators(part: Part, fit: Fit, hole: CylinderFeature) -> Iterator[Locator]:
     """Yield locators at both ends of the axis of the hole that holds a fastener, along it, and against turning."""
     x, y = fit.axis.across
-    low, high = hole.extent(fit.axis)
+    low, high = fit.axis.extent(hole)
     for number, station in enumerate((low, high), start=1):
         for letter, direction in (("x", x), ("y", y)):
             yield _locator(part, f"{letter}{number}", fit.axis.at(station), direction)
@@ -46,10 +53,10 @@ def _hole_locators(part: Part, fit: Fit, hole: PlacedCylinder) -> Iterator[Locat
     yield _locator(part, "turn", fit.axis.at((low + high) / 2) + fit.radius / 2 * x, y)
 
 
-def _seat_locators(part: Part, fit: Fit, seat: PlacedPlane) -> Iterator[Locator]:
+def _seat_locators(part: Part, fit: Fit, seat: PlaneFeature) -> Iterator[Locator]:
     """Yield supports under the head of a fastener, and above it: it slides on its seat, and neither lifts off nor tilts."""
     x, y = fit.axis.across
-    middle, arm = fit.axis.at(fit.axis.station(seat.point)), HEAD_WIDTH * fit.radius
+    middle, arm = fit.axis.at(fit.axis.station(seat.centre)), HEAD_WIDTH * fit.radius
     for number in range(3):
         angle = 2 * math.pi * number / 3
         foot = middle + arm * (math.cos(angle) * x + math.sin(angle) * y)
@@ -58,13 +65,13 @@ def _seat_locators(part: Part, fit: Fit, seat: PlacedPlane) -> Iterator[Locator]
 
 
 def _locator(part: Part, name: str, point: np.ndarray, direction: np.ndarray, *, one_sided: bool = False) -> Locator:
-    R, _ = placement(part)
+    R, _ = placement_of(part)
     return Locator(name, in_part(part, point), direction @ R, 0.0, one_sided=one_sided)
 
 
 def in_part(part: Part, point: np.ndarray) -> np.ndarray:
     """Return a point (3,) of the nominal assembly in the frame of a part."""
-    R, t = placement(part)
+    R, t = placement_of(part)
     return np.round((point - t) @ R, DIGITS) + 0.0
 
 
@@ -121,17 +128,17 @@ def fasten(
         faults.refuse(assembly.name)
     else:
         fit = made_fit(subject.nominal if isinstance(subject, Size) else float(subject), holes, plane)
-    Faults(f"{place}: {fault}" for fault in fit.faults()).refuse(assembly.name)
+    Faults(f"{place}: {fault}" for fault in fit.faults(plane_face)).refuse(assembly.name)
     part = subject if isinstance(subject, Part) else _made_part(assembly, name, subject, fit)
-    _declare_contacts(scene, name, fit.shank or _shank_face(part, fit), fit)
-    locate(scene, name, part, fit)
+    _declare_contacts(scene, name, fit.shank or _shank_face(part, fit), faces)
+    locate(scene, name, part, fit, faces, plane_face)
     if pushed is not None:
         middle = fit.axis.at(sum(fit.reach) / 2)
         scene.force(f"{name} push", at=part.point(*in_part(part, middle)), vector=pushed)
     return part
 
 
-def _hole(face: Face) -> PlacedCylinder:
+def _hole(face: Face) -> CylinderFeature:
     hole = placed_cylinder(face)
     if not hole.is_inner:
         raise GeometryFault(f"face {face} is the outside of a cylinder; expected the wall of a hole")
@@ -154,17 +161,17 @@ def _made_part(assembly: Assembly, name: str, size: Size | float, fit: Fit) -> P
     return part
 
 
-def _declare_contacts(scene: Assembly | Station, name: str, shank: Face, fit: Fit) -> None:
-    """Declare contact of the shank with each hole that it passes through.
+def _declare_contacts(scene: Assembly | Station, name: str, shank: Face, faces: Mapping[str, Face]) -> None:
+    """Declare contact of the shank with the face of each hole that it passes through, by labels.
 
     Parts before the last one are moving sides, so that contact may move them. The last one holds the fastener, or is the
     reference of it.
     """
-    for label, hole in fit.holes.items():
-        pair = f"{name} in {hole.face.part.name}"
+    for label, face in faces.items():
+        pair = f"{name} in {face.part.name}"
         if label == INTO:
             continue
-        if hole is list(fit.holes.values())[-1]:
-            scene.contact(pair, moving=shank, reference=hole.face)
+        if face is list(faces.values())[-1]:
+            scene.contact(pair, moving=shank, reference=face)
         else:
-            scene.contact(pair, moving=hole.face, reference=shank)
+            scene.contact(pair, moving=face, reference=shank)

@@ -9,15 +9,17 @@ import numpy as np
 from tolcontact.declaration import Assembly, Face, Feature, Part, Size, Station
 from tolcontact.declaration.values import is_finite, is_length, vector
 from tolcontact.errors import GeometryFault
-from tolcontact.fasteners.placed_faces import Axis, PlacedCylinder, PlacedPlane, outer_cylinders, placed_cylinder
+from tolcontact.fasteners.placed_faces import Axis, axis_of, outer_cylinders, placed_cylinder
+from tolcontact.features import PlaneFeature
+from tolcontact.features.feature_geometry import CylinderFeature
+from tolcontact.geometry.tolerances import SQUARE
 
 INTO, SEAT = "into", "seat"  # labels of faces, in addition to "through[0]" and so on
 FREE_END = 0.25  # of the diameter: how far a made shank reaches out of the parts
 ROUNDING = 1e-6  # of a diameter: what counts as nothing
 PRESSED = 1e-3  # of a diameter: distance allowed between the axes of a part and of the hole that it goes into
-MAX_LEAN = 1e-4  # [rad] between the axis of a fastener and the normal of its seat
 
-Holes = Mapping[str, PlacedCylinder]  # by their labels, from the head on
+Holes = Mapping[str, CylinderFeature]  # by their labels, from the head on
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,36 +33,27 @@ class Fit:
     """
 
     holes: Holes
-    seat: PlacedPlane | None
+    seat: PlaneFeature | None
     axis: Axis
     radius: float
     reach: tuple[float, float]
     shank: Face | None = None
 
-    @property
-    def tightest(self) -> PlacedCylinder:
-        """The hole of the smallest diameter."""
-        return min(self.holes.values(), key=lambda hole: hole.radius)
-
-    @property
-    def clearance(self) -> float:
-        """Half the difference [mm] of the diameters of its tightest hole and the shank."""
-        return self.tightest.radius - self.radius
-
-    def faults(self) -> Iterator[str]:
-        """Yield why the shank does not stand in its holes, or its head on the seat."""
-        if self.seat and np.linalg.norm(np.cross(self.seat.normal, self.axis.head)) > MAX_LEAN:
-            yield f"{SEAT}: face {self.seat.face} is not square to the axis of the holes; expected the plane under the head"
+    def faults(self, seat: Face | None) -> Iterator[str]:
+        """Yield why the shank does not stand in its holes, or its head on the face of the seat."""
+        if self.seat and np.linalg.norm(np.cross(self.seat.normal, self.axis.head)) > SQUARE:
+            yield f"{SEAT}: face {seat} is not square to the axis of the holes; expected the plane under the head"
             return
         for label, hole in self.holes.items():
             yield from self._hole_faults(label, hole)
 
-    def _hole_faults(self, label: str, hole: PlacedCylinder) -> Iterator[str]:
-        clearance, offset, (low, high) = hole.radius - self.radius, hole.offset(self.axis), hole.extent(self.axis)
+    def _hole_faults(self, label: str, hole: CylinderFeature) -> Iterator[str]:
+        clearance, (low, high) = hole.size / 2 - self.radius, self.axis.extent(hole)
+        offset = max(self.axis.distance(hole.end(number)) for number in (0, 1))
         limit = PRESSED * 2 * self.radius if label == INTO else clearance
         if label != INTO and clearance < -ROUNDING * self.radius:
             yield (
-                f"{label} has a diameter of {2 * hole.radius:.6g} mm, and the fastener {2 * self.radius:.6g} mm; expected a "
+                f"{label} has a diameter of {hole.size:.6g} mm, and the fastener {2 * self.radius:.6g} mm; expected a "
                 "fastener that is not thicker than its hole"
             )
         elif offset > limit + ROUNDING * self.radius:
@@ -72,16 +65,16 @@ class Fit:
             yield f"{label}: the fastener does not reach into this hole; move it, or choose another one"
 
 
-def made_fit(diameter: float, holes: Holes, seat: PlacedPlane | None) -> Fit:
+def made_fit(diameter: float, holes: Holes, seat: PlaneFeature | None) -> Fit:
     """Return the fit of a fastener that is to be made: on the axis of its last hole, with its origin under its head."""
     axis = _axis_of(list(holes.values()), seat)
-    extents = {label: hole.extent(axis) for label, hole in holes.items()}
-    top = axis.station(seat.point) if seat else max(high for _, high in extents.values()) + FREE_END * diameter
+    extents = {label: axis.extent(hole) for label, hole in holes.items()}
+    top = axis.station(seat.centre) if seat else max(high for _, high in extents.values()) + FREE_END * diameter
     bottom = extents[INTO][0] if INTO in extents else min(low for low, _ in extents.values()) - FREE_END * diameter
     return Fit(holes, seat, Axis(axis.at(top), axis.head), diameter / 2, (bottom - top, 0.0))
 
 
-def part_fit(part: Part, face: Face | None, holes: Holes, seat: PlacedPlane | None) -> Fit:
+def part_fit(part: Part, face: Face | None, holes: Holes, seat: PlaneFeature | None) -> Fit:
     """Return the fit of a part whose shank is a face, or the thickest outer cylinder about the middle of the first hole.
 
     Raises GeometryFault if there is none.
@@ -92,28 +85,28 @@ def part_fit(part: Part, face: Face | None, holes: Holes, seat: PlacedPlane | No
         if shank.is_inner:
             raise GeometryFault(f"face {face} is the wall of a hole; expected the outside of the shank")
     else:
-        candidates = [cylinder for cylinder in outer_cylinders(part) if _reaches(cylinder, first)]
+        candidates = [candidate for candidate in outer_cylinders(part) if _reaches(candidate[1], first)]
         if not candidates:
             raise GeometryFault(
                 f'no outer cylinder of part "{part.name}" stands in the first hole; move the part there, or give the face of '
                 "its shank in place of the part"
             )
-        shank = candidates[0]
-    axis = shank.axis(_axis_of(list(holes.values()), seat).head)
-    return Fit(holes, seat, axis, shank.radius, shank.extent(axis), shank.face)
+        face, shank = candidates[0]
+    axis = axis_of(shank, _axis_of(list(holes.values()), seat).head)
+    return Fit(holes, seat, axis, shank.size / 2, axis.extent(shank), face)
 
 
-def _reaches(cylinder: PlacedCylinder, hole: PlacedCylinder) -> bool:
+def _reaches(cylinder: CylinderFeature, hole: CylinderFeature) -> bool:
     """Return whether the middle of a hole lies within a cylinder."""
-    axis = cylinder.axis(cylinder.direction)
-    low, high = cylinder.extent(axis)
-    return axis.distance(hole.middle) < cylinder.radius and low < axis.station(hole.middle) < high
+    axis = axis_of(cylinder, cylinder.axis)
+    low, high = axis.extent(cylinder)
+    return axis.distance(hole.centre) < cylinder.size / 2 and low < axis.station(hole.centre) < high
 
 
-def _axis_of(holes: list[PlacedCylinder], seat: PlacedPlane | None) -> Axis:
+def _axis_of(holes: list[CylinderFeature], seat: PlaneFeature | None) -> Axis:
     """Return the axis of the last hole, towards the first one, or out of the seat."""
     first, last = holes[0], holes[-1]
-    return last.axis(seat.normal if seat else first.middle - last.middle)
+    return axis_of(last, seat.normal if seat else first.centre - last.centre)
 
 
 def check_types(scene: Any, name: str, fastener: Any, through: Any, into: Any, seat: Any) -> None:

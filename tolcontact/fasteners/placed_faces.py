@@ -1,19 +1,21 @@
 """The faces of fasteners, of their holes and of their seats in the nominal assembly. Lengths in mm."""
 
+import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Cylinder as CylinderSelection, Face, Geometry, Part
 from tolcontact.errors import GeometryFault
+from tolcontact.features import PlaneFeature, feature_geometry
+from tolcontact.features.feature_geometry import CylinderFeature
 from tolcontact.geometry.analytic_surfaces import Cylinder
 from tolcontact.geometry.brep_face import describe_faces
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.files import Shape
-from tolcontact.geometry.shapes import shape
+from tolcontact.geometry.shapes import placement_of, shape
 
 DIRECTION_DIGITS = 9  # of the parts of a direction: what is beyond is rounding
 SHAPES = 16  # that stay in memory while a script declares its fasteners
@@ -45,88 +47,49 @@ class Axis:
         """Return the distance [mm] of a point (3,)."""
         return float(np.linalg.norm(np.cross(point - self.origin, self.head)))
 
-
-@dataclass(frozen=True, eq=False)
-class PlacedCylinder:
-    """A cylindrical face: the ends (3,) of its axis, its radius [mm], and True for a hole."""
-
-    face: Face
-    ends: tuple[np.ndarray, np.ndarray]
-    radius: float
-    is_inner: bool
-
-    @property
-    def middle(self) -> np.ndarray:
-        """The middle (3,) of its axis."""
-        return (self.ends[0] + self.ends[1]) / 2
-
-    @property
-    def direction(self) -> np.ndarray:
-        """The unit vector (3,) from its first end to the other one."""
-        along = self.ends[1] - self.ends[0]
-        return along / np.linalg.norm(along)
-
-    def axis(self, towards: np.ndarray) -> Axis:
-        """Return its axis from its middle, in the sense of a vector (3,)."""
-        return Axis(self.middle, self.direction * (1.0 if self.direction @ towards >= 0 else -1.0))
-
-    def extent(self, axis: Axis) -> tuple[float, float]:
-        """Return the stations [mm] on the axis of a fastener between which it lies."""
-        low, high = sorted(axis.station(end) for end in self.ends)
+    def extent(self, cylinder: CylinderFeature) -> tuple[float, float]:
+        """Return the stations [mm] between which a cylinder lies."""
+        low, high = sorted(self.station(cylinder.end(number)) for number in (0, 1))
         return low, high
 
-    def offset(self, axis: Axis) -> float:
-        """Return the largest distance [mm] from its own axis to the axis of a fastener."""
-        return max(axis.distance(end) for end in self.ends)
+
+def axis_of(cylinder: CylinderFeature, towards: np.ndarray) -> Axis:
+    """Return the axis of a cylinder from its middle, in the sense of a vector (3,)."""
+    along = cylinder.end(1) - cylinder.end(0)
+    direction = along / np.linalg.norm(along)
+    return Axis(cylinder.centre, direction * (1.0 if direction @ towards >= 0 else -1.0))
 
 
-@dataclass(frozen=True, eq=False)
-class PlacedPlane:
-    """A flat face: a point (3,) on it, and its outward normal (3,)."""
-
-    face: Face
-    point: np.ndarray
-    normal: np.ndarray
-
-
-def placed_cylinder(face: Face) -> PlacedCylinder:
-    """Return a face that is one cylinder. Raises GeometryFault for any other face."""
+def placed_cylinder(face: Face) -> CylinderFeature:
+    """Return a face that is one cylinder, in the nominal assembly. Raises GeometryFault for any other face."""
     surface = patch(face, meshes_of(face))
     pieces, rest = surface.pieces, len(surface.unknown.mesh.faces)
     if len(pieces) != 1 or rest or not isinstance(pieces[0].surface, Cylinder):
         kinds = [piece.surface.kind for piece in pieces] + (["plane" if surface.is_flat else "other triangles"] if rest else [])
         raise GeometryFault(f"face {face} is {', '.join(dict.fromkeys(kinds))}; expected one cylinder")
-    cylinder = pieces[0].surface
-    stations = (np.asarray(surface.mesh.vertices) - cylinder.origin) @ cylinder.axis
-    R, t = placement(face.part)
-    low, high = (R @ (cylinder.origin + float(end) * cylinder.axis) + t for end in (stations.min(), stations.max()))
-    return PlacedCylinder(face, (low, high), cylinder.radius, pieces[0].is_hollow)
+    geometry = feature_geometry([surface.placed(*placement_of(face.part))])
+    assert isinstance(geometry, CylinderFeature)
+    return geometry
 
 
-def placed_plane(face: Face) -> PlacedPlane:
-    """Return a face that is flat. Raises GeometryFault for any other face."""
+def placed_plane(face: Face) -> PlaneFeature:
+    """Return a face that is flat, in the nominal assembly. Raises GeometryFault for any other face."""
     surface = patch(face, meshes_of(face))
     if not surface.is_flat:
         raise GeometryFault(f"face {face} is not flat; expected the plane under the head")
-    R, t = placement(face.part)
-    normal = surface.mesh.area_faces @ surface.mesh.face_normals
-    return PlacedPlane(face, R @ surface.mesh.vertices[0] + t, R @ normal / np.linalg.norm(normal))
+    geometry = feature_geometry([surface.placed(*placement_of(face.part))])
+    assert isinstance(geometry, PlaneFeature)
+    return geometry
 
 
-def outer_cylinders(part: Part) -> Iterator[PlacedCylinder]:
+def outer_cylinders(part: Part) -> Iterator[tuple[Face, CylinderFeature]]:
     """Yield the outer cylinders of a part by radius, the largest first; several of one radius are left out."""
     descriptions = describe_faces(shape_of(part.geometry))
     radii = {face.radius for face in descriptions if face.kind == "cylinder" and face.radius and not face.is_inner}
     for radius in sorted(radii, reverse=True):
-        try:
-            yield placed_cylinder(part.face(CylinderSelection(radius=radius, inner=False)))
-        except GeometryFault:
-            continue
-
-
-def placement(part: Part) -> tuple[np.ndarray, np.ndarray]:
-    """Return R (3, 3) and t (3,) [mm] of a part in the nominal assembly."""
-    return Rotation.from_rotvec(part.rotation).as_matrix(), np.array(part.at)
+        face = part.face(CylinderSelection(radius=radius, inner=False))
+        with contextlib.suppress(GeometryFault):
+            yield face, placed_cylinder(face)
 
 
 def meshes_of(face: Face) -> Meshes:

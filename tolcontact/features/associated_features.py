@@ -12,8 +12,9 @@ import numpy as np
 
 from tolcontact.errors import GeometryFault
 from tolcontact.features.covariances import Lengths
-from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, azimuths
 from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.tolerances import ON_FACE
 from tolcontact.geometry.triangle_mesh import quadrature
 
 PLACE_SPACING = 1 / 4  # of the correlation length
@@ -22,7 +23,6 @@ MAX_EXCESS = 8  # times the intended number of places
 MIN_AZIMUTHS, MAX_AZIMUTHS = 48, 144  # of a circle
 MIN_HEIGHTS, MAX_HEIGHTS = 9, 25
 MAX_FACET_ANGLE = np.radians(46.0)  # between neighbouring vertices: a wider gap is a gap of the face
-PLACE_TOLERANCE = 1e-4  # of a face's size: the distance of a place on it, in addition to the error of triangles
 ROTATIONS = 32  # that determine the position and diameter of a section, exactly for fewer lobes
 NODES = 16  # of a line
 MIN_LENGTH = 1e-9  # of a displacement, relative to the largest
@@ -58,8 +58,7 @@ class AssociatedSurface:
     @classmethod
     def of(cls, surface: AnalyticSurface, face: Surface) -> Self:
         """Return the associated feature of a face that lies on an analytic surface."""
-        along = (np.asarray(face.mesh.vertices) - surface.origin) @ surface.axis
-        return cls(surface, (float(along.min()), float(along.max())))
+        return cls(surface, surface.extent(np.asarray(face.mesh.vertices)))
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> Self:
         """Return the feature of a face in a part at R (3, 3), t (3,) [mm]."""
@@ -107,12 +106,12 @@ class AssociatedSurface:
         count = int(np.clip((end - start) / (PLACE_SPACING * lengths.along), MIN_HEIGHTS, MAX_HEIGHTS))
         heights = np.linspace(start, end, count)
         radii = heights * np.tan(surface.angle) if surface.angle else np.full(len(heights), surface.radius)
-        azimuths, shares, u = _azimuths(surface, face, PLACE_SPACING * lengths.across / radii.max())
-        outward = np.cos(azimuths)[:, None] * u + np.sin(azimuths)[:, None] * np.cross(surface.axis, u)
+        angles, shares, u = _azimuths(surface, face, PLACE_SPACING * lengths.across / radii.max())
+        outward = np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * np.cross(surface.axis, u)
         places = surface.origin + heights[:, None, None] * surface.axis + radii[:, None, None] * outward
         nearest = face.nearest(places.reshape(-1, 3))[1].reshape(places.shape)
-        is_on = np.linalg.norm(nearest - places, axis=2) <= PLACE_TOLERANCE * face.mesh.scale + face.bulge
-        goes_around = np.ptp(azimuths) > 2 * np.pi - MAX_FACET_ANGLE and is_on.all(axis=1).any()
+        is_on = np.linalg.norm(nearest - places, axis=2) <= ON_FACE * face.mesh.scale + face.bulge
+        goes_around = np.ptp(angles) > 2 * np.pi - MAX_FACET_ANGLE and is_on.all(axis=1).any()
         if not (self.is_whole or goes_around):
             raise GeometryFault(
                 "its face does not go all the way around its axis, so that the form of its sections and lines cannot be drawn; "
@@ -120,10 +119,6 @@ class AssociatedSurface:
             )
         areas = radii[:, None] * np.outer(_trapezoid(heights), shares)
         return places[is_on], areas[is_on]
-
-    def _along(self, points: np.ndarray) -> np.ndarray:
-        """Return the places (point,) [mm] of points (point, 3) along the axis."""
-        return (points - self.surface.origin) @ self.surface.axis
 
 
 class AssociatedCircles(AssociatedSurface):
@@ -142,7 +137,7 @@ class AssociatedCircles(AssociatedSurface):
             yield np.full(len(points), -(1 + 2 * np.cos(angle)) / ROTATIONS), rotated
 
     def members(self, places: np.ndarray) -> list[np.ndarray]:
-        return _groups_of_equal(self._along(places))
+        return _groups_of_equal(self.surface.along(places))
 
 
 class AssociatedLines(AssociatedSurface):
@@ -153,7 +148,7 @@ class AssociatedLines(AssociatedSurface):
     def copies(self, points: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yield points along the line of each point: integrals of a function, and of it times the place, are its line."""
         yield np.ones(len(points)), points
-        along, (start, end) = self._along(points), self.ends
+        along, (start, end) = self.surface.along(points), self.ends
         middle, half = (start + end) / 2, (end - start) / 2
         place = (along - middle) / half
         for node, weight in zip(*np.polynomial.legendre.leggauss(NODES), strict=True):
@@ -167,25 +162,24 @@ class AssociatedLines(AssociatedSurface):
     def members(self, places: np.ndarray) -> list[np.ndarray]:
         axis, arms = self.surface.axis, places - self.surface.origin
         u = arms[0] - (arms[0] @ axis) * axis
-        azimuths = np.arctan2(arms @ np.cross(axis, u), arms @ u)
-        return _groups_of_equal((azimuths + START) % (2 * np.pi))
+        angles = np.arctan2(arms @ np.cross(axis, u), arms @ u)
+        return _groups_of_equal((angles + START) % (2 * np.pi))
 
 
 def _azimuths(surface: AnalyticSurface, face: Surface, spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return azimuths (azimuth,) [rad] of a face, about `spacing` apart, their shares, and the unit vector (3,) at 0."""
     axis, arms = surface.axis, np.asarray(face.mesh.vertices) - surface.origin
     arms = arms - (arms @ axis)[:, None] * axis
-    arms = arms[np.linalg.norm(arms, axis=1) > PLACE_TOLERANCE * face.mesh.scale]
+    arms = arms[np.linalg.norm(arms, axis=1) > ON_FACE * face.mesh.scale]
     u = arms[0] / np.linalg.norm(arms[0])
-    angles = np.sort(np.arctan2(arms @ np.cross(axis, u), arms @ u))
-    gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
+    angles, gaps = azimuths(arms, u, np.cross(axis, u))
     widest = int(gaps.argmax())
     extent = 2 * np.pi - (gaps[widest] if gaps[widest] > MAX_FACET_ANGLE else 0.0)
     count = int(np.ceil(extent / (2 * np.pi) * np.clip(2 * np.pi / spacing, MIN_AZIMUTHS, MAX_AZIMUTHS)))
     if extent == 2 * np.pi:
         return np.arange(count) * extent / count, np.ones(count), u
-    azimuths = angles[widest] + gaps[widest] + np.linspace(0.0, extent, max(count, MIN_HEIGHTS))
-    return azimuths, _trapezoid(azimuths), u
+    spaced = angles[widest] + gaps[widest] + np.linspace(0.0, extent, max(count, MIN_HEIGHTS))
+    return spaced, _trapezoid(spaced), u
 
 
 def _trapezoid(values: np.ndarray) -> np.ndarray:

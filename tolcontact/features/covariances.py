@@ -51,15 +51,7 @@ def covariance(form: Form, lengths: Lengths, surface: AnalyticSurface, points: n
         stretch = (1 / lengths.along - 1 / lengths.across) * np.outer(surface.axis, surface.axis)
         scaled = [places / lengths.across + places @ stretch for places in (points, stations)]
         return decay(scipy.spatial.distance.cdist(*scaled))
-    (arms, along), (station_arms, station_along) = (_about_axis(surface, places) for places in (points, stations))
+    (arms, along), (station_arms, station_along) = (surface.around_axis(places)[1:] for places in (points, stations))
     cosines = np.einsum("pk,sk->ps", arms, station_arms)
     lobes = np.cos(form.lobes * np.arccos(cosines.clip(-1.0, 1.0)))
     return np.asarray(lobes * decay(np.abs(along[:, None] - station_along) / lengths.along))
-
-
-def _about_axis(surface: AnalyticSurface, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return unit vectors (point, 3) from the axis of a surface to points (point, 3), and places (point,) [mm] along it."""
-    arms = points - surface.origin
-    along = arms @ surface.axis
-    arms = arms - along[:, None] * surface.axis
-    return arms / np.linalg.norm(arms, axis=1, keepdims=True), along

@@ -18,12 +18,12 @@ from tolcontact.features.form_field import FormField
 from tolcontact.features.minimum_zone import minimax
 from tolcontact.features.nominal_feature import NominalFeature
 from tolcontact.features.zone_kernel import sum_modes
+from tolcontact.geometry.tolerances import MIN_PART
 
 FIELDS_AT_ONCE = 512
 MIN_DIRECTION = 1e-9  # of the largest tilt that a datum system leaves to a plane: smaller ones are rounding
 MIN_EFFECT = 1e-4  # smallest singular value, relative to the largest, of a displacement that affects a datum
 MIN_SHIFT = 1e-9  # mm of a datum or a feature, per unit deviation
-MIN_PART = 1e-12  # of a unit vector: smaller entries are rounding
 RANK_TOLERANCE = 1e-4  # smallest singular value of an independent direction: shapes of single precision are no better
 Declared = Feature | Pattern | DatumTargets
 Shifts = dict[tuple[object, bytes], np.ndarray]  # coordinates (row, 3) of planes that are already computed

@@ -16,17 +16,16 @@ from tolcontact.features.feature_geometry import (
     SlabFeature,
     SphereFeature,
 )
-from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, Plane, Sphere
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, Plane, Sphere, are_opposed
 from tolcontact.geometry.fitting import nearest_surface
 from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.tolerances import SAME_DIRECTION
 from tolcontact.geometry.triangle_mesh import smooth_pieces
 
 AREA_TOLERANCE = 1e-3  # relative: a rotated rectangle must be smaller by this to be preferred to one along the part's axes
-AXIS_TOLERANCE = 1e-6  # largest difference of a direction from the axis of the part after which it is named
 MIN_NORMAL_PART = 1e-3  # of a displacement: its part along the normals of a general surface, above which it is a freedom
 EXTREME_TRIALS = 4096  # random displacements that determine the extremes of a general surface
 CONE_PROBES = 32  # places around each end of a cone
-MAX_OPPOSED_ERROR = 1e-3  # rad between two planes that count as parallel
 AXES = np.eye(3)
 
 
@@ -89,7 +88,7 @@ def _slab(faces: Sequence[Surface], surfaces: Sequence[AnalyticSurface | None]) 
     if not (isinstance(first_plane, Plane) and isinstance(second_plane, Plane)):
         kinds = " and ".join("a general face" if surface is None else f"a {surface.kind}" for surface in surfaces)
         raise GeometryFault(f"it has two faces, {kinds}; expected two planes that are opposed")
-    if np.linalg.norm(first_plane.axis + second_plane.axis) > MAX_OPPOSED_ERROR:
+    if not are_opposed(first_plane.axis, second_plane.axis):
         raise GeometryFault("its two planes are not opposed; expected outward normals in opposite directions")
     n, outlines = first_plane.axis, [np.asarray(face.mesh.vertices) for face in faces]
     heights = [float(points.mean(axis=0) @ n) for points in outlines]
@@ -227,7 +226,7 @@ def _directions_across(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[str
     """Return two unit vectors normal to `a` (3,) and each other, with their names: axes of the part where they are parallel."""
     smallest = int(np.abs(a).argmin())
     largest = int(np.abs(a).argmax())
-    if abs(a[largest]) > 1 - AXIS_TOLERANCE:
+    if abs(a[largest]) > 1 - SAME_DIRECTION:
         i, j = (k for k in range(3) if k != largest)
         u = AXES[i] - (AXES[i] @ a) * a
         u = u / np.linalg.norm(u)
@@ -236,7 +235,7 @@ def _directions_across(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[str
     u = AXES[smallest] - a[smallest] * a
     u = u / np.linalg.norm(u)
     v = np.cross(a, u)
-    return u, v, ("xyz"[smallest] if abs(a[smallest]) < AXIS_TOLERANCE else "u", "v")
+    return u, v, ("xyz"[smallest] if abs(a[smallest]) < SAME_DIRECTION else "u", "v")
 
 
 def _hull(points: np.ndarray) -> np.ndarray:

@@ -189,10 +189,8 @@ def face_extents(associated: AssociatedSurface, points: np.ndarray) -> Lengths:
     surface = associated.surface
     if not isinstance(surface, Cylinder | Cone):
         return Lengths(longest_extent(points), longest_extent(points))
-    arms = points - surface.origin
-    along = arms @ surface.axis
-    radius = float(np.linalg.norm(arms - along[:, None] * surface.axis, axis=1).max())
-    return Lengths(2 * radius, float(np.ptp(along)))
+    radii, _, along = surface.around_axis(points)
+    return Lengths(2 * float(radii.max()), float(np.ptp(along)))
 
 
 def longest_extent(points: np.ndarray) -> float:

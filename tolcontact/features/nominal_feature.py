@@ -11,9 +11,9 @@ from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, F
 from tolcontact.features.form_field import FormField
 from tolcontact.geometry.faces import FaceArea
 from tolcontact.geometry.surface import Surface
+from tolcontact.geometry.tolerances import ON_FACE
 
 Placement = tuple[np.ndarray, np.ndarray]  # R (3, 3) and t (3,) [mm] of a part in the nominal assembly
-FACE_TOLERANCE = 1e-4  # of a face's size: the largest distance of a point on it
 ALONG_NORMAL = 0.999  # cosine of the angle between the direction of a locator and the normal of the face that it stands on
 
 
@@ -103,7 +103,7 @@ class NominalFeature:
         """
         geometry = self.geometry
         if isinstance(geometry, SlabFeature):
-            tolerance = FACE_TOLERANCE * max(surface.mesh.scale for surface in self.surfaces)
+            tolerance = ON_FACE * max(surface.mesh.scale for surface in self.surfaces)
             distances = [abs((position - surface.vertices.mean(axis=0)) @ geometry.normal) for surface in self.surfaces]
             nearest = int(np.argmin(distances))
             return nearest if distances[nearest] <= tolerance else None
@@ -128,7 +128,7 @@ class NominalFeature:
         index = self.face_with(position)
         surface = self.surfaces[index or 0]
         triangle, projection = surface.nearest(position[None])
-        if index is None or np.linalg.norm(projection[0] - position) > FACE_TOLERANCE * surface.mesh.scale:
+        if index is None or np.linalg.norm(projection[0] - position) > ON_FACE * surface.mesh.scale:
             place = ", ".join(f"{coordinate:g}" for coordinate in position)
             raise GeometryFault(f'its target at ({place}) is not on feature "{self.feature.name}"; move it there')
         normal = surface.normals(triangle, projection)[0]

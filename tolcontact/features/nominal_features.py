@@ -8,15 +8,16 @@ import numpy as np
 
 from tolcontact.declaration import DatumTargets, Face, Feature, Pattern
 from tolcontact.errors import GeometryFault
-from tolcontact.features.datum_frames import DatumShift, padded
+from tolcontact.features.datum_frames import DatumShift, Declared, padded
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.freedoms import DATUM, FEATURE, FORM, Freedom
 from tolcontact.features.nominal_feature import FaceDeviation, NominalFeature, Placement, moving_faces
-from tolcontact.features.nominal_pattern import MIXED, RELATIVE, SIZE_TOLERANCE, NominalPattern, check_alike
+from tolcontact.features.nominal_pattern import MIXED, RELATIVE, NominalPattern, unlike_members
 from tolcontact.features.tolerance_kinds import form_field_of, form_tolerance
 from tolcontact.features.tolerance_layers import tolerance_layers
 from tolcontact.geometry.faces import FaceArea, Meshes, face_area, patch
+from tolcontact.geometry.tolerances import SAME_SIZE
 
 MIN_SHARE = 1e-6  # of a face's area: a smaller common part of two faces does not count
 
@@ -47,8 +48,11 @@ class Features:
         """Return a copy, so that further features do not change these."""
         return replace(self, patterns=list(self.patterns), features=dict(self.features), _targets=dict(self._targets))
 
-    def add(self, declared: Feature | Pattern, part: int, meshes: Meshes) -> None:
-        """Add a feature or a pattern whose datums have been added before. Raises GeometryFault."""
+    def add(self, declared: Declared, part: int, meshes: Meshes) -> None:
+        """Add a feature, a pattern or datum targets, whose datums and features have been added before. Raises GeometryFault."""
+        if isinstance(declared, DatumTargets):
+            self._add_targets(declared, part)
+            return
         new = [member for member in declared.members if member not in self.features]
         if isinstance(declared, Pattern) and (lost := [member.name for member in declared.borrowed if member in new]):
             raise GeometryFault(f'its member "{lost[0]}" could not be made; mend that feature first')
@@ -58,8 +62,8 @@ class Features:
         pattern = NominalPattern(
             declared, tuple(recognized.get(member) or self.features[member] for member in declared.members)
         )
-        if declared.tolerances:
-            check_alike(pattern.geometries)
+        if declared.tolerances and (fault := unlike_members(pattern.geometries)):
+            raise GeometryFault(fault)
         # The order of the freedoms is the order of their columns: displacements, datum shifts, sizes, modes of forms.
         start = self.first_column + len(self.freedoms)
         pattern = replace(pattern, layers=tolerance_layers(pattern, self.datums(part), start))
@@ -86,7 +90,7 @@ class Features:
         members = tuple(self.features[member] for member in declared.members)
         self.patterns.append(replace(pattern, members=members, freedoms=tuple(freedoms), shifts=tuple(shifts), form=form))
 
-    def add_targets(self, targets: DatumTargets, part: int) -> None:
+    def _add_targets(self, targets: DatumTargets, part: int) -> None:
         """Add a datum whose features have been added before. Raises GeometryFault for a target that is not on its feature."""
         if lost := [feature.name for feature in targets.features if feature not in self.features]:
             raise GeometryFault(f'its feature "{lost[0]}" could not be made; mend that feature first')
@@ -211,7 +215,7 @@ def _check_size(feature: Feature, geometry: FeatureGeometry) -> None:
     size = feature.size
     if size is None or not isinstance(geometry, FeatureOfSize):
         raise GeometryFault(f"a size is for cylinders, spheres and two opposed planes, and it is {geometry.in_words}")
-    if abs(geometry.size - size.nominal) > SIZE_TOLERANCE * geometry.size:
+    if abs(geometry.size - size.nominal) > SAME_SIZE * geometry.size:
         raise GeometryFault(
             f"its size is {geometry.size:.9g} mm as shaped, and {size.nominal:g} mm in its tolerance; state the size of the "
             "shape, with the limits about it"

@@ -9,13 +9,12 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from tolcontact.declaration import Feature, GeometricTolerance, Pattern
-from tolcontact.errors import GeometryFault
 from tolcontact.features.datum_frames import DatumFrame, DatumShift
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize, PlaneFeature
 from tolcontact.features.freedoms import Freedom
 from tolcontact.features.nominal_feature import NominalFeature
+from tolcontact.geometry.tolerances import SAME_SIZE
 
-SIZE_TOLERANCE = 1e-6  # relative: largest difference between sizes that count as equal
 MIN_LENGTH = 1e-4  # of the coordinates of a motion of 1 mm that affects a pattern
 MIXED, RELATIVE = "mixed", "relative"
 MOTIONS = ("common shift x", "common shift y", "common shift z", "common turn x", "common turn y", "common turn z")
@@ -139,18 +138,19 @@ class NominalPattern:
         return MOTIONS[int(along.argmax())] if along.max() > 1 - 1e-6 else RELATIVE if along.max() < 1e-6 else MIXED
 
 
-def check_alike(members: Sequence[FeatureGeometry]) -> None:
-    """Raise GeometryFault if members of a pattern are not of one kind and size."""
+def unlike_members(members: Sequence[FeatureGeometry]) -> str:
+    """Return the fault of members of a pattern that are not of one kind and size; empty if they are."""
     first = members[0]
     for number, member in enumerate(members[1:], start=2):
         is_alike = type(member) is type(first)
         if is_alike and isinstance(member, FeatureOfSize) and isinstance(first, FeatureOfSize):
-            is_alike = member.is_inner == first.is_inner and abs(member.size - first.size) <= SIZE_TOLERANCE * first.size
+            is_alike = member.is_inner == first.is_inner and abs(member.size - first.size) <= SAME_SIZE * first.size
         if not is_alike:
-            raise GeometryFault(
+            return (
                 f"its member 1 is {_described(first)}, and member {number} is {_described(member)}; the members of a pattern "
                 "with tolerances are of one kind and size, so declare unlike ones as patterns or features of their own"
             )
+    return ""
 
 
 def _described(geometry: FeatureGeometry) -> str:

@@ -8,10 +8,11 @@ import scipy
 from tolcontact.declaration import GeometricTolerance
 from tolcontact.declaration.feature_tolerance import TRANSLATION
 from tolcontact.errors import GeometryFault
-from tolcontact.features.datum_frames import MIN_PART, RANK_TOLERANCE, DatumFrame, datum_frame
+from tolcontact.features.datum_frames import RANK_TOLERANCE, DatumFrame, datum_frame
 from tolcontact.features.nominal_feature import NominalFeature
 from tolcontact.features.nominal_pattern import MIN_LENGTH, Layer, NominalPattern
 from tolcontact.features.tolerance_kinds import zone_rows
+from tolcontact.geometry.tolerances import MIN_PART
 
 
 def tolerance_layers(

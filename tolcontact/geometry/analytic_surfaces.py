@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from tolcontact.geometry.tolerances import PARALLEL
 from tolcontact.vocabulary import SURFACE_KINDS
 
 PROJECTIONS = 2  # one is exact except for rounding
@@ -83,7 +84,7 @@ class AnalyticSurface(ABC):
         along = self.along(points)
         return float(along.min()), float(along.max())
 
-    def _around_axis(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def around_axis(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return distances (point,) from the axis, unit vectors (point, 3) away from it, and coordinates (point,) along it."""
         offset = points - self.origin
         along = offset @ self.axis
@@ -130,7 +131,7 @@ class Cylinder(RoundSurface):
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return signed distances (point,) [mm], and their gradients (point, 3)."""
-        radial, outward, along = self._around_axis(points)
+        radial, outward, along = self.around_axis(points)
         return self.height(radial, along), outward
 
     def touched(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
@@ -155,7 +156,7 @@ class Cone(RoundSurface):
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return signed distances (point,) [mm] from the nearer nappe, and their gradients (point, 3)."""
-        radial, outward, along = self._around_axis(points)
+        radial, outward, along = self.around_axis(points)
         side = np.where(along < 0, -1.0, 1.0)  # the nappes meet in one line through the apex
         slope = np.cos(self.angle) * outward - (side * np.sin(self.angle))[:, None] * self.axis
         return self.height(radial, side * along), slope
@@ -220,7 +221,7 @@ class Torus(AnalyticSurface):
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return signed distances (point,) [mm], and their gradients (point, 3)."""
-        radial, outward, along = self._around_axis(points)
+        radial, outward, along = self.around_axis(points)
         tube, slope = _length_and_direction(self.from_circle(radial[:, None], outward, along[:, None], self.axis))
         return self.height(tube, along), slope
 
@@ -228,6 +229,11 @@ class Torus(AnalyticSurface):
 def axes_across(direction: np.ndarray) -> np.ndarray:
     """Return two unit vectors (2, 3) perpendicular to a direction (3,) and to each other."""
     return np.asarray(np.linalg.svd(direction[None])[2][1:])
+
+
+def are_opposed(normal: np.ndarray, other: np.ndarray) -> bool:
+    """Return whether two unit normals (3,) are of planes in opposite directions."""
+    return bool(np.linalg.norm(normal + other) < PARALLEL)
 
 
 def azimuths(offsets: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,16 +9,15 @@ import trimesh
 
 from tolcontact.declaration.values import Vector
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere, Torus
-from tolcontact.geometry.face_groups import FaceOnSurface, hollow_cylinders, interruptions, patterns, slots
+from tolcontact.geometry.face_groups import MARGIN, FaceOnSurface, hollow_cylinders, interruptions, patterns, slots
 from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
 from tolcontact.geometry.files import BREP, STATED_FACES
 from tolcontact.geometry.files.step_shapes import FaceMeasure, StatedFace
 from tolcontact.geometry.fitting import fit_surface
-from tolcontact.geometry.tolerances import ROUNDING
+from tolcontact.geometry.tolerances import RESIDUALS, ROUNDING
 from tolcontact.geometry.triangle_mesh import smooth_pieces
 
 FIT_TOLERANCE = 1e-3  # [mm] largest distance of the vertices of a face from its surface
-RESIDUAL_FACTOR = 10  # times the residuals of two faces: largest distance between parts of one surface
 PIECES = "pieces"
 DESCRIPTIONS = "descriptions"
 ON_SURFACES = "on_surfaces"
@@ -81,9 +80,9 @@ def _grouped(mesh: trimesh.Trimesh, faces: Sequence[FaceInFile], surfaces: Seque
     touching = np.unique(np.sort(neighbours[neighbours[:, 0] != neighbours[:, 1]], axis=1), axis=0)
     wholes = _wholes(mesh, touching, surfaces)
     faces = [replace(face, whole=whole) for face, whole in zip(faces, wholes, strict=True)]
-    cylinders = hollow_cylinders(mesh, faces, surfaces)
-    slot_of = {number: slot for slot in slots(faces, cylinders, touching) for number in slot}
-    pattern_of = {number: pattern for pattern in patterns(cylinders) for number in pattern}
+    cylinders, margin = hollow_cylinders(faces, surfaces), MARGIN * float(mesh.scale)
+    slot_of = {number: slot for slot in slots(faces, cylinders, touching, margin) for number in slot}
+    pattern_of = {number: pattern for pattern in patterns(mesh, cylinders, surfaces, margin) for number in pattern}
     return [replace(face, slot=slot_of.get(face.number, ()), pattern=pattern_of.get(face.number, ())) for face in faces]
 
 
@@ -119,7 +118,7 @@ def are_one_surface(mesh: trimesh.Trimesh, face: FaceOnSurface, neighbour: FaceO
         return False
     vertices = np.asarray(mesh.vertices)[np.unique(np.asarray(mesh.faces)[next_triangles])]
     distance = float(np.abs(surface.distance(vertices)[0]).max())
-    return distance <= RESIDUAL_FACTOR * (surface.residual + next_surface.residual) + ROUNDING * float(mesh.scale)
+    return distance <= RESIDUALS * (surface.residual + next_surface.residual) + ROUNDING * float(mesh.scale)
 
 
 def _is_outside(mesh: trimesh.Trimesh, surface: AnalyticSurface, triangles: np.ndarray) -> bool:

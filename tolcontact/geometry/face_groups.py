@@ -10,8 +10,6 @@ The holes of a pattern are cylinders of one radius with parallel axes that span 
 import itertools
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import trimesh
@@ -19,11 +17,9 @@ import trimesh
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, axes_across, azimuths
 from tolcontact.geometry.body_overlap import SolidBody
 from tolcontact.geometry.face_in_file import FaceInFile
-from tolcontact.geometry.tolerances import SAME_PLACE
+from tolcontact.geometry.tolerances import RESIDUALS, SAME_PLACE, SQUARE
 
-MAX_TILT = 1e-4  # [rad] between directions that count as parallel
 MARGIN = 1e-5  # of a part's size: difference of lengths that count as equal
-RESIDUAL_FACTOR = 10  # times the residual of a fitted cylinder: the same
 MAX_HOLE_GAP = 3.0  # [rad] around the axis: the end of a slot has a gap of pi
 MIN_COMMON_SHARE = 0.5  # of the shorter face of an interrupted surface along the axis
 DIRECTIONS = 360  # samples around the axis
@@ -83,89 +79,53 @@ def _is_interrupted(body: SolidBody, surface: Cylinder | Cone, parts: Sequence[n
     return bool((body.depth(circle) < CHORD_FACTOR * chord + margin).all())
 
 
-@dataclass(frozen=True, eq=False)
-class HollowCylinder:
-    """A hollow cylinder of a part.
-
-    numbers    of its faces, from 1
-    vertices   (point, 3) [mm]
-    margin     [mm] difference of lengths that count as equal
-    """
-
-    numbers: Group
-    surface: Cylinder
-    vertices: np.ndarray
-    margin: float
-
-    @cached_property
-    def is_hole(self) -> bool:
-        """Whether it spans more than half a turn around its axis."""
-        _, gaps = azimuths(self.vertices - self.surface.origin, *axes_across(self.surface.axis))
-        return bool(gaps.max() < MAX_HOLE_GAP)
-
-    def equals(self, neighbour: "HollowCylinder") -> bool:
-        """Return whether another one has the same radius, and an axis parallel to this one."""
-        difference = abs(self.surface.radius - neighbour.surface.radius)
-        tilt = float(np.linalg.norm(np.cross(self.surface.axis, neighbour.surface.axis)))
-        return (
-            difference < self.margin + RESIDUAL_FACTOR * (self.surface.residual + neighbour.surface.residual)
-            and tilt < MAX_TILT
-        )
-
-    def is_tangent(self, plane: FaceInFile) -> bool:
-        """Return whether a plane that faces the axis is tangent to the cylinder."""
-        height = float((self.surface.origin - np.array(plane.point)) @ np.array(plane.direction))
-        slack = self.margin + RESIDUAL_FACTOR * self.surface.residual
-        is_parallel = abs(float(self.surface.axis @ np.array(plane.direction))) < MAX_TILT
-        return is_parallel and abs(height - self.surface.radius) < slack
-
-    def is_coaxial(self, neighbour: "HollowCylinder") -> bool:
-        """Return whether the axis of another one with a parallel axis is the same."""
-        offset = neighbour.surface.origin - self.surface.origin
-        return bool(np.linalg.norm(np.cross(offset, self.surface.axis)) < self.margin)
-
-
-def hollow_cylinders(
-    mesh: trimesh.Trimesh, faces: Sequence[FaceInFile], surfaces: Sequence[FaceOnSurface]
-) -> dict[Group, HollowCylinder]:
+def hollow_cylinders(faces: Sequence[FaceInFile], surfaces: Sequence[FaceOnSurface]) -> dict[Group, Cylinder]:
     """Return the hollow cylinders of a part by their face numbers, from descriptions that include whole surfaces."""
-    cylinders, margin = {}, MARGIN * float(mesh.scale)
-    for face, (surface, triangles) in zip(faces, surfaces, strict=True):
-        if isinstance(surface, Cylinder) and face.is_inner and len(triangles):
-            members = np.concatenate([surfaces[number - 1][1] for number in _whole(face)])
-            vertices = np.asarray(mesh.vertices)[np.unique(np.asarray(mesh.faces)[members])]
-            cylinders[_whole(face)] = HollowCylinder(_whole(face), surface, vertices, margin)
-    return cylinders
+    return {
+        _whole(face): surface
+        for face, (surface, triangles) in zip(faces, surfaces, strict=True)
+        if isinstance(surface, Cylinder) and face.is_inner and len(triangles)
+    }
 
 
-def slots(faces: Sequence[FaceInFile], cylinders: Mapping[Group, HollowCylinder], touching: np.ndarray) -> list[Group]:
-    """Return the face numbers, from 1, of each slot; `touching` (pair, 2) are the indices of faces that share an edge."""
+def slots(faces: Sequence[FaceInFile], cylinders: Mapping[Group, Cylinder], touching: np.ndarray, margin: float) -> list[Group]:
+    """Return the face numbers, from 1, of each slot; `touching` (pair, 2) are the indices of faces that share an edge.
+
+    Lengths that differ by less than a `margin` [mm] are equal.
+    """
     ends_of: dict[Group, set[Group]] = defaultdict(set)  # the cylinders that touch a plane and are tangent to it
     for number, neighbour in (*touching, *touching[:, ::-1]):
-        plane, end = faces[number], cylinders.get(_whole(faces[neighbour]))
-        if plane.kind == "plane" and end is not None and end.is_tangent(plane):
-            ends_of[_whole(plane)].add(end.numbers)
+        plane, end = faces[number], _whole(faces[neighbour])
+        if plane.kind == "plane" and end in cylinders and _is_tangent(cylinders[end], plane, margin):
+            ends_of[_whole(plane)].add(end)
     walls: dict[tuple[Group, Group], list[Group]] = defaultdict(list)  # of the two ends of a slot
     for plane_numbers, ends in ends_of.items():
         for pair in itertools.combinations(sorted(ends), 2):
             left, right = (cylinders[end] for end in pair)
-            if left.equals(right) and not left.is_coaxial(right):
+            is_coaxial = np.linalg.norm(np.cross(right.origin - left.origin, left.axis)) < margin
+            if _are_equal(left, right, margin) and not is_coaxial:
                 walls[pair].append(plane_numbers)
+    normals = {_whole(face): np.array(face.direction) for face in reversed(faces) if face.kind == "plane"}
     return [
         tuple(sorted(itertools.chain(*pair, *planes)))
         for pair, planes in walls.items()
-        if any(_are_opposed(faces, *sides) for sides in itertools.combinations(planes, 2))
+        if any(np.linalg.norm(normals[left] + normals[right]) < SQUARE for left, right in itertools.combinations(planes, 2))
     ]
 
 
-def patterns(cylinders: Mapping[Group, HollowCylinder]) -> list[Group]:
-    """Return the face numbers, from 1, of each pattern of at least two holes."""
-    holes: list[list[HollowCylinder]] = []
-    for hole in cylinders.values():
-        if hole.is_hole:
-            pattern = next((members for members in holes if members[0].equals(hole)), None)
-            holes.append([hole]) if pattern is None else pattern.append(hole)
-    return [tuple(sorted(itertools.chain(*(hole.numbers for hole in members)))) for members in holes if len(members) > 1]
+def patterns(
+    mesh: trimesh.Trimesh, cylinders: Mapping[Group, Cylinder], surfaces: Sequence[FaceOnSurface], margin: float
+) -> list[Group]:
+    """Return the face numbers, from 1, of each pattern of at least two holes, whose radii differ by less than a margin [mm]."""
+    holes: list[list[Group]] = []
+    for numbers, hole in cylinders.items():
+        members = np.concatenate([surfaces[number - 1][1] for number in numbers])
+        vertices = np.asarray(mesh.vertices)[np.unique(np.asarray(mesh.faces)[members])]
+        _, gaps = azimuths(vertices - hole.origin, *axes_across(hole.axis))
+        if gaps.max() < MAX_HOLE_GAP:
+            pattern = next((others for others in holes if _are_equal(cylinders[others[0]], hole, margin)), None)
+            holes.append([numbers]) if pattern is None else pattern.append(numbers)
+    return [tuple(sorted(itertools.chain(*pattern))) for pattern in holes if len(pattern) > 1]
 
 
 def _whole(face: FaceInFile) -> Group:
@@ -173,6 +133,15 @@ def _whole(face: FaceInFile) -> Group:
     return face.whole or (face.number,)
 
 
-def _are_opposed(faces: Sequence[FaceInFile], left: Group, right: Group) -> bool:
-    normals = [np.array(faces[plane[0] - 1].direction) for plane in (left, right)]
-    return bool(np.linalg.norm(normals[0] + normals[1]) < MAX_TILT)
+def _are_equal(left: Cylinder, right: Cylinder, margin: float) -> bool:
+    """Return whether two cylinders have the same radius, and parallel axes."""
+    difference, tilt = abs(left.radius - right.radius), float(np.linalg.norm(np.cross(left.axis, right.axis)))
+    return difference < margin + RESIDUALS * (left.residual + right.residual) and tilt < SQUARE
+
+
+def _is_tangent(cylinder: Cylinder, plane: FaceInFile, margin: float) -> bool:
+    """Return whether a plane that faces the axis is tangent to a cylinder."""
+    normal = np.array(plane.direction)
+    height = float((cylinder.origin - np.array(plane.point)) @ normal)
+    is_parallel = abs(float(cylinder.axis @ normal)) < SQUARE
+    return is_parallel and abs(height - cylinder.radius) < margin + RESIDUALS * cylinder.residual

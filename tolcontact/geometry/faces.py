@@ -17,7 +17,7 @@ from tolcontact.geometry.face_in_file import FaceInFile, group_lines
 from tolcontact.geometry.files import BREP, STATED_FACES
 from tolcontact.geometry.shapes import placement_of
 from tolcontact.geometry.surface import Surface
-from tolcontact.geometry.tolerances import OPPOSING_COSINE, ROUNDING
+from tolcontact.geometry.tolerances import OPPOSING_COSINE, ROUNDING, SAME_SIZE
 from tolcontact.geometry.triangle_mesh import have_area, overlaps, subdivided
 from tolcontact.user_functions import FunctionError, called
 
@@ -25,7 +25,6 @@ NEAR_DIVISIONS = 100
 CUT = 4  # refinement factor of the pieces of triangles in one step
 BREP_REACH = 1e-3  # of the part's size: largest distance of a point from the B-rep face that it selects
 FLAT_ANGLE = 2e-4  # rad: between neighbouring triangles of one flat face, after single precision
-RADIUS_TOLERANCE = 1e-6  # of a radius: radii that differ by less are equal
 MAX_LISTED = 12  # faces in a message
 MAX_COMPARISONS = 4_000_000  # of pieces with triangles: above this, a search for the nearest ones takes less time
 
@@ -157,7 +156,7 @@ def _is_cylinder(face: FaceInFile, selection: Cylinder) -> bool:
     if face.kind != "cylinder" or face.radius is None or selection.inner not in (None, face.is_inner):
         return False
     radius = selection.radius
-    return radius is None or abs(face.radius - radius) <= RADIUS_TOLERANCE * radius + face.residual
+    return radius is None or abs(face.radius - radius) <= SAME_SIZE * radius + face.residual
 
 
 def _is_along(face: FaceInFile, direction: Vector | None) -> bool:

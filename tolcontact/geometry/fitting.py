@@ -45,7 +45,7 @@ def _fit(triangles: np.ndarray, tolerance: float) -> AnalyticSurface | None:
     is_bent = len(np.unique(np.round(_normals(triangles) / NORMAL_TOLERANCE), axis=0)) < MIN_DIRECTIONS
     trials = [(vertices, triangles, tolerance)]
     if len(triangles) > SAMPLED_TRIANGLES:  # a few triangles rule out most surfaces at once
-        sample = _sampled(triangles)
+        sample = triangles[np.linspace(0, len(triangles) - 1, SAMPLED_TRIANGLES).astype(int)]
         trials.insert(0, (_vertices(sample), sample, tolerance * SAMPLE_TOLERANCE))
     fits = [fit for fit, numbers in FITS.items() if len(vertices) >= numbers + MIN_SPARE or fit is fit_plane]
     for fit in fits[:1] if is_bent else fits:
@@ -72,10 +72,6 @@ def nearest_surface(triangles: np.ndarray) -> AnalyticSurface:
         (surface for surface in surfaces if surface is not None),
         key=lambda surface: np.abs(surface.distance(samples)[0]).max(),
     )
-
-
-def _sampled(triangles: np.ndarray) -> np.ndarray:
-    return triangles[np.linspace(0, len(triangles) - 1, SAMPLED_TRIANGLES).astype(int)]
 
 
 def _normals(triangles: np.ndarray) -> np.ndarray:

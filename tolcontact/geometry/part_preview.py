@@ -1,6 +1,5 @@
 """Previews of parts before a run: shapes in their poses, and code that selects each face."""
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +12,7 @@ from tolcontact.geometry.brep_face import describe_faces, number_faces
 from tolcontact.geometry.face_in_file import FaceInFile
 from tolcontact.geometry.files import BREP
 from tolcontact.geometry.shapes import placement_of, shape
-
-MARGIN = 1e-6  # of a direction, and of a part's size
+from tolcontact.geometry.tolerances import SAME_DIRECTION, SAME_PLACE
 
 
 class PartPreview(NamedTuple):
@@ -51,7 +49,9 @@ def preview(part: Part) -> PartPreview | None:
     face_of, _ = number_faces(mesh)
     faces = describe_faces(mesh)
     snippets = tuple(_snippet(mesh, face_of, face) for face in faces)
-    groups = tuple(tuple(_group_snippets(face)) for face in faces)
+    groups = tuple(
+        tuple(_brep_snippet(face, f'whole="{word}"') for word in FACE_GROUPS if getattr(face, word)) for face in faces
+    )
     return PartPreview(mesh, R, vertices, np.asarray(mesh.faces), face_of, faces, snippets, groups)
 
 
@@ -64,7 +64,7 @@ def _snippet(mesh: trimesh.Trimesh, face_of: np.ndarray, face: FaceInFile) -> st
     if face.kind == "plane" and face.direction is not None:
         normal = np.array(face.direction)
         axis = int(np.argmax(np.abs(normal)))
-        is_axis = abs(normal[axis]) > 1 - MARGIN
+        is_axis = abs(normal[axis]) > 1 - SAME_DIRECTION
         direction = f'"{"+-"[int(normal[axis] < 0)]}{"xyz"[axis]}"' if is_axis else f"tc.select.Facing({_vector(normal)})"
         is_facing = np.asarray(mesh.face_normals) @ normal >= np.cos(FACE_ANGLE)
         return f"face({direction})" if (is_facing == mask).all() else f"face({direction}, {_box(mesh, mask)})"
@@ -75,15 +75,9 @@ def _brep_snippet(face: FaceInFile, option: str) -> str:
     return f"face(tc.select.Brep({', '.join(filter(None, [_vector(np.array(face.point)), option]))}))"
 
 
-def _group_snippets(face: FaceInFile) -> Iterator[str]:
-    for word in FACE_GROUPS:
-        if getattr(face, word):
-            yield _brep_snippet(face, f'whole="{word}"')
-
-
 def _box(mesh: trimesh.Trimesh, mask: np.ndarray) -> str:
     """Return code for the box, with a small margin, around the triangles of a mask (triangle,)."""
-    corners, margin = np.asarray(mesh.vertices)[mesh.faces[mask]].reshape(-1, 3), MARGIN * mesh.scale
+    corners, margin = np.asarray(mesh.vertices)[mesh.faces[mask]].reshape(-1, 3), SAME_PLACE * mesh.scale
     return f"tc.select.Inside({_vector(corners.min(axis=0) - margin)}, {_vector(corners.max(axis=0) + margin)})"
 
 

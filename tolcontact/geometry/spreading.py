@@ -83,7 +83,8 @@ def spread(surface: trimesh.Trimesh, count: int | None, spacing: float | None) -
     equal distances differ by rounding: points in straight rows would let a shaft roll between them.
     """
     step = spacing if spacing is not None else float(np.sqrt(surface.area / count))  # type: ignore[operator]
-    frame = face_frame(surface) if _is_flat(surface) else PART_FRAME
+    is_flat = np.ptp(np.asarray(surface.face_normals), axis=0).max() < SAME_DIRECTION
+    frame = face_frame(surface) if is_flat else PART_FRAME
     vertices, faces, candidates = frame.subdivided(surface.vertices, surface.faces, step / CANDIDATES_PER_SPACING)
     if len(candidates) > MAX_CANDIDATES_PER_POINT * max(surface.area / step**2, 1):
         thinned = _thinned(candidates, faces, step / (2 * CANDIDATES_PER_SPACING) / frame.cell)
@@ -99,10 +100,6 @@ def spread(surface: trimesh.Trimesh, count: int | None, spacing: float | None) -
         numbers = list(range(len(corners)))
     numbers = _farthest(candidates, numbers, count, None if spacing is None else spacing / frame.cell)
     return np.asarray(vertices)[numbers]
-
-
-def _is_flat(surface: trimesh.Trimesh) -> bool:
-    return bool(np.ptp(np.asarray(surface.face_normals), axis=0).max() < SAME_DIRECTION)
 
 
 def _farthest(candidates: np.ndarray, numbers: list[int], count: int | None, spacing: float | None) -> list[int]:

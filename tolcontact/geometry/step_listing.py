@@ -17,7 +17,7 @@ from tolcontact.errors import CONTROL_CHARACTERS, GeometryFault, ModelError, Opt
 from tolcontact.geometry.brep_face import describe_faces, plain_vector
 from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
 from tolcontact.geometry.files import STATED_FACES, key_of, read_files
-from tolcontact.geometry.files.product import MAX_LISTED, Product
+from tolcontact.geometry.files.product import MAX_LISTED, Body, Product
 from tolcontact.readable import Readable
 from tolcontact.shape_worker import UnfinishedRead
 
@@ -65,7 +65,8 @@ def bodies_in(path: str | Path) -> tuple[BodyInFile, ...]:
 
 
 def _bodies(product: Product) -> tuple[BodyInFile, ...]:
-    return tuple(_body(product, number) for number in range(1, len(product.bodies) + 1))
+    units = shown(product.units)
+    return tuple(_body(number, body, units) for number, body in enumerate(product.bodies, start=1))
 
 
 def faces_in(path: str | Path, body: str | int | None = None) -> tuple[FaceInFile, ...]:
@@ -227,11 +228,8 @@ def _product(path: str | Path, chord: float | None = None) -> Product:
     return content
 
 
-def _body(product: Product, number: int) -> BodyInFile:
-    body = product.bodies[number - 1]
+def _body(number: int, body: Body, units: str) -> BodyInFile:
     lower, upper = map(plain_vector, body.box)
     rotation = Rotation.from_matrix(body.place[:3, :3]).as_rotvec()
     place = plain_vector(body.place[:3, 3]), plain_vector(rotation)
-    return BodyInFile(
-        number, body.name, body.path, lower, upper, *place, len(body.shape.faces), body.is_open, shown(product.units)
-    )
+    return BodyInFile(number, body.name, body.path, lower, upper, *place, len(body.shape.faces), body.is_open, units)

@@ -126,7 +126,9 @@ class Document:
             raise Refusal("cannot be read as STEP: it is cut off, damaged, or holds no shape; export it again")
         self.transfer = self.reader.Reader().WS().TransferReader()
         self.has_face_names, self.has_solids = has_face_names, has_solids
-        self.entities = self._entities() if has_pmi else {}
+        model = self.reader.Reader().WS().Model()
+        # The records in the order of the file. The kernel itself finds no number, but has one object for each.
+        self.entities = {model.Value(number): number for number in range(1, model.NbEntities() + 1)} if has_pmi else {}
 
     def places(self) -> Iterator[Place]:
         """Yield each place of a shape that is no assembly, in the file's order."""
@@ -207,11 +209,6 @@ class Document:
     def face_records(self, faces: Sequence[Any]) -> list[int]:
         """Return the numbers of the records of faces, from 1 in the file's order, 0 for none; nothing if there is no PMI."""
         return [self.entities.get(self._entity(face), 0) for face in faces] if self.entities else []
-
-    def _entities(self) -> dict[Any, int]:
-        """Return the records in the order of the file. The kernel itself finds no number, but has one object for each."""
-        model = self.reader.Reader().WS().Model()
-        return {model.Value(number): number for number in range(1, model.NbEntities() + 1)}
 
     def _entity(self, shape: Any) -> Any:
         """Return the record that the kernel made a shape from; None if it is unknown."""

@@ -30,13 +30,11 @@ MAX_CLASHES = 20  # pairs of parts that are named
 class MeasuredClash:
     """Two bodies that interfere in some draws.
 
-    pair     indices of the bodies
     share    of the draws
     depths   (m,) [mm], of some of these draws, the deepest one first
     places   of these draws
     """
 
-    pair: tuple[int, int]
     share: float
     depths: Float[Array, " m"]
     places: list[ClashPlace]
@@ -132,7 +130,7 @@ def _measured(
     interference = watch.measured(Clash(pair, chosen), poses, draws.deviations)
     order = np.argsort(-interference.depths, kind="stable")
     places = [ClashPlace.of(watch, pair, interference, row) for row in order]
-    return MeasuredClash(pair, len(rows) / max(len(draws.deviations), 1), interference.depths[order], places)
+    return MeasuredClash(len(rows) / max(len(draws.deviations), 1), interference.depths[order], places)
 
 
 def _chosen_faces(nominal: Nominal, pair: tuple[int, int]) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -11,10 +11,10 @@ import numpy as np
 from tolcontact.declaration import Assembly, Mesh, Part
 from tolcontact.declaration.geometry import STEP, UNITS
 from tolcontact.discretization import Nominal, NominalPart
+from tolcontact.geometry.tolerances import ON_FACE
 from tolcontact.plausibility.trial_draws import TrialDraws
 
 FAR_SHARE = 0.25  # of a part's size: how far off its box a point may lie
-ON_SURFACE = 1e-4  # of a part's size
 PLAUSIBLE_SIZES = (1.0, 10_000.0)  # of a part [mm]
 MAX_SIZE_RATIO = 10.0  # of parts that touch
 MESH_MARGIN = 0.1  # of a mesh's size: largest distance of a point on the mesh
@@ -197,7 +197,7 @@ def _cause(nominal: NominalPart, point: np.ndarray) -> str:
     """Return the likely cause of a point that lies off its part."""
     R_WP, t_WP = nominal.placement
     meant = (point - t_WP) @ R_WP
-    if _outside(meant[None], nominal.mesh.bounds)[0] <= ON_SURFACE * nominal.mesh.scale:
+    if _outside(meant[None], nominal.mesh.bounds)[0] <= ON_FACE * nominal.mesh.scale:
         return f"points are stated in the part's own frame; for this point of the assembly write ({_row(meant)})"
     return "check the coordinates, which are in the part's own frame [mm]"
 
@@ -210,7 +210,7 @@ def _outside(points: np.ndarray, bounds: np.ndarray) -> np.ndarray:
 def _normals_at(nominal: NominalPart, point: np.ndarray) -> np.ndarray:
     """Return the normals (triangle, 3) of the triangles at a point (3,) [mm] of a part."""
     corners, normals = np.asarray(nominal.mesh.triangles), np.asarray(nominal.mesh.face_normals)
-    margin = ON_SURFACE * nominal.mesh.scale
+    margin = ON_FACE * nominal.mesh.scale
     nearby = np.flatnonzero(
         ((corners.min(axis=1) - margin <= point) & (corners.max(axis=1) + margin >= point)).all(axis=1)
         & (np.abs(((point - corners[:, 0]) * normals).sum(axis=1)) <= margin)

@@ -11,7 +11,7 @@ from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.discretization.measured_geometry import Combined, Heights, NominalMeasurement
 from tolcontact.features import FaceDeviation, NominalFeature
 from tolcontact.features.freedoms import FEATURE, FORM
-from tolcontact.features.nominal_feature import FACE_TOLERANCE
+from tolcontact.geometry.tolerances import ON_FACE
 from tolcontact.plausibility.declared_points import location_designation
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws
 
@@ -146,7 +146,7 @@ def _unfollowed(draws: TrialDraws, uses: Sequence[Use]) -> list[tuple[int, Nomin
             places = np.array([(uses[k].point - t_WP) @ R_WP for k in numbers])
             triangles, feet = surface.nearest(places)
             normals, distances = surface.normals(triangles, feet) @ R_WP.T, np.linalg.norm(feet - places, axis=1)
-            for row in np.flatnonzero(distances <= FACE_TOLERANCE * surface.mesh.scale):
+            for row in np.flatnonzero(distances <= ON_FACE * surface.mesh.scale):
                 use, normal = uses[numbers[row]], normals[row]
                 motion = _motion(draws, feature.deviation(index, placement), use, normal) * abs(float(normal @ use.direction))
                 doubts += [(numbers[row], feature, motion)] * (motion > 0)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tolcontact.declaration.values import Vector
+from tolcontact.geometry.analytic_surfaces import are_opposed
 from tolcontact.geometry.brep_face import (
     are_one_surface,
     describe_faces,
@@ -19,7 +20,6 @@ from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
 from tolcontact.pmi.declarable import Undeclared
 from tolcontact.readable import Readable
 
-MAX_OPPOSED_ERROR = 1e-3  # [rad] between two planes that count as parallel
 MAX_ANGLE = 0.01  # [rad] between directions of faces that may be parts of one surface: fitted ones differ by much less
 MAX_DISTANCE = 1e-3  # of a part's size: from a point to its face
 _ROUND = ("cylinder", "cone", "sphere", "torus")
@@ -79,7 +79,7 @@ class TolerancedSurfaces:
         """Return whether these are two planes with opposite normals."""
         if len(surfaces) != 2 or any(self.kind(surface) != "plane" for surface in surfaces):
             return False
-        return bool(np.linalg.norm(self.normal(surfaces[0]) + self.normal(surfaces[1])) < MAX_OPPOSED_ERROR)
+        return are_opposed(*map(self.normal, surfaces))
 
     def _are_one(self, number: int, other: int) -> bool:
         """Return whether two faces are parts of one surface. Most differ in their kind or direction."""

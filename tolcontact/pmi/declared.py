@@ -6,12 +6,13 @@ from pathlib import Path
 
 from tolcontact.declaration import Assembly, Mesh, Part
 from tolcontact.errors import GeometryFault, OptionError, shown
+from tolcontact.features.datum_frames import Declared
 from tolcontact.geometry.brep_face import describe_faces
 from tolcontact.geometry.shapes import shape
 from tolcontact.geometry.step_listing import LISTING_CHORD, FacesOfRecords, bodies_in, faces_of_records, part_name
 from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
 from tolcontact.pmi.claims import NO_FACE, Annotation, Claim, DeclaredAnnotation, missing_faces
-from tolcontact.pmi.drafts import Declared, declare_features
+from tolcontact.pmi.drafts import declare_features
 from tolcontact.pmi.reading import read_pmi
 from tolcontact.readable import Readable
 

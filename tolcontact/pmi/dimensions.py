@@ -3,7 +3,7 @@
 import math
 from collections import defaultdict
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any
 
 from tolcontact.pmi.annotations import Dimension
 from tolcontact.pmi.aspects import DATUM_SIZE, LOCATIONS, SIZES, Aspects, features_of
@@ -18,54 +18,45 @@ _LIMITS = {"upper limit": "upper", "lower limit": "lower"}
 MAX_NOTES = 1000  # records of notes of a dimension, which may refer to each other
 
 
-class _Values(NamedTuple):
-    """The values of a dimension by their roles "nominal", "lower" and "upper", and its notes."""
-
-    by_role: dict[str, Quantity]
-    notes: list[str]
-
-
-class _Bounds(NamedTuple):
-    """Deviations from the nominal value, or the class of a fit."""
-
-    lower: Quantity | None = None
-    upper: Quantity | None = None
-    fit: str = ""
+Values = dict[str, Quantity]  # of a dimension, by their roles: "nominal", "lower", "upper", "lower deviation", ...
 
 
 def dimensions_of(records: Records, aspects: Aspects) -> tuple[Dimension, ...]:
     """Return the dimensions of a file, in the order of their records."""
-    values, bounds = _values(records), _bounds(records)
-    numbers = records.numbers(*_KINDS)
+    values, notes = _values_and_notes(records)
+    fits = _add_deviations(records, values)
     return tuple(
-        _dimension(records, aspects, (number, record), values.get(record, _Values({}, [])), bounds.get(record, _Bounds()))
-        for number, record in enumerate(numbers, 1)
+        _dimension(
+            records,
+            aspects,
+            record,
+            values.get(record, {}),
+            number=number,
+            fit=fits.get(record, ""),
+            modifiers=tuple(dict.fromkeys(notes.get(record, ()))),
+        )
+        for number, record in enumerate(records.numbers(*_KINDS), 1)
     )
 
 
-def _dimension(records: Records, aspects: Aspects, numbers: tuple[int, int], values: _Values, bounds: _Bounds) -> Dimension:
-    number, record = numbers
+def _dimension(records: Records, aspects: Aspects, record: int, values: Values, **stated: Any) -> Dimension:
+    """Return a dimension, with what other records have `stated` of it."""
     entities = records.entities(record)
     start, *end = features_of(records, record)
     items, end_items = aspects.items(start), aspects.items(*end)
-    nominal = values.by_role.get("nominal")
-    sides = {side: _limit(values, bounds, side) for side in ("lower", "upper")}
-    measures = [*values.by_role.values(), *(side for side in (bounds.lower, bounds.upper) if side)]
     return Dimension(
-        number=number,
         record=record,
         kind=next(kind for entity, kind in _KINDS.items() if entity in entities),
         name=_name(records, record),
-        unit=measures[0].unit if measures else "",
-        nominal=nominal.value if nominal else None,
-        lower=sides["lower"],
-        upper=sides["upper"],
-        fit=bounds.fit,
-        modifiers=tuple(dict.fromkeys(values.notes)),
+        unit=next((measure.unit for measure in values.values()), ""),
+        nominal=values["nominal"].value if "nominal" in values else None,
+        lower=_limit(values, "lower"),
+        upper=_limit(values, "upper"),
         face_records=items.faces,
         other_records=items.others,
         end_face_records=end_items.faces,
         end_other_records=end_items.others,
+        **stated,
     )
 
 
@@ -78,34 +69,34 @@ def _name(records: Records, record: int) -> str:
     return records.parameters(record, *LOCATIONS, "SHAPE_ASPECT_RELATIONSHIP").text(0)
 
 
-def _limit(values: _Values, bounds: _Bounds, side: str) -> float | None:
+def _limit(values: Values, side: str) -> float | None:
     """Return a limit that the file states, or the nominal value plus its deviation."""
-    if side in values.by_role:
-        return values.by_role[side].value
-    nominal, deviation = values.by_role.get("nominal"), bounds.lower if side == "lower" else bounds.upper
+    if side in values:
+        return values[side].value
+    nominal, deviation = values.get("nominal"), values.get(f"{side} deviation")
     if not (nominal and deviation and nominal.unit == deviation.unit):
         return None
     limit = nominal.value + deviation.value
     return limit if math.isfinite(limit) else None
 
 
-def _values(records: Records) -> dict[int, _Values]:
-    """Return values and notes by the records of their dimensions."""
-    dimensions: dict[int, _Values] = defaultdict(lambda: _Values({}, []))
+def _values_and_notes(records: Records) -> tuple[dict[int, Values], dict[int, list[str]]]:
+    """Return values, and notes, by the records of their dimensions."""
+    values, notes = defaultdict[int, Values](dict), defaultdict[int, list[str]](list)
     for number in records.numbers("DIMENSIONAL_CHARACTERISTIC_REPRESENTATION"):
         parameters = records.parameters(number, "DIMENSIONAL_CHARACTERISTIC_REPRESENTATION")
-        values = dimensions[parameters.reference(0)]
+        dimension = parameters.reference(0)
         shape = records.parameters(parameters.reference(1), "SHAPE_DIMENSION_REPRESENTATION", "REPRESENTATION")
         for item in shape.references(1):
             measure = quantity(records, item)
             if measure is None:
-                values.notes.extend(_notes(records, item))
+                notes[dimension].extend(_notes(records, item))
                 continue
             qualifiers = [note for note in _qualifiers(records, item) if note not in ("designed", "nominal")]
             role = _LIMITS.get(_item_name(records, item), "nominal")
-            values.notes.extend(qualifiers)
-            values.by_role.setdefault(role, measure)
-    return dimensions
+            notes[dimension].extend(qualifiers)
+            values[dimension].setdefault(role, measure)
+    return values, notes
 
 
 def _item_name(records: Records, item: int) -> str:
@@ -136,15 +127,18 @@ def _notes(records: Records, item: int) -> Iterator[str]:
         waiting.extend(reversed(records.parameters(number, "COMPOUND_REPRESENTATION_ITEM").references(1)))
 
 
-def _bounds(records: Records) -> dict[int, _Bounds]:
-    """Return deviations and fits by the records of their dimensions."""
-    bounds = {}
+def _add_deviations(records: Records, values: dict[int, Values]) -> dict[int, str]:
+    """Add deviations from nominal values to the values, and return fits by the records of their dimensions."""
+    fits = {}
     for number in records.numbers("PLUS_MINUS_TOLERANCE"):
         parameters = records.parameters(number, "PLUS_MINUS_TOLERANCE")
         source, dimension = parameters.reference(0), parameters.reference(1)
         deviations = records.parameters(source, "TOLERANCE_VALUE")
+        for index, role in enumerate(("lower deviation", "upper deviation")):
+            values[dimension].pop(role, None)
+            if deviation := quantity(records, deviations.reference(index)):
+                values[dimension][role] = deviation
         fit = records.parameters(source, "LIMITS_AND_FITS")
-        lower, upper = (quantity(records, deviations.reference(index)) for index in (0, 1))
         # Some systems write the grade with the form variance ("H7"), and leave its own place empty.
-        bounds[dimension] = _Bounds(lower, upper, " ".join(filter(None, (fit.text(0) + fit.text(2), fit.text(1)))))
-    return bounds
+        fits[dimension] = " ".join(filter(None, (fit.text(0) + fit.text(2), fit.text(1))))
+    return fits

@@ -15,9 +15,10 @@ from tolcontact.declaration.toleranced import Control
 from tolcontact.declaration.values import Vector, script_line
 from tolcontact.errors import GeometryFault
 from tolcontact.features import Features, datum_order
+from tolcontact.features.datum_frames import Declared
 from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, SlabFeature
 from tolcontact.features.feature_recognition import feature_geometry
-from tolcontact.features.nominal_pattern import check_alike
+from tolcontact.features.nominal_pattern import unlike_members
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.files import Shape
 from tolcontact.pmi import declarable
@@ -26,7 +27,6 @@ from tolcontact.pmi.claims import Claim, Place, TolerancedSurfaces, claims_of
 from tolcontact.pmi.declarable import Undeclared
 
 Statement = tuple[Claim, Control]
-Declared = Feature | Pattern | DatumTargets
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +144,7 @@ def _patterns(drafts: Mapping[Place, Draft], datums: Collection[frozenset[Place]
         places, members = frozenset(group), [drafts[place] for place in group]
         is_divided = any(places & datum and places != datum for datum in datums)
         geometries = tuple(geometry for member in members for geometry in member.geometries)
-        if len(members) > 1 and not is_divided and _are_alike(geometries):
+        if len(members) > 1 and not is_divided and not unlike_members(geometries):
             kind, number = members[0].name.split()
             faces = tuple(faces for member in members for faces in member.faces)
             yield Draft(f"{kind}s {number}", faces, geometries, stated=members[0].stated), places
@@ -156,14 +156,6 @@ def _keeps_together(claim: Claim) -> bool:
     return isinstance(stated, Tolerance) and (
         stated.kind == "position" or stated.refines is not None or "common zone" in stated.modifiers
     )
-
-
-def _are_alike(geometries: Sequence[FeatureGeometry]) -> bool:
-    try:
-        check_alike(geometries)
-    except GeometryFault:
-        return False
-    return True
 
 
 def _common_datum(claim: Claim, drafts: Mapping[Place, Draft]) -> Draft:
@@ -182,7 +174,7 @@ class _Trial:
         self._numbers = Features(0)
         self._declared: dict[Draft, Declared] = {}
         for earlier in datum_order(part)[0]:
-            self._add(earlier, self._numbers)
+            self._numbers.add(earlier, 0, meshes)
 
     def features(self, drafts: Sequence[Draft]) -> dict[Draft, Declared]:
         """Declare the features of drafts, each after its datums and members, with the tolerances that are compatible."""
@@ -201,7 +193,7 @@ class _Trial:
             for draft in ready:
                 declared = self._made(draft, stated[draft], is_needed=draft in needed)
                 if declared is not None:
-                    self._add(declared, self._numbers)
+                    self._numbers.add(declared, 0, self._meshes)
                     self._declared[draft] = declared
                     self._part.add(declared)
             waiting = [draft for draft in waiting if draft not in ready]
@@ -253,18 +245,12 @@ class _Trial:
             return DatumTargets(name, tuple(feature.point(*point) for feature, point in points), script_line())
         return Pattern(name, part, borrowed or draft.faces, tolerances, letter, script_line())
 
-    def _add(self, declared: Declared, numbers: Features) -> None:
-        if isinstance(declared, DatumTargets):
-            numbers.add_targets(declared, 0)
-        else:
-            numbers.add(declared, 0, self._meshes)
-
     def _fault(self, declared: Declared) -> str:
         """Return why something cannot be added to what is declared before it; "" if it can."""
         for fault in declared.faults():
             return fault
         try:
-            self._add(declared, self._numbers.copy())
+            self._numbers.copy().add(declared, 0, self._meshes)
         except GeometryFault as error:
             return str(error)
         return ""

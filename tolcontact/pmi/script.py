@@ -16,6 +16,7 @@ from tolcontact.pmi.declared import DeclaredFile
 from tolcontact.texts import literal
 
 MAX_WIDTH = 120  # of a line that can be broken
+COMMENT: dict[str, Any] = {"initial_indent": "    # ", "subsequent_indent": "    #   "}
 _DIGITS = 9  # of lengths: more than a shape resolves
 
 
@@ -33,7 +34,7 @@ def script(path: Path, declared: DeclaredFile) -> str:
         f"    model = tc.Assembly({literal(path.stem)})",
         *(line for part in declared.parts for line in _part_lines(part)),
         *(["    # Not declared, or not wholly:"] if comments else []),
-        *(line for comment in comments for line in _comment_lines(comment)),
+        *(line for comment in comments for line in textwrap.wrap(shown(comment), MAX_WIDTH, **COMMENT)),
         "    return model",
         "",
         "",
@@ -41,10 +42,6 @@ def script(path: Path, declared: DeclaredFile) -> str:
         "    tc.main(assembly)",
         "",
     ])  # fmt: skip
-
-
-def _comment_lines(comment: str) -> list[str]:
-    return textwrap.wrap(shown(comment), MAX_WIDTH, initial_indent="    # ", subsequent_indent="    #   ")
 
 
 def _part_lines(part: Part) -> Iterator[str]:
@@ -97,12 +94,9 @@ def _member(faces: Sequence[Face]) -> str:
 
 
 def _face(face: Face) -> str:
-    return f"part.face({_brep(face.selections[0])})"
-
-
-def _brep(selection: Any) -> str:
+    (selection,) = face.selections
     assert isinstance(selection, Brep)
-    return f"tc.select.Brep({', '.join(map(literal, selection.which))})"
+    return f"part.face(tc.select.Brep({', '.join(map(literal, selection.which))}))"
 
 
 def _source(tolerance: Size | GeometricTolerance) -> str:

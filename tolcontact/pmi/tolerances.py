@@ -1,7 +1,7 @@
 """Geometric tolerances in the records of a file."""
 
 from collections import defaultdict
-from typing import NamedTuple
+from typing import Any
 
 from tolcontact.pmi.annotations import Tolerance
 from tolcontact.pmi.aspects import Aspects
@@ -21,25 +21,27 @@ _BASE = "GEOMETRIC_TOLERANCE"
 _WITH = f"{_BASE}_WITH_"
 
 
-class _Zone(NamedTuple):
-    """The form of a tolerance zone in words, and the length of a projected zone [mm]."""
-
-    form: str = ""
-    projected: float | None = None
-
-
 def tolerances_of(records: Records, aspects: Aspects) -> tuple[Tolerance, ...]:
     """Return the geometric tolerances of a file, in the order of their records."""
     numbers = records.numbers(_BASE, *KINDS)
     order = {number: k for k, number in enumerate(numbers, 1)}
-    zones, refined = _zones(records), _refined(records)
+    (forms, projected), refined = _zones(records), _refined(records)
     return tuple(
-        _tolerance(records, aspects, record, order[record], zones.get(record, _Zone()), order.get(refined.get(record, 0)))
+        _tolerance(
+            records,
+            aspects,
+            record,
+            number=order[record],
+            zone=", ".join(dict.fromkeys(filter(None, forms.get(record, ())))),
+            projected=projected.get(record),
+            refines=order.get(refined.get(record, 0)),
+        )
         for record in numbers
     )
 
 
-def _tolerance(records: Records, aspects: Aspects, record: int, number: int, zone: _Zone, refines: int | None) -> Tolerance:
+def _tolerance(records: Records, aspects: Aspects, record: int, **stated: Any) -> Tolerance:
+    """Return a tolerance, with what other records have `stated` of it."""
     entities = records.entities(record)
     parameters = records.parameters(record, _BASE, *KINDS)
     aspect = parameters.reference(3)
@@ -48,13 +50,10 @@ def _tolerance(records: Records, aspects: Aspects, record: int, number: int, zon
     sides = [length(records, number) for number in (unit.reference(0), area.reference(1))]
     items = aspects.items(aspect)
     return Tolerance(
-        number=number,
         record=record,
         kind=next((kind for entity, kind in KINDS.items() if entity in entities), ""),
         name=parameters.text(0),
         value=length(records, parameters.reference(2)),
-        zone=zone.form,
-        projected=zone.projected,
         modifiers=_modifiers(records, record),
         per_unit=tuple(side for side in sides if side is not None),
         unit_shape=next(iter(area.words(0)), ""),
@@ -62,9 +61,9 @@ def _tolerance(records: Records, aspects: Aspects, record: int, number: int, zon
         maximum=_length_in(records, record, f"{_WITH}MAXIMUM_TOLERANCE"),
         extent=aspects.extent(aspect),
         datums=datum_system(records, systems),
-        refines=refines,
         face_records=items.faces,
         other_records=items.others,
+        **stated,
     )
 
 
@@ -82,26 +81,24 @@ def _length_in(records: Records, record: int, entity: str) -> float | None:
     return length(records, records.entities(record).get(entity, Parameters()).reference(0))
 
 
-def _zones(records: Records) -> dict[int, _Zone]:
-    """Return the zones by the records of their tolerances."""
-    definitions = records.numbers("PROJECTED_ZONE_DEFINITION")
-    projected: dict[int, float | None] = {}
-    for number in definitions:
+def _zones(records: Records) -> tuple[dict[int, list[str]], dict[int, float]]:
+    """Return the forms of zones in words, and the lengths of projected zones [mm], by the records of their tolerances.
+
+    Most tolerances have one zone, and a projected zone may have a second record.
+    """
+    lengths: dict[int, float | None] = {}
+    for number in records.numbers("PROJECTED_ZONE_DEFINITION"):
         parameters = records.parameters(number, "PROJECTED_ZONE_DEFINITION")
-        projected[parameters.reference(0)] = length(records, parameters.reference(3))
-    zones: dict[int, list[_Zone]] = defaultdict(list)
+        lengths[parameters.reference(0)] = length(records, parameters.reference(3))
+    forms, projected = defaultdict[int, list[str]](list), dict[int, float]()
     for number in records.numbers("TOLERANCE_ZONE"):
         parameters = records.parameters(number, "TOLERANCE_ZONE")
         form = records.parameters(parameters.reference(5), "TOLERANCE_ZONE_FORM").text(0)
         for tolerance in parameters.references(4):
-            zones[tolerance].append(_Zone(form, projected.get(number)))
-    return {tolerance: _merged(entries) for tolerance, entries in zones.items()}
-
-
-def _merged(zones: list[_Zone]) -> _Zone:
-    """Return a tolerance's zone: most have one record, and a projected zone may have a second one."""
-    forms = dict.fromkeys(zone.form for zone in zones if zone.form)
-    return _Zone(", ".join(forms), next((zone.projected for zone in zones if zone.projected is not None), None))
+            forms[tolerance].append(form)
+            if (height := lengths.get(number)) is not None:
+                projected.setdefault(tolerance, height)
+    return forms, projected
 
 
 def _refined(records: Records) -> dict[int, int]:

@@ -16,6 +16,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from tolcontact.limits import Limits
 from tolcontact.statistics.intervals import (
@@ -30,7 +31,6 @@ from tolcontact.statistics.intervals import (
     proportion_of,
 )
 from tolcontact.statistics.sample import Sample
-from tolcontact.variation.plans import scrambled_points
 
 PERCENTS = 0.135, 50.0, 99.865
 MIN_AT_STOP = 2  # values at a limit that is a stop
@@ -187,7 +187,7 @@ def _simulated_percentiles(x: Sample) -> tuple[np.ndarray, np.ndarray]:
 @lru_cache
 def values_below(n: int) -> np.ndarray:
     """Return simulated numbers of the values below the percentiles, among `n` values, (percentile, trial)."""
-    u = scrambled_points(TRIALS, len(PERCENTS), np.random.default_rng(0).spawn(1)[0]).T
+    u = scipy.stats.qmc.Sobol(len(PERCENTS), rng=np.random.default_rng(0)).random(TRIALS).T
     p = np.array(PERCENTS) / 100
     below_low = binomial_quantile(u[0], np.full(TRIALS, n), p[0])
     below_median = below_low + binomial_quantile(u[1], n - below_low, (p[1] - p[0]) / (1 - p[0]))

@@ -15,6 +15,7 @@ from tolcontact.errors import GeometryFault, ModelError, designation
 from tolcontact.features import FeatureOfSize, FormField, Freedom, Layer, NominalPattern
 from tolcontact.features.minimum_zone import ZoneMember, minimum_widths
 from tolcontact.features.tolerance_kinds import floats, includes_form
+from tolcontact.geometry.tolerances import MIN_PART
 from tolcontact.variation import zones
 from tolcontact.variation.zones import SHARE, FormedZone, MemberZone, chi_share, directions
 
@@ -22,7 +23,6 @@ DIRECTIONS = 1 << 12
 FACES = 500  # that are drawn for the mean width of measured ones
 MIN_SPREAD, MAX_SPREAD = 1e-6, 1e3  # of the width
 INNER_SHARE_TOLERANCE = 1e-3  # share of features that narrower tolerances may leave outside of a wider one, beyond 0.27 %
-MIN_PART = 1e-12  # of a unit component: smaller parts of it in a coordinate are rounding
 
 
 def form_spreads(field: FormField, tolerance: GeometricTolerance) -> np.ndarray:

@@ -18,8 +18,6 @@ import numpy as np
 import scipy
 from scipy.special import gammainc, ndtri
 
-from tolcontact.variation.plans import MAX_DIMENSIONS, scrambled_points
-
 SHARE = 0.9973002039367398  # of a normal distribution within three standard deviations
 LOG2_DIRECTIONS = 14
 MEMBER_DIRECTIONS = 1 << 17  # for all members of a pattern that differ; the mean share then has an error of some 3e-5
@@ -184,9 +182,5 @@ def directions(components: int) -> np.ndarray:
     """Return unit vectors (direction, component) in all directions evenly."""
     if components == 1:
         return np.ones((1, 1))
-    if components <= MAX_DIMENSIONS:
-        points = scrambled_points(1 << LOG2_DIRECTIONS, components, np.random.default_rng(0))
-    else:
-        points = scipy.stats.qmc.Sobol(components, seed=0).random_base2(LOG2_DIRECTIONS)
-    normal = ndtri(points)
+    normal = ndtri(scipy.stats.qmc.Sobol(components, seed=0).random_base2(LOG2_DIRECTIONS))
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)

@@ -76,7 +76,8 @@ class StepText:
     @property
     def shape_files(self) -> tuple[str, ...]:
         """The documents that are files of shapes."""
-        return tuple(name for name in self.documents if _suffix(name) in SHAPE_SUFFIXES)
+        suffixes = {name: PurePosixPath(PureWindowsPath(name).name).suffix.lower() for name in self.documents}
+        return tuple(name for name, suffix in suffixes.items() if suffix in SHAPE_SUFFIXES)
 
     def has_any(self, entities: Iterable[str]) -> bool:
         """Return whether there is a record of one of some entities."""
@@ -179,7 +180,3 @@ def decoded(string: bytes) -> str:
 
 def _wide(match: re.Match[str]) -> str:
     return bytes.fromhex(match[2]).decode("latin-1") if match[2] else bytes.fromhex(match[1]).decode("utf-16-be", "replace")
-
-
-def _suffix(name: str) -> str:
-    return PurePosixPath(PureWindowsPath(name).name).suffix.lower()
