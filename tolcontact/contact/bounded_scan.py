@@ -1,6 +1,7 @@
 """Scans of bounded bodies: the places where they can touch are searched at every pose."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,7 +9,7 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import SLOTS
 from tolcontact.contact import bounded_kernel
 from tolcontact.contact.guard import PARTING, Guard, is_guard, no_places
-from tolcontact.contact.scan import Deepest, Scan, SlotScan
+from tolcontact.contact.scan import Deepest, Scan
 from tolcontact.discretization import FIRST_POINT, ContactPoints, raised_places
 from tolcontact.geometry.kernel import CORNER_ON_FACET, INSIDE
 from tolcontact.geometry.meeting import NEARNESS, Meeting, Places
@@ -21,67 +22,93 @@ ALIGNED = 0.87  # cosine of the largest angle between the axis of separation and
 SHOWN_SHARE = 0.05  # of the gap along this axis: no place is added if another place shows the gap to within this share
 
 
+class SearchedPlaces(NamedTuple):
+    """Places where a pair can touch, found at given poses, separately for each realization.
+
+    labels          (realization, place): -1 for none
+    P_m, P_r, n_r   (realization, place, 3): P^m, P^r, n^r of nominal faces
+    heights         (realization, place) [mm]: growth of both faces there, including form deviations
+    valid           (realization, place): the places that count
+    """
+
+    labels: Int[Array, "realization place"]
+    P_m: Float[Array, "realization place 3"]
+    P_r: Float[Array, "realization place 3"]
+    n_r: Float[Array, "realization place 3"]
+    heights: Float[Array, "realization place"]
+    valid: Bool[Array, "realization place"]
+
+    @classmethod
+    def none(cls, count: int, room: int = 0) -> "SearchedPlaces":
+        """Return empty places for a number of realizations, with room for some."""
+        shape = count, room
+        P_m, P_r, n_r = np.zeros((3, *shape, 3))
+        return cls(np.full(shape, -1), P_m, P_r, n_r, np.zeros(shape), np.zeros(shape, dtype=bool))
+
+    def take(self, rows: np.ndarray) -> "SearchedPlaces":
+        """Return the places of some realizations."""
+        return SearchedPlaces(*(values[rows] for values in self))
+
+    def gaps(self, relative: Float[Array, "realization 12"]) -> Float[Array, "realization place"]:
+        """Return the gaps [mm] at X_RM; infinite where there is no place."""
+        gaps = np.where(self.valid, 0.0, np.inf)
+        bounded_kernel.gaps(np.ascontiguousarray(relative), self.P_m, self.P_r, self.n_r, self.heights, gaps)
+        return gaps
+
+    def rows(self, labels: Int[Array, "realization slot"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return P^m, P^r, n^r (realization, slot, 3) of the places with some labels, on deviating faces."""
+        P_m, P_r, n_r = np.empty((3, *labels.shape, 3))
+        bounded_kernel.gather(labels, self.labels, self.P_m, self.P_r, self.n_r, self.heights, P_m, P_r, n_r)
+        return P_m, P_r, n_r
+
+    def holds(self, labels: Int[Array, "realization slot"]) -> Bool[Array, "realization slot"]:
+        """Return whether places with some labels are among those that count."""
+        found = np.empty(labels.shape, dtype=bool)
+        bounded_kernel.contains(labels, self.labels, self.valid, found)
+        return found
+
+
 @dataclass(frozen=True, eq=False)
-class BoundedScan(SlotScan):
+class BoundedScan(Scan):
     """Places where a pair can touch at given poses: for each realization, the places with the smallest gaps.
 
-    labels              (realization, place): indices of the places in the pair's meeting
-    places, feet, normals   (realization, place, 3): P^m, P^r, n^r
-    heights             (realization, place) [mm]: growth of both faces there, including form deviations
+    places   whose labels are their indices in the meeting of the pair
     """
 
     fills = True
 
     meeting: Meeting
-    labels: Int[Array, "realization place"]
-    places: Float[Array, "realization place 3"]
-    feet: Float[Array, "realization place 3"]
-    normals: Float[Array, "realization place 3"]
-    valid: Bool[Array, "realization place"]
-    heights: Float[Array, "realization place"]
+    places: SearchedPlaces
 
     def take(self, rows: np.ndarray) -> "BoundedScan":
-        return BoundedScan(
-            self.tables, self.P_m, self.offsets, self.meeting,
-            *(getattr(self, name)[rows] for name in ("labels", "places", "feet", "normals", "valid", "heights")),
-        )  # fmt: skip
+        return BoundedScan(self.meeting, self.places.take(rows))
 
     @property
     def minima(self) -> Int[Array, "realization minimum"]:
         """The labels of minima of the gap between contact points, -1 for none."""
-        is_minimum = self.labels >= FIRST_PLACE
-        return np.where(is_minimum, self.labels, -1)[:, is_minimum.any(axis=0)]
-
-    def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        gaps = np.where(self.valid, 0.0, np.inf)
-        relative = np.ascontiguousarray(relative)
-        bounded_kernel.gaps(relative, self.places, self.feet, self.normals, self.heights, gaps)
-        return gaps
+        labels = self.places.labels
+        is_minimum = labels >= FIRST_PLACE
+        return np.where(is_minimum, labels, -1)[:, is_minimum.any(axis=0)]
 
     def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        gaps = np.where(self.labels < FIRST_PLACE, self.gaps(relative, deviations), np.inf)
+        gaps = np.where(self.places.labels < FIRST_PLACE, self.places.gaps(relative), np.inf)
         return gaps.min(axis=1, initial=np.inf)
 
     def depth_between(self, relative: np.ndarray) -> np.ndarray:
-        gaps = np.where(self.labels < FIRST_PLACE, np.inf, self.gaps(relative, np.empty((len(relative), 0))))
+        gaps = np.where(self.places.labels < FIRST_PLACE, np.inf, self.places.gaps(relative))
         return -gaps.min(axis=1, initial=0.0)
 
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
-        shape = len(relative), min(MAX_DEEPEST, self.labels.shape[1])
+        places, shape = self.places, (len(relative), min(MAX_DEEPEST, self.places.labels.shape[1]))
         deepest = Deepest(np.empty(shape, dtype=np.int64), np.empty(shape))
-        gaps, distance = self.gaps(relative, deviations), self.meeting.reach.spread
-        bounded_kernel.deepest(self.labels, self.feet, gaps, distance, *deepest)
+        bounded_kernel.deepest(places.labels, places.P_r, places.gaps(relative), self.meeting.reach.spread, *deepest)
         return deepest
 
     def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        P_m, P_r, n_r = np.empty((3, *points.shape, 3))
-        bounded_kernel.gather(points, self.labels, self.places, self.feet, self.normals, self.heights, P_m, P_r, n_r)
-        return P_m, P_r, n_r
+        return self.places.rows(points)
 
-    def holds(self, points: Int[Array, "realization slot"]) -> Bool[Array, "realization slot"]:
-        found = np.empty(points.shape, dtype=bool)
-        bounded_kernel.contains(points, self.labels, self.valid, found)
-        return found
+    def holds(self, points: np.ndarray) -> np.ndarray:
+        return self.places.holds(points)
 
     def moves(self, points: np.ndarray) -> np.ndarray:
         if not len(self.meeting.kinds):
@@ -91,7 +118,6 @@ class BoundedScan(SlotScan):
 
 
 def bounded_scan(
-    scan: Scan,
     pair: ContactPoints,
     meeting: Meeting,
     X_RM: Float[Array, "n 12"],
@@ -119,8 +145,8 @@ def bounded_scan(
         found, heights = _with_guard(found, heights, guard, X_RM, carried)
     if parting is not None:
         found, heights = _with_parting(found, heights, parting, X_RM, carried)
-    arrays = found.labels, found.P_m, found.P_r, found.n_r, np.isfinite(found.gaps)
-    return BoundedScan(scan.tables, scan.P_m, scan.offsets, meeting, *arrays, np.ascontiguousarray(heights))
+    nominal = found.labels, found.P_m, found.P_r, found.n_r
+    return BoundedScan(meeting, SearchedPlaces(*nominal, np.ascontiguousarray(heights), np.isfinite(found.gaps)))
 
 
 def _with_guard(

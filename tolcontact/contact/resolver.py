@@ -20,10 +20,10 @@ from tolcontact.contact.iterated_search import search
 from tolcontact.contact.linear_step import MAX_ROUNDS, PENETRATION, LinearStep
 from tolcontact.contact.record import accumulate_starts
 from tolcontact.contact.repeated_steps import repeat
-from tolcontact.contact.scan import min_gaps, undone
-from tolcontact.contact.springs import spring_misfit
+from tolcontact.contact.scan import RoundScan, Scan, min_gaps, undone
 from tolcontact.contact.starts import FIRST, RESCUES, Start
 from tolcontact.contact.state import NO_ANSWER, Resolved, State, Task
+from tolcontact.discretization import ContactPoints
 from tolcontact.interference import ordered
 
 SAME_CONFLICT = 1e-3  # conflicts whose penetration differs by less than this share count as the same
@@ -106,14 +106,13 @@ class ContactResolver:
         unseen = np.flatnonzero(~moves)
         moves[unseen] = self._candidates.interfere(relative[unseen])
         touched = np.flatnonzero(moves)
-        scans = [scan.take(touched) for scan in survey.scans]
         task = Task(
             raw=poses[touched][:, self.parts],
             relative=relative[touched],
             deviations=deviations[touched],
             moments=survey.moments[touched],
-            may_carry=self._candidates.may_carry(scans, relative[touched], deviations[touched]),
-            scans=scans,
+            may_carry=self._candidates.may_carry(relative[touched], deviations[touched]),
+            scans=[scan.take(touched) for scan in survey.scans],
         )
         state = self._step.start(task.raw, task.relative)
         self._attempt(task, state, FIRST)
@@ -134,16 +133,14 @@ class ContactResolver:
         """Take steps from the poses of `state` to an answer, and judge it."""
         if start.projected:
             caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull parts far if nothing holds them
-            search(self._step, self._limits, self._candidates, self._energy_of, task, state, start.stride, caution)
+            search(self._step, self._limits, self._candidates, self._energy_of, task, state, start, caution)
         elif self._method.is_exact:
             repeat(self._step, self._limits, self._candidates, self._free_steps, task, state, start)
         else:
             self._step.take(task, state, stride=start.stride)
         state.searched[:] = start.projected
         self._leave_adrift(task, state)
-        scans = self._candidates.scans(
-            state.relative, task.deviations, projected=start.projected, earlier=task.scans, start=start, answered=state.slots
-        )
+        scans = self._candidates.scans(state.relative, task.deviations, earlier=task.scans, start=start, answered=state.slots)
         task = replace(task, scans=scans)
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
         if self._method.is_exact:
@@ -221,10 +218,7 @@ class ContactResolver:
             poses, relative = state.poses[rows], state.relative[rows]
         if start.free:
             poses, relative = self._free_steps.lift(poses, relative, part.deviations)
-        part = replace(
-            part,
-            scans=self._candidates.scans(relative, part.deviations, projected=start.projected, start=start),
-        )
+        part = replace(part, scans=self._candidates.scans(relative, part.deviations, start=start))
         attempt = self._step.start(poses, relative)
         self._attempt(part, attempt, start)
         accumulate_starts(state, rows, attempt)
@@ -263,6 +257,28 @@ def is_same_conflict(state: State, best: State) -> Bool[Array, " n"]:
     depth, best_depth = state.slack.max(axis=1), best.slack.max(axis=1)
     goes_as_deep = np.abs(depth - best_depth) <= SAME_CONFLICT * np.maximum(depth, best_depth)
     return (state.rank == 1) & (best.rank == 1) & goes_as_deep
+
+
+def spring_misfit(
+    pair: ContactPoints,
+    scan: Scan,
+    relative: Float[Array, "n 12"],
+    deviations: Float[Array, "n contributor"],
+    reactions: Float[Array, "n point"],
+) -> Float[Array, " n"]:
+    """Return how far poses and reactions [N] of a pair miss the law of its springs (n,) [mm].
+
+    A compliant contact pushes with its stiffness times its compression, and does not pull. A rigid support among them may not
+    be inside. `relative` (n, 12) are X_RM.
+    """
+    assert pair.stiffness is not None
+    if isinstance(scan, RoundScan):
+        gaps = scan.gaps(relative, deviations)
+    else:
+        points = np.broadcast_to(np.arange(len(pair.P_m)), (len(relative), len(pair.P_m)))
+        gaps = pair.nominal_gaps(relative) - pair.offsets.heights(deviations, points)
+    compression = reactions / pair.stiffness
+    return np.asarray(np.abs(np.minimum(gaps + compression, compression)).max(axis=1))
 
 
 def checked_residual(state: State, depth: Float[Array, " n"]) -> Float[Array, " n"]:
