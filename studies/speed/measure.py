@@ -281,7 +281,7 @@ def breakdown(samples: int) -> None:
         "sampling": [(Draws, "__call__")],
         "scan": [(FixedScan, name) for name in ("survey", "min_gap", "deepest")],
         "QP": [(InterpretedFunction, "__call__")],
-        "rows, update, measures": [(named.AdaptiveFunction, "__call__")],
+        "rows, update, measures": [(named.NamedFunction, "__call__")],
         "fields": [(DisplacementFields, "sums"), (DisplacementFields, "merge")],
         "archive": [(ArchiveWriter, "append"), (Journal, "put_into")],
     }

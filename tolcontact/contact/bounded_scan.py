@@ -12,9 +12,10 @@ from tolcontact.contact.guard import PARTING, Guard, is_guard, no_places
 from tolcontact.contact.scan import Deepest, Scan
 from tolcontact.discretization import FIRST_POINT, ContactPoints, raised_places
 from tolcontact.geometry.kernel import CORNER_ON_FACET, INSIDE
-from tolcontact.geometry.meeting import NEARNESS, Meeting, Places
+from tolcontact.geometry.meeting import NEARNESS, Meeting
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.parting import Parting
+from tolcontact.geometry.places import RaisedPlaces, unraised
 
 PENETRATION = 1e-10  # mm: less than this is no penetration
 MAX_DEEPEST = SLOTS  # places of a pair that get a row in one round
@@ -44,6 +45,12 @@ class SearchedPlaces(NamedTuple):
         shape = count, room
         P_m, P_r, n_r = np.zeros((3, *shape, 3))
         return cls(np.full(shape, -1), P_m, P_r, n_r, np.zeros(shape), np.zeros(shape, dtype=bool))
+
+    @classmethod
+    def of(cls, raised: RaisedPlaces) -> "SearchedPlaces":
+        """Return places at the poses where they were found."""
+        places, heights = raised.places, np.ascontiguousarray(raised.heights)
+        return cls(places.labels, places.P_m, places.P_r, np.ascontiguousarray(places.n_r), heights, np.isfinite(places.gaps))
 
     def take(self, rows: np.ndarray) -> "SearchedPlaces":
         """Return the places of some realizations."""
@@ -138,57 +145,47 @@ def bounded_scan(
     `carried` (n, slot) are the labels of places that were active before, -1 for none. Places deeper than `deepest` (n,) [mm] do
     not count.
     """
-    found, heights = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness, depth)
+    raised = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness, depth)
     if deepest is not None:
-        found = found._replace(gaps=np.where(found.gaps - heights >= -deepest[:, None], found.gaps, np.inf))
+        raised = raised.only(raised.gaps >= -deepest[:, None])
     if guard is not None:
-        found, heights = _with_guard(found, heights, guard, X_RM, carried)
+        raised = _with_guard(raised, guard, X_RM, carried)
     if parting is not None:
-        found, heights = _with_parting(found, heights, parting, X_RM, carried)
-    nominal = found.labels, found.P_m, found.P_r, found.n_r
-    return BoundedScan(meeting, SearchedPlaces(*nominal, np.ascontiguousarray(heights), np.isfinite(found.gaps)))
+        raised = _with_parting(raised, parting, X_RM, carried)
+    return BoundedScan(meeting, SearchedPlaces.of(raised))
 
 
-def _with_guard(
-    found: Places, heights: np.ndarray, guard: Guard, X_RM: np.ndarray, carried: np.ndarray | None
-) -> tuple[Places, np.ndarray]:
-    """Return places, and their heights (n, place), with one more where bodies interfere and no place shows it.
+def _with_guard(raised: RaisedPlaces, guard: Guard, X_RM: np.ndarray, carried: np.ndarray | None) -> RaisedPlaces:
+    """Return places with one more where bodies interfere and no place shows it.
 
     If such a place was active before (`carried` (n, k)), it is found again: otherwise bodies would interfere again at once.
     """
     labels = np.full(len(X_RM), -1)
     if carried is not None:
         labels = np.where(is_guard(carried), carried, -1).max(axis=1, initial=-1)
-    rows = np.flatnonzero((labels >= 0) | ((found.gaps - heights).min(axis=1, initial=np.inf) >= -PENETRATION))
+    rows = np.flatnonzero((labels >= 0) | (raised.gaps.min(axis=1, initial=np.inf) >= -PENETRATION))
     extra = no_places(len(X_RM))
     for values, of_rows in zip(extra, guard.places(X_RM[rows], labels[rows]), strict=True):
         values[rows] = of_rows
-    joined = Places(*(np.concatenate(arrays, axis=1) for arrays in zip(found, extra, strict=True)))
-    return joined, np.concatenate([heights, np.zeros(extra.gaps.shape)], axis=1)
+    return raised.followed_by(unraised(extra))
 
 
-def _with_parting(
-    found: Places, heights: np.ndarray, parting: Parting, X_RM: np.ndarray, carried: np.ndarray | None
-) -> tuple[Places, np.ndarray]:
-    """Return places, and their heights (n, place), that separate convex bodies in the best direction, and the best place.
+def _with_parting(raised: RaisedPlaces, parting: Parting, X_RM: np.ndarray, carried: np.ndarray | None) -> RaisedPlaces:
+    """Return places that separate convex bodies in the best direction, and the best place.
 
     Bodies are free once they are separate in one direction; penetrating places with other normals would push them as well. The
     separating place is added where no other place shows as much. Nearly parallel edges that were active before (`carried`
     (n, k)) are added, too.
     """
     axis = parting.at(X_RM)
-    is_aligned = (found.n_r * axis.n_r[:, None]).sum(axis=2) > ALIGNED
-    counts = (found.gaps - heights >= -INSIDE) | ((axis.gaps[:, None] < -INSIDE) & is_aligned)
-    found = found._replace(gaps=np.where(counts, found.gaps, np.inf))
-    shown = np.where(is_aligned, found.gaps - heights, np.inf).min(axis=1, initial=np.inf)
+    is_aligned = (raised.places.n_r * axis.n_r).sum(axis=2) > ALIGNED
+    raised = raised.only((raised.gaps >= -INSIDE) | ((axis.gaps < -INSIDE) & is_aligned))
+    shown = np.where(is_aligned, raised.gaps, np.inf).min(axis=1, initial=np.inf)[:, None]
     is_new = axis.gaps < shown - SHOWN_SHARE * np.maximum(np.abs(axis.gaps), INSIDE)
-    labels = np.where(is_new, PARTING + axis.edges, -1)[:, None]
-    best = Places(labels, np.where(is_new, axis.gaps, np.inf)[:, None], *(values[:, None] for values in axis[2:]))
-    added = [best]
+    labels = np.where(is_new, PARTING + axis.labels, -1)
+    added = [axis._replace(labels=labels, gaps=np.where(is_new, axis.gaps, np.inf))]
     if carried is not None:
         edges = np.where((carried >= PARTING) & (carried != labels), carried - PARTING, -1)
-        crossings = parting.crossings(X_RM, edges, axis.n_r)
-        added.append(Places(np.where(np.isfinite(crossings.gaps), carried, -1), *crossings))
-    joined = Places(*(np.concatenate(arrays, axis=1) for arrays in zip(found, *added, strict=True)))
-    spare = joined.gaps.shape[1] - heights.shape[1]
-    return joined, np.concatenate([heights, np.zeros((len(X_RM), spare))], axis=1)
+        crossings = parting.crossings(X_RM, edges, axis.n_r[:, 0])
+        added.append(crossings._replace(labels=np.where(np.isfinite(crossings.gaps), carried, -1)))
+    return raised.followed_by(*map(unraised, added))

@@ -15,6 +15,7 @@ from tolcontact.contact.scan import Deepest, FixedScan, Scan
 from tolcontact.discretization import ContactPoints
 from tolcontact.discretization.plane_minima import with_former
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
+from tolcontact.geometry.places import RaisedPlaces
 
 MIN_HEIGHTS = 4  # that vary independently: fewer are as fast in every pass
 
@@ -99,9 +100,7 @@ class RaisedScan(Scan):
         if not labels.shape[1]:
             return replace(self, minima=SearchedPlaces.none(len(relative)))
         places, heights = pair.minima.at(relative, deviations, labels)
-        nominal = places.labels, places.P_m, places.P_r, np.ascontiguousarray(places.n_r)
-        minima = SearchedPlaces(*nominal, heights + grown[:, None], places.labels >= 0)
-        return replace(self, minima=minima)
+        return replace(self, minima=SearchedPlaces.of(RaisedPlaces(places, heights + grown[:, None])))
 
 
 def raised_scan(scan: FixedScan, deviations: Float[Array, "realization contributor"], *, always: bool = False) -> Scan:

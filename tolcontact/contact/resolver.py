@@ -22,7 +22,7 @@ from tolcontact.contact.record import accumulate_starts
 from tolcontact.contact.repeated_steps import repeat
 from tolcontact.contact.scan import RoundScan, Scan, min_gaps, undone
 from tolcontact.contact.starts import FIRST, RESCUES, Start
-from tolcontact.contact.state import NO_ANSWER, Resolved, State, Task
+from tolcontact.contact.state import Outcome, Resolved, State, Task
 from tolcontact.discretization import ContactPoints
 from tolcontact.interference import ordered
 
@@ -127,7 +127,7 @@ class ContactResolver:
     def _stays(self, task: Task, state: State) -> Bool[Array, " n"]:
         """Return whether answers are the raw poses, without contact (n,)."""
         is_loaded = (state.multipliers > 0).any(axis=1) | self._method.minimizes.presses
-        return (state.rank == 0) & ~is_loaded & (self._limits.displacement(task.raw, state.poses) <= UNMOVED)
+        return state.certified & ~is_loaded & (self._limits.displacement(task.raw, state.poses) <= UNMOVED)
 
     def _attempt(self, task: Task, state: State, start: Start) -> None:
         """Take steps from the poses of `state` to an answer, and judge it."""
@@ -151,10 +151,10 @@ class ContactResolver:
                 depth[:, k] = misfit - state.slack[:, k]
             state.kkt_residual[:] = checked_residual(state, depth.max(axis=1))
         state.doubtful[:] = self._limits.is_doubtful(task, state, self._candidates)
-        certified = np.flatnonzero(state.rank == 0)
+        certified = np.flatnonzero(state.certified)
         state.doubtful[certified] = self._candidates.interfere(state.relative[certified])
-        state.doubtful[:] |= self._candidates.are_apart(state) & (state.rank == 0)
-        state.doubtful[:] |= self._candidates.bulge(task.scans, state.relative) & (state.rank == 0)
+        state.doubtful[:] |= self._candidates.are_apart(state) & state.certified
+        state.doubtful[:] |= self._candidates.bulge(task.scans, state.relative) & state.certified
         state.doubtful[:] |= self._limits.lie_in_form(task, state)
         if not start.projected:
             self._doubt_rolled(task, state)
@@ -203,9 +203,9 @@ class ContactResolver:
             rows = np.flatnonzero(state.doubtful)
             return rows[interfere(state.relative[rows])]
         if which == "not separated":
-            rows = np.flatnonzero(state.rank == NO_ANSWER)
+            rows = np.flatnonzero(state.outcome >= Outcome.DOUBTFUL)
             return rows[~state.solved[rows] | interfere(state.relative[rows])]
-        is_uncertain = state.rank == NO_ANSWER if which == "no answer" else state.rank > 0
+        is_uncertain = state.outcome >= (Outcome.DOUBTFUL if which == "no answer" else Outcome.IN_CONFLICT)
         return np.flatnonzero(is_uncertain | (~self._limits.is_near(task, state) if which == "uncertain or far" else False))
 
     def _try_again(self, task: Task, state: State, rows: Int[Array, " n"], start: Start) -> Int[Array, " left"]:
@@ -225,7 +225,7 @@ class ContactResolver:
         best = state.take(rows)
         better = is_better(attempt, self._energy_of(part, attempt), best, self._energy_of(part, best))
         state.put(rows[better], attempt.take(better))
-        return rows[(state.rank[rows] > 0) & ~is_same_conflict(attempt, best)]
+        return rows[~state.certified[rows] & ~is_same_conflict(attempt, best)]
 
     def _energy_of(self, task: Task, state: State) -> Float[Array, " n"]:
         return self._energy(poses=state.poses, raw=task.raw, moments=task.moments, deviations=task.deviations)
@@ -244,19 +244,22 @@ class ContactResolver:
 def is_better(state: State, energy: Float[Array, " n"], best: State, best_energy: Float[Array, " n"]) -> Bool[Array, " n"]:
     """Return whether answers are better than the best ones so far (n,).
 
-    A lower rank is better. Of two certified answers, the one with less energy (n,) is better; of two conflicts, the shallower.
+    A less severe outcome is better, but a doubtful answer is as bad as none. Of two certified answers, the one with less energy
+    (n,) is better; of two conflicts, the shallower.
     """
     depth, best_depth = state.slack.max(axis=1), best.slack.max(axis=1)
     is_lower = energy < best_energy - MIN_GAIN * np.abs(best_energy)
-    gains = np.where(state.rank == 0, is_lower, (state.rank == 1) & (depth < best_depth - MIN_GAIN))
-    return (state.rank < best.rank) | ((state.rank == best.rank) & gains)
+    outcome, best_outcome = (np.minimum(answer.outcome, Outcome.DOUBTFUL) for answer in (state, best))
+    is_shallower = (outcome == Outcome.IN_CONFLICT) & (depth < best_depth - MIN_GAIN)
+    gains = np.where(outcome == Outcome.RESOLVED, is_lower, is_shallower)
+    return (outcome < best_outcome) | ((outcome == best_outcome) & gains)
 
 
 def is_same_conflict(state: State, best: State) -> Bool[Array, " n"]:
     """Return whether answers, and the best ones so far, are conflicts of equal depth (n,)."""
     depth, best_depth = state.slack.max(axis=1), best.slack.max(axis=1)
     goes_as_deep = np.abs(depth - best_depth) <= SAME_CONFLICT * np.maximum(depth, best_depth)
-    return (state.rank == 1) & (best.rank == 1) & goes_as_deep
+    return (state.outcome == Outcome.IN_CONFLICT) & (best.outcome == Outcome.IN_CONFLICT) & goes_as_deep
 
 
 def spring_misfit(

@@ -28,6 +28,16 @@ def edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return ends, edge, triangles
 
 
+def into_facets(ends: np.ndarray, normals: np.ndarray, centres: np.ndarray) -> np.ndarray:
+    """Return unit vectors (edge, 2, 3) across edges with ends (edge, 2, 3), into the two facets that meet at each.
+
+    normals, centres   (edge, 2, 3): the unit normal and a point of each facet
+    """
+    along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
+    into = np.cross(normals, along[:, None])
+    return np.asarray(into * np.where((into * (centres - ends[:, :1])).sum(axis=2) < 0, -1.0, 1.0)[..., None])
+
+
 def have_area(mesh: trimesh.Trimesh) -> Bool[Array, " face"]:
     """Return which triangles of a mesh have an area that exceeds its rounding, and so a normal."""
     corners = np.asarray(mesh.triangles)
