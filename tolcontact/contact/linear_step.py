@@ -13,13 +13,12 @@ import numpy as np
 
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import ContactGroup, Program
-from tolcontact.contact.scan import Deepest, Scan
+from tolcontact.contact.scan import PENETRATION, Deepest, Scan
 from tolcontact.contact.slots import NEGLIGIBLE_SHARE, Slots
 from tolcontact.contact.state import State, Task
 from tolcontact.mechanics import ENTRIES
 
 MAX_ROUNDS = 60
-PENETRATION = 1e-10  # mm: less than this is no penetration
 MAX_RESIDUAL = 1e-3  # of the group's length: a larger KKT residual [mm] is no answer
 
 

@@ -14,9 +14,9 @@ from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.free_steps import FreeSteps
-from tolcontact.contact.linear_step import PENETRATION, LinearStep, Step
+from tolcontact.contact.linear_step import LinearStep, Step
 from tolcontact.contact.progress import Progress
-from tolcontact.contact.scan import min_gaps
+from tolcontact.contact.scan import PENETRATION, min_gaps
 from tolcontact.contact.starts import Start
 from tolcontact.contact.state import State, Task, Unsettled
 

@@ -17,10 +17,10 @@ from tolcontact.contact.acceptance import MAX_TURN, AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.free_steps import FreeSteps
 from tolcontact.contact.iterated_search import search
-from tolcontact.contact.linear_step import MAX_ROUNDS, PENETRATION, LinearStep
+from tolcontact.contact.linear_step import MAX_ROUNDS, LinearStep
 from tolcontact.contact.record import accumulate_starts
 from tolcontact.contact.repeated_steps import repeat
-from tolcontact.contact.scan import RoundScan, Scan, min_gaps, undone
+from tolcontact.contact.scan import PENETRATION, RoundScan, Scan, min_gaps, undone
 from tolcontact.contact.starts import FIRST, RESCUES, Start
 from tolcontact.contact.state import Outcome, Resolved, State, Task
 from tolcontact.discretization import ContactPoints
@@ -237,8 +237,7 @@ class ContactResolver:
             if mobility.movers:
                 lowest = self._group.position(self._group.free[mobility.movers[0]])
                 poses[:, k] = pose.relative(task.raw[:, k], task.raw[:, lowest])
-        relative = self._relate(poses=poses, deviations=task.deviations)
-        return poses, relative.reshape(len(task), len(self.pairs), -1)
+        return poses, self._relate(poses=poses, deviations=task.deviations)
 
 
 def is_better(state: State, energy: Float[Array, " n"], best: State, best_energy: Float[Array, " n"]) -> Bool[Array, " n"]:

@@ -18,6 +18,7 @@ from tolcontact.contact import kernel
 from tolcontact.discretization import ContactPoints, Offsets
 from tolcontact.mechanics import MOMENTS, GapMap
 
+PENETRATION = 1e-10  # mm: less than this is no penetration
 BOUND_TOLERANCE = 1e-12  # of the largest coordinate: bounds of leaves are that much wider, for rounding
 OUTSIDE = 1e300  # a coordinate that no point has
 NOTHING = np.empty((0, 0))

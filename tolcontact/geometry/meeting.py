@@ -21,7 +21,7 @@ import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.geometry import kernel, places_kernel
-from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER
+from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER, TINY
 from tolcontact.geometry.places import Places
 from tolcontact.geometry.polyhedron import Polyhedron, polyhedron
 from tolcontact.geometry.sorted_candidates import sorted_candidates
@@ -41,7 +41,6 @@ CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 ARC = np.linspace(0, 1, 17)  # shares at which the normals between two facets are compared
 ARC_SPACING = np.pi / 16  # rad: the largest angle between two of them
 BLOCK_ARCS = 4096  # pairs of edges whose arcs are compared in one block
-TINY = 1e-300
 
 
 class Reach(NamedTuple):

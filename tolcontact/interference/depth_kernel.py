@@ -6,8 +6,8 @@ import numpy as np
 
 from tolcontact.compiled import compiled, inlined_uncounted, uncounted
 from tolcontact.geometry.vector_kernel import along, dot, minus, move, move_back, scaled
+from tolcontact.interference.box_tree import LEAF
 from tolcontact.interference.kernel import (
-    LEAF,
     corners_of,
     deviate,
     is_beyond,

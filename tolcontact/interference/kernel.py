@@ -18,8 +18,8 @@ from tolcontact.geometry.vector_kernel import (
     row_of,
     turn_back,
 )
+from tolcontact.interference.box_tree import LEAF
 
-LEAF = 4
 MANY = 8  # triangles of a facet: with more, only triangles near the point where an edge passes their plane are tested
 ROUNDED = 1e-9  # of coordinates: the largest error of a point
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from tolcontact.compiled import compiled
 from tolcontact.geometry.vector_kernel import row
-from tolcontact.interference.kernel import LEAF, square_distance
+from tolcontact.interference.box_tree import LEAF
+from tolcontact.interference.kernel import square_distance
 
 
 @compiled
