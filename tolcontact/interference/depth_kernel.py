@@ -6,8 +6,8 @@ import numpy as np
 
 from tolcontact.compiled import compiled, inlined_uncounted, uncounted
 from tolcontact.geometry.vector_kernel import along, dot, minus, move, move_back, scaled
-from tolcontact.interference.box_tree import LEAF
 from tolcontact.interference.kernel import (
+    LEAF,
     corners_of,
     deviate,
     is_beyond,
@@ -15,9 +15,9 @@ from tolcontact.interference.kernel import (
     motion_of,
     near_count,
     passes,
-    square_distance,
     vertex,
 )
+from tolcontact.interference.near_kernel import square_distance
 
 SAMPLES = 4  # of a piece of an edge inside the other body
 MAX_PASSES = 64  # of one edge

@@ -18,8 +18,8 @@ from tolcontact.geometry.vector_kernel import (
     row_of,
     turn_back,
 )
-from tolcontact.interference.box_tree import LEAF
 
+LEAF = 4  # triangles in a leaf of a BoxTree
 MANY = 8  # triangles of a facet: with more, only triangles near the point where an edge passes their plane are tested
 ROUNDED = 1e-9  # of coordinates: the largest error of a point
 
@@ -238,15 +238,6 @@ def misses(boxes, k, p, q):  # type: ignore[no-untyped-def]
         boxes[k, 0] > max(p[0], q[0]) or boxes[k, 3] < min(p[0], q[0]) or boxes[k, 1] > max(p[1], q[1])
         or boxes[k, 4] < min(p[1], q[1]) or boxes[k, 2] > max(p[2], q[2]) or boxes[k, 5] < min(p[2], q[2])
     )  # fmt: skip
-
-
-@inlined_uncounted
-def square_distance(boxes, k, low, high):  # type: ignore[no-untyped-def]
-    """Return the squared distance of box k from a box."""
-    x = max(boxes[k, 0] - high[0], 0.0, low[0] - boxes[k, 3])
-    y = max(boxes[k, 1] - high[1], 0.0, low[1] - boxes[k, 4])
-    z = max(boxes[k, 2] - high[2], 0.0, low[2] - boxes[k, 5])
-    return x * x + y * y + z * z
 
 
 @inlined_uncounted

@@ -4,10 +4,18 @@ import math
 
 import numpy as np
 
-from tolcontact.compiled import compiled
+from tolcontact.compiled import compiled, inlined_uncounted
 from tolcontact.geometry.vector_kernel import row
-from tolcontact.interference.box_tree import LEAF
-from tolcontact.interference.kernel import square_distance
+from tolcontact.interference.kernel import LEAF
+
+
+@inlined_uncounted
+def square_distance(boxes, k, low, high):  # type: ignore[no-untyped-def]
+    """Return the squared distance of box k from a box."""
+    x = max(boxes[k, 0] - high[0], 0.0, low[0] - boxes[k, 3])
+    y = max(boxes[k, 1] - high[1], 0.0, low[1] - boxes[k, 4])
+    z = max(boxes[k, 2] - high[2], 0.0, low[2] - boxes[k, 5])
+    return x * x + y * y + z * z
 
 
 @compiled

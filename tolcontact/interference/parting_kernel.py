@@ -7,8 +7,7 @@ import numpy as np
 
 from tolcontact.compiled import compiled, uncounted
 from tolcontact.geometry.vector_kernel import along, cross, dot, minus, move, move_back, row, scaled, turn
-from tolcontact.interference.box_tree import LEAF
-from tolcontact.interference.kernel import corners_of, crossing, misses, vertex
+from tolcontact.interference.kernel import LEAF, corners_of, crossing, misses, vertex
 
 MIN_SINE = 1e-3  # of the angle between edges that have a common normal
 MAX_POINTS = 512  # of the common region of two bodies
