@@ -128,19 +128,18 @@ class Candidates:
         deviations: Float[Array, "realization contributor"],
         *,
         slots: Sequence[Slots] = (),
-        width: float = 1.0,
+        width: float = 0.0,
         at_rest: Bool[Array, " realization"] | None = None,
         earlier: Sequence[Scan] = (),
         start: Start = FIRST,
         deepest: Float[Array, " realization"] | None = None,
-        answered: Sequence[Slots] = (),
     ) -> list[Scan]:
         """Return scans of the points that may be active.
 
-        Places of bounded pairs are searched again. In steps, given the `slots` of the pairs with changing points, active places
-        persist slightly beyond their edges, up to `width` times the limit for an answer, unless the realization is `at_rest`.
-        If the `start` is guarded, bodies that interfere where no place shows it get one more place (see Guard), which persists
-        if it is in the `answered` slots. If it is parted, places separate convex bodies only in the best direction (see
+        Places of bounded pairs are searched again. In steps, active places, which are in the `slots` of the pairs with changing
+        points, persist slightly beyond their edges, up to `width` times the limit for an answer, unless the realization is
+        `at_rest`. If the `start` is guarded, bodies that interfere where no place shows it get one more place (see Guard),
+        which persists if it is in the slots. If it is parted, places separate convex bodies only in the best direction (see
         Parting). If it is free, places deeper than `deepest` (realization,) [mm], `free_depth` by default, are on the far side
         of a body and do not count; its steps include places slightly beyond their edges, so that a corner in a valley meets
         both sides of the valley.
@@ -150,15 +149,14 @@ class Candidates:
         for k, scan in enumerate(self._carrying_scans):
             X_RM, former = relative[:, k], earlier[k] if earlier else None
             if k in self.bounded:
-                carrying = slots or (answered if start.guarded else ())
-                carried = carrying[self._varying.index(k)].labels if carrying else None
-                kept = self._kept(carried, former, at_rest) if slots and carried is not None else None
+                carried = slots[self._varying.index(k)].labels if slots and (width > 0 or start.guarded) else None
+                kept = None if carried is None or width == 0 else self._kept(carried, former, at_rest)
                 limits = np.full(len(X_RM), self.free_depth) if start.free and deepest is None else deepest
                 scans.append(self._bounded(k, X_RM, deviations, start, kept, width, carried, limits))
             elif start.projected and k in self._margins:
                 scans.append(self.projected(k, X_RM))
             elif self._pairs[k].has_form:
-                scans.append(self._raised(k, former, X_RM, deviations, in_steps=len(slots) > 0))
+                scans.append(self._raised(k, former, X_RM, deviations, in_steps=width > 0))
             else:
                 scans.append(scan)
         return scans
@@ -188,8 +186,8 @@ class Candidates:
             meeting = self._free[k] if kept is None else self._widened[k]
         return bounded_scan(
             self._pairs[k], meeting, X_RM, deviations, kept,
-            error=0.0 if kept is None else width * self._edge_error,
-            nearness=NEARNESS if width == 1 else np.inf,
+            error=width * self._edge_error,
+            nearness=NEARNESS if width <= 1 else np.inf,
             depth=self._bulge if k in self._with_minima else np.inf,
             guard=self.guards.get(k) if start.guarded else None,
             parting=self.partings.get(k) if start.parted else None,
@@ -260,7 +258,7 @@ class Candidates:
 
     def hold(self, task: Task, state: State, start: Start) -> Bool[Array, " n"]:
         """Return whether the active places are as close to their faces as an answer requires (n,)."""
-        scans = self.scans(state.relative, task.deviations, slots=state.slots, earlier=task.scans, start=start)
+        scans = self.scans(state.relative, task.deviations, slots=state.slots, width=1.0, earlier=task.scans, start=start)
         held = np.ones(len(state), dtype=bool)
         for k in self.bounded:
             slots = state.slots[self._varying.index(k)]

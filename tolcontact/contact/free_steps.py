@@ -52,7 +52,7 @@ class FreeSteps:
         rows = np.flatnonzero(is_short)
         if rows.size:
             part, held = task.take(rows), state.take(rows)
-            scans = self._candidates.scans(held.relative, part.deviations, slots=held.slots, start=FREE_WHERE_RAW)
+            scans = self._candidates.scans(held.relative, part.deviations, slots=held.slots, width=1.0, start=FREE_WHERE_RAW)
             part = replace(part, raw=held.poses, relative=held.relative, scans=scans)
             freed = held.take(np.arange(len(rows)))
             size_of_rows, _ = step.take(part, freed, stride=STRIDE)
