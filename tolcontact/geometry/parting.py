@@ -15,8 +15,7 @@ from tolcontact.arrays import Array, Float, Int
 from tolcontact.geometry import parting_kernel
 from tolcontact.geometry.inset import smaller
 from tolcontact.geometry.places import Places
-from tolcontact.geometry.tolerances import SHARP_ANGLE
-from tolcontact.geometry.triangle_mesh import coordinate_error, into_facets
+from tolcontact.geometry.triangle_mesh import SHARP_ANGLE, coordinate_error, into_facets
 
 CONVEX_SHARE = 1e-6  # of the hull's size: largest depth of a convex body's surface inside its hull, since files are rounded
 MAX_COMPARISONS = 10_000_000  # of edges with edges

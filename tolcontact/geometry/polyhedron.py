@@ -9,8 +9,7 @@ from tolcontact.arrays import Array, Float, Int
 from tolcontact.geometry.inset import smaller
 from tolcontact.geometry.merged_surface import merged_surface
 from tolcontact.geometry.surface import Surface
-from tolcontact.geometry.tolerances import SHARP_ANGLE
-from tolcontact.geometry.triangle_mesh import coordinate_error, edges, into_facets
+from tolcontact.geometry.triangle_mesh import SHARP_ANGLE, coordinate_error, edges, into_facets
 
 
 class Polyhedron(NamedTuple):

@@ -10,6 +10,7 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.geometry.tolerances import ROUNDING
 
 CREASE = np.cos(np.radians(30.0))  # facets that meet at a wider angle are two faces; else they approximate one curved face
+SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
 MAX_ROUNDS = 30  # of subdivision; each halves the longest edges
 SHIFT = 32  # bits of a vertex index in the key of an edge
 BLOCK_PAIRS = 1_000_000
