@@ -26,7 +26,7 @@ import tolcontact as tc
 from tolcontact.archive import ArchiveWriter, Run, row_values
 from tolcontact.archive.journal import Journal
 from tolcontact.compilation.functions import InterpretedFunction, named
-from tolcontact.contact.scan import CompiledScan
+from tolcontact.contact.scan import FixedScan
 from tolcontact.simulation import processors, simulate_blocks
 from tolcontact.statistics import DisplacementFields
 from tolcontact.variation import Draws
@@ -279,9 +279,9 @@ def clocked(where: dict[str, list[tuple[object, str]]]) -> Iterator[dict[str, fl
 def breakdown(samples: int) -> None:
     where: dict[str, list[tuple[object, str]]] = {
         "sampling": [(Draws, "__call__")],
-        "scan": [(CompiledScan, name) for name in ("survey", "min_gap", "deepest")],
+        "scan": [(FixedScan, name) for name in ("survey", "min_gap", "deepest")],
         "QP": [(InterpretedFunction, "__call__")],
-        "rows, update, measures": [(named.AdaptiveFunction, "__call__")],
+        "rows, update, measures": [(named.NamedFunction, "__call__")],
         "fields": [(DisplacementFields, "sums"), (DisplacementFields, "merge")],
         "archive": [(ArchiveWriter, "append"), (Journal, "put_into")],
     }

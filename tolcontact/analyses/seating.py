@@ -113,7 +113,7 @@ def _touching(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray
         raised = raised_places(pair, program.meetings[k], X_RM, deviations)
         is_near = raised.gaps[0] < nearness
         return TouchingPoints(pose.apply(X_RM[0], raised.places.P_m[0, is_near]), raised.places.n_r[0, is_near])
-    gaps = ((pose.apply(X_RM, pair.P_m) - pair.P_r) * pair.n_r).sum(axis=2)[0]
+    gaps = pair.nominal_gaps(X_RM)[0]
     return TouchingPoints(pose.apply(X_RM[0], pair.P_m[gaps < nearness]), pair.n_r[gaps < nearness])
 
 

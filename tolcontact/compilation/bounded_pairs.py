@@ -1,7 +1,11 @@
-"""The choice between fixed planes and bounded faces for each pair: a trial at raw poses when the model is compiled."""
+"""The choice between fixed planes and bounded faces for each pair: a trial at raw poses when the model is compiled.
 
+It also decides how deep bodies may penetrate each other in an answer.
+"""
+
+import itertools
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
@@ -13,7 +17,7 @@ from tolcontact.compilation.functions import NamedFunction
 from tolcontact.discretization import ContactPoints, Nominal, raised_places
 from tolcontact.errors import ContactWarning, ModelError, shown
 from tolcontact.geometry.meeting import Meeting, Reach, meeting
-from tolcontact.interference import Watch
+from tolcontact.interference import Watch, ordered
 from tolcontact.mechanics.groups import Group
 from tolcontact.method import Method
 from tolcontact.variation import Draws
@@ -27,6 +31,7 @@ TRAVEL_FACTOR = 2  # times the largest travel of the trial: search range of cont
 POSES_AT_ONCE = 64
 THREADS = 2  # that compare poses: the search for contact points releases the interpreter lock
 MIN_TRAVEL_SHARE = 1e-6  # of the size of the face
+PLANES_FACTOR = 3.0  # times the error that a trial allows: allowed penetration of faces on fixed planes
 
 
 class Trial(NamedTuple):
@@ -180,3 +185,33 @@ def _travel(pair: ContactPoints, X_RM: np.ndarray) -> float:
 def clearance(pair: ContactPoints) -> float:
     """Return the smallest nominal distance [mm] of contact points from their projections."""
     return float(np.linalg.norm(pair.P_m - pair.P_r, axis=1).min())
+
+
+def allowed_depths(
+    nominal: Nominal, meetings: Mapping[int, Meeting], trials: Mapping[int, Trial]
+) -> dict[tuple[int, int], float]:
+    """Return the allowed penetration [mm] of bodies of contact pairs, where it exceeds the default.
+
+    Fixed planes err by the error allowed in their trial, at raw poses; other contact tilts parts more. Faces on springs
+    penetrate each other, and form is not part of a solid. Parts that are declared to overlap may penetrate to any depth. Bodies
+    in the watch have flat planes, but fixed contact points lie on triangles, with coordinates rounded by the file.
+    """
+    depths = dict[tuple[int, int], float]()
+    for k, pair in enumerate(nominal.pairs):
+        if pair.reference is not None and pair.moving_face is not None:
+            bodies = ordered(pair.moving, pair.reference)
+            is_free = pair.is_springy or pair.has_form
+            is_fixed = k in trials and k not in meetings and np.isfinite(trials[k].allowed)
+            planes = PLANES_FACTOR * trials[k].allowed if is_fixed else 0.0
+            rounding = 0.0 if k in meetings else pair.coordinate_error
+            depths[bodies] = max(depths.get(bodies, 0.0), np.inf if is_free else planes + rounding)
+    return depths | dict.fromkeys(_declared_overlaps(nominal), np.inf)
+
+
+def _declared_overlaps(nominal: Nominal) -> Iterator[tuple[int, int]]:
+    """Yield the pairs of bodies, of one station, that are declared to overlap."""
+    for overlap in nominal.assembly.overlaps:
+        indices = [index for index, part in enumerate(nominal.parts) if part.part in overlap.parts]
+        for left, right in itertools.combinations(indices, 2):
+            if nominal.parts[left].station == nominal.parts[right].station:
+                yield left, right

@@ -10,6 +10,7 @@ from tolcontact.compilation.contact_qp import ContactQP
 from tolcontact.compilation.functions import flat
 from tolcontact.compilation.solver import ACCURACY, Solver, SolverChoice
 from tolcontact.compilation.solvers import SOLVERS
+from tolcontact.mechanics.pose import ENTRIES
 
 MAX_DENSE_ENTRIES = 4_000_000  # of the linear systems that are solved together
 POLISHED_RESIDUAL = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is rough
@@ -86,9 +87,10 @@ class ContactSolver:
         """Return the objective (realization,) at poses, for raw poses, moments and deviations (see ContactQP)."""
         return self._energy(**arrays)["energy"][:, 0]
 
-    def relative(self, **arrays: Float[Array, "realization ..."]) -> Float[Array, "realization _"]:
-        """Return X_RM (realization, 12 * pair) of the group's pairs at poses, for deviations."""
-        return self._relate(**arrays)["relative"]
+    def relative(self, **arrays: Float[Array, "realization ..."]) -> Float[Array, "realization pair 12"]:
+        """Return X_RM (realization, pair, 12) of the group's pairs at poses, for deviations."""
+        relative = self._relate(**arrays)["relative"]
+        return relative.reshape(len(relative), -1, ENTRIES)
 
     def _solved(self, solver: Solver, inputs: Arrays) -> Arrays:
         count = len(inputs["poses"])

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from tolcontact.compilation.allowed_depths import allowed_depths
-from tolcontact.compilation.bounded_pairs import TRIAL_SEED, Trial, bounded_pairs
+from tolcontact.compilation.bounded_pairs import TRIAL_SEED, Trial, allowed_depths, bounded_pairs
 from tolcontact.compilation.contact_qp import ContactQP, contact_qp
 from tolcontact.compilation.contact_rows import MIN_SLOTS, SLOTS, standing_points
 from tolcontact.compilation.contact_solver import ContactSolver

@@ -106,7 +106,7 @@ class AcceptanceLimits:
 
         These are polyhedra on a plane with form. The faces are compared at many points.
         """
-        found, rows = np.zeros(len(state), dtype=bool), np.flatnonzero(state.rank == 0)
+        found, rows = np.zeros(len(state), dtype=bool), np.flatnonzero(state.certified)
         for k in self._polyhedra if rows.size else ():
             pair, faces, deviations = self._group_pairs[k], self._nominal.face_pair(self._pairs[k]), task.deviations[rows]
             if faces is not None:

@@ -1,6 +1,7 @@
 """Scans of bounded bodies: the places where they can touch are searched at every pose."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,80 +9,112 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import SLOTS
 from tolcontact.contact import bounded_kernel
 from tolcontact.contact.guard import PARTING, Guard, is_guard, no_places
-from tolcontact.contact.scan import Deepest, Scan, SlotScan
+from tolcontact.contact.scan import PENETRATION, Deepest, Scan
 from tolcontact.discretization import FIRST_POINT, ContactPoints, raised_places
 from tolcontact.geometry.kernel import CORNER_ON_FACET, INSIDE
-from tolcontact.geometry.meeting import NEARNESS, Meeting, Places
+from tolcontact.geometry.meeting import NEARNESS, Meeting
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.parting import Parting
+from tolcontact.geometry.places import RaisedPlaces, unraised
 
-PENETRATION = 1e-10  # mm: less than this is no penetration
 MAX_DEEPEST = SLOTS  # places of a pair that get a row in one round
 ALIGNED = 0.87  # cosine of the largest angle between the axis of separation and the normal of a penetrating place that counts
 SHOWN_SHARE = 0.05  # of the gap along this axis: no place is added if another place shows the gap to within this share
 
 
+class SearchedPlaces(NamedTuple):
+    """Places where a pair can touch, found at given poses, separately for each realization.
+
+    labels          (realization, place): -1 for none
+    P_m, P_r, n_r   (realization, place, 3): P^m, P^r, n^r of nominal faces
+    heights         (realization, place) [mm]: growth of both faces there, including form deviations
+    valid           (realization, place): the places that count
+    """
+
+    labels: Int[Array, "realization place"]
+    P_m: Float[Array, "realization place 3"]
+    P_r: Float[Array, "realization place 3"]
+    n_r: Float[Array, "realization place 3"]
+    heights: Float[Array, "realization place"]
+    valid: Bool[Array, "realization place"]
+
+    @classmethod
+    def none(cls, count: int, room: int = 0) -> "SearchedPlaces":
+        """Return empty places for a number of realizations, with room for some."""
+        shape = count, room
+        P_m, P_r, n_r = np.zeros((3, *shape, 3))
+        return cls(np.full(shape, -1), P_m, P_r, n_r, np.zeros(shape), np.zeros(shape, dtype=bool))
+
+    @classmethod
+    def of(cls, raised: RaisedPlaces) -> "SearchedPlaces":
+        """Return places at the poses where they were found."""
+        places, heights = raised.places, np.ascontiguousarray(raised.heights)
+        return cls(places.labels, places.P_m, places.P_r, np.ascontiguousarray(places.n_r), heights, np.isfinite(places.gaps))
+
+    def take(self, rows: np.ndarray) -> "SearchedPlaces":
+        """Return the places of some realizations."""
+        return SearchedPlaces(*(values[rows] for values in self))
+
+    def gaps(self, relative: Float[Array, "realization 12"]) -> Float[Array, "realization place"]:
+        """Return the gaps [mm] at X_RM; infinite where there is no place."""
+        gaps = np.where(self.valid, 0.0, np.inf)
+        bounded_kernel.gaps(np.ascontiguousarray(relative), self.P_m, self.P_r, self.n_r, self.heights, gaps)
+        return gaps
+
+    def rows(self, labels: Int[Array, "realization slot"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return P^m, P^r, n^r (realization, slot, 3) of the places with some labels, on deviating faces."""
+        P_m, P_r, n_r = np.empty((3, *labels.shape, 3))
+        bounded_kernel.gather(labels, self.labels, self.P_m, self.P_r, self.n_r, self.heights, P_m, P_r, n_r)
+        return P_m, P_r, n_r
+
+    def holds(self, labels: Int[Array, "realization slot"]) -> Bool[Array, "realization slot"]:
+        """Return whether places with some labels are among those that count."""
+        found = np.empty(labels.shape, dtype=bool)
+        bounded_kernel.contains(labels, self.labels, self.valid, found)
+        return found
+
+
 @dataclass(frozen=True, eq=False)
-class BoundedScan(SlotScan):
+class BoundedScan(Scan):
     """Places where a pair can touch at given poses: for each realization, the places with the smallest gaps.
 
-    labels              (realization, place): indices of the places in the pair's meeting
-    places, feet, normals   (realization, place, 3): P^m, P^r, n^r
-    heights             (realization, place) [mm]: growth of both faces there, including form deviations
+    places   whose labels are their indices in the meeting of the pair
     """
 
     fills = True
 
     meeting: Meeting
-    labels: Int[Array, "realization place"]
-    places: Float[Array, "realization place 3"]
-    feet: Float[Array, "realization place 3"]
-    normals: Float[Array, "realization place 3"]
-    valid: Bool[Array, "realization place"]
-    heights: Float[Array, "realization place"]
+    places: SearchedPlaces
 
     def take(self, rows: np.ndarray) -> "BoundedScan":
-        return BoundedScan(
-            self.tables, self.P_m, self.offsets, self.meeting,
-            *(getattr(self, name)[rows] for name in ("labels", "places", "feet", "normals", "valid", "heights")),
-        )  # fmt: skip
+        return BoundedScan(self.meeting, self.places.take(rows))
 
     @property
     def minima(self) -> Int[Array, "realization minimum"]:
         """The labels of minima of the gap between contact points, -1 for none."""
-        is_minimum = self.labels >= FIRST_PLACE
-        return np.where(is_minimum, self.labels, -1)[:, is_minimum.any(axis=0)]
-
-    def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        gaps = np.where(self.valid, 0.0, np.inf)
-        relative = np.ascontiguousarray(relative)
-        bounded_kernel.gaps(relative, self.places, self.feet, self.normals, self.heights, gaps)
-        return gaps
+        labels = self.places.labels
+        is_minimum = labels >= FIRST_PLACE
+        return np.where(is_minimum, labels, -1)[:, is_minimum.any(axis=0)]
 
     def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        gaps = np.where(self.labels < FIRST_PLACE, self.gaps(relative, deviations), np.inf)
+        gaps = np.where(self.places.labels < FIRST_PLACE, self.places.gaps(relative), np.inf)
         return gaps.min(axis=1, initial=np.inf)
 
     def depth_between(self, relative: np.ndarray) -> np.ndarray:
-        gaps = np.where(self.labels < FIRST_PLACE, np.inf, self.gaps(relative, np.empty((len(relative), 0))))
+        gaps = np.where(self.places.labels < FIRST_PLACE, np.inf, self.places.gaps(relative))
         return -gaps.min(axis=1, initial=0.0)
 
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
-        shape = len(relative), min(MAX_DEEPEST, self.labels.shape[1])
+        places, shape = self.places, (len(relative), min(MAX_DEEPEST, self.places.labels.shape[1]))
         deepest = Deepest(np.empty(shape, dtype=np.int64), np.empty(shape))
-        gaps, distance = self.gaps(relative, deviations), self.meeting.reach.spread
-        bounded_kernel.deepest(self.labels, self.feet, gaps, distance, *deepest)
+        bounded_kernel.deepest(places.labels, places.P_r, places.gaps(relative), self.meeting.reach.spread, *deepest)
         return deepest
 
     def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        P_m, P_r, n_r = np.empty((3, *points.shape, 3))
-        bounded_kernel.gather(points, self.labels, self.places, self.feet, self.normals, self.heights, P_m, P_r, n_r)
-        return P_m, P_r, n_r
+        return self.places.rows(points)
 
-    def holds(self, points: Int[Array, "realization slot"]) -> Bool[Array, "realization slot"]:
-        found = np.empty(points.shape, dtype=bool)
-        bounded_kernel.contains(points, self.labels, self.valid, found)
-        return found
+    def holds(self, points: np.ndarray) -> np.ndarray:
+        return self.places.holds(points)
 
     def moves(self, points: np.ndarray) -> np.ndarray:
         if not len(self.meeting.kinds):
@@ -91,7 +124,6 @@ class BoundedScan(SlotScan):
 
 
 def bounded_scan(
-    scan: Scan,
     pair: ContactPoints,
     meeting: Meeting,
     X_RM: Float[Array, "n 12"],
@@ -112,57 +144,47 @@ def bounded_scan(
     `carried` (n, slot) are the labels of places that were active before, -1 for none. Places deeper than `deepest` (n,) [mm] do
     not count.
     """
-    found, heights = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness, depth)
+    raised = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness, depth)
     if deepest is not None:
-        found = found._replace(gaps=np.where(found.gaps - heights >= -deepest[:, None], found.gaps, np.inf))
+        raised = raised.only(raised.gaps >= -deepest[:, None])
     if guard is not None:
-        found, heights = _with_guard(found, heights, guard, X_RM, carried)
+        raised = _with_guard(raised, guard, X_RM, carried)
     if parting is not None:
-        found, heights = _with_parting(found, heights, parting, X_RM, carried)
-    arrays = found.labels, found.P_m, found.P_r, found.n_r, np.isfinite(found.gaps)
-    return BoundedScan(scan.tables, scan.P_m, scan.offsets, meeting, *arrays, np.ascontiguousarray(heights))
+        raised = _with_parting(raised, parting, X_RM, carried)
+    return BoundedScan(meeting, SearchedPlaces.of(raised))
 
 
-def _with_guard(
-    found: Places, heights: np.ndarray, guard: Guard, X_RM: np.ndarray, carried: np.ndarray | None
-) -> tuple[Places, np.ndarray]:
-    """Return places, and their heights (n, place), with one more where bodies interfere and no place shows it.
+def _with_guard(raised: RaisedPlaces, guard: Guard, X_RM: np.ndarray, carried: np.ndarray | None) -> RaisedPlaces:
+    """Return places with one more where bodies interfere and no place shows it.
 
     If such a place was active before (`carried` (n, k)), it is found again: otherwise bodies would interfere again at once.
     """
     labels = np.full(len(X_RM), -1)
     if carried is not None:
         labels = np.where(is_guard(carried), carried, -1).max(axis=1, initial=-1)
-    rows = np.flatnonzero((labels >= 0) | ((found.gaps - heights).min(axis=1, initial=np.inf) >= -PENETRATION))
+    rows = np.flatnonzero((labels >= 0) | (raised.gaps.min(axis=1, initial=np.inf) >= -PENETRATION))
     extra = no_places(len(X_RM))
     for values, of_rows in zip(extra, guard.places(X_RM[rows], labels[rows]), strict=True):
         values[rows] = of_rows
-    joined = Places(*(np.concatenate(arrays, axis=1) for arrays in zip(found, extra, strict=True)))
-    return joined, np.concatenate([heights, np.zeros(extra.gaps.shape)], axis=1)
+    return raised.followed_by(unraised(extra))
 
 
-def _with_parting(
-    found: Places, heights: np.ndarray, parting: Parting, X_RM: np.ndarray, carried: np.ndarray | None
-) -> tuple[Places, np.ndarray]:
-    """Return places, and their heights (n, place), that separate convex bodies in the best direction, and the best place.
+def _with_parting(raised: RaisedPlaces, parting: Parting, X_RM: np.ndarray, carried: np.ndarray | None) -> RaisedPlaces:
+    """Return places that separate convex bodies in the best direction, and the best place.
 
     Bodies are free once they are separate in one direction; penetrating places with other normals would push them as well. The
     separating place is added where no other place shows as much. Nearly parallel edges that were active before (`carried`
     (n, k)) are added, too.
     """
     axis = parting.at(X_RM)
-    is_aligned = (found.n_r * axis.n_r[:, None]).sum(axis=2) > ALIGNED
-    counts = (found.gaps - heights >= -INSIDE) | ((axis.gaps[:, None] < -INSIDE) & is_aligned)
-    found = found._replace(gaps=np.where(counts, found.gaps, np.inf))
-    shown = np.where(is_aligned, found.gaps - heights, np.inf).min(axis=1, initial=np.inf)
+    is_aligned = (raised.places.n_r * axis.n_r).sum(axis=2) > ALIGNED
+    raised = raised.only((raised.gaps >= -INSIDE) | ((axis.gaps < -INSIDE) & is_aligned))
+    shown = np.where(is_aligned, raised.gaps, np.inf).min(axis=1, initial=np.inf)[:, None]
     is_new = axis.gaps < shown - SHOWN_SHARE * np.maximum(np.abs(axis.gaps), INSIDE)
-    labels = np.where(is_new, PARTING + axis.edges, -1)[:, None]
-    best = Places(labels, np.where(is_new, axis.gaps, np.inf)[:, None], *(values[:, None] for values in axis[2:]))
-    added = [best]
+    labels = np.where(is_new, PARTING + axis.labels, -1)
+    added = [axis._replace(labels=labels, gaps=np.where(is_new, axis.gaps, np.inf))]
     if carried is not None:
         edges = np.where((carried >= PARTING) & (carried != labels), carried - PARTING, -1)
-        crossings = parting.crossings(X_RM, edges, axis.n_r)
-        added.append(Places(np.where(np.isfinite(crossings.gaps), carried, -1), *crossings))
-    joined = Places(*(np.concatenate(arrays, axis=1) for arrays in zip(found, *added, strict=True)))
-    spare = joined.gaps.shape[1] - heights.shape[1]
-    return joined, np.concatenate([heights, np.zeros((len(X_RM), spare))], axis=1)
+        crossings = parting.crossings(X_RM, edges, axis.n_r[:, 0])
+        added.append(crossings._replace(labels=np.where(np.isfinite(crossings.gaps), carried, -1)))
+    return raised.followed_by(*map(unraised, added))

@@ -12,7 +12,7 @@ from tolcontact.contact.bounded_scan import BoundedScan, bounded_scan
 from tolcontact.contact.guard import GUARD, Guard
 from tolcontact.contact.projected_scan import half_spacing, project
 from tolcontact.contact.raised_scan import RaisedScan, raised_scan
-from tolcontact.contact.scan import PairScan, RoundScan, Scan, changing, fixed, min_gaps, pair_scan
+from tolcontact.contact.scan import FixedScan, RoundScan, Scan, min_gaps, pair_scan
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.starts import FIRST, Start
 from tolcontact.contact.state import State, Task
@@ -88,13 +88,13 @@ class Candidates:
         self._bodies = [part.body for part in program.nominal.parts]
         self._standing, self._spans = group.qp.standing, group.qp.spans
         self._varying = [k for k, points in enumerate(self._standing) if isinstance(points, int)]
-        self._all_scans: list[Scan] = []
-        self._carrying_scans: list[Scan] = []
+        self._all_scans: list[RoundScan | FixedScan] = []
+        self._carrying_scans: list[RoundScan | FixedScan] = []
         for position, index in enumerate(group.group.pairs):
             pair, gaps = program.nominal.pairs[index], program.gaps[index]
             tables = [side.table for side in group.group.sides if side.pair == position]
             if gaps is None:
-                round_scan = RoundScan(tuple(tables), pair.P_m, pair.offsets, program.round_gaps[index])
+                round_scan = RoundScan(tuple(tables), program.round_gaps[index])
                 self._all_scans.append(round_scan)
                 self._carrying_scans.append(round_scan)
                 continue
@@ -104,8 +104,8 @@ class Candidates:
             # If the paper's set of points may be active, points between the corners count, too.
             corners = self._method.is_closed and index not in program.meetings
             self._carrying_scans.append(pair_scan(pair, gaps, (), clusters, gaps.corners) if corners else self._all_scans[-1])
+        self._fixed = {k: scan for k, scan in enumerate(self._carrying_scans) if isinstance(scan, FixedScan)}
         smallest = program.nominal.assembly.smallest_zone()
-        self._with_form = [k for k, pair in enumerate(self._pairs) if pair.has_form]
         self.free_depth = FREE_SHARE * smallest
         self._edge_error, self._bulge = EDGE_SHARE * smallest, max(BULGE_SHARE * smallest, MIN_BULGE)
         self._allowed_bulge = max(ALLOWED_SHARE * smallest, 2 * MIN_BULGE)
@@ -120,68 +120,86 @@ class Candidates:
         self.guards = {k: self._guards[k] for k in sorted(of_bodies.values())}
         curved = curved_pairs(program.nominal, group.group) if self._method.is_exact else []
         self.curved = [k for k in curved if k not in self.bounded]
-        self._margins = {k: half_spacing(fixed(self._all_scans[k])) for k in self.curved}
+        self._margins = {k: half_spacing(self._pairs[k].P_m) for k in self.curved}
 
     def scans(
         self,
         relative: Float[Array, "realization pair 12"],
         deviations: Float[Array, "realization contributor"],
         *,
-        projected: bool = False,
         slots: Sequence[Slots] = (),
-        width: float = 1.0,
+        width: float = 0.0,
         at_rest: Bool[Array, " realization"] | None = None,
         earlier: Sequence[Scan] = (),
         start: Start = FIRST,
         deepest: Float[Array, " realization"] | None = None,
-        answered: Sequence[Slots] = (),
     ) -> list[Scan]:
         """Return scans of the points that may be active.
 
-        Places of bounded pairs are searched again. In steps, given the `slots` of the pairs with changing points, active places
-        persist slightly beyond their edges, up to `width` times the limit for an answer, unless the realization is `at_rest`.
-        If the `start` is guarded, bodies that interfere where no place shows it get one more place (see Guard), which persists
-        if it is in the `answered` slots. If it is parted, places separate convex bodies only in the best direction (see
+        Places of bounded pairs are searched again. In steps, active places, which are in the `slots` of the pairs with changing
+        points, persist slightly beyond their edges, up to `width` times the limit for an answer, unless the realization is
+        `at_rest`. If the `start` is guarded, bodies that interfere where no place shows it get one more place (see Guard),
+        which persists if it is in the slots. If it is parted, places separate convex bodies only in the best direction (see
         Parting). If it is free, places deeper than `deepest` (realization,) [mm], `free_depth` by default, are on the far side
         of a body and do not count; its steps include places slightly beyond their edges, so that a corner in a valley meets
         both sides of the valley.
-        With `projected`, points against curved faces are projected again. `earlier` are scans with the sums of heights.
+        If it is projected, points against curved faces are projected again. `earlier` are scans with the sums of heights.
         """
-        scans = list(self._carrying_scans)
-        for k in self._with_form:
-            if k not in self.bounded:
-                former = earlier[k] if earlier else None
-                scans[k] = self._raised(k, fixed(scans[k]), former, relative[:, k], deviations, in_steps=len(slots) > 0)
-        if projected:
-            for k in self._margins:
-                scans[k] = self.projected(k, relative[:, k])
-        for k, places in (self.bounded if not start.free else self._widened if slots else self._free).items():
-            kept, error = (slots[self._varying.index(k)].labels, width * self._edge_error) if slots else (None, 0.0)
-            carrying = slots or (answered if start.guarded else ())
-            carried = carrying[self._varying.index(k)].labels if carrying else None
-            if kept is not None and at_rest is not None:
-                # Places between the ends of faces with form appear and vanish without an edge.
-                kept[at_rest[:, None] & ~_lies_between(kept)] = -1
-            former = earlier[k] if earlier else None
-            if kept is not None and isinstance(former, BoundedScan):
-                kept = np.concatenate([kept, former.minima], axis=1)
-            nearness, guard = NEARNESS if width == 1 else np.inf, self.guards.get(k) if start.guarded else None
-            depth = self._bulge if k in self._with_minima else np.inf
-            parting = self.partings.get(k) if start.parted else None
-            limits = np.full(len(relative), self.free_depth) if start.free and deepest is None else deepest
-            scans[k] = bounded_scan(
-                scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness, depth, guard, parting,
-                carried, limits,
-            )  # fmt: skip
+        scans: list[Scan] = []
+        for k, scan in enumerate(self._carrying_scans):
+            X_RM, former = relative[:, k], earlier[k] if earlier else None
+            if k in self.bounded:
+                carried = slots[self._varying.index(k)].labels if slots and (width > 0 or start.guarded) else None
+                kept = None if carried is None or width == 0 else self._kept(carried, former, at_rest)
+                limits = np.full(len(X_RM), self.free_depth) if start.free and deepest is None else deepest
+                scans.append(self._bounded(k, X_RM, deviations, start, kept, width, carried, limits))
+            elif start.projected and k in self._margins:
+                scans.append(self.projected(k, X_RM))
+            elif self._pairs[k].has_form:
+                scans.append(self._raised(k, former, X_RM, deviations, in_steps=width > 0))
+            else:
+                scans.append(scan)
         return scans
 
-    def _raised(
-        self, k: int, scan: PairScan, former: Scan | None, X_RM: np.ndarray, deviations: np.ndarray, *, in_steps: bool
-    ) -> RaisedScan | PairScan:
+    def _kept(self, labels: np.ndarray, former: Scan | None, at_rest: np.ndarray | None) -> np.ndarray:
+        """Return the labels (n, k) of places that persist in steps, from those in the slots; -1 for none."""
+        kept = labels.copy()
+        if at_rest is not None:
+            # Places between the ends of faces with form appear and vanish without an edge.
+            kept[at_rest[:, None] & ~_lies_between(kept)] = -1
+        return np.concatenate([kept, former.minima], axis=1) if isinstance(former, BoundedScan) else kept
+
+    def _bounded(
+        self,
+        k: int,
+        X_RM: np.ndarray,
+        deviations: np.ndarray,
+        start: Start,
+        kept: np.ndarray | None,
+        width: float,
+        carried: np.ndarray | None,
+        limits: np.ndarray | None,
+    ) -> BoundedScan:
+        """Return the scan of a bounded pair at X_RM (n, 12), see `scans` and bounded_scan."""
+        meeting = self.bounded[k]
+        if start.free:
+            meeting = self._free[k] if kept is None else self._widened[k]
+        return bounded_scan(
+            self._pairs[k], meeting, X_RM, deviations, kept,
+            error=width * self._edge_error,
+            nearness=NEARNESS if width <= 1 else np.inf,
+            depth=self._bulge if k in self._with_minima else np.inf,
+            guard=self.guards.get(k) if start.guarded else None,
+            parting=self.partings.get(k) if start.parted else None,
+            carried=carried,
+            deepest=limits,
+        )  # fmt: skip
+
+    def _raised(self, k: int, former: Scan | None, X_RM: np.ndarray, deviations: np.ndarray, *, in_steps: bool) -> Scan:
         """Return the scan of a pair with form at X_RM (n, 12), with minima of the gap between its points."""
-        is_raw = not isinstance(former, RaisedScan)
-        raised = former if isinstance(former, RaisedScan) else raised_scan(scan, deviations, always=k in self._with_minima)
-        if k in self._with_minima and isinstance(raised, RaisedScan):
+        is_raw, always = not isinstance(former, RaisedScan), k in self._with_minima
+        raised = former if isinstance(former, RaisedScan) else raised_scan(self._fixed[k], deviations, always=always)
+        if always and isinstance(raised, RaisedScan):
             return raised.with_minima(self._pairs[k], X_RM, deviations, self._bulge, is_raw=is_raw, in_steps=in_steps)
         return raised
 
@@ -240,16 +258,16 @@ class Candidates:
 
     def hold(self, task: Task, state: State, start: Start) -> Bool[Array, " n"]:
         """Return whether the active places are as close to their faces as an answer requires (n,)."""
-        scans = self.scans(state.relative, task.deviations, slots=state.slots, earlier=task.scans, start=start)
+        scans = self.scans(state.relative, task.deviations, slots=state.slots, width=1.0, earlier=task.scans, start=start)
         held = np.ones(len(state), dtype=bool)
         for k in self.bounded:
             slots = state.slots[self._varying.index(k)]
-            held &= (changing(scans[k]).holds(slots.points) | ~slots.filled).all(axis=1)
+            held &= (scans[k].holds(slots.points) | ~slots.filled).all(axis=1)
         return held
 
-    def projected(self, k: int, relative: Float[Array, "realization 12"]) -> PairScan:
+    def projected(self, k: int, relative: Float[Array, "realization 12"]) -> Scan:
         """Return a scan of the points of pair k, projected again at X_RM (realization, 12)."""
-        return project(fixed(self._carrying_scans[k]), self._pairs[k], relative, self._margins[k])
+        return project(self._fixed[k], self._pairs[k], relative, self._margins[k])
 
     def survey(
         self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
@@ -275,17 +293,14 @@ class Candidates:
         return np.broadcast_to(total, active.shape)
 
     def may_carry(
-        self,
-        scans: Sequence[Scan],
-        relative: Float[Array, "realization pair 12"],
-        deviations: Float[Array, "realization contributor"],
+        self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
     ) -> list[Bool[Array, "realization _"] | None]:
         """Return which points (realization, point) may be active; in the paper's set, the points active in the raw state."""
         if self._method.is_closed:
-            return [None for _ in scans]
+            return [None for _ in self._pairs]
         return [
             None if pair.is_supports or pair.round or k in self.bounded else scan.gaps(relative[:, k], deviations) < ACTIVE_GAP
-            for k, (pair, scan) in enumerate(zip(self._pairs, scans, strict=True))
+            for k, (pair, scan) in enumerate(zip(self._pairs, self._carrying_scans, strict=True))
         ]
 
     def carriers(self, k: int, state: State) -> Carriers:
@@ -305,10 +320,10 @@ class Candidates:
         else:
             realization, column = np.nonzero(loaded)
             places = pair.P_m[standing[column]]
-        return Carriers(realization, places, np.ones(len(places), dtype=bool), 2 * half_spacing(fixed(self._all_scans[k])))
+        return Carriers(realization, places, np.ones(len(places), dtype=bool), 2 * half_spacing(pair.P_m))
 
     def _places(self, k: int, labels: Int[Array, " point"]) -> Float[Array, "point 3"]:
         """Return the nominal places of contact points of pair k, and of minima of the gap between them, by their labels."""
         is_point, minima = labels < FIRST_PLACE, self._pairs[k].minima
-        places = self._carrying_scans[k].P_m[np.where(is_point, labels, 0)]
+        places = self._fixed[k].P_m[np.where(is_point, labels, 0)]
         return places if minima is None else np.where(is_point[:, None], places, minima.points(labels))

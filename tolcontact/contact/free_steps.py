@@ -52,7 +52,7 @@ class FreeSteps:
         rows = np.flatnonzero(is_short)
         if rows.size:
             part, held = task.take(rows), state.take(rows)
-            scans = self._candidates.scans(held.relative, part.deviations, slots=held.slots, start=FREE_WHERE_RAW)
+            scans = self._candidates.scans(held.relative, part.deviations, slots=held.slots, width=1.0, start=FREE_WHERE_RAW)
             part = replace(part, raw=held.poses, relative=held.relative, scans=scans)
             freed = held.take(np.arange(len(rows)))
             size_of_rows, _ = step.take(part, freed, stride=STRIDE)
@@ -83,7 +83,7 @@ class FreeSteps:
                 break
             shares[rows] /= 2
             state.poses[rows] = _halfway(before.poses[rows], state.poses[rows], self._centres)
-            state.relative[rows] = self._related(state.poses[rows], part.deviations)
+            state.relative[rows] = self._relate(poses=state.poses[rows], deviations=part.deviations)
         # Places show penetration after small motions of the bodies, unless only the complete test detects it.
         rows = rows[enters[rows] & self._candidates.interfere(state.relative[rows])]
         state.poses[rows], state.relative[rows] = before.poses[rows], before.relative[rows]
@@ -111,13 +111,10 @@ class FreeSteps:
                     for part, mobility in enumerate(self._group.mobilities):
                         if moved & set(mobility.movers):
                             poses[rows, part, 9:] += sense * shift / (2 if all(own) else 1)
-                relative[rows] = self._related(poses[rows], deviations[rows])
+                relative[rows] = self._relate(poses=poses[rows], deviations=deviations[rows])
             if is_free:
                 break
         return poses, relative
-
-    def _related(self, poses: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        return self._relate(poses=poses, deviations=deviations).reshape(len(poses), len(self._pairs), -1)
 
     def _depths(self, task: Task, relative: np.ndarray, deepest: np.ndarray) -> np.ndarray:
         """Return the largest penetration (n,) [mm] of the places that are not deeper than `deepest` (n,) [mm]."""

@@ -7,7 +7,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import Program
-from tolcontact.geometry.meeting import Places
+from tolcontact.geometry.places import Places
 from tolcontact.interference import Neighbours, WayOut, ordered
 
 GUARD = 1 << 41  # first label of places that a guard adds: a label encodes the direction that separates the bodies

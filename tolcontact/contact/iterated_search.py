@@ -15,6 +15,7 @@ from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.linear_step import LinearStep
 from tolcontact.contact.scan import min_gaps, undone
 from tolcontact.contact.slots import Slots
+from tolcontact.contact.starts import Start
 from tolcontact.contact.state import State, Task, Unsettled
 
 MAX_STEPS = 100
@@ -31,7 +32,7 @@ def search(
     energy_of: Callable[[Task, State], np.ndarray],
     task: Task,
     state: State,
-    stride: float,
+    start: Start,
     caution: float,
 ) -> None:
     """Take the steps of `state` to their end, from the given `caution` on; `energy_of` returns the objective (n,)."""
@@ -39,10 +40,10 @@ def search(
     last_size, last_energy = np.full(len(task), np.inf), energy_of(task, state)
     for _ in range(MAX_STEPS):
         _empty_slots(unsettled.state)
-        size, scaled = step.take(unsettled.task, unsettled.state, stride=stride, caution=cautions)
+        size, scaled = step.take(unsettled.task, unsettled.state, stride=start.stride, caution=cautions)
         energy = energy_of(unsettled.task, unsettled.state)
         gain_ratio = (last_energy - energy) / np.maximum(scaled**2 / 2, 1e-300)  # relative to the gain that the QP predicts
-        scans = candidates.scans(unsettled.state.relative, unsettled.task.deviations, projected=True)
+        scans = candidates.scans(unsettled.state.relative, unsettled.task.deviations, start=start)
         # A step whose points are deeper inside afterwards only gains what is lost again later.
         sinks = _depth_left(scans, unsettled) > np.maximum((1 - GOOD_RATIO) * np.minimum(size, scaled), STEP_TOLERANCE)
         stalls = (size > GOOD_RATIO * last_size) & (gain_ratio < 1 - GOOD_RATIO) | sinks

@@ -3,8 +3,8 @@
 Contact points form leaves of neighbours, and leaves form branches. Bounds of their coordinates bound their gaps.
 A leaf or branch that is entirely clear is skipped, one that is entirely active adds its summed moments, and one that cannot
 contain the deepest point is left out.
-Gaps are summed up in the order of `PairScan.gaps`, so that both give the same to the last bit; moments are summed up in
-another order than NumPy's, and agree to rounding.
+Gaps are summed up coordinate by coordinate. Heights of faces with form are summed up once for each realization, not in every
+pass, and are then added.
 """
 
 from typing import NamedTuple
@@ -18,7 +18,7 @@ ROUNDING = 1e-14  # of the gap in the origin of the coordinates: sums of a dozen
 
 
 class Points(NamedTuple):
-    """The contact points of a pair, as PairScan has them (see there), and the boxes of its leaves and branches.
+    """The contact points of a pair, as FixedScan has them (see there), and the boxes of its leaves and branches.
 
     leaf_boxes, branch_boxes    (2, coordinate, box): centres and half widths of the coordinates, without the first one
     """
@@ -30,6 +30,21 @@ class Points(NamedTuple):
     branches: np.ndarray
     leaf_boxes: np.ndarray
     branch_boxes: np.ndarray
+
+
+class Raised(NamedTuple):
+    """Heights of the points of m realizations; without realizations no heights are known.
+
+    points      (m, point) [mm]: added to the gaps of nominal faces, below 0 where faces are raised
+    leaves      (m, leaf) [mm], and
+    branches    (m, branch) [mm]: the least of these
+    rows        (n,): indices of the realizations of a pass among the m
+    """
+
+    points: np.ndarray
+    leaves: np.ndarray
+    branches: np.ndarray
+    rows: np.ndarray
 
 
 @inlined
@@ -123,11 +138,15 @@ def survey(points, table, leaf_sums, branch_sums, relative, deviations, activity
 
 
 @inlined
-def _deepest_of_leaves(points, first_leaf, end_leaf, factors, may_carry, lowest, where, scratch):  # type: ignore[no-untyped-def]
+def _deepest_of_leaves(points, raised, k, first_leaf, end_leaf, factors, may_carry, lowest, where, scratch):  # type: ignore[no-untyped-def]
     """Return gap and index of the deepest point of some leaves, if it is below `lowest`, or as low and before `where`."""
-    leaves = points.leaves
+    leaves, is_raised = points.leaves, raised.rows.size > 0
+    row = raised.rows[k] if is_raised else 0
     gaps, middle, spread = scratch
     bounds(points.leaf_boxes, first_leaf, end_leaf - first_leaf, factors, middle, spread)
+    if is_raised:
+        for place in range(end_leaf - first_leaf):
+            middle[place] += raised.leaves[row, first_leaf + place]
     promising = 0
     for place in range(1, end_leaf - first_leaf):
         if middle[place] - spread[place] < middle[promising] - spread[promising]:
@@ -141,20 +160,21 @@ def _deepest_of_leaves(points, first_leaf, end_leaf, factors, may_carry, lowest,
         for j in range(count):
             if may_carry.size and not may_carry[start + j]:
                 continue
-            if gaps[j] < lowest or (gaps[j] == lowest and start + j < where):
-                lowest, where = gaps[j], start + j
+            gap = gaps[j] + raised.points[row, start + j] if is_raised else gaps[j]
+            if gap < lowest or (gap == lowest and start + j < where):
+                lowest, where = gap, start + j
     return lowest, where
 
 
 @compiled
-def deepest(points, clusters, relative, deviations, may_carry, limit, numbers, gaps_there):  # type: ignore[no-untyped-def]
+def deepest(points, raised, relative, deviations, clusters, may_carry, limit, numbers, gaps_there):  # type: ignore[no-untyped-def]
     """Write index and gap of the deepest point of each cluster (n, cluster), if its gap is less than `limit`.
 
     Else write the cluster's first point, and `limit`.
 
-    points      Points
-    clusters    (cluster + 1,): the first branch of each cluster, and the end
-    may_carry   (n, point): the points to look at; all if it is (n, 0)
+    points, raised   Points, and Raised
+    clusters         (cluster + 1,): the first branch of each cluster, and the end
+    may_carry        (n, point): the points to look at; all if it is (n, 0)
     """
     leaves, branches = points.leaves, points.branches
     factors = np.empty(points.coordinates.shape[0])
@@ -163,6 +183,9 @@ def deepest(points, clusters, relative, deviations, may_carry, limit, numbers, g
     for k in range(relative.shape[0]):
         write_factors(points.basis, points.columns, relative[k], deviations[k], factors)
         bounds(points.branch_boxes, 0, middle.size, factors, middle, spread)
+        if raised.rows.size:
+            for branch in range(middle.size):
+                middle[branch] += raised.branches[raised.rows[k], branch]
         for cluster in range(clusters.size - 1):
             begin, end = clusters[cluster], clusters[cluster + 1]
             lowest, where = limit, leaves[branches[begin]]
@@ -174,10 +197,47 @@ def deepest(points, clusters, relative, deviations, may_carry, limit, numbers, g
                 branch = promising if turn < begin else turn
                 if turn == promising or middle[branch] - spread[branch] > lowest:
                     continue
+                first_leaf, end_leaf = branches[branch], branches[branch + 1]
                 lowest, where = _deepest_of_leaves(
-                    points, branches[branch], branches[branch + 1], factors, may_carry[k], lowest, where, scratch
+                    points, raised, k, first_leaf, end_leaf, factors, may_carry[k], lowest, where, scratch
                 )
             numbers[k, cluster], gaps_there[k, cluster] = where, lowest
+
+
+@compiled
+def write_gaps(points, raised, relative, deviations, limits, values):  # type: ignore[no-untyped-def]
+    """Write the gaps (n, point) of the leaves that may hold gaps below `limits` (n,); infinite ones of other leaves."""
+    leaves, factors = points.leaves, np.empty(points.coordinates.shape[0])
+    middle, spread, gaps = np.empty(leaves.size - 1), np.empty(leaves.size - 1), np.empty(LEAF)
+    for k in range(relative.shape[0]):
+        write_factors(points.basis, points.columns, relative[k], deviations[k], factors)
+        bounds(points.leaf_boxes, 0, middle.size, factors, middle, spread)
+        row = raised.rows[k] if raised.rows.size else -1
+        for leaf in range(middle.size):
+            start, count = leaves[leaf], leaves[leaf + 1] - leaves[leaf]
+            lowest = raised.leaves[row, leaf] if row >= 0 else 0.0
+            is_clear = middle[leaf] + lowest - spread[leaf] > limits[k]
+            if not is_clear:
+                gaps_of(points.coordinates, start, count, factors, gaps)
+            for j in range(count):
+                height = raised.points[row, start + j] if row >= 0 else 0.0
+                values[k, start + j] = np.inf if is_clear else gaps[j] + height
+
+
+@compiled
+def sum_heights(columns, slopes, leaves, branches, deviations, raised):  # type: ignore[no-untyped-def]
+    """Write sums of slopes (k, point) times deviations[columns] (n, k), and the least of each leaf and branch; see Raised."""
+    for k in range(deviations.shape[0]):
+        sums, lowest = raised.points[k], raised.leaves[k]
+        sums[:] = 0.0
+        for c in range(columns.size):
+            factor, row = deviations[k, columns[c]], slopes[c]
+            for j in range(row.size):
+                sums[j] += factor * row[j]
+        for leaf in range(leaves.size - 1):
+            lowest[leaf] = sums[leaves[leaf] : leaves[leaf + 1]].min()
+        for branch in range(branches.size - 1):
+            raised.branches[k, branch] = lowest[branches[branch] : branches[branch + 1]].min()
 
 
 @compiled

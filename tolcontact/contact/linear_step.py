@@ -13,13 +13,12 @@ import numpy as np
 
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import ContactGroup, Program
-from tolcontact.contact.scan import Deepest, SlotScan, changing
+from tolcontact.contact.scan import PENETRATION, Deepest, Scan
 from tolcontact.contact.slots import NEGLIGIBLE_SHARE, Slots
 from tolcontact.contact.state import State, Task
 from tolcontact.mechanics import ENTRIES
 
 MAX_ROUNDS = 60
-PENETRATION = 1e-10  # mm: less than this is no penetration
 MAX_RESIDUAL = 1e-3  # of the group's length: a larger KKT residual [mm] is no answer
 
 
@@ -77,7 +76,7 @@ class LinearStep:
         newton     whether the curvature of objective and gaps counts
         """
         start_slots = [
-            slots.only(changing(task.scans[k]).holds(slots.points)) for k, slots in zip(self.varying, state.slots, strict=True)
+            slots.only(task.scans[k].holds(slots.points)) for k, slots in zip(self.varying, state.slots, strict=True)
         ]
         inputs = self._inputs(task, state, start_slots, newton)
         weights = {"proximal_weight": caution, "regularization_factor": firmness}
@@ -88,7 +87,7 @@ class LinearStep:
         slots, deepest = start_slots, self._deepest(task, state.relative)
         for number in range(self._max_rounds):
             extended = [
-                old.with_deepest(*points, PENETRATION, fills=changing(task.scans[k]).fills)
+                old.with_deepest(*points, PENETRATION, fills=task.scans[k].fills)
                 for k, old, points in zip(self.varying, slots, deepest, strict=True)
             ]
             slots = [new for new, _ in extended]
@@ -115,9 +114,7 @@ class LinearStep:
         bends = [np.zeros((len(task), 0)), *(np.zeros((len(task), ENTRIES)) for _ in slots)]
         if newton:
             inputs["reactions"] = _cleared(inputs["reactions"], self.spans)
-            bends[1:] = [
-                _bend(changing(task.scans[k]), old, task.deviations) for k, old in zip(self.varying, slots, strict=True)
-            ]
+            bends[1:] = [_bend(task.scans[k], old, task.deviations) for k, old in zip(self.varying, slots, strict=True)]
         return inputs | {"bend": np.concatenate(bends, axis=1)}
 
     def _set_reactions(self, inputs: dict[str, np.ndarray], start_slots: Sequence[Slots], slots: Sequence[Slots]) -> None:
@@ -134,10 +131,7 @@ class LinearStep:
         Returns the deepest points of the varying pairs, with their depth beyond the slack; and step sizes (2, n).
         """
         count = len(task)
-        points = [
-            changing(task.scans[k]).rows(of_pair.points, task.deviations)
-            for k, of_pair in zip(self.varying, slots, strict=True)
-        ]
+        points = [task.scans[k].rows(of_pair.points, task.deviations) for k, of_pair in zip(self.varying, slots, strict=True)]
         P_m, P_r, n_r = (
             np.concatenate([np.zeros((count, 0, 3)), *vectors], axis=1)
             for vectors in ([row[i] for row in points] for i in range(3))
@@ -173,7 +167,7 @@ class LinearStep:
 
     def _deepest(self, task: Task, relative: np.ndarray) -> list[Deepest]:
         """Return the deepest points of the varying pairs that may be active, at X_RM (n, pair, 12)."""
-        return [changing(task.scans[k]).deepest(relative[:, k], task.deviations, task.may_carry[k]) for k in self.varying]
+        return [task.scans[k].deepest(relative[:, k], task.deviations, task.may_carry[k]) for k in self.varying]
 
 
 def _cleared(multipliers: np.ndarray, spans: Sequence[slice]) -> np.ndarray:
@@ -182,7 +176,7 @@ def _cleared(multipliers: np.ndarray, spans: Sequence[slice]) -> np.ndarray:
     return np.concatenate([np.where(m > NEGLIGIBLE_SHARE * m.max(axis=1, keepdims=True), m, 0.0) for m in of_pairs], axis=1)
 
 
-def _bend(scan: SlotScan, slots: Slots, deviations: np.ndarray) -> np.ndarray:
+def _bend(scan: Scan, slots: Slots, deviations: np.ndarray) -> np.ndarray:
     """Return the sum of reaction times the gap's gradient by the entries of X_RM, (n, 12)."""
     P_m, _, n_r = scan.rows(slots.points, deviations)
     weighted = (slots.reactions * scan.moves(slots.points))[..., None] * n_r

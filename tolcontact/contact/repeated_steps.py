@@ -4,7 +4,7 @@ The first steps are like the paper's. Realizations that still move then have fre
 curvature of gaps and objective counts: they continue with Newton steps, which hold those freedoms firmly at first.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -14,9 +14,9 @@ from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.free_steps import FreeSteps
-from tolcontact.contact.linear_step import PENETRATION, LinearStep, Step
+from tolcontact.contact.linear_step import LinearStep, Step
 from tolcontact.contact.progress import Progress
-from tolcontact.contact.scan import min_gaps
+from tolcontact.contact.scan import PENETRATION, min_gaps
 from tolcontact.contact.starts import Start
 from tolcontact.contact.state import State, Task, Unsettled
 
@@ -27,46 +27,52 @@ MAX_IDLE = 3  # steps in a row that end where they begin, because bodies would p
 CLOSED = 1e-6  # mm, and of rotation matrices: steps that return this close to an earlier pose repeat themselves
 
 
-class StepKind(NamedTuple):
-    """How a step is taken.
+class Phase(NamedTuple):
+    """A phase of the schedule: a number of steps, and how they are taken.
 
+    newton     whether they count curvature
     firmness   weight of the regularization of freedoms that the objective leaves open
-    newton     whether it counts curvature
     width      how wide edges are taken (see Candidates.scans)
-    sharp      whether edges are sharp after it, for realizations that have nearly converged
+    sharp      whether edges are sharp after a step, for realizations that have nearly converged
     """
 
-    firmness: float
-    newton: bool
+    steps: int
+    newton: bool = False
+    firmness: float = 1.0
     width: float = 1.0
     sharp: bool = False
 
 
-FIRM_STEPS = (*[StepKind(1e4, newton=True)] * 6, *[StepKind(1e2, newton=True)] * 6)
-STEPS = (*[StepKind(1.0, newton=False)] * 8, *FIRM_STEPS, *[StepKind(1.0, newton=True)] * 80)
+WIDE = 32.0
+FIRM = Phase(6, newton=True, firmness=1e4), Phase(6, newton=True, firmness=1e2)
+USUAL = Phase(8), *FIRM, Phase(80, newton=True)
 # Places between the points of planes with form are added step by step: a few realizations need more steps for that.
-STEPS_WITH_FORM = (*[StepKind(1.0, newton=False)] * 8, *STEPS)
+WITH_FORM = Phase(16), *USUAL[1:]
 # Where faces end, places appear and vanish. Newton's curvature belongs to places that stay, so steps like the paper's come
 # first. Damped, they come again later, with places that stay longer, and do not alternate between places. Beyond its edge, a
 # place separates bodies that would touch nearby at a lower objective. So places only stay while steps are large, unless
 # convergence takes too long.
-WIDE = 32.0
-STEPS_WHERE_FACES_END = (
-    *[StepKind(1.0, newton=False, sharp=True)] * 12,
-    *[StepKind(1.0, newton=False)] * 12,
-    *(kind._replace(width=WIDE) for kind in FIRM_STEPS),
-    *[StepKind(10.0, newton=False, width=WIDE)] * 30,
-    *[StepKind(3.0, newton=False, width=WIDE)] * 20,
-    *[StepKind(1.0, newton=False, width=WIDE)] * 30,
-    *[StepKind(1.0, newton=True, width=WIDE)] * 50,
+WHERE_FACES_END = (
+    Phase(12, sharp=True),
+    Phase(12),
+    *(phase._replace(width=WIDE) for phase in FIRM),
+    *(Phase(steps, firmness=firmness, width=WIDE) for steps, firmness in ((30, 10.0), (20, 3.0), (30, 1.0))),
+    Phase(50, newton=True, width=WIDE),
 )
-STEPS_OF_FREE_BODIES = (*[StepKind(1.0, newton=False)] * 60, *[StepKind(1.0, newton=True)] * 30)
+OF_FREE_BODIES = Phase(60), Phase(30, newton=True)
 
 
-def _steps(candidates: Candidates, start: Start) -> Sequence[StepKind]:
+def _schedule(candidates: Candidates, start: Start) -> Sequence[Phase]:
     if start.free:
-        return STEPS_OF_FREE_BODIES
-    return STEPS_WHERE_FACES_END if candidates.bounded else STEPS_WITH_FORM if candidates.change else STEPS
+        return OF_FREE_BODIES
+    return WHERE_FACES_END if candidates.bounded else WITH_FORM if candidates.change else USUAL
+
+
+def _steps(schedule: Sequence[Phase]) -> Iterator[tuple[Phase, bool]]:
+    """Yield the phase of each step, and whether the step is the first one of this phase."""
+    for phase in schedule:
+        for step in range(phase.steps):
+            yield phase, step == 0
 
 
 def repeat(
@@ -83,46 +89,45 @@ def repeat(
     progress: Progress | None = None
     if not len(task):
         return
-    asleep, idle, last = np.zeros(len(task), dtype=bool), np.zeros(len(task), dtype=int), None
-    for kind in _steps(candidates, start):
-        asleep &= kind == last
-        last = kind
+    asleep, idle = np.zeros(len(task), dtype=bool), np.zeros(len(task), dtype=int)
+    for phase, is_first in _steps(_schedule(candidates, start)):
+        asleep &= not is_first
         if asleep.all():
             continue
         before = unsettled.state.take(np.arange(len(unsettled))) if start.free else None
-        size, scaled = _take(step, unsettled, np.flatnonzero(~asleep), kind, start.stride)
+        size, scaled = _take(step, unsettled, np.flatnonzero(~asleep), phase, start.stride)
         is_short = np.zeros(len(unsettled), dtype=bool)
         if before is not None:
             is_short = free_steps.shorten(step, unsettled.task, before, unsettled.state, size) & (size > STEP_TOLERANCE)
             stays = limits.displacement(before.poses, unsettled.state.poses) <= STEP_TOLERANCE
             idle = np.where(is_short & stays, idle + 1, 0)
-        rounding_counts = kind.newton or step.knows_walls or start.balances
-        moves = is_short | (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
-        if kind.width > 1:
+        rounding_counts = phase.newton or step.knows_walls or start.balances
+        moves = is_short | (phase.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
+        if phase.width > 1:
             moves |= ~candidates.hold(unsettled.task, unsettled.state, start)
         # The smaller size counts: steps are large in unconstrained freedoms, and in the norm of the objective if
         # Newton's curvature is stiff.
         unrest, residual = np.minimum(size, scaled), unsettled.state.kkt_residual
         residual[~moves] = np.maximum(residual[~moves], unrest[~moves])
         lost = moves & (limits.is_lost(unsettled.task, unsettled.state) | (idle >= MAX_IDLE))
-        if kind.width > 1 and not kind.newton:
+        if phase.width > 1 and not phase.newton:
             lost |= moves & _goes_round(trail, unsettled.state)
             trail = [*trail[-1:], unsettled.state.poses.copy()]
         residual[lost] = np.inf
         moves &= ~lost
         unsettled.settle(~moves)
         # Realizations that converge while steps are damped need no further damping.
-        asleep = (size[moves] <= STEP_TOLERANCE) & (kind.width > 1)
+        asleep = (size[moves] <= STEP_TOLERANCE) & (phase.width > 1)
         unrest, idle, trail = unrest[moves], idle[moves], [poses[moves] for poses in trail]
         progress = None if progress is None else progress.take(moves)
         if not len(unsettled):
             return
         if candidates.change:
-            _find_places(candidates, unsettled, kind.width, (size[moves] < NEARLY_AT_REST) & kind.sharp, start)
-        if kind.newton:
+            _find_places(candidates, unsettled, phase.width, (size[moves] < NEARLY_AT_REST) & phase.sharp, start)
+        if phase.newton:
             penetration = _true_penetration(unsettled.task, unsettled.state)
             progress = progress or Progress.start(unsettled.state)
-            progress.look(unsettled.state, penetration, unrest, is_held=kind.firmness > 1)
+            progress.look(unsettled.state, penetration, unrest, is_held=phase.firmness > 1)
             ends = progress.is_over(_is_stuck(unsettled.state))
             if ends.any():
                 _end(unsettled, progress, unrest, ends)
@@ -149,13 +154,13 @@ def _end(unsettled: Unsettled, progress: Progress | None, unrest: Float[Array, "
     unsettled.settle(ends)
 
 
-def _take(step: LinearStep, unsettled: Unsettled, rows: np.ndarray, kind: StepKind, stride: float) -> Step:
+def _take(step: LinearStep, unsettled: Unsettled, rows: np.ndarray, phase: Phase, stride: float) -> Step:
     """Take a step of some realizations; the others stay where they are."""
     if len(rows) == len(unsettled):
-        return step.take(unsettled.task, unsettled.state, stride=stride, firmness=kind.firmness, newton=kind.newton)
+        return step.take(unsettled.task, unsettled.state, stride=stride, firmness=phase.firmness, newton=phase.newton)
     task, state = unsettled.task.take(rows), unsettled.state.take(rows)
     size, scaled = np.zeros((2, len(unsettled)))
-    size[rows], scaled[rows] = step.take(task, state, stride=stride, firmness=kind.firmness, newton=kind.newton)
+    size[rows], scaled[rows] = step.take(task, state, stride=stride, firmness=phase.firmness, newton=phase.newton)
     unsettled.state.put(rows, state)
     return Step(size, scaled)
 

@@ -17,13 +17,13 @@ from tolcontact.contact.acceptance import MAX_TURN, AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.free_steps import FreeSteps
 from tolcontact.contact.iterated_search import search
-from tolcontact.contact.linear_step import MAX_ROUNDS, PENETRATION, LinearStep
+from tolcontact.contact.linear_step import MAX_ROUNDS, LinearStep
 from tolcontact.contact.record import accumulate_starts
 from tolcontact.contact.repeated_steps import repeat
-from tolcontact.contact.scan import min_gaps, undone
-from tolcontact.contact.springs import spring_misfit
+from tolcontact.contact.scan import PENETRATION, RoundScan, Scan, min_gaps, undone
 from tolcontact.contact.starts import FIRST, RESCUES, Start
-from tolcontact.contact.state import NO_ANSWER, Resolved, State, Task
+from tolcontact.contact.state import Outcome, Resolved, State, Task
+from tolcontact.discretization import ContactPoints
 from tolcontact.interference import ordered
 
 SAME_CONFLICT = 1e-3  # conflicts whose penetration differs by less than this share count as the same
@@ -106,14 +106,13 @@ class ContactResolver:
         unseen = np.flatnonzero(~moves)
         moves[unseen] = self._candidates.interfere(relative[unseen])
         touched = np.flatnonzero(moves)
-        scans = [scan.take(touched) for scan in survey.scans]
         task = Task(
             raw=poses[touched][:, self.parts],
             relative=relative[touched],
             deviations=deviations[touched],
             moments=survey.moments[touched],
-            may_carry=self._candidates.may_carry(scans, relative[touched], deviations[touched]),
-            scans=scans,
+            may_carry=self._candidates.may_carry(relative[touched], deviations[touched]),
+            scans=[scan.take(touched) for scan in survey.scans],
         )
         state = self._step.start(task.raw, task.relative)
         self._attempt(task, state, FIRST)
@@ -128,22 +127,20 @@ class ContactResolver:
     def _stays(self, task: Task, state: State) -> Bool[Array, " n"]:
         """Return whether answers are the raw poses, without contact (n,)."""
         is_loaded = (state.multipliers > 0).any(axis=1) | self._method.minimizes.presses
-        return (state.rank == 0) & ~is_loaded & (self._limits.displacement(task.raw, state.poses) <= UNMOVED)
+        return state.certified & ~is_loaded & (self._limits.displacement(task.raw, state.poses) <= UNMOVED)
 
     def _attempt(self, task: Task, state: State, start: Start) -> None:
         """Take steps from the poses of `state` to an answer, and judge it."""
         if start.projected:
             caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull parts far if nothing holds them
-            search(self._step, self._limits, self._candidates, self._energy_of, task, state, start.stride, caution)
+            search(self._step, self._limits, self._candidates, self._energy_of, task, state, start, caution)
         elif self._method.is_exact:
             repeat(self._step, self._limits, self._candidates, self._free_steps, task, state, start)
         else:
             self._step.take(task, state, stride=start.stride)
         state.searched[:] = start.projected
         self._leave_adrift(task, state)
-        scans = self._candidates.scans(
-            state.relative, task.deviations, projected=start.projected, earlier=task.scans, start=start, answered=state.slots
-        )
+        scans = self._candidates.scans(state.relative, task.deviations, earlier=task.scans, start=start, slots=state.slots)
         task = replace(task, scans=scans)
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
         if self._method.is_exact:
@@ -154,10 +151,10 @@ class ContactResolver:
                 depth[:, k] = misfit - state.slack[:, k]
             state.kkt_residual[:] = checked_residual(state, depth.max(axis=1))
         state.doubtful[:] = self._limits.is_doubtful(task, state, self._candidates)
-        certified = np.flatnonzero(state.rank == 0)
+        certified = np.flatnonzero(state.certified)
         state.doubtful[certified] = self._candidates.interfere(state.relative[certified])
-        state.doubtful[:] |= self._candidates.are_apart(state) & (state.rank == 0)
-        state.doubtful[:] |= self._candidates.bulge(task.scans, state.relative) & (state.rank == 0)
+        state.doubtful[:] |= self._candidates.are_apart(state) & state.certified
+        state.doubtful[:] |= self._candidates.bulge(task.scans, state.relative) & state.certified
         state.doubtful[:] |= self._limits.lie_in_form(task, state)
         if not start.projected:
             self._doubt_rolled(task, state)
@@ -206,9 +203,9 @@ class ContactResolver:
             rows = np.flatnonzero(state.doubtful)
             return rows[interfere(state.relative[rows])]
         if which == "not separated":
-            rows = np.flatnonzero(state.rank == NO_ANSWER)
+            rows = np.flatnonzero(state.outcome >= Outcome.DOUBTFUL)
             return rows[~state.solved[rows] | interfere(state.relative[rows])]
-        is_uncertain = state.rank == NO_ANSWER if which == "no answer" else state.rank > 0
+        is_uncertain = state.outcome >= (Outcome.DOUBTFUL if which == "no answer" else Outcome.IN_CONFLICT)
         return np.flatnonzero(is_uncertain | (~self._limits.is_near(task, state) if which == "uncertain or far" else False))
 
     def _try_again(self, task: Task, state: State, rows: Int[Array, " n"], start: Start) -> Int[Array, " left"]:
@@ -221,17 +218,14 @@ class ContactResolver:
             poses, relative = state.poses[rows], state.relative[rows]
         if start.free:
             poses, relative = self._free_steps.lift(poses, relative, part.deviations)
-        part = replace(
-            part,
-            scans=self._candidates.scans(relative, part.deviations, projected=start.projected, start=start),
-        )
+        part = replace(part, scans=self._candidates.scans(relative, part.deviations, start=start))
         attempt = self._step.start(poses, relative)
         self._attempt(part, attempt, start)
         accumulate_starts(state, rows, attempt)
         best = state.take(rows)
         better = is_better(attempt, self._energy_of(part, attempt), best, self._energy_of(part, best))
         state.put(rows[better], attempt.take(better))
-        return rows[(state.rank[rows] > 0) & ~is_same_conflict(attempt, best)]
+        return rows[~state.certified[rows] & ~is_same_conflict(attempt, best)]
 
     def _energy_of(self, task: Task, state: State) -> Float[Array, " n"]:
         return self._energy(poses=state.poses, raw=task.raw, moments=task.moments, deviations=task.deviations)
@@ -243,26 +237,50 @@ class ContactResolver:
             if mobility.movers:
                 lowest = self._group.position(self._group.free[mobility.movers[0]])
                 poses[:, k] = pose.relative(task.raw[:, k], task.raw[:, lowest])
-        relative = self._relate(poses=poses, deviations=task.deviations)
-        return poses, relative.reshape(len(task), len(self.pairs), -1)
+        return poses, self._relate(poses=poses, deviations=task.deviations)
 
 
 def is_better(state: State, energy: Float[Array, " n"], best: State, best_energy: Float[Array, " n"]) -> Bool[Array, " n"]:
     """Return whether answers are better than the best ones so far (n,).
 
-    A lower rank is better. Of two certified answers, the one with less energy (n,) is better; of two conflicts, the shallower.
+    A less severe outcome is better, but a doubtful answer is as bad as none. Of two certified answers, the one with less energy
+    (n,) is better; of two conflicts, the shallower.
     """
     depth, best_depth = state.slack.max(axis=1), best.slack.max(axis=1)
     is_lower = energy < best_energy - MIN_GAIN * np.abs(best_energy)
-    gains = np.where(state.rank == 0, is_lower, (state.rank == 1) & (depth < best_depth - MIN_GAIN))
-    return (state.rank < best.rank) | ((state.rank == best.rank) & gains)
+    outcome, best_outcome = (np.minimum(answer.outcome, Outcome.DOUBTFUL) for answer in (state, best))
+    is_shallower = (outcome == Outcome.IN_CONFLICT) & (depth < best_depth - MIN_GAIN)
+    gains = np.where(outcome == Outcome.RESOLVED, is_lower, is_shallower)
+    return (outcome < best_outcome) | ((outcome == best_outcome) & gains)
 
 
 def is_same_conflict(state: State, best: State) -> Bool[Array, " n"]:
     """Return whether answers, and the best ones so far, are conflicts of equal depth (n,)."""
     depth, best_depth = state.slack.max(axis=1), best.slack.max(axis=1)
     goes_as_deep = np.abs(depth - best_depth) <= SAME_CONFLICT * np.maximum(depth, best_depth)
-    return (state.rank == 1) & (best.rank == 1) & goes_as_deep
+    return (state.outcome == Outcome.IN_CONFLICT) & (best.outcome == Outcome.IN_CONFLICT) & goes_as_deep
+
+
+def spring_misfit(
+    pair: ContactPoints,
+    scan: Scan,
+    relative: Float[Array, "n 12"],
+    deviations: Float[Array, "n contributor"],
+    reactions: Float[Array, "n point"],
+) -> Float[Array, " n"]:
+    """Return how far poses and reactions [N] of a pair miss the law of its springs (n,) [mm].
+
+    A compliant contact pushes with its stiffness times its compression, and does not pull. A rigid support among them may not
+    be inside. `relative` (n, 12) are X_RM.
+    """
+    assert pair.stiffness is not None
+    if isinstance(scan, RoundScan):
+        gaps = scan.gaps(relative, deviations)
+    else:
+        points = np.broadcast_to(np.arange(len(pair.P_m)), (len(relative), len(pair.P_m)))
+        gaps = pair.nominal_gaps(relative) - pair.offsets.heights(deviations, points)
+    compression = reactions / pair.stiffness
+    return np.asarray(np.abs(np.minimum(gaps + compression, compression)).max(axis=1))
 
 
 def checked_residual(state: State, depth: Float[Array, " n"]) -> Float[Array, " n"]:

@@ -18,8 +18,11 @@ from tolcontact.contact import kernel
 from tolcontact.discretization import ContactPoints, Offsets
 from tolcontact.mechanics import MOMENTS, GapMap
 
+PENETRATION = 1e-10  # mm: less than this is no penetration
 BOUND_TOLERANCE = 1e-12  # of the largest coordinate: bounds of leaves are that much wider, for rounding
 OUTSIDE = 1e300  # a coordinate that no point has
+NOTHING = np.empty((0, 0))
+NOT_RAISED = kernel.Raised(NOTHING, NOTHING, NOTHING, np.empty(0, dtype=np.int64))
 
 
 class Survey(NamedTuple):
@@ -36,56 +39,27 @@ class Deepest(NamedTuple):
     depth: Float[Array, "realization cluster"]
 
 
-@dataclass(frozen=True, eq=False)
 class Scan:
-    """The contact points of a pair.
-
-    tables             moment tables (moment, point) of the sides that enter the objective
-    P_m                (point, 3), nominal
-    offsets            of the points
-    """
-
-    tables: tuple[Float[Array, "moment point"], ...]
-    P_m: Float[Array, "point 3"]
-    offsets: Offsets
-
-    def take(self, rows: np.ndarray) -> "Scan":
-        """Return the scan of some realizations: the same one if all have the same contact points."""
-        return self
-
-    def gaps(
-        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
-    ) -> Float[Array, "realization point"]:
-        """Return gaps (realization, point) [mm] for X_RM (realization, 12) and deviations (realization, contributor)."""
-        raise NotImplementedError
-
-    def survey(
-        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"], activity: float
-    ) -> "Survey":
-        """Return number and moments of the points whose gap is below `activity` [mm]."""
-        active = self.gaps(relative, deviations) < activity
-        sums = [[np.where(active, row, 0.0).sum(axis=1) for row in table] for table in self.tables]
-        moments = np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, MOMENTS))
-        return Survey(active.sum(axis=1), moments)
-
-    def min_gap(
-        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
-    ) -> Float[Array, " realization"]:
-        """Return the smallest gap of all points (realization,) [mm]."""
-        return self.gaps(relative, deviations).min(axis=1)
-
-    def depth_between(self, relative: Float[Array, "realization 12"]) -> Float[Array, " realization"]:
-        """Return the largest known depth [mm] of faces with form between the points; 0 if there is none."""
-        return np.zeros(len(relative))
-
-
-class SlotScan(Scan):
-    """A scan whose points take turns in the slots of the QP.
+    """The contact points of a pair, of which some take turns in the slots of the QP.
 
     fills   whether points outside take the remaining slots: worthwhile if most points may be active
     """
 
     fills: ClassVar[bool] = False
+
+    def take(self, rows: np.ndarray) -> "Scan":
+        """Return the scan of some realizations: the same one if all have the same contact points."""
+        return self
+
+    def min_gap(
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
+    ) -> Float[Array, " realization"]:
+        """Return the smallest gap of all points (realization,) [mm]."""
+        raise NotImplementedError
+
+    def depth_between(self, relative: Float[Array, "realization 12"]) -> Float[Array, " realization"]:
+        """Return the largest known depth [mm] of faces with form between the points; 0 if there is none."""
+        return np.zeros(len(relative))
 
     def rows(
         self, points: Int[Array, "realization slot"], deviations: Float[Array, "realization contributor"]
@@ -93,7 +67,7 @@ class SlotScan(Scan):
         """Return P^m, P^r, n^r (realization, slot, 3) of some `points` (realization, slot), which their rows of the QP need."""
         raise NotImplementedError
 
-    def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> "Deepest":
+    def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
         """Return the deepest point of each cluster; its depth is at most 0 if no point is inside.
 
         may_carry   (realization, point): the points to look at; all if it is None
@@ -110,39 +84,90 @@ class SlotScan(Scan):
 
 
 @dataclass(frozen=True, eq=False)
-class PairScan(SlotScan):
-    """Contact constants of a pair, its points sorted by cluster; and within a cluster into branches and leaves of neighbours.
+class RoundScan(Scan):
+    """The points of round faces, which follow from every pose. They always have a row of the QP; no row is searched for.
 
+    tables     moment tables (moment, point) of the sides that enter the objective
+    gaps_at    X_RM, deviations -> gaps (realization, point)
+    """
+
+    tables: tuple[Float[Array, "moment point"], ...]
+    gaps_at: NamedFunction
+
+    def gaps(
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
+    ) -> Float[Array, "realization point"]:
+        """Return gaps (realization, point) [mm] for X_RM (realization, 12) and deviations (realization, contributor)."""
+        return self.gaps_at(X_RM=relative, deviations=deviations)["gaps"]
+
+    def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        return self.gaps(relative, deviations).min(axis=1)
+
+    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> Survey:
+        """Return number and moments of the points whose gap is below `activity` [mm]."""
+        active = self.gaps(relative, deviations) < activity
+        sums = [[np.where(active, row, 0.0).sum(axis=1) for row in table] for table in self.tables]
+        moments = np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, MOMENTS))
+        return Survey(active.sum(axis=1), moments)
+
+
+@dataclass(frozen=True, eq=False)
+class FixedScan(Scan):
+    """Fixed contact points of a pair, sorted by cluster; and within a cluster into branches and leaves of neighbours.
+
+    tables             moment tables (moment, point) of the sides that enter the objective
     basis              (13, r),
     columns            (k,), and
     coordinates        (r + k, point): gaps [mm] = [[X_RM, 1] @ basis, deviations[columns]] @ coordinates
-    P_r, n_r           (point, 3)
+    P_m, P_r, n_r      (point, 3), nominal
+    offsets            of the points
     leaves             (leaf + 1,): the first point of each leaf, and the end
     branches           (branch + 1,): the first leaf of each branch, and the end
     clusters           (cluster + 1,): the first branch of each cluster, and the end
     """
 
+    tables: tuple[Float[Array, "moment point"], ...]
     basis: Float[Array, "entry r"]
     columns: Int[Array, " k"]
     coordinates: Float[Array, "coordinate point"]
+    P_m: Float[Array, "point 3"]
     P_r: Float[Array, "point 3"]
     n_r: Float[Array, "point 3"]
+    offsets: Offsets
     leaves: Int[Array, " _"]
     branches: Int[Array, " _"]
     clusters: Int[Array, " _"]
 
     def gaps(
-        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
+        self,
+        relative: Float[Array, "realization 12"],
+        deviations: Float[Array, "realization contributor"],
+        limits: Float[Array, " realization"] | None = None,
+        *,
+        raised: kernel.Raised | None = None,
     ) -> Float[Array, "realization point"]:
-        slopes = np.repeat(self.basis[-1:], len(relative), axis=0)
-        for entry, row in zip(relative.T, self.basis[:-1], strict=True):
-            slopes += entry[:, None] * row
-        slopes = np.hstack([slopes, deviations[:, self.columns]])
-        result = np.repeat(slopes[:, :1], self.coordinates.shape[1], axis=1)
-        term = np.empty_like(result)
-        for slope, row in zip(slopes.T[1:], self.coordinates[1:], strict=True):
-            result += np.multiply(slope[:, None], row, out=term)
-        return result
+        """Return gaps (realization, point) [mm]; infinite ones of leaves where all are above `limits` (realization,) [mm].
+
+        raised   the heights of the points, if they are known; otherwise they follow from the deviations
+        """
+        gaps = np.empty((len(relative), len(self.P_m)))
+        limits = np.full(len(relative), np.inf) if limits is None else limits
+        kernel.write_gaps(*self._inputs(relative, deviations, raised), limits, gaps)
+        return gaps
+
+    def survey(
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"], activity: float
+    ) -> Survey:
+        """Return number and moments of the points whose gap is below `activity` [mm]."""
+        count = len(relative)
+        active, moments = np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS))
+        poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
+        flat = moments.reshape(count, self._table.shape[1])
+        kernel.survey(self.points, self._table, *self._sums, poses, heights, activity, active, flat)
+        return Survey(active, moments)
+
+    def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        return self.deepest_of(self.clusters[[0, -1]], relative, deviations)[1][:, 0]
 
     def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         P_m, P_r, n_r = self.P_m[points], self.P_r[points], self.n_r[points]
@@ -150,80 +175,42 @@ class PairScan(SlotScan):
             P_r = P_r + self.offsets.heights(deviations, points)[..., None] * n_r
         return P_m, P_r, n_r
 
-    def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> "Deepest":
-        gaps = np.minimum(self.gaps(relative, deviations), 0)
-        if may_carry is not None:
-            gaps = np.where(may_carry, gaps, 0)
-        firsts = self.leaves[self.branches[self.clusters]]
-        points = np.stack([gaps[:, a:b].argmin(axis=1) + a for a, b in itertools.pairwise(firsts)], axis=1)
-        return Deepest(points, -np.take_along_axis(gaps, points, axis=1))
-
-
-@dataclass(frozen=True, eq=False)
-class RoundScan(Scan):
-    """The points of round faces, which follow from every pose. They always have a row of the QP; no row is searched for.
-
-    gaps_at    X_RM, deviations -> gaps (realization, point)
-    """
-
-    gaps_at: NamedFunction
-
-    def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        return self.gaps_at(X_RM=relative, deviations=deviations)["gaps"]
-
-
-def fixed(scan: Scan) -> PairScan:
-    """Return a scan, which must not be one of round faces."""
-    assert isinstance(scan, PairScan)
-    return scan
-
-
-def changing(scan: Scan) -> SlotScan:
-    """Return a scan, which must be one whose points take turns in slots."""
-    assert isinstance(scan, SlotScan)
-    return scan
-
-
-class CompiledScan(PairScan):
-    """A scan whose passes are compiled; PairScan is the same in NumPy."""
-
-    def survey(
-        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"], activity: float
-    ) -> "Survey":
-        count = len(relative)
-        active, moments = np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS))
-        poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
-        flat = moments.reshape(count, self._table.shape[1])
-        kernel.survey(self.compiled, self._table, *self._sums, poses, heights, activity, active, flat)
-        return Survey(active, moments)
-
-    def min_gap(
-        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
-    ) -> Float[Array, " realization"]:
-        return self._deepest(self.clusters[[0, -1]], relative, deviations, None, np.inf)[1][:, 0]
-
-    def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> "Deepest":
-        points, gaps = self._deepest(self.clusters, relative, deviations, may_carry, 0.0)
+    def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
+        points, gaps = self.deepest_of(self.clusters, relative, deviations, may_carry, 0.0)
         return Deepest(points, -gaps)
 
-    def _deepest(
-        self, clusters: np.ndarray, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None, limit: float
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def deepest_of(
+        self,
+        clusters: Int[Array, " _"],
+        relative: Float[Array, "realization 12"],
+        deviations: Float[Array, "realization contributor"],
+        may_carry: Bool[Array, "realization point"] | None = None,
+        limit: float = np.inf,
+        *,
+        raised: kernel.Raised | None = None,
+    ) -> tuple[Int[Array, "realization cluster"], Float[Array, "realization cluster"]]:
+        """Return index and gap [mm] of the deepest point of each cluster, if its gap is less than `limit` [mm].
+
+        Otherwise these are the first point of the cluster, and `limit`.
+
+        clusters   (cluster + 1,): the first branch of each cluster, and the end
+        raised     the heights of the points, if they are known; otherwise they follow from the deviations
+        """
         points = np.empty((len(relative), len(clusters) - 1), dtype=np.int64)
         gaps = np.empty(points.shape)
-        poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
         mask = np.empty((len(relative), 0), dtype=bool) if may_carry is None else np.ascontiguousarray(may_carry)
-        kernel.deepest(self.compiled, clusters, poses, heights, mask, limit, points, gaps)
+        kernel.deepest(*self._inputs(relative, deviations, raised), clusters, mask, limit, points, gaps)
         return points, gaps
 
-    @cached_property
-    def contiguous(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """P_m, P_r and n_r (point, 3), in rows."""
-        P_m, P_r, n_r = (np.ascontiguousarray(values) for values in (self.P_m, self.P_r, self.n_r))
-        return P_m, P_r, n_r
+    def _inputs(
+        self, relative: np.ndarray, deviations: np.ndarray, raised: kernel.Raised | None
+    ) -> tuple[kernel.Points, kernel.Raised, np.ndarray, np.ndarray]:
+        """Return the first arguments of compiled passes."""
+        points = self.points if raised is None else self._nominal_points
+        return points, raised or NOT_RAISED, np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
 
     @cached_property
-    def compiled(self) -> kernel.Points:
+    def points(self) -> kernel.Points:
         """The points as compiled passes take them."""
         rounding = BOUND_TOLERANCE * np.abs(self.coordinates[1:]).max(initial=0)
         boxes = []
@@ -231,6 +218,13 @@ class CompiledScan(PairScan):
             low, high = (extreme.reduceat(self.coordinates[1:], starts, axis=1) for extreme in (np.minimum, np.maximum))
             boxes.append(np.stack([(low + high) / 2, (high - low) / 2 + rounding]))
         return kernel.Points(self.basis, self.columns, self.coordinates, self.leaves, self.branches, *boxes)
+
+    @cached_property
+    def _nominal_points(self) -> kernel.Points:
+        """The points without the heights that deviations add."""
+        points, size = self.points, self.basis.shape[1]
+        boxes = (np.ascontiguousarray(boxes[:, : size - 1]) for boxes in (points.leaf_boxes, points.branch_boxes))
+        return kernel.Points(self.basis, self.columns[:0], self.coordinates[:size], self.leaves, self.branches, *boxes)
 
     @cached_property
     def _table(self) -> np.ndarray:
@@ -246,7 +240,7 @@ class CompiledScan(PairScan):
 
 def pair_scan(
     pair: ContactPoints, gaps: GapMap, tables: Sequence[np.ndarray], clusters: int, points: np.ndarray | None = None
-) -> PairScan:
+) -> FixedScan:
     """Sort the points of a pair into at most `clusters` clusters of neighbours, and each cluster into branches and leaves.
 
     Each support has its own cluster.
@@ -261,7 +255,7 @@ def pair_scan(
     order = np.concatenate(leaves)
     ends = np.cumsum([0, *map(len, leaves_of_clusters)])
     firsts = [np.arange(begin, end, kernel.BRANCH) for begin, end in itertools.pairwise(ends)]
-    return CompiledScan(
+    return FixedScan(
         basis=gaps.basis,
         columns=gaps.columns,
         coordinates=np.ascontiguousarray(gaps.coordinates[:, order]),
@@ -321,7 +315,7 @@ def undone(
     may_carry   for each pair (realization, point), or None if all points may
     """
     depths = [
-        -min_gap[:, k] if may is None else fixed(scan).deepest(relative[:, k], deviations, may).depth.max(axis=1)
+        -min_gap[:, k] if may is None else scan.deepest(relative[:, k], deviations, may).depth.max(axis=1)
         for k, (scan, may) in enumerate(zip(scans, may_carry, strict=True))
     ]
     return np.stack(depths, axis=1) - slack

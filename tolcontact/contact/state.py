@@ -4,6 +4,7 @@ Their first dimension is n: the realizations that contact touches, or some of th
 them back. Code that works on realizations takes a task and a state, and uses no other index.
 """
 
+import enum
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
@@ -16,9 +17,18 @@ from tolcontact.contact.scan import Scan
 from tolcontact.contact.slots import Slots
 from tolcontact.discretization import ContactPoints
 
-NO_ANSWER = 2  # the rank of a realization without a certified answer or conflict
 LOADED_SHARE = 1e-4  # of the largest reaction of a realization: smaller ones only oppose the regularization
 ANSWER = ("poses", "relative", "multipliers", "slack", "astray")
+
+
+class Outcome(enum.IntEnum):
+    """The outcome of a realization in one group, in ascending order of severity: the worst of all groups decides its status."""
+
+    UNTOUCHED = 0
+    RESOLVED = 1
+    IN_CONFLICT = 2
+    DOUBTFUL = 3
+    UNSOLVED = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,9 +102,15 @@ class State(Record):
         return np.asarray(self.kkt_residual <= np.maximum(ACCURACY, self.slack.max(axis=1)))
 
     @property
-    def rank(self) -> Int[Array, " n"]:
-        """(n,): 0 for a certified answer, 1 for a conflict, 2 if there is no answer, or a doubtful one."""
-        return np.where(self.solved & ~self.doubtful, np.where(self.in_conflict, 1, 0), NO_ANSWER)
+    def outcome(self) -> Int[Array, " n"]:
+        """(n,): the Outcome."""
+        solved = np.where(self.in_conflict, Outcome.IN_CONFLICT, Outcome.RESOLVED)
+        return np.where(self.solved, np.where(self.doubtful, Outcome.DOUBTFUL, solved), Outcome.UNSOLVED)
+
+    @property
+    def certified(self) -> Bool[Array, " n"]:
+        """(n,): whether the answer is certified."""
+        return self.outcome == Outcome.RESOLVED
 
     @property
     def loaded(self) -> Bool[Array, "n row"]:

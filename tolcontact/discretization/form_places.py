@@ -5,8 +5,6 @@ reference face are candidates, too, and so are minima of the gap between them. T
 other face's point at the pose.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from tolcontact import poses as pose
@@ -14,24 +12,13 @@ from tolcontact.arrays import Array, Float, Int
 from tolcontact.discretization.nominal import ContactPoints
 from tolcontact.discretization.plane_minima import with_former
 from tolcontact.geometry import region_kernel
-from tolcontact.geometry.meeting import NEARNESS, Meeting, Places
+from tolcontact.geometry.meeting import NEARNESS, Meeting
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
+from tolcontact.geometry.places import Places, RaisedPlaces
 
 FIRST_POINT = 1 << 40  # label of the first contact point
 EXACT_SHARE = 0.1  # of the largest dip of the gap between points: heights in smaller gaps are exact, others from splines
 POINT_GROUPS = 12  # of neighbouring contact points; the lowest of each group counts
-
-
-class RaisedPlaces(NamedTuple):
-    """Candidate contacts, and the heights (n, place) [mm] of both faces there, which reduce the nominal gaps."""
-
-    places: Places
-    heights: Float[Array, "n p"]
-
-    @property
-    def gaps(self) -> Float[Array, "n p"]:
-        """The gaps (n, place) [mm] of the actual faces, infinite where there is no candidate."""
-        return np.asarray(self.places.gaps - self.heights)
 
 
 def raised_places(
@@ -57,51 +44,41 @@ def raised_places(
     row, place = np.nonzero(np.isfinite(ends.gaps))
     heights = np.zeros(ends.gaps.shape)
     heights[row, place] = pair.form(deviations).at(row, ends.P_m[row, place], ends.P_r[row, place])
-    points, of_points, between, of_minima = _points(pair, X_RM, deviations, retained, depth)
-    joined = [np.concatenate(arrays, axis=1) for arrays in zip(ends, points, between, strict=True)]
-    return RaisedPlaces(Places(*joined), grown + np.concatenate([heights, of_points, of_minima], axis=1))
+    raised = RaisedPlaces(ends, heights).followed_by(*_points(pair, X_RM, deviations, retained, depth))
+    return raised._replace(heights=grown + raised.heights)
 
 
-class RimPoints(NamedTuple):
-    """Points of the rim of the reference face, and the points of the moving plane across from them at n poses.
+def rim_points(pair: ContactPoints, X_RM: Float[Array, "n 12"]) -> tuple[Float[Array, "n point 3"], Float[Array, "n point"]]:
+    """Return the points of the moving plane across from the rim points of the reference plane of a pair at X_RM (n, 12).
 
-    P_m    (n, point, 3) [mm] of the nominal moving plane
-    P_r    (point, 3) [mm]
-    gaps   (n, point) [mm] of nominal faces, along the normal of the reference face
+    These are P_m (n, point, 3) [mm] of the nominal plane, and gaps (n, point) [mm] along the normal of the reference face.
     """
-
-    P_m: Float[Array, "n point 3"]
-    P_r: Float[Array, "point 3"]
-    gaps: Float[Array, "n point"]
-
-
-def rim_points(pair: ContactPoints, X_RM: Float[Array, "n 12"]) -> RimPoints:
-    """Return the rim points of the reference plane of a pair at X_RM (n, 12)."""
     assert pair.moving_face is not None
     rim, n = pair.reference_rim, pair.n_r[0]
     m, corner = pair.moving_face.corner_normals[0, 0], pair.moving_face.vertices[0]
     back, along = pose.apply(pose.inverse(X_RM), rim), n @ pose.rotation(X_RM)  # (n, rim point, 3), (n, 3)
     heights = ((corner - back) @ m) / (along @ m)[:, None]
-    return RimPoints(back + heights[..., None] * along[:, None], rim, heights)
+    return back + heights[..., None] * along[:, None], heights
 
 
 def _points(
     pair: ContactPoints, X_RM: np.ndarray, deviations: np.ndarray, retained: np.ndarray | None, depth: float
-) -> tuple[Places, np.ndarray, Places, np.ndarray]:
-    """Return points inside the rims of the faces as candidates, and the heights (n, place) [mm] of the forms there.
+) -> tuple[RaisedPlaces, RaisedPlaces]:
+    """Return points inside the rims of the faces as candidates, and minima of the gap between them, with the forms there.
 
-    These are the `retained` ones, and the lowest of each group: contact points, and after these points of the rim. The minima
-    of the gap between them that are deeper than `depth` [mm] follow, and their heights.
+    The points are the `retained` ones, and the lowest of each group: contact points, and after these points of the rim. The
+    minima are deeper than `depth` [mm].
     """
     assert pair.reference_face is not None and pair.moving_face is not None and pair.minima is not None
     regions, minima = (pair.reference_face.region, pair.moving_face.region), pair.minima
-    poses, rim, count = np.ascontiguousarray(X_RM), rim_points(pair, X_RM), len(pair.P_m)
-    total = count + len(rim.P_r)
+    poses, count, rim = np.ascontiguousarray(X_RM), len(pair.P_m), pair.reference_rim
+    across, rim_gaps = rim_points(pair, X_RM)
+    total = count + len(rim)
     groups = np.cumsum([0, *map(len, np.array_split(np.arange(total), min(POINT_GROUPS, total)))])
     gaps, heights = np.empty((len(poses), total)), np.zeros((len(poses), total))
-    P_m, feet = np.ascontiguousarray(pair.P_m), np.ascontiguousarray(rim.P_m)
+    P_m, feet = np.ascontiguousarray(pair.P_m), np.ascontiguousarray(across)
     region_kernel.plane_gaps(poses, P_m, *(np.ascontiguousarray(values) for values in (pair.P_r, pair.n_r)), gaps)
-    gaps[:, count:], heights[:, :count] = rim.gaps, pair.form_heights(deviations)
+    gaps[:, count:], heights[:, :count] = rim_gaps, pair.form_heights(deviations)
     between = kept = np.zeros((len(poses), 0), dtype=np.int64)
     if retained is not None:
         is_point = (retained >= FIRST_POINT) & (retained < FIRST_POINT + total)
@@ -133,14 +110,14 @@ def _points(
     labels, gaps = np.where(is_point, numbers + FIRST_POINT, -1), np.where(is_point, gaps[rows, numbers], np.inf)
     of_pair, of_rim = np.where(numbers < count, numbers, 0), numbers[on_rim] - count
     P_m, P_r = pair.P_m[of_pair], pair.P_r[of_pair]
-    P_m[on_rim], P_r[on_rim] = feet[on_rim[0], of_rim], rim.P_r[of_rim]
+    P_m[on_rim], P_r[on_rim] = feet[on_rim[0], of_rim], rim[of_rim]
     n_r = np.broadcast_to(pair.n_r[0], (*numbers.shape, 3))
     heights = heights[rows, numbers] * is_point
     row, place = _exact(gaps - heights, minima.bulge(deviations))
     moved = pose.apply(poses[row], P_m[row, place, None])[:, 0]
     true_feet = moved - ((moved - P_r[row, place]) @ pair.n_r[0])[:, None] * pair.n_r[0]
     heights[row, place] = pair.form(deviations).at(row, P_m[row, place], true_feet)
-    return Places(labels, gaps, P_m, P_r, n_r), heights, *minima.at(poses, deviations, between)
+    return RaisedPlaces(Places(labels, gaps, P_m, P_r, n_r), heights), minima.at(poses, deviations, between)
 
 
 def _exact(gaps: np.ndarray, bulge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -147,12 +147,16 @@ class ContactPoints:
             if face is not None and face.form is not None
         ]
 
+    def nominal_gaps(self, X_RM: np.ndarray, points: np.ndarray | slice = EVERY_POINT) -> np.ndarray:
+        """Return the gaps (row, point) [mm] of fixed contact points at X_RM (row, 12), without any deviation of the faces."""
+        return np.asarray(((pose.apply(X_RM, self.P_m[points]) - self.P_r[points]) * self.n_r[points]).sum(axis=2))
+
     def least_gap(self, X_RM: np.ndarray, deviations: np.ndarray | None = None) -> np.ndarray:
         """Return the least gap (row,) [mm] of the points at X_RM (row, 12) for deviations (row, contributor) of the faces."""
         gaps, together = np.empty(len(X_RM)), max(1, GAPS_TOGETHER // max(len(self.P_m), 1))
         for k in range(0, len(X_RM), together):
             rows = slice(k, k + together)
-            of_points = ((pose.apply(X_RM[rows], self.P_m) - self.P_r) * self.n_r).sum(axis=2)
+            of_points = self.nominal_gaps(X_RM[rows])
             if deviations is not None and self.has_form:
                 of_points -= self.form_heights(deviations[rows])
             gaps[rows] = of_points.min(axis=1)

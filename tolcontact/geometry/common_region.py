@@ -3,6 +3,7 @@
 import numpy as np
 import trimesh
 
+from tolcontact.geometry.overlap import mean_normal
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.triangle_mesh import overlaps
 
@@ -18,8 +19,7 @@ def common_region(face: Surface, target: Surface) -> np.ndarray | None:
     Over means along the normal of the target. The result is None if too many triangles overlap to cut them all.
     """
     corners, target_corners = np.asarray(face.mesh.triangles), np.asarray(target.mesh.triangles)
-    n = target.corner_normals.reshape(-1, 3).mean(axis=0)
-    n /= np.linalg.norm(n)
+    n = mean_normal(target)
     rows, columns = _overlapping(*(points - (points @ n)[..., None] * n for points in (corners, target_corners)))
     if len(rows) > MAX_PAIRS:
         return None

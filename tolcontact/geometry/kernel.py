@@ -1,7 +1,6 @@
 """Compiled gaps at the points where two bodies can touch: corners on facets, and edges across edges."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -32,22 +31,6 @@ INSIDE = 1e-9  # mm: contact points that are no deeper count as touching
 TINY = 1e-300
 ORIGIN = (0.0, 0.0, 0.0)
 NOWHERE = (np.inf, ORIGIN, ORIGIN, ORIGIN)  # gap, point, projection and normal of elements that do not meet
-
-
-class Body(NamedTuple):
-    """The corners, edges and facets of a polyhedron (see Polyhedron), and the triangles of its whole body."""
-
-    vertices: np.ndarray
-    cones: np.ndarray
-    directions: np.ndarray
-    facets: np.ndarray
-    normals: np.ndarray
-    inward: np.ndarray
-    edges: np.ndarray
-    ends: np.ndarray
-    into: np.ndarray
-    edge_normals: np.ndarray
-    triangles: np.ndarray
 
 
 @inlined_uncounted

@@ -21,7 +21,8 @@ import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.geometry import kernel, places_kernel
-from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER
+from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER, TINY
+from tolcontact.geometry.places import Places
 from tolcontact.geometry.polyhedron import Polyhedron, polyhedron
 from tolcontact.geometry.sorted_candidates import sorted_candidates
 from tolcontact.geometry.surface import Surface
@@ -40,22 +41,6 @@ CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 ARC = np.linspace(0, 1, 17)  # shares at which the normals between two facets are compared
 ARC_SPACING = np.pi / 16  # rad: the largest angle between two of them
 BLOCK_ARCS = 4096  # pairs of edges whose arcs are compared in one block
-TINY = 1e-300
-
-
-class Places(NamedTuple):
-    """Points at which two bodies can touch, at n poses.
-
-    labels    (n, point): indices of the points among the candidates of the meeting, -1 for none
-    gaps      (n, point) [mm], infinite for none
-    P_m, P_r, n_r   (n, point, 3): the points on both bodies, and the normal, in the frames of the paper
-    """
-
-    labels: Int[Array, "n p"]
-    gaps: Float[Array, "n p"]
-    P_m: Float[Array, "n p 3"]
-    P_r: Float[Array, "n p 3"]
-    n_r: Float[Array, "n p 3"]
 
 
 class Reach(NamedTuple):
@@ -152,11 +137,6 @@ class Meeting:
         return reached
 
     @cached_property
-    def _bodies(self) -> tuple[kernel.Body, kernel.Body]:
-        """The moving and the reference body in the form that compiled functions take."""
-        return _touching_parts(self.moving), _touching_parts(self.reference)
-
-    @cached_property
     def _extremes(self) -> Float[Array, "v 3"]:
         """The outermost vertices of the moving body in a set of fixed directions."""
         numbers = np.unique((self.moving.vertices @ np.vstack([DIRECTIONS, CORNERS]).T).argmax(axis=0))
@@ -210,20 +190,13 @@ class Meeting:
             np.zeros((len(X_RM), 0), dtype=np.int64) if retained is None else np.where(retained < len(self), retained, -1)
         )
         places_kernel.find(
-            *self._bodies, self.candidates,
+            self.moving, self.reference, self.candidates,
             np.array([self.reach.depth, self.reach.height, np.inf if self.is_free else _passed(self.reach, self.size)]),
             kernel.MARGIN * self.size + self.overhang,
             np.array([error, self.reach.depth, nearness, self.overhang]),
             np.ascontiguousarray(X_RM), retained, DIRECTIONS, *places,
         )  # fmt: skip
         return places
-
-
-def _touching_parts(body: Polyhedron) -> kernel.Body:
-    return kernel.Body(
-        body.vertices, body.cones, body.directions, body.facets, body.normals, body.inward, body.edges, body.ends,
-        body.into, body.edge_normals, body.body,
-    )  # fmt: skip
 
 
 def meeting(faces: tuple[Surface, Surface], bodies: tuple, reach: Reach) -> Meeting | None:

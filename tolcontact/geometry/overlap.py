@@ -19,7 +19,7 @@ def overlap_corners(face: Surface, target: Surface) -> np.ndarray:
     face_rim, target_rim = (rim(np.asarray(surface.mesh.faces)) for surface in (face, target))
     if not _are_few(face_rim, target_rim):
         return np.zeros((0, 3))
-    n = _mean_normal(target)
+    n = mean_normal(target)
     edges_p, edges_q = np.asarray(face.mesh.vertices)[face_rim], np.asarray(target.mesh.vertices)[target_rim]
     row, _, share = _crossings(edges_p, edges_q, n)
     crossings = edges_p[row, 0] + share[:, None] * (edges_p[row, 1] - edges_p[row, 0])
@@ -40,7 +40,7 @@ def crossing_edges(face: Surface, target: Surface) -> tuple[np.ndarray, np.ndarr
     edges_p, edges_q = np.asarray(face.mesh.vertices)[face_rim], np.asarray(target.mesh.vertices)[target_rim]
     if not _are_few(face_rim, target_rim):
         return edges_p[:0], edges_q[:0]
-    row, column, _ = _crossings(edges_p, edges_q, _mean_normal(target))
+    row, column, _ = _crossings(edges_p, edges_q, mean_normal(target))
     return edges_p[row], edges_q[column]
 
 
@@ -67,7 +67,8 @@ def _crossings(edges_p: np.ndarray, edges_q: np.ndarray, n: np.ndarray) -> tuple
     return row, column, a[row, column]
 
 
-def _mean_normal(face: Surface) -> np.ndarray:
+def mean_normal(face: Surface) -> np.ndarray:
+    """Return the mean unit normal (3,) of a face."""
     n = face.corner_normals.reshape(-1, 3).mean(axis=0)
     n /= np.linalg.norm(n)
     return n
@@ -81,7 +82,7 @@ def rim_points(face: Surface, target: Surface, step: float, within: float) -> np
     faces, vertices = np.asarray(target.mesh.faces), np.asarray(target.mesh.vertices)
     ends, edge, triangles = edges(faces)
     outer = np.flatnonzero(triangles[edge] == 1)
-    n = _mean_normal(target)
+    n = mean_normal(target)
     starts = []
     length = np.linalg.norm(vertices[ends[outer, 1]] - vertices[ends[outer, 0]], axis=1)
     step = max(step, float(length.sum()) / MAX_EDGES)

@@ -6,7 +6,6 @@ bodies penetrate each other (Gottschalk, Lin and Manocha, OBBTree, 1996). If it 
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -15,39 +14,11 @@ import trimesh
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.geometry import parting_kernel
 from tolcontact.geometry.inset import smaller
-from tolcontact.geometry.triangle_mesh import coordinate_error
+from tolcontact.geometry.places import Places
+from tolcontact.geometry.triangle_mesh import SHARP_ANGLE, coordinate_error, into_facets
 
-SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
 CONVEX_SHARE = 1e-6  # of the hull's size: largest depth of a convex body's surface inside its hull, since files are rounded
 MAX_COMPARISONS = 10_000_000  # of edges with edges
-
-
-class Axis(NamedTuple):
-    """The separating axis of two convex bodies, at n poses.
-
-    edges          (n,): the index of the pair of edges that cross along it, -1 if it is the normal of a plane
-    gaps           (n,) [mm] of the bodies along the axis; negative if they penetrate each other
-    P_m, P_r, n_r  (n, 3): the nearest points of both bodies along it, and the axis, in the frames of the paper
-    """
-
-    edges: Int[Array, " n"]
-    gaps: Float[Array, " n"]
-    P_m: Float[Array, "n 3"]
-    P_r: Float[Array, "n 3"]
-    n_r: Float[Array, "n 3"]
-
-
-class Crossings(NamedTuple):
-    """Pairs of edges of two bodies, at n poses.
-
-    gaps           (n, k) [mm] along their common normals; infinite where they do not cross
-    P_m, P_r, n_r  (n, k, 3): the points on the edges, and their common normals, in the frames of the paper
-    """
-
-    gaps: Float[Array, "n k"]
-    P_m: Float[Array, "n k 3"]
-    P_r: Float[Array, "n k 3"]
-    n_r: Float[Array, "n k 3"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,18 +28,26 @@ class Parting:
     moving: parting_kernel.Convex
     reference: parting_kernel.Convex
 
-    def at(self, X_RM: Float[Array, "n 12"]) -> Axis:
-        """Return the separating axis of the bodies at poses X_RM (n, 12)."""
-        count = len(X_RM)
-        axis = Axis(np.empty(count, dtype=np.int64), np.empty(count), *np.empty((3, count, 3)))
-        parting_kernel.part(self.moving, self.reference, np.ascontiguousarray(X_RM), *axis)
-        return axis
+    def at(self, X_RM: Float[Array, "n 12"]) -> Places:
+        """Return the nearest points (n, 1) of the bodies along their separating axis at poses X_RM (n, 12).
 
-    def crossings(self, X_RM: Float[Array, "n 12"], edges: Int[Array, "n k"], axes: Float[Array, "n 3"]) -> Crossings:
-        """Return pairs of `edges` (n, k), -1 for none, at poses X_RM (n, 12), with normals in the sense of `axes` (n, 3)."""
-        crossings = Crossings(np.empty(edges.shape), *np.zeros((3, *edges.shape, 3)))
-        poses, pairs, senses = (np.ascontiguousarray(values) for values in (X_RM, edges, axes))
-        parting_kernel.cross_edges(self.moving, self.reference, poses, pairs, senses, *crossings)
+        The normal is the axis, and the gap is negative if the bodies penetrate each other. The label is the index of the pair
+        of edges that cross along the axis, -1 if it is the normal of a plane.
+        """
+        count = len(X_RM)
+        edges, gaps, (P_m, P_r, n_r) = np.empty(count, dtype=np.int64), np.empty(count), np.empty((3, count, 3))
+        parting_kernel.part(self.moving, self.reference, np.ascontiguousarray(X_RM), edges, gaps, P_m, P_r, n_r)
+        return Places(edges[:, None], gaps[:, None], P_m[:, None], P_r[:, None], n_r[:, None])
+
+    def crossings(self, X_RM: Float[Array, "n 12"], edges: Int[Array, "n k"], axes: Float[Array, "n 3"]) -> Places:
+        """Return the points of pairs of `edges` (n, k), -1 for none, along their common normals, at poses X_RM (n, 12).
+
+        Normals have the sense of `axes` (n, 3); gaps are infinite where edges do not cross.
+        """
+        P_m, P_r, n_r = np.zeros((3, *edges.shape, 3))
+        crossings = Places(np.ascontiguousarray(edges), np.empty(edges.shape), P_m, P_r, n_r)
+        poses, senses = np.ascontiguousarray(X_RM), np.ascontiguousarray(axes)
+        parting_kernel.cross_edges(self.moving, self.reference, poses, crossings.labels, senses, *crossings[1:])
         return crossings
 
 
@@ -103,10 +82,7 @@ def convex(body: trimesh.Trimesh) -> parting_kernel.Convex | None:
         return None
     sharp_neighbours = neighbours[is_sharp]
     ends = vertices[np.asarray(hull.face_adjacency_edges)[is_sharp]]
-    along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
-    into = np.cross(facet_normals[sharp_neighbours], along[:, None])
-    towards = np.asarray(hull.triangles_center)[sharp_neighbours] - ends[:, :1]
-    into *= np.where((into * towards).sum(axis=2) < 0, -1.0, 1.0)[..., None]
+    into = into_facets(ends, facet_normals[sharp_neighbours], np.asarray(hull.triangles_center)[sharp_neighbours])
     return parting_kernel.Convex(*(np.ascontiguousarray(values) for values in (vertices, normals, heights, ends, into)))
 
 

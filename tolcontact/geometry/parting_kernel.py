@@ -6,10 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.compiled import compiled, inlined_uncounted, uncounted
+from tolcontact.geometry.kernel import ORIGIN, PARALLEL
 from tolcontact.geometry.vector_kernel import along, cross, dot, minus, move, move_back, row, row_of, scaled, turn, turn_back
-
-PARALLEL = 1e-6  # rad: edges at a smaller angle have no common normal
-ORIGIN = (0.0, 0.0, 0.0)
 
 
 class Convex(NamedTuple):

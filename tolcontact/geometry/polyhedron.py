@@ -1,6 +1,6 @@
 """A face of a body with its ends: the corners, edges and facets at which it can touch another one."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import trimesh
@@ -9,13 +9,10 @@ from tolcontact.arrays import Array, Float, Int
 from tolcontact.geometry.inset import smaller
 from tolcontact.geometry.merged_surface import merged_surface
 from tolcontact.geometry.surface import Surface
-from tolcontact.geometry.triangle_mesh import coordinate_error, edges
-
-SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
+from tolcontact.geometry.triangle_mesh import SHARP_ANGLE, coordinate_error, edges, into_facets
 
 
-@dataclass(frozen=True, eq=False)
-class Polyhedron:
+class Polyhedron(NamedTuple):
     """The triangles of a face, and the edges and corners around them, in the nominal assembly frame [mm].
 
     Vertices inside a plane, and edges between facets of one plane, cannot be the first to touch anything, and are left out.
@@ -33,7 +30,7 @@ class Polyhedron:
     convex       (e,): whether the body is convex there
     facet_planes, vertex_planes, edge_planes   index of the plane of each facet (t,); indices of the planes around each vertex
                  (v, plane) and on both sides of each edge (e, 2), -1 for none
-    body         (f, 3, 3): all triangles of the body, none if it is not closed
+    triangles    (f, 3, 3): all triangles of the body, none if it is not closed
     """
 
     vertices: Float[Array, "v 3"]
@@ -50,7 +47,7 @@ class Polyhedron:
     facet_planes: Int[Array, " t"]
     vertex_planes: Int[Array, "v p"]
     edge_planes: Int[Array, "e 2"]
-    body: Float[Array, "f 3 3"]
+    triangles: Float[Array, "f 3 3"]
 
 
 def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
@@ -75,11 +72,7 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
     is_chosen = np.isin(planes, planes[numbers])
     indices = np.flatnonzero(is_chosen)
     is_ours = is_sharp & is_chosen[neighbours].any(axis=1)
-    start, end = vertices[ends[:, 0]], vertices[ends[:, 1]]
-    along = (end - start) / np.linalg.norm(end - start, axis=1)[:, None]
-    into = np.cross(facet_normals[neighbours], along[:, None])
-    towards = np.asarray(merged.triangles_center)[neighbours] - start[:, None]
-    into *= np.where((into * towards).sum(axis=2) < 0, -1.0, 1.0)[..., None]
+    into = into_facets(vertices[ends], facet_normals[neighbours], np.asarray(merged.triangles_center)[neighbours])
     corners = np.unique(ends[is_ours])
     corners = corners[np.isin(corners, faces[indices])]
     cones, directions = _cones(corners, ends[is_sharp], vertices)
@@ -94,7 +87,7 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
         facets=triangles,
         normals=facet_normals[indices],
         inward=np.cross(facet_normals[indices][:, None], sides),
-        edges=np.stack([start, end], axis=1)[is_ours],
+        edges=vertices[ends][is_ours],
         ends=np.searchsorted(corners, ends[is_ours]),
         into=into[is_ours],
         edge_normals=facet_normals[neighbours][is_ours],
@@ -102,7 +95,7 @@ def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
         facet_planes=planes[indices],
         vertex_planes=_planes_around(corners, faces[indices], planes[indices]),
         edge_planes=edge_planes[is_ours],
-        body=vertices[faces] if is_closed else np.zeros((0, 3, 3)),
+        triangles=vertices[faces] if is_closed else np.zeros((0, 3, 3)),
     )
 
 

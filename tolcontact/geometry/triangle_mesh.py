@@ -10,6 +10,7 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.geometry.tolerances import ROUNDING
 
 CREASE = np.cos(np.radians(30.0))  # facets that meet at a wider angle are two faces; else they approximate one curved face
+SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
 MAX_ROUNDS = 30  # of subdivision; each halves the longest edges
 SHIFT = 32  # bits of a vertex index in the key of an edge
 BLOCK_PAIRS = 1_000_000
@@ -26,6 +27,16 @@ def edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     key = ends.min(axis=1) * (int(ends.max(initial=0)) + 1) + ends.max(axis=1)
     _, edge, triangles = np.unique(key, return_inverse=True, return_counts=True)
     return ends, edge, triangles
+
+
+def into_facets(ends: np.ndarray, normals: np.ndarray, centres: np.ndarray) -> np.ndarray:
+    """Return unit vectors (edge, 2, 3) across edges with ends (edge, 2, 3), into the two facets that meet at each.
+
+    normals, centres   (edge, 2, 3): the unit normal and a point of each facet
+    """
+    along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
+    into = np.cross(normals, along[:, None])
+    return np.asarray(into * np.where((into * (centres - ends[:, :1])).sum(axis=2) < 0, -1.0, 1.0)[..., None])
 
 
 def have_area(mesh: trimesh.Trimesh) -> Bool[Array, " face"]:

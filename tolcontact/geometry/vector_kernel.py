@@ -125,18 +125,24 @@ def is_within(segments, start, middle, end, tallest, x, y, spare):  # type: igno
         k += 1
 
 
+@inlined_uncounted
+def half_solid_angle(a, b, c):  # type: ignore[no-untyped-def]
+    """Return half the signed solid angle of a triangle as seen from the origin (van Oosterom and Strackee, 1983)."""
+    length_a, length_b, length_c = math.sqrt(dot(a, a)), math.sqrt(dot(b, b)), math.sqrt(dot(c, c))
+    near = length_a * length_b * length_c + dot(a, b) * length_c + dot(b, c) * length_a + dot(c, a) * length_b
+    return math.atan2(dot(a, cross(b, c)), near)
+
+
 @uncounted
 def is_inside(triangles, x):  # type: ignore[no-untyped-def]
     """Return whether x lies in a closed body: its triangles cover at least half of the full solid angle.
 
-    The result is True if there are no triangles. Solid angles follow van Oosterom and Strackee (1983).
+    The result is True if there are no triangles.
     """
     if triangles.shape[0] == 0:
         return True
     total = 0.0
     for k in range(triangles.shape[0]):
         a, b, c = minus(row_of(triangles, k, 0), x), minus(row_of(triangles, k, 1), x), minus(row_of(triangles, k, 2), x)
-        length_a, length_b, length_c = math.sqrt(dot(a, a)), math.sqrt(dot(b, b)), math.sqrt(dot(c, c))
-        near = length_a * length_b * length_c + dot(a, b) * length_c + dot(b, c) * length_a + dot(c, a) * length_b
-        total += math.atan2(dot(a, cross(b, c)), near)
+        total += half_solid_angle(a, b, c)
     return total > math.pi  # half of the solid angle, 2 pi inside

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.arrays import Array, Float, Int
+from tolcontact.interference.kernel import LEAF
 
-LEAF = 4  # triangles in a leaf
 LEVELS = 1 << 10  # cells along each side of the mesh, for sorting triangles
 
 

@@ -17,6 +17,7 @@ from tolcontact.interference.kernel import (
     passes,
     vertex,
 )
+from tolcontact.interference.near_kernel import square_distance
 
 SAMPLES = 4  # of a piece of an edge inside the other body
 MAX_PASSES = 64  # of one edge
@@ -45,15 +46,6 @@ def _nearest_on_triangle(p, a, b, c):  # type: ignore[no-untyped-def]  # noqa: P
     return along(along(a, vb / total, ab), vc / total, ac)
 
 
-@inlined_uncounted
-def _box_distance(boxes, node, p):  # type: ignore[no-untyped-def]
-    """Return the squared distance of p from the box of a node."""
-    x = max(boxes[node, 0] - p[0], 0.0, p[0] - boxes[node, 3])
-    y = max(boxes[node, 1] - p[1], 0.0, p[1] - boxes[node, 4])
-    z = max(boxes[node, 2] - p[2], 0.0, p[2] - boxes[node, 5])
-    return x * x + y * y + z * z
-
-
 @uncounted
 def _seems_within(side, p, shares, senses):  # type: ignore[no-untyped-def]
     """Return whether a ray from p leaves a body where it first passes the surface; a ray along an edge may be wrong."""
@@ -68,7 +60,7 @@ def _near_leaf(side, p):  # type: ignore[no-untyped-def]
     node, inner, square = 0, side.next.size // 2, np.inf
     while node < inner:
         left, right = 2 * node + 1, 2 * node + 2
-        node = left if _box_distance(side.boxes, left, p) <= _box_distance(side.boxes, right, p) else right
+        node = left if square_distance(side.boxes, left, p, p) <= square_distance(side.boxes, right, p, p) else right
     for j in range(LEAF):
         triangle = side.triangles[node - inner, j]
         if triangle < 0:
@@ -85,7 +77,7 @@ def _nearest(side, p, enough):  # type: ignore[no-untyped-def]
     node, inner, best, foot, square = 0, side.next.size // 2, -1, p, np.inf
     bound = _near_leaf(side, p)
     while node < side.next.size:
-        if _box_distance(side.boxes, node, p) > min(square, bound):
+        if square_distance(side.boxes, node, p, p) > min(square, bound):
             node = side.next[node]
             continue
         if node < inner:

@@ -6,9 +6,20 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.compiled import compiled, inlined_uncounted, uncounted
-from tolcontact.geometry.vector_kernel import along, cross, dot, minus, move, move_back, row, row_of, turn_back
+from tolcontact.geometry.vector_kernel import (
+    along,
+    cross,
+    dot,
+    half_solid_angle,
+    minus,
+    move,
+    move_back,
+    row,
+    row_of,
+    turn_back,
+)
 
-LEAF = 4
+LEAF = 4  # triangles in a leaf of a BoxTree
 MANY = 8  # triangles of a facet: with more, only triangles near the point where an edge passes their plane are tested
 ROUNDED = 1e-9  # of coordinates: the largest error of a point
 
@@ -192,14 +203,11 @@ def _holds(owner, target, X, is_forward, motion):  # type: ignore[no-untyped-def
 
 @uncounted
 def is_within(side, p):  # type: ignore[no-untyped-def]
-    """Return whether p lies in a body: its triangles fill all solid angles (van Oosterom and Strackee, 1983)."""
+    """Return whether p lies in a body: its triangles fill all solid angles."""
     total = 0.0
     for t in range(side.faces.shape[0]):
         a, b, c = corners_of(side, t)
-        a, b, c = minus(a, p), minus(b, p), minus(c, p)
-        length_a, length_b, length_c = math.sqrt(dot(a, a)), math.sqrt(dot(b, b)), math.sqrt(dot(c, c))
-        near = length_a * length_b * length_c + dot(a, b) * length_c + dot(b, c) * length_a + dot(c, a) * length_b
-        total += math.atan2(dot(a, cross(b, c)), near)
+        total += half_solid_angle(minus(a, p), minus(b, p), minus(c, p))
     return total > math.pi
 
 
@@ -224,11 +232,11 @@ def motion_of(X, bounds):  # type: ignore[no-untyped-def]
 
 
 @inlined_uncounted
-def _misses(boxes, p, q):  # type: ignore[no-untyped-def]
-    """Return whether the box around p and q misses the box of a whole body."""
+def misses(boxes, k, p, q):  # type: ignore[no-untyped-def]
+    """Return whether the box around p and q misses box k."""
     return (
-        boxes[0, 0] > max(p[0], q[0]) or boxes[0, 3] < min(p[0], q[0]) or boxes[0, 1] > max(p[1], q[1])
-        or boxes[0, 4] < min(p[1], q[1]) or boxes[0, 2] > max(p[2], q[2]) or boxes[0, 5] < min(p[2], q[2])
+        boxes[k, 0] > max(p[0], q[0]) or boxes[k, 3] < min(p[0], q[0]) or boxes[k, 1] > max(p[1], q[1])
+        or boxes[k, 4] < min(p[1], q[1]) or boxes[k, 2] > max(p[2], q[2]) or boxes[k, 5] < min(p[2], q[2])
     )  # fmt: skip
 
 
@@ -239,10 +247,7 @@ def _heights(side, f, p, q):  # type: ignore[no-untyped-def]
     For facets that are not flat they are 1 and -1, since nothing is known of them.
     """
     facets = side.facets
-    if (
-        facets[f, 0] > max(p[0], q[0]) or facets[f, 3] < min(p[0], q[0]) or facets[f, 1] > max(p[1], q[1])
-        or facets[f, 4] < min(p[1], q[1]) or facets[f, 2] > max(p[2], q[2]) or facets[f, 5] < min(p[2], q[2])
-    ):  # fmt: skip
+    if misses(facets, f, p, q):
         return 1.0, 1.0
     if side.vertices_of_facets[f, 0] >= 0:
         a = vertex(side, side.vertices_of_facets[f, 0])
@@ -295,7 +300,7 @@ def _passes_any(owner, target, X, is_forward, motion, shares, senses):  # type: 
             continue
         p, q = vertex(owner, owner.edges[j, 0]), vertex(owner, owner.edges[j, 1])
         p, q = (move(X, p), move(X, q)) if is_forward else (move_back(X, p), move_back(X, q))
-        if _misses(target.boxes, p, q):
+        if misses(target.boxes, 0, p, q):
             continue
         if not is_listed:
             if passes(target, p, q, shares, senses) > 0:

@@ -4,19 +4,18 @@ import math
 
 import numpy as np
 
-from tolcontact.compiled import compiled, uncounted
+from tolcontact.compiled import compiled, inlined_uncounted
 from tolcontact.geometry.vector_kernel import row
 from tolcontact.interference.kernel import LEAF
 
 
-@uncounted
-def _distance_of_boxes(boxes, node, low, high):  # type: ignore[no-untyped-def]
-    """Return the squared distance between the box of a node and a box."""
-    square = 0.0
-    for i in range(3):
-        away = max(boxes[node, i] - high[i], 0.0, low[i] - boxes[node, 3 + i])
-        square += away * away
-    return square
+@inlined_uncounted
+def square_distance(boxes, k, low, high):  # type: ignore[no-untyped-def]
+    """Return the squared distance of box k from a box."""
+    x = max(boxes[k, 0] - high[0], 0.0, low[0] - boxes[k, 3])
+    y = max(boxes[k, 1] - high[1], 0.0, low[1] - boxes[k, 4])
+    z = max(boxes[k, 2] - high[2], 0.0, low[2] - boxes[k, 5])
+    return x * x + y * y + z * z
 
 
 @compiled
@@ -26,7 +25,7 @@ def distances(lower, upper, boxes, successors, result):  # type: ignore[no-untyp
     for k in range(lower.shape[0]):
         low, high, min_square, node = row(lower, k), row(upper, k), np.inf, 0
         while node < successors.size:
-            square = _distance_of_boxes(boxes, node, low, high)
+            square = square_distance(boxes, node, low, high)
             if not square < min_square:
                 node = successors[node]
             elif node < inner:
@@ -51,7 +50,7 @@ def near_facets(lower, upper, tree, around, facet_of, reach, is_written, starts,
     for k in range(lower.shape[0]):
         low, high, node, count = row(lower, k), row(upper, k), 0, 0
         while node < successors.size:
-            square = _distance_of_boxes(boxes, node, low, high)
+            square = square_distance(boxes, node, low, high)
             if square > reach * reach:
                 node = successors[node]
             elif node < inner:
@@ -60,7 +59,7 @@ def near_facets(lower, upper, tree, around, facet_of, reach, is_written, starts,
                 for j in range(LEAF):
                     triangle = triangles[node - inner, j]
                     if triangle >= 0:
-                        facet, distance = facet_of[triangle], math.sqrt(_distance_of_boxes(around, triangle, low, high))
+                        facet, distance = facet_of[triangle], math.sqrt(square_distance(around, triangle, low, high))
                         if distance <= reach:
                             if nearest[facet] == np.inf:
                                 candidates[count], count = facet, count + 1

@@ -7,7 +7,7 @@ import numpy as np
 
 from tolcontact.compiled import compiled, uncounted
 from tolcontact.geometry.vector_kernel import along, cross, dot, minus, move, move_back, row, scaled, turn
-from tolcontact.interference.kernel import LEAF, corners_of, crossing, vertex
+from tolcontact.interference.kernel import LEAF, corners_of, crossing, misses, vertex
 
 MIN_SINE = 1e-3  # of the angle between edges that have a common normal
 MAX_POINTS = 512  # of the common region of two bodies
@@ -104,11 +104,7 @@ def _collect(owner, target, X, is_forward, region, count):  # type: ignore[no-un
         p, q = (move(X, p), move(X, q)) if is_forward else (move_back(X, p), move_back(X, q))
         first, node = count, 0
         while node < node_count:
-            boxes = target.boxes
-            is_off = False
-            for i in range(3):
-                is_off = is_off or boxes[node, i] > max(p[i], q[i]) or boxes[node, 3 + i] < min(p[i], q[i])
-            if is_off:
+            if misses(target.boxes, node, p, q):
                 node = target.next[node]
                 continue
             if node < inner:

@@ -60,8 +60,7 @@ class TrialDraws:
         chosen_points = np.arange(len(pair.P_m)) if points is None else points
         if pair.round is not None:
             return np.asarray(self.program.round_gaps[k](X_RM=X_RM, deviations=deviations)["gaps"])[:, chosen_points]
-        P_m, P_r, n_r = pair.P_m[chosen_points], pair.P_r[chosen_points], pair.n_r[chosen_points]
-        gaps = ((pose.apply(X_RM, P_m) - P_r) * n_r).sum(axis=2) - pair.heights(deviations)[:, None]
+        gaps = pair.nominal_gaps(X_RM, chosen_points) - pair.heights(deviations)[:, None]
         return gaps - pair.form_heights(deviations, chosen_points)
 
     @cached_property

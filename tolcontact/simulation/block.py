@@ -1,75 +1,22 @@
 """A block of realizations: its simulation, from deviations to corrected poses and measures, and its results as arrays."""
 
-import enum
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
-from typing import NamedTuple
 
 import numpy as np
 
 from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation import Program
+from tolcontact.compilation.station_program import StationProgram
 from tolcontact.contact import ContactResolver, Resolved
 from tolcontact.contact.record import Record, join_groups, untouched_numbers
+from tolcontact.contact.state import Outcome
 from tolcontact.mechanics import ENTRIES
 from tolcontact.readable import Readable
 from tolcontact.simulation.bodies import watched_bodies
 from tolcontact.simulation.locator_offsets import locator_offsets
 from tolcontact.vocabulary import CORRECTED, RAW, Status
-
-
-class Stage(NamedTuple):
-    """A station in the sequence of a program; a program without stations has one stage, which places nothing again.
-
-    position   its position among the stations
-    groups     indices of its contact groups
-    """
-
-    position: int
-    groups: tuple[int, ...]
-
-
-class InitialPoses(NamedTuple):
-    """The poses before contact of the stations is resolved.
-
-    poses     (realization, part, 12)
-    relative  (realization, pair, 12): X_RM of the pairs
-    """
-
-    poses: Float[Array, "realization part 12"]
-    relative: Float[Array, "realization pair 12"]
-
-
-def stages(program: Program) -> list[Stage]:
-    """Return the stages of a program, in their order."""
-    if not program.stations:
-        return [Stage(0, tuple(range(len(program.groups))))]
-    return [Stage(position, station.groups) for position, station in enumerate(program.stations)]
-
-
-def hand_over(
-    program: Program,
-    stage: Stage,
-    rows: np.ndarray,
-    initial: InitialPoses,
-    corrected: Float[Array, "realization part 12"],
-    deviations: Float[Array, "realization contributor"],
-) -> bool:
-    """Place the joints of a station again if contact in earlier stations has changed them, and return whether it did.
-
-    rows        (row,) realizations that contact in earlier stations has changed
-    initial     initial poses; the poses of this station are replaced
-    corrected   corrected poses of earlier stations, and raw poses of this station, which are replaced, too
-    """
-    station = program.stations[stage.position] if program.stations else None
-    if station is None or station.place is None or not rows.size:
-        return False
-    placed = station.place(poses=corrected[rows[:, None], station.sources], deviations=deviations[rows])
-    poses = placed["placed"].reshape(len(rows), len(station.parts), ENTRIES)
-    corrected[rows[:, None], station.parts] = initial.poses[rows[:, None], station.parts] = poses
-    initial.relative[rows[:, None], station.pairs] = placed["relative"].reshape(len(rows), len(station.pairs), ENTRIES)
-    return True
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -169,16 +116,6 @@ def outcomes(block: Block) -> tuple[Float[Array, "n state measure"], Int[Array, 
     return block.measured.copy(), block.status.copy()
 
 
-class Outcome(enum.IntEnum):
-    """The outcome of a realization in one group, in ascending order of severity: the worst of all groups decides its status."""
-
-    UNTOUCHED = 0
-    RESOLVED = 1
-    IN_CONFLICT = 2
-    DOUBTFUL = 3
-    UNSOLVED = 4
-
-
 def simulate_block(
     program: Program,
     deviations: Float[Array, "n contributor"],
@@ -193,21 +130,23 @@ def simulate_block(
     raw = placed.reshape(len(deviations), len(program.nominal.parts), ENTRIES)
     measured, relative = _observe(program, raw, deviations)
     block = Block.untouched(start, deviations, raw, measured, len(program.nominal.pairs), len(program.stations))
-    sequence = stages(program)
-    outcomes_by_stage = np.zeros((len(block), len(sequence)), dtype=np.int8)
+    stages = program.stations or (None,)
+    outcomes_by_stage = np.zeros((len(block), len(stages)), dtype=np.int8)
     # NaN gaps count as no contact, so realizations with NaN poses are marked as unsolved below.
-    initial, is_unknown = InitialPoses(raw, relative), ~np.isfinite(raw).all(axis=(1, 2))
+    is_unknown = ~np.isfinite(raw).all(axis=(1, 2))
     raw_relative = relative.copy() if program.stations else relative
-    for stage in sequence:
-        worst = outcomes_by_stage[:, stage.position]
+    for position, station in enumerate(stages):
+        worst = outcomes_by_stage[:, position]
         changed = np.flatnonzero(outcomes_by_stage.any(axis=1))
-        is_placed_again = hand_over(program, stage, changed, initial, block.poses[:, CORRECTED], deviations)
-        for resolver in (resolvers[index] for index in stage.groups):
-            resolved = resolver.resolve(initial.poses, initial.relative, deviations)
+        is_placed_again = station is not None and _hand_over(
+            station, changed, raw, relative, block.poses[:, CORRECTED], deviations
+        )
+        for resolver in resolvers if station is None else [resolvers[index] for index in station.groups]:
+            resolved = resolver.resolve(raw, relative, deviations)
             _put(block, resolver, resolved)
             if is_placed_again:
                 _put_raw(block, resolver, changed, raw_relative)
-            worst[resolved.touched] = np.maximum(worst[resolved.touched], _outcome(resolved))
+            worst[resolved.touched] = np.maximum(worst[resolved.touched], resolved.state.outcome)
     if program.method.is_bounded:
         worst = outcomes_by_stage.max(axis=1)
         bodies = watched_bodies(
@@ -221,10 +160,10 @@ def simulate_block(
         )
         block.clashes[:], block.clash_depth[:] = bodies.clashes, bodies.depth
         block.clash_part[:], block.clash_other[:] = bodies.part, bodies.other
-        for station, rows in bodies.withdrawn:
-            worst = outcomes_by_stage[:, station]
+        for index, rows in bodies.withdrawn:
+            worst = outcomes_by_stage[:, index]
             worst[rows] = np.where(worst[rows] <= Outcome.RESOLVED, Outcome.DOUBTFUL, worst[rows])
-    is_unknown |= ~np.isfinite(initial.poses).all(axis=(1, 2))
+    is_unknown |= ~np.isfinite(raw).all(axis=(1, 2))
     outcomes_by_stage[is_unknown], block.kkt_residual[is_unknown] = Outcome.UNSOLVED, np.inf
     worst = outcomes_by_stage.max(axis=1)
     touched = worst > Outcome.UNTOUCHED
@@ -233,6 +172,29 @@ def simulate_block(
     statuses = _statuses(program.method.is_exact)
     block.status[:], block.station_status[:] = statuses[worst], statuses[outcomes_by_stage[:, : len(program.stations)]]
     return block
+
+
+def _hand_over(
+    station: StationProgram,
+    rows: Int[Array, " row"],
+    initial: Float[Array, "realization part 12"],
+    relative: Float[Array, "realization pair 12"],
+    corrected: Float[Array, "realization part 12"],
+    deviations: Float[Array, "realization contributor"],
+) -> bool:
+    """Place the joints of a station again if contact in earlier stations has changed them, and return whether it did.
+
+    rows               realizations that contact in earlier stations has changed
+    initial, relative  poses, and X_RM of the pairs, before contact is resolved; those of this station are replaced
+    corrected          corrected poses of earlier stations, and raw poses of this station, which are replaced, too
+    """
+    if station.place is None or not rows.size:
+        return False
+    placed = station.place(poses=corrected[rows[:, None], station.sources], deviations=deviations[rows])
+    poses = placed["placed"].reshape(len(rows), len(station.parts), ENTRIES)
+    corrected[rows[:, None], station.parts] = initial[rows[:, None], station.parts] = poses
+    relative[rows[:, None], station.pairs] = placed["relative"].reshape(len(rows), len(station.pairs), ENTRIES)
+    return True
 
 
 def _put(block: Block, resolver: ContactResolver, resolved: Resolved) -> None:
@@ -250,13 +212,6 @@ def _put_raw(block: Block, resolver: ContactResolver, rows: np.ndarray, relative
     gaps, active = resolver.raw_contact(relative[rows], block.deviations[rows])
     block.gap_min[rows[:, None], RAW, resolver.pairs] = gaps
     block.active[rows[:, None], resolver.pairs] = active
-
-
-def _outcome(resolved: Resolved) -> Int[Array, " n"]:
-    """Return the Outcome of each touched realization (n,)."""
-    state = resolved.state
-    solved = np.where(state.doubtful, Outcome.DOUBTFUL, np.where(state.in_conflict, Outcome.IN_CONFLICT, Outcome.RESOLVED))
-    return np.where(state.solved, solved, Outcome.UNSOLVED)
 
 
 def _statuses(is_exact: bool) -> np.ndarray:

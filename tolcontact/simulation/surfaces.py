@@ -53,7 +53,7 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviation
         surfaces.penetration[:, k] = faces.depth(X_RM, heights, form)
         if not pair.round and k not in program.meetings:  # otherwise contact points project onto the face
             points = pose.apply(X_RM, pair.P_m)
-            gaps = ((points - pair.P_r) * pair.n_r).sum(axis=2)
+            gaps = pair.nominal_gaps(X_RM)
             raised = heights[:, None] if form is None else heights[:, None] + pair.form_heights(deviations)
             row, point = np.nonzero(gaps < ON_PLANE_GAP + raised)
             depth = np.maximum(-pair.least_gap(raw_relative[:, k], deviations), 0)

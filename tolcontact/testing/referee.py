@@ -292,13 +292,14 @@ class ArchivedPair:
     def _gaps_over_face(self, X_RM: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         """Return gaps (n, point) [mm] of points inside the faces; infinite for points outside their rims."""
         assert self.nominal is not None
-        rim, R, t = rim_points(self.nominal, X_RM), X_RM[:, :9].reshape(-1, 3, 3), X_RM[:, None, 9:]
+        R, t = X_RM[:, :9].reshape(-1, 3, 3), X_RM[:, None, 9:]
+        across, rim_gaps = rim_points(self.nominal, X_RM)
         moved = self.moving_point @ R.swapaxes(1, 2) + t
         gaps = ((moved - self.reference_point) * self.normal).sum(axis=2)
         gaps -= self._form(deviations, self.moving_point, moved - gaps[..., None] * self.normal)
-        at_rim = rim.gaps - self._form(deviations, rim.P_m, rim.P_r)
+        at_rim = rim_gaps - self._form(deviations, across, self.nominal.reference_rim)
         gaps[~_are_over(self.nominal.reference_face, moved)] = np.inf
-        at_rim[~_are_over(self.nominal.moving_face, rim.P_m)] = np.inf
+        at_rim[~_are_over(self.nominal.moving_face, across)] = np.inf
         return np.concatenate([gaps, at_rim], axis=1)
 
 

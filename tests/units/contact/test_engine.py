@@ -6,8 +6,9 @@ import pytest
 import tolcontact as tc
 from tests import cases
 from tests.helpers import nightly
+from tests.units.contact import plain_scan
 from tolcontact.contact import kernel
-from tolcontact.contact.scan import PairScan, cluster_labels, pair_scan
+from tolcontact.contact.scan import cluster_labels, pair_scan
 from tolcontact.poses import AT_REST
 from tolcontact.simulation import simulate_blocks
 from tolcontact.vocabulary import CORRECTED, RAW
@@ -30,25 +31,23 @@ def test_compiled_scans_equal_those_in_numpy(make, activity):
     (group,) = program.groups
     for position, index in enumerate(group.group.pairs):
         tables = [side.table for side in group.group.sides if side.pair == position]
-        compiled = pair_scan(program.nominal.pairs[index], program.gaps[index], tables, 6)
-        plain = PairScan(**{name: getattr(compiled, name) for name in PairScan.__dataclass_fields__})
-        (active, moments), expected = (
-            scan.survey(relative[:, index], block.deviations, activity) for scan in (compiled, plain)
-        )
+        scan = pair_scan(program.nominal.pairs[index], program.gaps[index], tables, 6)
+        active, moments = scan.survey(relative[:, index], block.deviations, activity)
+        expected = plain_scan.survey(scan, relative[:, index], block.deviations, activity)
         assert (active == expected[0]).all()
         assert np.allclose(moments, expected[1], rtol=1e-12, atol=1e-9)
         level = np.tile(AT_REST, (3, 1))  # all points of a flat face are as deep: the first one counts
         level[:, 9:] = -0.05 * program.nominal.pairs[index].n_r[0]
         for poses in (relative[:, index], later[:, index], level):
-            assert (
-                compiled.min_gap(poses, block.deviations[: len(poses)]) == plain.min_gap(poses, block.deviations[: len(poses)])
-            ).all()
-            for mask in (None, plain.gaps(relative[:, index], block.deviations)[: len(poses)] < activity):
-                (points, depth), expected = (
-                    scan.deepest(poses, block.deviations[: len(poses)], mask) for scan in (compiled, plain)
-                )
-                assert (points == expected[0]).all() and (depth == expected[1]).all()
-        assert plain.deepest(relative[:, index], block.deviations)[1].max() > 0.01
+            deviations = block.deviations[: len(poses)]
+            gaps = plain_scan.gaps(scan, poses, deviations)
+            assert (scan.gaps(poses, deviations) == gaps).all()
+            assert (scan.min_gap(poses, deviations) == gaps.min(axis=1)).all()
+            for mask in (None, plain_scan.gaps(scan, relative[:, index], block.deviations)[: len(poses)] < activity):
+                points, depth = scan.deepest(poses, deviations, mask)
+                expected = plain_scan.deepest(scan, poses, deviations, mask)
+                assert (points == expected.points).all() and (depth == expected.depth).all()
+        assert scan.deepest(relative[:, index], block.deviations).depth.max() > 0.01
 
 
 @pytest.mark.parametrize(("offset", "tilt"), [(-1000.0, 1.0), (-0.5, 1e-3), (0.5, 1e-3)])

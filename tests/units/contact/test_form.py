@@ -4,8 +4,9 @@ import numpy as np
 
 import tolcontact as tc
 from tests.cases.seats import seat
+from tests.units.contact import plain_scan
 from tolcontact.contact.raised_scan import raised_scan
-from tolcontact.contact.scan import PairScan, pair_scan
+from tolcontact.contact.scan import pair_scan
 
 
 def test_heights_that_are_summed_up_once_give_the_same_deepest_points():
@@ -18,7 +19,7 @@ def test_heights_that_are_summed_up_once_give_the_same_deepest_points():
     raised = raised_scan(scan, deviations).take(np.arange(49, -1, -1))
     actual, expected = (
         raised.deepest(relative[::-1], deviations[::-1]),
-        PairScan.deepest(scan, relative[::-1], deviations[::-1]),
+        plain_scan.deepest(scan, relative[::-1], deviations[::-1]),
     )
     assert (actual.points == expected.points).all() and expected.depth.max() > 0
     np.testing.assert_allclose(actual.depth, expected.depth, atol=1e-14)

@@ -7,7 +7,7 @@ from tolcontact.contact.progress import PATIENCE, PATIENCE_IN_CONFLICT, Progress
 from tolcontact.contact.record import initial_numbers
 from tolcontact.contact.resolver import is_better
 from tolcontact.contact.slots import Slots
-from tolcontact.contact.state import State
+from tolcontact.contact.state import Outcome, State
 
 
 def state(residual, slack, *, doubtful=False):
@@ -36,7 +36,12 @@ def test_a_conflict_is_penetration_beyond_the_accuracy_in_any_pair():
 
 def test_answers_are_ranked_certified_before_conflicts_before_none():
     answers = [state(0.0, [0.0]), state(0.0, [0.01]), state(1.0, [0.0]), state(0.0, [0.0], doubtful=True)]
-    assert [int(answer.rank[0]) for answer in answers] == [0, 1, 2, 2]
+    assert [int(answer.outcome[0]) for answer in answers] == [
+        Outcome.RESOLVED,
+        Outcome.IN_CONFLICT,
+        Outcome.UNSOLVED,
+        Outcome.DOUBTFUL,
+    ]
 
 
 def test_the_better_of_two_states_is_kept():

@@ -155,70 +155,25 @@ def _instructions(function: ca.Function) -> tuple[int, int]:
     return function.n_instructions() + compiled, function.n_instructions() + sum(executed for *_, executed in calls)
 
 
-class AdaptiveFunction:
-    """A Function of scalar expressions that is interpreted first, and compiled after many evaluations. Threads may share it.
+class NamedFunction:
+    """A Function of scalar expressions for many realizations at once: the first dimension of every array.
 
-    Both give the same results to the last bit. Evaluations of earlier processes count, too.
+    It is interpreted first, and compiled after many evaluations; both give the same results to the last bit. Evaluations of
+    earlier processes count, too. Threads may share it.
 
-    native   the machine code, or None while CasADi interprets the Function
+    function   the Function that is evaluated
+    names      the names of its inputs
+    native     its machine code, or None while CasADi interprets it
     """
 
     def __init__(self, function: ca.Function) -> None:
-        self._function = function
+        self.function, self.names, self._results = function, function.name_in(), function.name_out()
         self.native: NativeFunction | None = None
         compiled, executed = _instructions(function)
         self._may_be_compiled = compiled <= MAX_INSTRUCTIONS
         self._min_calls = MIN_COMPILED_CALLS * compiled // executed
         self._evaluations: Evaluations | None = None
         self._lock = threading.Lock()
-
-    def __call__(self, inputs: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Return outputs (realization, stored entry) for inputs (realization, stored entry)."""
-        if native := self._compiled(len(inputs[0])):
-            return native(inputs)
-        with self._lock:
-            return self._interpreted(inputs)[0]
-
-    @functools.cached_property
-    def _interpreted(self) -> InterpretedFunction:
-        with CONSTRUCTION_LOCK:
-            return InterpretedFunction(self._function)
-
-    def _compiled(self, count: int) -> NativeFunction | None:
-        """Return the machine code for `count` more evaluations, or None while CasADi interprets the Function."""
-        # CasADi interprets a Function that LLVM cannot compile on this machine.
-        with contextlib.suppress(UnknownInstructionError, RuntimeError):
-            if self.native is None and self._is_due(count):
-                self.native = NativeFunction(self._function)  # other threads interpret meanwhile
-        return self.native
-
-    def _is_due(self, count: int) -> bool:
-        """Return whether to compile before `count` evaluations, which only one call does. The first call loads stored code."""
-        with self._lock:  # other threads wait for stored code: interpreting takes longer
-            if not self._may_be_compiled or self.native is not None:
-                return False
-            if self._evaluations is None:
-                key = key_of(self._function)
-                self.native = NativeFunction.from_cache(self._function, key)
-                if self.native is not None:
-                    return False
-                self._evaluations = Evaluations(key)
-                weakref.finalize(self, self._evaluations.store)
-            self._evaluations.number += count
-            self._may_be_compiled = self._evaluations.number <= self._min_calls
-            return not self._may_be_compiled
-
-
-class NamedFunction:
-    """A Function of scalar expressions for many realizations at once: the first dimension of every array.
-
-    function   the Function that is evaluated; its machine code only saves time
-    names      the names of its inputs
-    """
-
-    def __init__(self, function: ca.Function) -> None:
-        self.function, self.names, self._results = function, function.name_in(), function.name_out()
-        self._evaluate = AdaptiveFunction(function)
 
     @classmethod
     def dense(cls, function: ca.Function) -> "NamedFunction":
@@ -232,8 +187,42 @@ class NamedFunction:
 
         Arrays with other names are ignored.
         """
-        outputs = self._evaluate([flat(arrays[name]) for name in self.names])
+        inputs = [flat(arrays[name]) for name in self.names]
+        if native := self._compiled(len(inputs[0])):
+            outputs = native(inputs)
+        else:
+            with self._lock:
+                outputs, _ = self._interpreted(inputs)
         return dict(zip(self._results, outputs, strict=True))
+
+    @functools.cached_property
+    def _interpreted(self) -> InterpretedFunction:
+        with CONSTRUCTION_LOCK:
+            return InterpretedFunction(self.function)
+
+    def _compiled(self, count: int) -> NativeFunction | None:
+        """Return the machine code for `count` more evaluations, or None while CasADi interprets the Function."""
+        # CasADi interprets a Function that LLVM cannot compile on this machine.
+        with contextlib.suppress(UnknownInstructionError, RuntimeError):
+            if self.native is None and self._is_due(count):
+                self.native = NativeFunction(self.function)  # other threads interpret meanwhile
+        return self.native
+
+    def _is_due(self, count: int) -> bool:
+        """Return whether to compile before `count` evaluations, which only one call does. The first call loads stored code."""
+        with self._lock:  # other threads wait for stored code: interpreting takes longer
+            if not self._may_be_compiled or self.native is not None:
+                return False
+            if self._evaluations is None:
+                key = key_of(self.function)
+                self.native = NativeFunction.from_cache(self.function, key)
+                if self.native is not None:
+                    return False
+                self._evaluations = Evaluations(key)
+                weakref.finalize(self, self._evaluations.store)
+            self._evaluations.number += count
+            self._may_be_compiled = self._evaluations.number <= self._min_calls
+            return not self._may_be_compiled
 
 
 def flat(array: Real[Array, "realization ..."]) -> Float[Array, "realization _"]:

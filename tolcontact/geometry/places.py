@@ -1,0 +1,49 @@
+"""Places at which two bodies can touch, at some poses."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tolcontact.arrays import Array, Bool, Float, Int
+
+
+class Places(NamedTuple):
+    """Points at which two bodies can touch, at n poses.
+
+    labels    (n, point): indices of the points among all candidates, -1 for none
+    gaps      (n, point) [mm], infinite for none
+    P_m, P_r, n_r   (n, point, 3): the points on both bodies, and the normal, in the frames of the paper
+    """
+
+    labels: Int[Array, "n p"]
+    gaps: Float[Array, "n p"]
+    P_m: Float[Array, "n p 3"]
+    P_r: Float[Array, "n p 3"]
+    n_r: Float[Array, "n p 3"]
+
+
+class RaisedPlaces(NamedTuple):
+    """Points of nominal faces, and the heights (n, place) [mm] of both faces there, which reduce the gaps."""
+
+    places: Places
+    heights: Float[Array, "n p"]
+
+    @property
+    def gaps(self) -> Float[Array, "n p"]:
+        """The gaps (n, place) [mm] of the actual faces, infinite where there is no candidate."""
+        return np.asarray(self.places.gaps - self.heights)
+
+    def only(self, counts: Bool[Array, "n p"]) -> "RaisedPlaces":
+        """Return the same points, of which only some count."""
+        return self._replace(places=self.places._replace(gaps=np.where(counts, self.places.gaps, np.inf)))
+
+    def followed_by(self, *others: "RaisedPlaces") -> "RaisedPlaces":
+        """Return these points, and after them others at the same poses."""
+        every = (self, *others)
+        joined = (np.concatenate(arrays, axis=1) for arrays in zip(*(raised.places for raised in every), strict=True))
+        return RaisedPlaces(Places(*joined), np.concatenate([raised.heights for raised in every], axis=1))
+
+
+def unraised(places: Places) -> RaisedPlaces:
+    """Return points without heights."""
+    return RaisedPlaces(places, np.zeros(places.gaps.shape))
