@@ -28,7 +28,7 @@ COMMANDS = (
     ("--version",), ("run", MODELS / "ra1.py", *FEW, "--out", "ra1.nc"), ("summary", "ra1.nc"), ("report", "ra1.nc"),
     ("run", MODELS / "ra1.py", "--samples", "300", "--out", "ra1.nc", "--resume"), ("contributions", "ra1.nc"),
     ("sensitivities", "ra1.nc"), ("check", "größe 1/kiste.py"), ("run", "größe 1/kiste.py", *FEW, "--out", "größe 1/kiste.nc"),
-    ("compare", "ra1.nc", "ra1.nc"),
+    ("run", MODELS / "ra1.py", "--samples", "200", "--seed", "2", "--out", "other.nc"), ("compare", "ra1.nc", "other.nc"),
 )  # fmt: skip
 EXTRAS = (  # a module, what needs it, the extra that brings it
     ("OCP", ("bodies", "empty.step"), "step"),
