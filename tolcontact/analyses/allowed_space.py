@@ -12,6 +12,7 @@ import scipy
 
 from tolcontact.declaration import Tolerance
 from tolcontact.features.freedoms import TAIL, Freedom
+from tolcontact.statistics.linear_shares import joined_columns
 from tolcontact.variation.draws import Draws
 from tolcontact.variation.spreads import ComponentZone
 
@@ -243,12 +244,9 @@ class AllowedRegion:
 
     def _joint_columns(self) -> list[np.ndarray]:
         """Return sets of columns: zones with common columns are one set, with the sizes that widen them and their causes."""
-        sets: list[set[int]] = []
-        for zone in self.zones:
-            joined = {int(column) for column in zone.columns}
-            overlapping = [columns for columns in sets if columns & joined]
-            sets = [columns for columns in sets if columns not in overlapping] + [joined.union(*overlapping)]
-        return [np.array(sorted(joined)) for joined in sets]
+        sets = [zone.columns for zone in self.zones]
+        columns, names = np.unique(np.concatenate([np.zeros(0, dtype=int), *sets])), list(map(str, range(len(self.lower))))
+        return list(joined_columns(names, sets, columns).values())
 
     def _extremes(self, columns: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Return extreme points (point, column) of zones."""

@@ -179,7 +179,7 @@ def proportion(hits: np.ndarray | Sample) -> Estimate:
     """Return the share of True in a sample of booleans with the exact (Clopper-Pearson) interval."""
     hits = Sample.of(hits)
     widening = hits.map(lambda piece: piece.astype(float)).widening
-    k, n = sum(int(piece.sum()) for piece in hits.pieces()), hits.count
+    k, n = int(hits.values.sum()), hits.count
     return proportion_of(k / widening**2, n / widening**2) if 0 < k < n and widening > 0 else proportion_of(k, n)
 
 
@@ -197,12 +197,13 @@ def variance_ratio(sample: np.ndarray | Sample, baseline: np.ndarray | Sample) -
     if is_constant(sample) or is_constant(baseline):
         return UNDEFINED
     # The influence of each realization on the logarithm of the ratio; their sum is zero.
-    influence = Sample(lambda: (
-        (a - sample.mean) ** 2 / variance_sample - (b - baseline.mean) ** 2 / variance_baseline
-        for a, b in zip(sample.pieces(), baseline.pieces(), strict=True)
-    ), sample.replicate)  # fmt: skip
-    squares = sum(float((piece**2).sum()) for piece in influence.pieces())
-    fourths = sum(float((piece**4).sum()) for piece in influence.pieces())
+    influence = Sample(
+        lambda: (
+            (sample.values - sample.mean) ** 2 / variance_sample - (baseline.values - baseline.mean) ** 2 / variance_baseline
+        ),
+        sample.replicate,
+    )
+    squares, fourths = float((influence.values**2).sum()), float((influence.values**4).sum())
     ratio, n = variance_sample / variance_baseline, sample.count
     if n < MIN_VARIANCE or not (sample.determines_moments and baseline.determines_moments):
         return Estimate(ratio, math.nan, math.nan)

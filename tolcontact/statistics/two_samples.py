@@ -59,7 +59,7 @@ def share_shift(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:
         change = sample.map(lambda piece: piece.astype(float)) - baseline.map(lambda piece: piece.astype(float))
         weight = _weight(change)
         n = weight * change.count
-        counts = [weight * sum(int((piece == sign).sum()) for piece in change.pieces()) for sign in (1, -1)]
+        counts = [weight * int((change.values == sign).sum()) for sign in (1, -1)]
         gained, lost = (intervals.proportion_of(count, n) for count in counts)
         least = _hypotenuse(gained.value - gained.lower, lost.upper - lost.value, gained.value, lost.value)
         most = _hypotenuse(gained.upper - gained.value, lost.value - lost.lower, gained.value, lost.value)
