@@ -7,9 +7,9 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.realizations import EXISTS, assembled, pieces
+from tolcontact.realizations import EXISTS, assembled, column, pieces
 from tolcontact.statistics import intervals
-from tolcontact.statistics.sample import Sample, read_column
+from tolcontact.statistics.sample import Sample
 from tolcontact.vocabulary import ArchiveVariable
 
 MAX_COMBINATIONS = 10  # of pairs under load at the same time
@@ -33,7 +33,7 @@ def reactions(rows: xr.Dataset) -> np.ndarray:
     if EXISTS in rows.coords and not rows[EXISTS].values.any():
         return np.full((rows.sizes[terms.PAIR], 1 + len(terms.REACTION_PERCENTILES), len(terms.ESTIMATE)), np.nan)
     for pair in range(rows.sizes[terms.PAIR]):
-        x = Sample.of(read_column(rows, terms.REACTION, pair=pair))
+        x = Sample.of(column(rows, terms.REACTION, pair=pair))
         estimates.append([intervals.mean(x), *intervals.percentiles(x, terms.REACTION_PERCENTILES)])
     return np.array(estimates).reshape(-1, 1 + len(terms.REACTION_PERCENTILES), len(terms.ESTIMATE))
 

@@ -6,10 +6,10 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.realizations import pieces
+from tolcontact.realizations import column, pieces
 from tolcontact.statistics import intervals
 from tolcontact.statistics.measure_statistics import changes_of
-from tolcontact.statistics.sample import Sample, read_column
+from tolcontact.statistics.sample import Sample
 from tolcontact.vocabulary import ArchiveVariable
 
 MIN_COMPARED = 10  # realizations: with fewer, 6 sigma has no interval
@@ -35,7 +35,7 @@ def offset_values(rows: xr.Dataset) -> dict[ArchiveVariable, Any]:
         beyond += (offsets > variations + ACCURACY).sum(axis=0)
         unexplained += ((offsets > variations + depths[:, None] + ACCURACY) & is_certified[:, None]).sum(axis=0)
     for part in np.flatnonzero(np.isfinite(variations)):
-        x = Sample.of(read_column(rows, terms.LOCATOR_OFFSET, part=part))
+        x = Sample.of(column(rows, terms.LOCATOR_OFFSET, part=part))
         values[terms.OFFSET][part] = intervals.percentiles(x, list(terms.OFFSET_PERCENTILES.values()))
         values[terms.OFFSET_BEYOND][part] = intervals.proportion_of(int(beyond[part]), total)
         values[terms.OFFSET_UNEXPLAINED][part] = intervals.proportion_of(int(unexplained[part]), total)

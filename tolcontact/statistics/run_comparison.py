@@ -167,7 +167,7 @@ def _hits(rows: xr.Dataset, measure: int, limits: Limits, state: str) -> Sample 
     values = measured_sample(rows, measure, state)
     if limits.are_open or state == terms.STATES[terms.RAW]:
         return None if limits.are_open else values.map(limits.outside)
-    exists = is_assembled(np.concatenate(list(statuses(rows))))
+    exists = is_assembled(statuses(rows))
     return values.map(lambda x: limits.outside(x) | ~exists)
 
 

@@ -8,7 +8,7 @@ import xarray as xr
 from scipy import special
 
 from tolcontact import vocabulary as terms
-from tolcontact.realizations import pieces
+from tolcontact.realizations import column
 
 MIN_REPLICATES = 16
 MIN_APART = 20  # values apart from a stop: moments of fewer have no interval
@@ -131,16 +131,11 @@ class Sample:
         return np.sort(self.values)
 
 
-def read_column(rows: xr.Dataset, variable: terms.ArchiveVariable, **labels: int) -> np.ndarray:
-    """Return the values (realization,) of a variable, at the indices of its other dimensions; pieces that are left out not."""
-    return np.concatenate([piece[variable.name].values for piece in pieces(rows[[variable.name]].isel(labels))])
-
-
 def measured_sample(rows: xr.Dataset, measure: int, state: str) -> Sample:
     """Return the values of a measure, given by its index, in a state; they are read from the rows when needed."""
     is_planned, raw = rows.attrs.get("sampler", terms.MONTE_CARLO) != terms.MONTE_CARLO, terms.STATES[terms.RAW]
     sample = Sample(
-        lambda: read_column(rows, terms.MEASURED, state=terms.STATES.index(state), measure=measure),
+        lambda: column(rows, terms.MEASURED, state=terms.STATES.index(state), measure=measure),
         terms.REPLICATE if is_planned else 1, accuracy=float(rows[terms.MEASURE_ACCURACY.name].values[measure]),
     )  # fmt: skip
     sample.cause = sample if state == raw else measured_sample(rows, measure, raw)

@@ -1,13 +1,11 @@
 """Summaries of results, and their accessor `results.tolcontact`, of `tc.run`, `tc.open_archive` or xarray itself."""
 
-from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from tolcontact import plot, report, vocabulary as terms
+from tolcontact import report, vocabulary as terms
 from tolcontact.archive import check_rows, open_archive
 from tolcontact.errors import OptionError
 from tolcontact.realizations import finished
@@ -31,29 +29,11 @@ def summarize(results: xr.DataTree | str | Path) -> Summary:
     return summary_of(results)
 
 
-class Plots:
-    """The functions of `tc.plot` for these results (see tolcontact.plot): histogram, field, assembly."""
-
-    def __init__(self, results: xr.DataTree) -> None:
-        self._results = results
-
-    def __getattr__(self, name: str) -> Any:
-        return partial(getattr(plot, name), self._results)
-
-    def __dir__(self) -> list[str]:
-        return list(plot.__all__)
-
-
 class Results:
     """The methods of results. A notebook shows them as figures and a report."""
 
     def __init__(self, results: xr.DataTree) -> None:
         self._results = results
-
-    @cached_property
-    def plot(self) -> Plots:
-        """The pictures of these results."""
-        return Plots(self._results)
 
     def summary(self) -> Summary:
         """Return the statistics with their intervals (see tc.summarize)."""
@@ -97,7 +77,7 @@ class Results:
         return touching(self._results)
 
     def __repr__(self) -> str:
-        verbs = "summary(), field(part), realization(number), where_status(status), touching(), plot.histogram(measure)"
+        verbs = "summary(), field(part), realization(number), where_status(status), touching()"
         return f"{self._results.attrs.get('title', 'results')}: {verbs}"
 
     def _repr_html_(self) -> str:

@@ -7,10 +7,10 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
+from tolcontact.realizations import column
 from tolcontact.report.contributor_shares import ContributorShares
 from tolcontact.report.html.scene import Packed, packed
 from tolcontact.statistics import intervals
-from tolcontact.statistics.sample import read_column
 
 BINS = 60
 MAX_BARS = 10  # contributors next to a histogram
@@ -96,7 +96,7 @@ def _estimates(measure: xr.Dataset, statistic: str) -> xr.DataArray:
 
 def _values(rows: xr.Dataset, measure: int) -> list[np.ndarray]:
     """Return the values (realization,) of a measure in each state."""
-    return [read_column(rows, terms.MEASURED, state=state, measure=measure) for state in range(len(terms.STATES))]
+    return [column(rows, terms.MEASURED, state=state, measure=measure) for state in range(len(terms.STATES))]
 
 
 def _convergence(x: np.ndarray) -> Packed:
