@@ -47,11 +47,6 @@ class RoundZone:
         # From |rows c| <= half follows |c| <= |inverse| half, entry by entry.
         return np.asarray(np.abs(np.linalg.pinv(zone.rows.reshape(-1, zone.rows.shape[2]))).sum(axis=1) * widest / 2)
 
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        """Return whether points (n, contributor) lie in the zone."""
-        lengths = np.linalg.norm(self._rows_at(points), axis=2)
-        return np.asarray((lengths <= self._half(points) + TOLERANCE * self._zone.width).all(axis=1))
-
     def reach(self, points: np.ndarray, step: np.ndarray) -> np.ndarray:
         """Return the shares (n,), at most 1, of steps (n, contributor) from points (n, contributor) that stay in the zone."""
         start, along = self._rows_at(points), np.einsum("pec,nc->npe", self._zone.rows, step[:, self.components])
@@ -218,14 +213,6 @@ class AllowedRegion:
         """
         starts, flat = np.repeat(points, steps.shape[1], axis=0), steps.reshape(-1, steps.shape[2])
         return np.asarray((starts + self.reach(starts, flat)[:, None] * flat).reshape(steps.shape))
-
-    def is_inside(self, points: np.ndarray) -> np.ndarray:
-        """Return whether points (n, contributor) lie in the region."""
-        slack = TOLERANCE * (self.upper - self.lower)
-        inside = ((points >= self.lower - slack) & (points <= self.upper + slack)).all(axis=1)
-        for zone in self.zones:
-            inside &= zone.contains(points)
-        return np.asarray(inside)
 
     def planes(self, point: np.ndarray | None = None, slack: float = TOLERANCE) -> tuple[np.ndarray, np.ndarray]:
         """Return half-spaces (row, contributor), (row,) that contain the region: a @ point <= b.
