@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import report, vocabulary as terms
-from tolcontact.archive import check_rows, open_archive
+from tolcontact.archive import check_rows, opened
 from tolcontact.errors import OptionError
 from tolcontact.realizations import finished
 from tolcontact.statistics import Summary, summarize as summary_of, touching
@@ -18,15 +18,9 @@ def summarize(results: xr.DataTree | str | Path) -> Summary:
     `tc.summarize("run.nc").statistic_value.sel(measure="gap", state="corrected", statistic="6 sigma")`
     Raises ArchiveError if realizations differ from what was written, or if fewer than two are finished.
     """
-    if isinstance(results, str | Path):
-        with open_archive(results) as tree:
-            return summarize(tree)
-    if not isinstance(results, xr.DataTree):
-        raise OptionError(
-            f"results are a {type(results).__name__}; expected what tc.run or tc.open_archive returns, or an archive's path"
-        )
-    check_rows(results)
-    return summary_of(results)
+    with opened(results) as tree:
+        check_rows(tree)
+        return summary_of(tree)
 
 
 class Results:
