@@ -34,7 +34,7 @@ def offset_values(rows: xr.Dataset) -> dict[ArchiveVariable, Any]:
         is_certified = np.isin(piece[terms.STATUS.name].values, terms.CERTIFIED)
         beyond += (offsets > variations + ACCURACY).sum(axis=0)
         unexplained += ((offsets > variations + depths[:, None] + ACCURACY) & is_certified[:, None]).sum(axis=0)
-    for part in np.flatnonzero(np.isfinite(variations)):
+    for part in np.flatnonzero(np.isfinite(variations)).tolist():
         x = Sample.of(column(rows, terms.LOCATOR_OFFSET, part=part))
         values[terms.OFFSET][part] = intervals.percentiles(x, list(terms.OFFSET_PERCENTILES.values()))
         values[terms.OFFSET_BEYOND][part] = intervals.proportion_of(int(beyond[part]), total)
