@@ -159,20 +159,21 @@ def percentiles(x: np.ndarray | Sample, percents: Sequence[float]) -> list[Estim
     A bound is infinite if the sample is too small.
     """
     x = Sample.of(x)
-    ranks = [_quantile_ranks(x.count, percent / 100) for percent in percents]
-    values = _values_at(x, ranks)
-    widenings = [x.map(lambda piece, v=value: (piece <= v).astype(float)).widening for value in values[:, 2]]  # type: ignore[misc]
-    if any(widening != 1.0 for widening in widenings):
-        ranks = [quantile.widened(widening) for quantile, widening in zip(ranks, widenings, strict=True)]
-        values = _values_at(x, ranks)
-    estimates = []
-    for quantile, (low, high, floor, ceiling) in zip(ranks, values, strict=True):
-        lower = low if quantile.lower >= 0 else -np.inf
-        upper = high if quantile.upper < x.count else np.inf
-        # In small samples the interpolated value may lie beyond a bound.
-        value = np.clip(floor + (ceiling - floor) * quantile.fraction, lower, upper)
-        estimates.append(Estimate(float(value), float(lower), float(upper)))
-    return estimates
+    shares, last = np.array(percents) / 100, x.count - 1
+    places = last * shares  # ranks, from 0, of the percentiles and of the bounds of their intervals
+    floors = np.floor(places).astype(int)
+    lower, upper = np.array([binomial_quantile([_LOWER, _UPPER], x.count, share) for share in shares]).T
+    lower -= 1
+    below, above = x.ordered(floors), x.ordered(np.minimum(floors + 1, last))
+    widenings = np.array([x.map(lambda values, v=v: (values <= v).astype(float)).widening for v in below])  # type: ignore[misc]
+    if (widenings != 1.0).any():
+        lower = np.floor(places - widenings * (places - lower)).astype(int)
+        upper = np.ceil(places + widenings * (upper - places)).astype(int)
+    lows = np.where(lower >= 0, x.ordered(lower.clip(0, last)), -np.inf)
+    highs = np.where(upper <= last, x.ordered(upper.clip(0, last)), np.inf)
+    # In small samples the interpolated value may lie beyond a bound.
+    values = np.clip(below + (above - below) * (places - floors), lows, highs)
+    return [Estimate(*map(float, estimate)) for estimate in zip(values, lows, highs, strict=True)]
 
 
 def proportion(hits: np.ndarray | Sample) -> Estimate:
@@ -233,37 +234,6 @@ def variance_from_moments(count: int, moment2: ArrayLike, moment4: ArrayLike) ->
 def is_constant(x: Sample, accuracy: float = 0.0) -> bool:
     """Return whether the spread of a sample may be due to rounding, or to a solver with a finite accuracy."""
     return not x.moments[0] > max(8 * np.finfo(float).eps * abs(x.mean), accuracy, x.accuracy) ** 2
-
-
-class _QuantileRanks(NamedTuple):
-    """Ranks, from 0: the bounds of a quantile's interval, and the two values around the quantile."""
-
-    lower: int
-    upper: int
-    floor: int
-    ceiling: int
-    fraction: float  # position of the quantile between the two values
-
-    def widened(self, widening: float) -> "_QuantileRanks":
-        """Return the ranks with the bounds moved away from the quantile by the factor `widening`."""
-        place = self.floor + self.fraction
-        return self._replace(
-            lower=int(np.floor(place - widening * (place - self.lower))),
-            upper=int(np.ceil(place + widening * (self.upper - place))),
-        )
-
-
-def _quantile_ranks(n: int, p: float) -> _QuantileRanks:
-    """Return the ranks for the quantile `p` of `n` values."""
-    place = (n - 1) * p
-    floor = int(np.floor(place))
-    lower, upper = (int(k) for k in binomial_quantile([_LOWER, _UPPER], n, p))
-    return _QuantileRanks(lower - 1, upper, floor, min(floor + 1, n - 1), place - floor)
-
-
-def _values_at(x: Sample, ranks: Sequence[_QuantileRanks]) -> np.ndarray:
-    """Return the values (quantile, 4) at ranks; ranks beyond the sample give its extremes."""
-    return x.ordered([min(max(rank, 0), x.count - 1) for quantile in ranks for rank in quantile[:4]]).reshape(-1, 4)
 
 
 def binomial_quantile(q: ArrayLike, n: ArrayLike, p: float) -> np.ndarray:

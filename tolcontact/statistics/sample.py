@@ -122,7 +122,7 @@ class Sample:
             power *= z  # a power by `**` takes twenty times as long
         return sums / self.count
 
-    def ordered(self, ranks: Sequence[int]) -> np.ndarray:
+    def ordered(self, ranks: Sequence[int] | np.ndarray) -> np.ndarray:
         """Return the order statistics at ranks from 0 (least) to count - 1; NaN if a value is not finite."""
         return np.array(self._sorted[list(ranks)]) if np.isfinite(self.mean) else np.full(len(ranks), np.nan)
 
