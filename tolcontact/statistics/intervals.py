@@ -81,7 +81,7 @@ def from_standardized_influence(x: Sample, estimate: float, influence: Sequence[
         max(float(polynomial @ x.standardized_moments[: len(polynomial)] * x.count), 0.0)
         for polynomial in (square, np.convolve(square, square))
     )
-    widening = x.map(lambda piece: np.polyval(influence[::-1], (piece - x.mean) / scale)).widening
+    widening = x.map(lambda values: np.polyval(influence[::-1], (values - x.mean) / scale)).widening
     return from_influence(estimate, squares * widening**2, x.count, fourths * widening**4)
 
 
@@ -127,7 +127,7 @@ def variance(x: np.ndarray | Sample) -> Estimate:
     kurt, sixth = x.standardized_moments[[4, 6]].tolist()
     deviation = math.sqrt(max(kurt - 1, 0.0))  # of squares, relative to their mean
     skew = (sixth - 3 * kurt + 2) / deviation**3 if deviation > 0 else 0.0
-    widening = x.map(lambda piece: (piece - x.mean) ** 2).widening
+    widening = x.map(lambda values: (values - x.mean) ** 2).widening
     lower, upper = (1 - deviation * _back(sign * _Z * widening, skew, x.count) for sign in (1, -1))
     lower, upper = estimate * max(lower, 0.0), estimate * upper
     if x.count < MAX_SMALL:
@@ -179,7 +179,7 @@ def percentiles(x: np.ndarray | Sample, percents: Sequence[float]) -> list[Estim
 def proportion(hits: np.ndarray | Sample) -> Estimate:
     """Return the share of True in a sample of booleans with the exact (Clopper-Pearson) interval."""
     hits = Sample.of(hits)
-    widening = hits.map(lambda piece: piece.astype(float)).widening
+    widening = hits.map(lambda values: values.astype(float)).widening
     k, n = int(hits.values.sum()), hits.count
     return proportion_of(k / widening**2, n / widening**2) if 0 < k < n and widening > 0 else proportion_of(k, n)
 
