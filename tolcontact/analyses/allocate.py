@@ -79,11 +79,9 @@ def allocate(
     program = analysis.program
     requirements = _requirements(require, program, samples)
     curves = _curves(costs, groups := _groups(program, by))
-    engine = analysis.engine(_expected(samples, len(groups)))
-    measures = sorted({requirement.measure for requirement in requirements})
-    trials = ScaledTrials(engine, list(groups.values()), measures, seed, samples)
+    trials = ScaledTrials(analysis.engine(_expected(samples, len(groups))), list(groups.values()), requirements, seed, samples)
     prices = [curves.get(name, 0.0) for name in groups]
-    search = Search(trials, requirements, prices, np.array([name in curves for name in groups]))
+    search = Search(trials, prices, np.array([name in curves for name in groups]))
     fresh, estimates, is_met = _allocated(search, _expected(samples, 0))
     factors = np.exp(np.stack([np.zeros(len(groups)), fresh.logs], axis=1))
     values = {
@@ -160,7 +158,7 @@ def _allocated(search: "Search", expected: int) -> tuple[Trial, list[list[Estima
 
     The last result states whether each requirement is met after (requirement,).
     """
-    trials, requirements, nothing = search.trials, search.requirements, np.zeros(len(search.priced))
+    trials, requirements, nothing = search.trials, search.trials.requirements, np.zeros(len(search.priced))
     before = _estimates(requirements, trials.trial(nothing, verification=1))
     aims, searched = np.zeros(len(requirements)), trials.trial(nothing)
     search.release(searched)
@@ -200,7 +198,6 @@ class Search:
     """
 
     trials: ScaledTrials
-    requirements: Sequence[Requirement]
     curves: Sequence[Cost]
     priced: np.ndarray
     idle: np.ndarray = field(init=False)  # (group,) whether a group has no known influence on any requirement
@@ -243,8 +240,8 @@ class Search:
         are then unresolved than a requirement permits outside, unless there were as many before.
         """
         radius = FIRST_RADIUS
-        margins, slopes = _margins(self.requirements, trial.corrected) - aims, None
-        allowed = min(requirement.share for requirement in self.requirements) * len(trial.is_resolved)
+        margins, slopes = _margins(self.trials.requirements, trial.corrected) - aims, None
+        allowed = min(requirement.share for requirement in self.trials.requirements) * len(trial.is_resolved)
         most_unresolved = max(int(allowed), int((~trial.is_resolved).sum()))
         for _ in range(MAX_STEPS):
             if radius < LAST_RADIUS:
@@ -259,7 +256,7 @@ class Search:
             if candidate is None:
                 radius /= 2
                 continue
-            candidate_margins = _margins(self.requirements, candidate.corrected) - aims
+            candidate_margins = _margins(self.trials.requirements, candidate.corrected) - aims
             merit = self._merit(trial.logs, margins, penalty)
             gain = merit - self._merit(logs, candidate_margins, penalty)
             if gain > MIN_GAIN * abs(merit):
@@ -280,7 +277,9 @@ class Search:
         return min([trial, *map(self.trials.trial, common)], key=self._missing)
 
     def _missing(self, trial: Trial) -> float:
-        return math.fsum(requirement.shortfall(trial.corrected[:, requirement.measure]) for requirement in self.requirements)
+        return math.fsum(
+            requirement.shortfall(trial.corrected[:, requirement.measure]) for requirement in self.trials.requirements
+        )
 
     def _merit(self, logs: np.ndarray, margins: np.ndarray, penalty: np.ndarray) -> float:
         return self.cost(logs) + float(penalty @ np.maximum(-margins, 0))
@@ -291,14 +290,14 @@ class Search:
         A margin depends on the realizations beyond it and near it (Hong, 2009): only these are simulated again if they are
         resolved, and the measures of the others do not change.
         """
-        corrected, slopes = trial.corrected, np.zeros((len(self.requirements), len(trial.logs)))
-        rows = np.unique(np.concatenate([r.decisive(corrected[:, r.measure]) for r in self.requirements]))
+        corrected, slopes = trial.corrected, np.zeros((len(self.trials.requirements), len(trial.logs)))
+        rows = np.unique(np.concatenate([r.decisive(corrected[:, r.measure]) for r in self.trials.requirements]))
         rows, groups = rows[trial.is_resolved[rows]], np.flatnonzero(self.is_free)
         of_signs = [self.trials.changes(trial, groups, rows, trial.logs + step) for step in (STEP, -STEP)]
         for group, (wider, wider_values), (narrower, narrower_values) in zip(groups, *of_signs, strict=True):
             wide, narrow = corrected.copy(), corrected.copy()
             wide[wider], narrow[narrower] = wider_values, narrower_values
-            for row, requirement in enumerate(self.requirements):
+            for row, requirement in enumerate(self.trials.requirements):
                 margins = [requirement.smooth_margin(x[:, requirement.measure]) for x in (wide, narrow)]
                 slopes[row, group] = (margins[0] - margins[1]) / (2 * STEP)
         return slopes

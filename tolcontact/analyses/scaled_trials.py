@@ -160,13 +160,12 @@ class Trial(NamedTuple):
 class ScaledTrials:
     """Simulations with scaled ranges, on the same draws. Logarithms of the factors of the ranges are `logs` (group,).
 
-    groups    columns of each group
-    measures  indices of the required measures
+    groups  columns of each group
     """
 
     engine: Engine
     groups: Sequence[np.ndarray]
-    measures: Sequence[int]
+    requirements: Sequence[Requirement]
     seed: int
     samples: int
     _known: dict[str, np.ndarray] = field(default_factory=dict, init=False)
@@ -226,11 +225,12 @@ class ScaledTrials:
         sets   for each of the results, the group or the groups (k,) that change to `logs` at the same time
         """
         changed = [np.where(np.isin(np.arange(len(logs)), groups), logs, before.logs) for groups in sets]
-        resolved = before.corrected[before.is_resolved][:, self.measures]
-        spreads = resolved.std(axis=0) if len(resolved) else np.zeros(len(self.measures))
+        measures = sorted({requirement.measure for requirement in self.requirements})
+        resolved = before.corrected[before.is_resolved][:, measures]
+        spreads = resolved.std(axis=0) if len(resolved) else np.zeros(len(measures))
         hits = []
         for corrected in self.corrected_rows(changed, rows):
-            differences = np.abs(corrected - before.corrected[rows])[:, self.measures]
+            differences = np.abs(corrected - before.corrected[rows])[:, measures]
             is_hit = ~(differences <= NEGLIGIBLE * spreads).all(axis=1)
             hits.append((rows[is_hit], corrected[is_hit]))
         return hits
