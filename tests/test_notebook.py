@@ -61,7 +61,7 @@ def test_results_are_asked_by_name(results):
     assert touched.realization.values.tolist() == np.flatnonzero(results.status == tc.Status.RESOLVED).tolist()
     assert touched["sample/deviation"].shape[0] == touched.sizes["realization"]
     assert results.tolcontact.where_status(tc.Status.DOUBTFUL).sizes["realization"] == 0
-    assert results.tolcontact.plot.histogram("top").get_xlabel() == "top [mm]"
+    assert tc.plot.histogram(results, "top").get_xlabel() == "top [mm]"
 
 
 @pytest.mark.parametrize(

@@ -106,7 +106,7 @@ def test_commands_work_without_what_only_posix_has(tmp_path):
 
 
 def test_the_process_without_posix_lacks_what_windows_lacks():
-    code = "import os, signal, sys\nfrom tolcontact.system.kind import IS_POSIX\n"
+    code = "import os, signal, sys\nfrom tolcontact.system.files import IS_POSIX\n"
     code += "assert not IS_POSIX and not hasattr(os, 'O_NOFOLLOW') and not hasattr(signal, 'pthread_sigmask')\nimport resource"
     assert "ModuleNotFoundError" in python(code).stderr
 

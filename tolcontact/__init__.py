@@ -56,7 +56,7 @@ Every example in the guide is run by the tests.
 | measure faces | `Gap`, `Flush`, `Clearance`, `LargestGap`, `MeanGap`, `AxisDistance`, `Angle`; |
 | | `Minimum`, `Maximum`, `Mean`, `Sum`, `Difference`; `stations` |
 | fasten | `fasten` |
-| run | `main`, `run`, `build`, `check`, `compare`, `simulate`, `simulate_blocks`, `study`; `Method`, `Program` |
+| run | `main`, `run`, `build`, `check`, `compare`, `simulate`, `simulate_blocks`; `Method`, `Program` |
 | read results | `open_archive`, `summarize`, `compare_runs`, `Status`, `plot` |
 | errors and warnings | `TolcontactError` and its kinds `ModelError` and `OptionError`; `NominalWarning` |
 | choose faces, `tc.select` | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |

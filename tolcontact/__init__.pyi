@@ -71,6 +71,5 @@ from .workflow import (
     open_archive as open_archive,
     run as run,
     simulate as simulate,
-    study as study,
     summarize as summarize,
 )

@@ -21,7 +21,8 @@ def command_line() -> None:
             streams.open_closed()
             check_address_space()
             check_threads()
-            limit_threads()
+            # Linear algebra has one thread: starting more takes longer than a run, and blocks have threads of their own.
+            os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
             gc.set_threshold(MIN_GARBAGE)
             _imported()()
     except KeyboardInterrupt:  # between the end of a command and that of the process
@@ -48,14 +49,6 @@ def check_threads() -> None:
     threads = os.environ.get("NUMBA_NUM_THREADS", "1")
     if not (threads.isdecimal() and int(threads)):
         _refuse(f"NUMBA_NUM_THREADS is {threads!r} in the environment; expected a whole number from 1, so set or unset it")
-
-
-def limit_threads() -> None:
-    """Give NumPy's and SciPy's linear algebra one thread each, unless the user chose: starting more takes longer than a run.
-
-    The blocks of a run have threads of their own.
-    """
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def _refuse(message: str) -> NoReturn:

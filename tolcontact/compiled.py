@@ -43,8 +43,9 @@ inlined_inner = functools.partial(compiled, counts=False, inline=True, inner=Tru
 def _without_counts() -> dict[str, bool]:
     """Return Numba's option for code without reference counts, as on graphics processors; none if this version has none.
 
-    The option is not public. Without it, the graph solver takes 1.6 times as long for exact runs of models/ra1.py, and 1.5
-    times for models/tower.py (CPU time of a block, Numba 0.68); linearized runs of models/cells.py and ra2.py take as long.
+    The option is not public. Without it, exact runs take 1.3 times as long (models/ra2.py 646 and 495 us of CPU time for each
+    realization, tower.py 3.79 and 2.95 ms, Numba 0.68), nearly all of it in geometry/places_kernel.py, which passes on tuples
+    of many arrays; linearized runs, and exact ones of ra1.py, take as long. Inlining these functions does not help.
     """
     option = {"_nrt": False}
     try:

@@ -8,8 +8,8 @@ import threading
 from collections.abc import Iterator
 from typing import Any, NoReturn
 
-from tolcontact.system.signals import STOPPING
-
+# Ctrl-C, an order to end, and Ctrl-Break of Windows, which never delivers the order.
+STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGBREAK") if hasattr(signal, name))
 _received: list[int] = []  # signals
 
 

@@ -19,13 +19,17 @@ def pieces(rows: xr.Dataset) -> Iterator[xr.Dataset]:
         yield piece.load().isel({terms.REALIZATION: piece[EXISTS].values}) if EXISTS in piece.coords else piece
 
 
-def statuses(rows: xr.Dataset) -> Iterator[np.ndarray]:
-    """Yield their statuses, piece by piece. Raises ArchiveError for one that has no meaning."""
-    for piece in pieces(rows[[terms.STATUS.name]]):
-        status = piece[terms.STATUS.name].values
-        if status.min(initial=0) < 0 or status.max(initial=0) >= len(terms.STATUS_MEANINGS):
-            raise ArchiveError("the archive is damaged: some statuses are unknown; run the model again")
-        yield status
+def column(rows: xr.Dataset, variable: terms.ArchiveVariable, **places: int) -> np.ndarray:
+    """Return the values (realization,) of a variable at some places along its other dimensions."""
+    return np.concatenate([piece[variable.name].values for piece in pieces(rows[[variable.name]].isel(places))])
+
+
+def statuses(rows: xr.Dataset) -> np.ndarray:
+    """Return their statuses (realization,). Raises ArchiveError for one that has no meaning."""
+    status = column(rows, terms.STATUS)
+    if status.min(initial=0) < 0 or status.max(initial=0) >= len(terms.STATUS_MEANINGS):
+        raise ArchiveError("the archive is damaged: some statuses are unknown; run the model again")
+    return status
 
 
 def assembled(*runs: xr.Dataset) -> tuple[xr.Dataset, ...]:
@@ -33,7 +37,7 @@ def assembled(*runs: xr.Dataset) -> tuple[xr.Dataset, ...]:
 
     The rest of a sampling plan counts as independent realizations, since its replicates are no longer complete.
     """
-    exists = np.all([np.concatenate([*map(is_assembled, statuses(rows))]) for rows in runs], axis=0)
+    exists = np.all([is_assembled(statuses(rows)) for rows in runs], axis=0)
     if exists.all():
         return runs
     mask = {EXISTS: (terms.REALIZATION, exists)}
@@ -47,4 +51,4 @@ def is_assembled(status: np.ndarray) -> np.ndarray:
 
 def finished(results: xr.DataTree) -> int:
     """Return the number of realizations. Raises ArchiveError for a status that has no meaning."""
-    return sum(map(len, statuses(results.to_dataset())))
+    return len(statuses(results.to_dataset()))

@@ -15,7 +15,6 @@ from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Progress
 from tolcontact.analyses.scaled_trials import (
     MIN_DECISIVE,
     STEP,
-    ChangedRows,
     Requirement,
     ScaledTrials,
     Trial,
@@ -80,11 +79,11 @@ def allocate(
     program = analysis.program
     requirements = _requirements(require, program, samples)
     curves = _curves(costs, groups := _groups(program, by))
-    trials = ScaledTrials(analysis.engine(_expected(samples, len(groups))), list(groups.values()), seed, samples)
+    trials = ScaledTrials(analysis.engine(_expected(samples, len(groups))), list(groups.values()), requirements, seed, samples)
     prices = [curves.get(name, 0.0) for name in groups]
-    search = Search(trials, requirements, prices, np.array([name in curves for name in groups]))
-    logs, estimates, is_met = _allocated(search, _expected(samples, 0))
-    factors = np.exp(np.stack([np.zeros(len(groups)), logs], axis=1))
+    search = Search(trials, prices, np.array([name in curves for name in groups]))
+    fresh, estimates, is_met = _allocated(search, _expected(samples, 0))
+    factors = np.exp(np.stack([np.zeros(len(groups)), fresh.logs], axis=1))
     values = {
         "range": np.array(_ranges(program, groups))[:, None] * factors,
         "factor": factors[:, 1],
@@ -154,29 +153,28 @@ def _expected(samples: int, groups: int) -> int:
     return (VERIFICATION_FACTOR + USUAL_STEPS) * samples + groups * of_groups
 
 
-def _allocated(search: "Search", expected: int) -> tuple[np.ndarray, list[list[Estimate]], np.ndarray]:
-    """Return logarithms of the factors (group,), and estimates of the requirements in fresh runs, before and after.
+def _allocated(search: "Search", expected: int) -> tuple[Trial, list[list[Estimate]], np.ndarray]:
+    """Return a fresh run with the allocated ranges, and estimates of the requirements in fresh runs, before and after.
 
     The last result states whether each requirement is met after (requirement,).
     """
-    trials, requirements, logs = search.trials, search.requirements, np.zeros(len(search.trials))
-    before = _estimates(requirements, trials.trial(np.ones(len(trials)), verification=1))
-    aims = np.zeros(len(requirements))
-    searched = trials.trial(np.exp(logs))
-    search.release(logs, searched)
+    trials, requirements, nothing = search.trials, search.trials.requirements, np.zeros(len(search.priced))
+    before = _estimates(requirements, trials.trial(nothing, verification=1))
+    aims, searched = np.zeros(len(requirements)), trials.trial(nothing)
+    search.release(searched)
     for number in range(VERIFICATIONS):
-        logs, searched = search.least_cost(logs, searched, aims)
-        fresh = trials.trial(np.exp(logs), verification=2 + number)
+        searched = search.least_cost(searched, aims)
+        fresh = trials.trial(searched.logs, verification=2 + number)
         missing = -_sure_margins(requirements, fresh.corrected)
         if (missing <= 0).all():
             break
         aims += AIM_GAIN * np.where(np.isfinite(missing), np.maximum(missing, 0.0), 0.0)
         trials.engine.total += expected
     else:
-        logs = search.least_missing(logs)
-        search.release(logs, trials.trial(np.exp(logs)))
-        fresh = trials.trial(np.exp(logs), verification=2 + VERIFICATIONS)
-    return logs, [before, _estimates(requirements, fresh)], _sure_margins(requirements, fresh.corrected) >= 0
+        searched = search.least_missing(searched)
+        search.release(searched)
+        fresh = trials.trial(searched.logs, verification=2 + VERIFICATIONS)
+    return fresh, [before, _estimates(requirements, fresh)], _sure_margins(requirements, fresh.corrected) >= 0
 
 
 def _estimates(requirements: Sequence[Requirement], trial: Trial) -> list[Estimate]:
@@ -200,7 +198,6 @@ class Search:
     """
 
     trials: ScaledTrials
-    requirements: Sequence[Requirement]
     curves: Sequence[Cost]
     priced: np.ndarray
     idle: np.ndarray = field(init=False)  # (group,) whether a group has no known influence on any requirement
@@ -219,99 +216,91 @@ class Search:
         factors = zip(self.curves, np.exp(logs), self.priced, strict=True)
         return math.fsum(_cost(curve, factor) for curve, factor, is_priced in factors if is_priced)
 
-    def release(self, logs: np.ndarray, trial: Trial) -> bool:
-        """Free the ranges of idle groups that have an influence at `logs`; return whether there are any.
-
-        trial   the trial at `logs`
-        """
-        before, changes = self.idle, self._changes(logs, trial)
-        self.idle, self.tested_rows = changes.idle(before, (MIN_FACTOR, MAX_FACTOR)), len(changes.resolved_rows)
+    def release(self, trial: Trial) -> bool:
+        """Free the ranges of idle groups that have an influence at a trial; return whether there are any."""
+        before, self.tested_rows = self.idle, int(trial.is_resolved.sum())
+        self.idle = self.trials.idle(trial, before, (MIN_FACTOR, MAX_FACTOR))
         return bool((before & ~self.idle).any())
 
-    def least_cost(self, logs: np.ndarray, trial: Trial, aims: np.ndarray) -> tuple[np.ndarray, Trial]:
-        """Return the logarithms of least cost with margins of at least `aims` (requirement,), and the trial there.
+    def least_cost(self, trial: Trial, aims: np.ndarray) -> Trial:
+        """Return the trial of least cost with margins of at least `aims` (requirement,); the search starts at a trial.
 
-        The search starts at `logs`, with its trial. Groups that turn out to have an influence at the resulting ranges are
-        added.
+        Groups that turn out to have an influence at the resulting ranges are added.
         """
-        logs, trial = self._descend(logs, trial, aims)
-        while self.release(logs, trial):
-            logs, trial = self._descend(logs, trial, aims)
-        return logs, trial
+        trial = self._descend(trial, aims)
+        while self.release(trial):
+            trial = self._descend(trial, aims)
+        return trial
 
-    def _descend(self, logs: np.ndarray, trial: Trial, aims: np.ndarray) -> tuple[np.ndarray, Trial]:
-        """Return the logarithms of least cost that are reached by steps from `logs`, and the trial there.
+    def _descend(self, trial: Trial, aims: np.ndarray) -> Trial:
+        """Return the trial of least cost that is reached by steps from a trial.
 
         The merit of a point is its cost plus a penalty for missed margins. A step that improves the merit is accepted, and the
         trust region of the next step doubles; after any other step the region halves. A step is rejected if more realizations
         are then unresolved than a requirement permits outside, unless there were as many before.
         """
         radius = FIRST_RADIUS
-        margins, slopes = _margins(self.requirements, trial.corrected) - aims, None
-        allowed = min(requirement.share for requirement in self.requirements) * len(trial.is_resolved)
+        margins, slopes = _margins(self.trials.requirements, trial.corrected) - aims, None
+        allowed = min(requirement.share for requirement in self.trials.requirements) * len(trial.is_resolved)
         most_unresolved = max(int(allowed), int((~trial.is_resolved).sum()))
         for _ in range(MAX_STEPS):
             if radius < LAST_RADIUS:
                 break
             if slopes is None:
-                slopes = self._slopes(logs, trial)
+                slopes = self._slopes(trial)
                 scales = np.abs(slopes).sum(axis=1)  # margins in mm and in rad count alike
                 scales[scales == 0] = 1.0
-                penalty = PENALTY * self.cost(logs) / scales
-            candidate = self._step(margins / scales, slopes / scales[:, None], logs, radius)
-            candidate_trial = self.trials.trial_within(np.exp(candidate), most_unresolved)
-            if candidate_trial is None:
+                penalty = PENALTY * self.cost(trial.logs) / scales
+            logs = self._step(margins / scales, slopes / scales[:, None], trial.logs, radius)
+            candidate = self.trials.trial_within(logs, most_unresolved)
+            if candidate is None:
                 radius /= 2
                 continue
-            candidate_margins = _margins(self.requirements, candidate_trial.corrected) - aims
-            merit = self._merit(logs, margins, penalty)
-            gain = merit - self._merit(candidate, candidate_margins, penalty)
+            candidate_margins = _margins(self.trials.requirements, candidate.corrected) - aims
+            merit = self._merit(trial.logs, margins, penalty)
+            gain = merit - self._merit(logs, candidate_margins, penalty)
             if gain > MIN_GAIN * abs(merit):
-                logs, trial, margins, slopes = candidate, candidate_trial, candidate_margins, None
+                trial, margins, slopes = candidate, candidate_margins, None
                 radius = min(2 * radius, FIRST_RADIUS)
                 if gain < LAST_GAIN * abs(merit):
                     break
             else:
                 radius /= 2
-        return logs, trial
+        return trial
 
-    def least_missing(self, logs: np.ndarray) -> np.ndarray:
-        """Return the point that misses the requirements least: `logs`, or all free ranges times a common factor.
+    def least_missing(self, trial: Trial) -> Trial:
+        """Return the trial that misses the requirements least: this one, or all free ranges times a common factor.
 
         Margins lead to points where a quantile is near its limit, which may be far from most values.
         """
         common = [np.where(self.is_free, log, 0.0) for log in np.log(COMMON_FACTORS[::-1])]  # the widest that miss nothing
-        return min([logs, *common], key=self._missing)
+        return min([trial, *map(self.trials.trial, common)], key=self._missing)
 
-    def _missing(self, logs: np.ndarray) -> float:
-        corrected = self.trials.trial(np.exp(logs)).corrected
-        return math.fsum(requirement.shortfall(corrected[:, requirement.measure]) for requirement in self.requirements)
+    def _missing(self, trial: Trial) -> float:
+        return math.fsum(
+            requirement.shortfall(trial.corrected[:, requirement.measure]) for requirement in self.trials.requirements
+        )
 
     def _merit(self, logs: np.ndarray, margins: np.ndarray, penalty: np.ndarray) -> float:
         return self.cost(logs) + float(penalty @ np.maximum(-margins, 0))
 
-    def _slopes(self, logs: np.ndarray, trial: Trial) -> np.ndarray:
+    def _slopes(self, trial: Trial) -> np.ndarray:
         """Return derivatives (requirement, group) of the margins, by central differences; 0 for groups that do not change.
 
         A margin depends on the realizations beyond it and near it (Hong, 2009): only these are simulated again if they are
         resolved, and the measures of the others do not change.
         """
-        corrected, slopes = trial.corrected, np.zeros((len(self.requirements), len(logs)))
-        rows = np.unique(np.concatenate([r.decisive(corrected[:, r.measure]) for r in self.requirements]))
+        corrected, slopes = trial.corrected, np.zeros((len(self.trials.requirements), len(trial.logs)))
+        rows = np.unique(np.concatenate([r.decisive(corrected[:, r.measure]) for r in self.trials.requirements]))
         rows, groups = rows[trial.is_resolved[rows]], np.flatnonzero(self.is_free)
-        changes = self._changes(logs, trial)
-        of_signs = [changes.of_sets(groups, rows, logs + step) for step in (STEP, -STEP)]
-        for group, wider, narrower in zip(groups, *of_signs, strict=True):
+        of_signs = [self.trials.changes(trial, groups, rows, trial.logs + step) for step in (STEP, -STEP)]
+        for group, (wider, wider_values), (narrower, narrower_values) in zip(groups, *of_signs, strict=True):
             wide, narrow = corrected.copy(), corrected.copy()
-            wide[wider.rows], narrow[narrower.rows] = wider.corrected, narrower.corrected
-            for row, requirement in enumerate(self.requirements):
+            wide[wider], narrow[narrower] = wider_values, narrower_values
+            for row, requirement in enumerate(self.trials.requirements):
                 margins = [requirement.smooth_margin(x[:, requirement.measure]) for x in (wide, narrow)]
                 slopes[row, group] = (margins[0] - margins[1]) / (2 * STEP)
         return slopes
-
-    def _changes(self, logs: np.ndarray, trial: Trial) -> ChangedRows:
-        measures = sorted({requirement.measure for requirement in self.requirements})
-        return ChangedRows(self.trials, measures, logs, trial)
 
     def _step(self, margins: np.ndarray, slopes: np.ndarray, logs: np.ndarray, radius: float) -> np.ndarray:
         """Return the point of least cost with margins approximated by functions of squared ranges.

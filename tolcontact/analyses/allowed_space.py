@@ -12,6 +12,7 @@ import scipy
 
 from tolcontact.declaration import Tolerance
 from tolcontact.features.freedoms import TAIL, Freedom
+from tolcontact.statistics.linear_shares import joined_columns
 from tolcontact.variation.draws import Draws
 from tolcontact.variation.spreads import ComponentZone
 
@@ -45,11 +46,6 @@ class RoundZone:
             widest += float((zone.growth * (ends - zone.limit)).max())
         # From |rows c| <= half follows |c| <= |inverse| half, entry by entry.
         return np.asarray(np.abs(np.linalg.pinv(zone.rows.reshape(-1, zone.rows.shape[2]))).sum(axis=1) * widest / 2)
-
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        """Return whether points (n, contributor) lie in the zone."""
-        lengths = np.linalg.norm(self._rows_at(points), axis=2)
-        return np.asarray((lengths <= self._half(points) + TOLERANCE * self._zone.width).all(axis=1))
 
     def reach(self, points: np.ndarray, step: np.ndarray) -> np.ndarray:
         """Return the shares (n,), at most 1, of steps (n, contributor) from points (n, contributor) that stay in the zone."""
@@ -218,14 +214,6 @@ class AllowedRegion:
         starts, flat = np.repeat(points, steps.shape[1], axis=0), steps.reshape(-1, steps.shape[2])
         return np.asarray((starts + self.reach(starts, flat)[:, None] * flat).reshape(steps.shape))
 
-    def is_inside(self, points: np.ndarray) -> np.ndarray:
-        """Return whether points (n, contributor) lie in the region."""
-        slack = TOLERANCE * (self.upper - self.lower)
-        inside = ((points >= self.lower - slack) & (points <= self.upper + slack)).all(axis=1)
-        for zone in self.zones:
-            inside &= zone.contains(points)
-        return np.asarray(inside)
-
     def planes(self, point: np.ndarray | None = None, slack: float = TOLERANCE) -> tuple[np.ndarray, np.ndarray]:
         """Return half-spaces (row, contributor), (row,) that contain the region: a @ point <= b.
 
@@ -243,12 +231,9 @@ class AllowedRegion:
 
     def _joint_columns(self) -> list[np.ndarray]:
         """Return sets of columns: zones with common columns are one set, with the sizes that widen them and their causes."""
-        sets: list[set[int]] = []
-        for zone in self.zones:
-            joined = {int(column) for column in zone.columns}
-            overlapping = [columns for columns in sets if columns & joined]
-            sets = [columns for columns in sets if columns not in overlapping] + [joined.union(*overlapping)]
-        return [np.array(sorted(joined)) for joined in sets]
+        sets = [zone.columns for zone in self.zones]
+        columns, names = np.unique(np.concatenate([np.zeros(0, dtype=int), *sets])), list(map(str, range(len(self.lower))))
+        return list(joined_columns(names, sets, columns).values())
 
     def _extremes(self, columns: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Return extreme points (point, column) of zones."""

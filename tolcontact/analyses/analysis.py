@@ -91,17 +91,23 @@ class Engine:
         return tuple(array.reshape(samples, len(array) // samples, *array.shape[1:]) for array in arrays)
 
 
-class Question:
+class Analysis:
     """A question about one model, and its answer: a dataset that can be stored in an archive.
 
-    Raises ModelError, ArchiveError, OptionError for invalid arguments.
+    All options are checked before anything is simulated; without `samples` nothing is. Raises ModelError, ArchiveError,
+    OptionError for invalid arguments.
     """
 
     def __init__(
-        self, record: terms.AnalysisRecord, model: Model | Program, *, solver: Solver | None, method: Choice | None,
-        into: str | Path | None,
+        self, record: terms.AnalysisRecord, model: Model | Program, *, samples: int | None = None, seed: int = 1,
+        solver: Solver | None = None, method: Choice | None = None, into: str | Path | None = None, client: Any = None,
+        progress: Progress | None = None,
     ) -> None:  # fmt: skip
+        if samples is not None:
+            check_counts(samples=samples, seed=seed)
         self.record, self.program, self._into = record, program_of(model, solver, method), into
+        self.samples, self.seed, self.progress = samples or 0, seed, progress
+        self.blocks, self._client = mapping(client), client
         if into is not None:
             check_room_for(into, record, self.program)
 
@@ -109,11 +115,6 @@ class Question:
     def assembly(self) -> str:
         """The name of the assembly."""
         return self.program.nominal.assembly.name
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """The attributes of the dataset that state how its numbers were computed."""
-        return {}
 
     def dataset(
         self, values: Mapping[str, Any], labels: Mapping[str, Sequence[str]], *, units: str | None = None, **attributes: Any
@@ -127,14 +128,16 @@ class Question:
         """
         stated = [*self.record.variables, *(v for v in self.record.of_stations if v.name in values)]
         arrays = {v.name: v.entry(np.array(values[v.name])) for v in stated}
+        title = {"title": self.record.title.format(assembly=self.assembly, **attributes)}
+        method = self.program.method
+        settings = {
+            "seed": self.seed, "solver": self.program.solver.name, "resolution": method.resolution,
+            "objective": method.objective,
+        }  # fmt: skip
         dataset = xr.Dataset(
             arrays,
             coords=self._coordinates(labels) | ({} if units is None else {"measure_units": ((), units)}),
-            attrs={
-                "title": self.record.title.format(assembly=self.assembly, **attributes),
-                **attributes,
-                **self.settings,
-            },
+            attrs=title | attributes | (settings if self.samples else {}),
         )
         if self._into is not None:
             keep(self._into, self.record, dataset, self.program)
@@ -159,29 +162,6 @@ class Question:
             if self.record.has_units_of(dim):
                 coordinates[f"{dim}_units"] = (dim, [units[dim][label] for label in coordinates[dim]])
         return coordinates
-
-
-class Analysis(Question):
-    """A question that is answered by simulations. All options are checked before anything is simulated."""
-
-    def __init__(
-        self, record: terms.AnalysisRecord, model: Model | Program, *, samples: int, seed: int, solver: Solver | None,
-        method: Choice | None, into: str | Path | None, client: Any, progress: Progress | None,
-    ) -> None:  # fmt: skip
-        check_counts(samples=samples, seed=seed)
-        super().__init__(record, model, solver=solver, method=method, into=into)
-        self.samples, self.seed, self.progress = samples, seed, progress
-        self.blocks, self._client = mapping(client), client
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """The attributes of the dataset that state how its numbers were computed."""
-        return {
-            "seed": self.seed,
-            "solver": self.program.solver.name,
-            "resolution": self.program.method.resolution,
-            "objective": self.program.method.objective,
-        }
 
     def engine(self, total: int | None = None) -> Engine:
         """Return an engine that reports its progress if there is a `total` of realizations.

@@ -15,14 +15,7 @@ The bounds are of first order in deviations and motions. Pairs of round faces an
 widens the bounds.
 """
 
-import contextlib
-import ctypes
-import functools
 import itertools
-import os
-import platform
-import threading
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -37,9 +30,6 @@ MAX_ROUNDS = 30
 SLACK = 1e-7  # of a zone's width
 MAX_BINARY, MAX_SECONDS = 64, 30.0  # rows that may be active or open; time for one bound
 MAX_CONDITION = 1e8  # of the objective's quadratic term: above this, contact points do not constrain all freedoms
-_LOCK = threading.Lock()
-_inside = 0  # number of threads inside `muted_c_stdout`
-_stream: int | None = None  # the address of the replaced stream
 
 
 def farthest_poses(program: Program, region: AllowedRegion, model: LinearModel) -> np.ndarray:
@@ -128,11 +118,11 @@ class _Problem:
         constraints, bound, (planes, ends) = list(self._constraints), np.inf, self._region.planes()
         for _ in range(MAX_ROUNDS):
             constraints += self._rows(planes, -np.inf, ends)
-            with muted_c_stdout():  # HiGHS prints a line when a solution needs another solve in the space of all variables
-                solution = scipy.optimize.milp(
-                    -goal, constraints=constraints, bounds=self._bounds, integrality=self._integer,
-                    options={"time_limit": MAX_SECONDS},
-                )  # fmt: skip
+            # With presolve, HiGHS prints a line when an integer solution needs another solve in the space of all variables.
+            solution = scipy.optimize.milp(
+                -goal, constraints=constraints, bounds=self._bounds, integrality=self._integer,
+                options={"time_limit": MAX_SECONDS, "presolve": not self._integer.any()},
+            )  # fmt: skip
             if solution.x is None:
                 break
             bound = min(bound, -float(solution.mip_dual_bound if self._integer.any() else solution.fun))
@@ -145,36 +135,3 @@ class _Problem:
 def _hessian(model: LinearModel) -> np.ndarray:
     """Return the quadratic term (freedom, freedom) of the objective "all points"."""
     return np.asarray(2 * model.displacements.T @ model.displacements)
-
-
-@functools.cache
-def _null_stream() -> int | None:
-    """Return the address of a C stream to the null device; it stays open, as another thread may be printing to it."""
-    library = ctypes.CDLL(None)
-    library.fopen.restype = ctypes.c_void_p
-    return library.fopen(os.devnull.encode(), b"w")
-
-
-@contextlib.contextmanager
-def muted_c_stdout() -> Iterator[None]:
-    """Suppress the output of C code to its stream `stdout`, such as HiGHS in integer programs; without glibc, do nothing.
-
-    With glibc this stream is a variable. It leads to the null device while any thread is in this context. The file descriptor
-    does not change, so that Python's own output, from any thread, is not affected.
-    """
-    global _inside, _stream  # noqa: PLW0603  the stream is global, so is its replacement
-    if platform.libc_ver()[0] != "glibc":
-        yield
-        return
-    variable = ctypes.c_void_p.in_dll(ctypes.CDLL(None), "stdout")
-    with _LOCK:
-        _inside += 1
-        if _inside == 1:
-            _stream, variable.value = variable.value, _null_stream()
-    try:
-        yield
-    finally:
-        with _LOCK:
-            _inside -= 1
-            if not _inside:
-                variable.value = _stream

@@ -91,23 +91,19 @@ def leverages(program: Program) -> np.ndarray:
     The leverage is the largest nominal displacement of any vertex of the part, or of its joint, for 1 mm. It is 1 for three
     locators on a plane that span the whole part, and increases as they move closer together.
     """
-    nominal = program.nominal
-    leverages = np.full(len(nominal.contributors), np.nan)
+    nominal, count = program.nominal, len(program.nominal.contributors)
+    leverages = np.full(count, np.nan)
+    placed = (program.place(deviations=sign * STEP * np.eye(count))["poses"] for sign in (1, -1))
+    ahead, behind = (poses.reshape(count, len(nominal.parts), -1) for poses in placed)
     for number in range(len(nominal.parts)):
         columns = nominal.columns(number)
-        if not len(columns):
-            continue
-        steps = np.zeros((len(columns), len(leverages)))
-        steps[np.arange(len(columns)), columns] = STEP
-        ends = [
-            program.place(deviations=sign * steps)["poses"].reshape(len(columns), len(nominal.parts), -1) for sign in (1, -1)
-        ]
         joined = [k for k, other in enumerate(nominal.parts) if other.carried and other.parent == number]
-        displacements = np.concatenate(
-            [pose.apply(ends[0][:, k], nominal.parts[k].vertices) - pose.apply(ends[1][:, k], nominal.parts[k].vertices)
-             for k in (number, *joined)], axis=1
-        )  # fmt: skip
-        leverages[columns] = np.linalg.norm(displacements, axis=-1).max(axis=-1, initial=0) / (2 * STEP)
+        displacements = [
+            pose.apply(ahead[columns, k], nominal.parts[k].vertices) - pose.apply(behind[columns, k], nominal.parts[k].vertices)
+            for k in (number, *joined)
+        ]
+        lengths = np.linalg.norm(np.concatenate(displacements, axis=1), axis=-1)
+        leverages[columns] = lengths.max(axis=-1, initial=0) / (2 * STEP)
     return leverages
 
 

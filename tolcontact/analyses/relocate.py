@@ -68,7 +68,7 @@ def relocate(
     if not np.isfinite(trials.values).any():
         lower, upper = trials.lower.tolist(), trials.upper.tolist()
         raise OptionError(f'"{locator}" cannot stand anywhere between {lower} and {upper}; choose other corners')
-    trials.try_present()
+    trials.attempt(trials.point)
     trials.search()
     best = trials.points[int(np.nanargmin(trials.values))]
     (before, lost_before), (after, lost_after) = (trials.measured(point, fresh=True) for point in (trials.point, best))
@@ -136,7 +136,6 @@ class TrialPositions:
         self._analysis, self._goal, self.lower, self.upper = analysis, goal, lower, upper
         self._sides = np.flatnonzero(upper > lower)
         self._count = GRID_POINTS[len(self._sides)]
-        self._shares: list[np.ndarray] = []
         self.points: list[np.ndarray] = []
         self.values: list[float] = []
         nominal = analysis.program.nominal
@@ -177,37 +176,32 @@ class TrialPositions:
         """Try a grid of positions."""
         axes = [np.linspace(0, 1, self._count)] * len(self._sides)
         for shares in np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(self._sides)):
-            self._try(shares)
-
-    def try_present(self) -> None:
-        """Try the declared position, which may lie outside the box."""
-        shares = (self.point - self.lower)[self._sides] / (self.upper - self.lower)[self._sides]
-        self._try(shares.clip(0.0, 1.0), self.point)
+            self.attempt(self._at(shares))
 
     def search(self) -> None:
         """Try further positions, starting at the best one."""
-        start = self._shares[int(np.nanargmin(self.values))]
+        sides, best = self._sides, self.points[int(np.nanargmin(self.values))]
+        start = ((best - self.lower)[sides] / (self.upper - self.lower)[sides]).clip(0.0, 1.0)
         ceiling = 1e3 * max(value for value in self.values if np.isfinite(value))  # COBYQA does not accept infinity
         scipy.optimize.minimize(
-            lambda shares: min(self._try(shares), ceiling),
+            lambda shares: min(self.attempt(self._at(shares)), ceiling),
             start, method="COBYQA", bounds=scipy.optimize.Bounds(np.zeros(len(start)), np.ones(len(start))),
             options={"maxfev": MAX_TRIALS, "initial_tr_radius": 0.5 / self._count, "final_tr_radius": POSITION_TOLERANCE},
         )  # fmt: skip
 
-    def _try(self, shares: np.ndarray, position: np.ndarray | None = None) -> float:
-        """Return the value of the goal at shares (side,) of the sides, or at a position (3,) [mm] that they are nearest to.
-
-        The value is infinite if the model cannot be built.
-        """
-        point = self.lower + np.zeros(3)
+    def _at(self, shares: np.ndarray) -> np.ndarray:
+        """Return the position (3,) [mm] at shares (side,) of the sides."""
+        point = self.lower.copy()
         point[self._sides] += shares * (self.upper - self.lower)[self._sides]
-        point = point if position is None else position
+        return point
+
+    def attempt(self, point: np.ndarray) -> float:
+        """Return the value of the goal at a position (3,) [mm], also outside the box; infinite if there is no model."""
         try:
             measured, _ = self.measured(point)
             value = self._goal.estimate(measured).value
         except ModelError:
             value = np.inf
-        self._shares.append(shares)
         self.points.append(point)
         self.values.append(value)
         if progress := self._analysis.progress:

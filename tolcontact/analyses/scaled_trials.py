@@ -11,7 +11,6 @@ import bisect
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -141,68 +140,71 @@ class Requirement:
         return by_percentiles(sample, self.limits)[1]
 
 
-class Trial(NamedTuple):
-    """Corrected measures (n, measure) of realizations, and whether each is resolved (n,).
+Hits = tuple[np.ndarray, np.ndarray]  # numbers (row,) of realizations that change, and their corrected measures afterwards
 
-    Poses of unresolved realizations are arbitrary, and so are their measures.
+
+class Trial(NamedTuple):
+    """Realizations with scaled ranges. Poses of unresolved realizations are arbitrary, and so are their measures.
+
+    logs         (group,): logarithms of the factors of the ranges
+    corrected    (n, measure): corrected measures
+    is_resolved  (n,)
     """
 
+    logs: np.ndarray
     corrected: np.ndarray
     is_resolved: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
 class ScaledTrials:
-    """Simulations with scaled ranges, on the same draws.
+    """Simulations with scaled ranges, on the same draws. Logarithms of the factors of the ranges are `logs` (group,).
 
     groups  columns of each group
     """
 
     engine: Engine
     groups: Sequence[np.ndarray]
+    requirements: Sequence[Requirement]
     seed: int
     samples: int
     _known: dict[str, np.ndarray] = field(default_factory=dict, init=False)
 
-    def trial(self, factors: np.ndarray, *, verification: int = 0) -> Trial:
-        """Return the trial with the groups' ranges times factors (group,).
-
-        A `verification` above 0 is the number of a run with other draws, and more of them.
-        """
+    def trial(self, logs: np.ndarray, *, verification: int = 0) -> Trial:
+        """Return the trial; a `verification` above 0 is the number of a run with other draws, and more of them."""
         count = VERIFICATION_FACTOR * self.samples if verification else self.samples
-        measured, status = self.engine.simulate(count, start=verification << 32, seed=self.seed, draws=self._draws(factors))
-        return Trial(np.ascontiguousarray(measured[:, terms.CORRECTED]), ~np.isin(status, terms.UNRESOLVED))
+        measured, status = self.engine.simulate(count, start=verification << 32, seed=self.seed, draws=self._draws(logs))
+        return Trial(logs, np.ascontiguousarray(measured[:, terms.CORRECTED]), ~np.isin(status, terms.UNRESOLVED))
 
-    def trial_within(self, factors: np.ndarray, most_unresolved: int) -> Trial | None:
-        """Return the trial with the groups' ranges times factors (group,), or None if too many realizations are unresolved.
+    def trial_within(self, logs: np.ndarray, most_unresolved: int) -> Trial | None:
+        """Return the trial, or None if too many realizations are unresolved.
 
         It stops once there are more than `most_unresolved`, since these take a hundred times as long as others.
         """
-        draws, parts, unresolved, start = self._draws(factors), [], 0, 0
+        draws, corrected, resolved, start = self._draws(logs), [], [], 0
         while start < self.samples:
             stop = min(max(2 * start, FIRST_TRIALS), self.samples)
             measured, status = self.engine.simulate(stop - start, start=start, seed=self.seed, draws=draws)
-            parts.append(Trial(measured[:, terms.CORRECTED], ~np.isin(status, terms.UNRESOLVED)))
-            unresolved += int((~parts[-1].is_resolved).sum())
-            if unresolved > most_unresolved:
+            corrected.append(measured[:, terms.CORRECTED])
+            resolved.append(~np.isin(status, terms.UNRESOLVED))
+            if sum(int((~part).sum()) for part in resolved) > most_unresolved:
                 return None
             start = stop
-        return Trial(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+        return Trial(logs, np.concatenate(corrected), np.concatenate(resolved))
 
-    def corrected_rows(self, factors: Sequence[np.ndarray], rows: np.ndarray) -> list[np.ndarray]:
-        """Return corrected measures (row, measure) of the realizations with numbers `rows`, for several factors (group,)."""
+    def corrected_rows(self, trials: Sequence[np.ndarray], rows: np.ndarray) -> list[np.ndarray]:
+        """Return corrected measures (row, measure) of realizations by their numbers, for the `logs` of several trials."""
         if not len(rows):
-            return [np.empty((0, len(self.engine.program.nominal.measures)))] * len(factors)
+            return [np.empty((0, len(self.engine.program.nominal.measures)))] * len(trials)
         corrected, at_once = [], max(MAX_ROWS // len(rows), 1)
-        for start in range(0, len(factors), at_once):
-            deviations = [self._deviations(trial, rows) for trial in factors[start : start + at_once]]
+        for start in range(0, len(trials), at_once):
+            deviations = [
+                self._draws(logs).from_numbers(lambda label: self._numbers(label)[rows], len(rows))
+                for logs in trials[start : start + at_once]
+            ]
             measured, _ = self.engine.simulate_deviations(np.concatenate(deviations))
             corrected += np.split(measured[:, terms.CORRECTED], len(deviations))
         return corrected
-
-    def _deviations(self, factors: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Return the deviations (row, contributor) of the realizations with numbers `rows` (row,)."""
-        return self._draws(factors).from_numbers(lambda label: self._numbers(label)[rows], len(rows))
 
     def _numbers(self, label: str) -> np.ndarray:
         """Return the random numbers (n,) between 0 and 1 for the deviations of a label, in all realizations."""
@@ -210,59 +212,30 @@ class ScaledTrials:
             self._known[label] = self.engine.program.draws.numbers(seed=self.seed, start=0, stop=self.samples)(label)
         return self._known[label]
 
-    def _draws(self, factors: np.ndarray) -> Draws:
+    def _draws(self, logs: np.ndarray) -> Draws:
         program = self.engine.program
         scale = np.ones(len(program.nominal.contributors))
-        for factor, columns in zip(factors, self.groups, strict=True):
-            scale[columns] = factor
+        for log, columns in zip(logs, self.groups, strict=True):
+            scale[columns] = np.exp(log)
         return program.draws.scaled(scale)
 
-    def __len__(self) -> int:
-        return len(self.groups)
+    def changes(self, before: Trial, sets: Iterable[Any], rows: np.ndarray, logs: np.ndarray) -> list[Hits]:
+        """Return the rows, out of resolved `rows` (row,) of a trial, whose required measures change with other ranges.
 
-
-class Hits(NamedTuple):
-    """Realizations that change: their numbers (row,), and their corrected measures (row, measure) after the change."""
-
-    rows: np.ndarray
-    corrected: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class ChangedRows:
-    """The search for realizations that change.
-
-    measures  indices of the required measures
-    logs      (group,) logarithms of the factors of the ranges before the change
-    before    the trial there; only its resolved realizations may be requested
-    """
-
-    trials: ScaledTrials
-    measures: Sequence[int]
-    logs: np.ndarray
-    before: Trial
-
-    @cached_property
-    def resolved_rows(self) -> np.ndarray:
-        """The numbers of the realizations (row,) that are resolved before the change."""
-        return np.flatnonzero(self.before.is_resolved)
-
-    def of_sets(self, sets: Iterable[Any], rows: np.ndarray, changed_logs: np.ndarray) -> list[Hits]:
-        """Return the rows, out of `rows` (row,), that change if the logarithms of factors become `changed_logs` (group,).
-
-        sets   for each of the results, the group or the groups (k,) that change at the same time
+        sets   for each of the results, the group or the groups (k,) that change to `logs` at the same time
         """
-        factors = [np.exp(np.where(np.isin(np.arange(len(self.logs)), groups), changed_logs, self.logs)) for groups in sets]
-        resolved = self.before.corrected[self.resolved_rows][:, self.measures]
-        spreads = resolved.std(axis=0) if len(resolved) else np.zeros(len(self.measures))
+        changed = [np.where(np.isin(np.arange(len(logs)), groups), logs, before.logs) for groups in sets]
+        measures = sorted({requirement.measure for requirement in self.requirements})
+        resolved = before.corrected[before.is_resolved][:, measures]
+        spreads = resolved.std(axis=0) if len(resolved) else np.zeros(len(measures))
         hits = []
-        for corrected in self.trials.corrected_rows(factors, rows):
-            changes = np.abs(corrected - self.before.corrected[rows])[:, self.measures]
-            is_hit = ~(changes <= NEGLIGIBLE * spreads).all(axis=1)
-            hits.append(Hits(rows[is_hit], corrected[is_hit]))
+        for corrected in self.corrected_rows(changed, rows):
+            differences = np.abs(corrected - before.corrected[rows])[:, measures]
+            is_hit = ~(differences <= NEGLIGIBLE * spreads).all(axis=1)
+            hits.append((rows[is_hit], corrected[is_hit]))
         return hits
 
-    def idle(self, candidates: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
+    def idle(self, before: Trial, candidates: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
         """Return the candidates (group,) bool that jointly change no realization, with their ranges times either of `ends`.
 
         Other groups keep their ranges. If none of n realizations changes, the share of changing realizations is at most 3 / n,
@@ -270,23 +243,23 @@ class ChangedRows:
         """
         idle = candidates.copy()
         for end in reversed(ends):
-            while self._release(idle, np.full(len(candidates), np.log(end))):
+            while self._release(before, idle, np.full(len(candidates), np.log(end))):
                 pass  # only a last run over all blocks shows that the remaining groups change nothing
         return idle
 
-    def _release(self, idle: np.ndarray, logs: np.ndarray) -> bool:
+    def _release(self, before: Trial, idle: np.ndarray, logs: np.ndarray) -> bool:
         """Mark idle groups (group,) that change a realization as not idle; return whether there are any."""
-        before, start, count = idle.sum(), 0, len(self.resolved_rows)
-        while start < count and idle.any():
-            stop = min(max(2 * start, FIRST_BLOCK), count)
-            rows = self.resolved_rows[start:stop]
-            while idle.any() and len(rows := self.of_sets([np.flatnonzero(idle)], rows, logs)[0].rows):
+        resolved_rows, number, start = np.flatnonzero(before.is_resolved), idle.sum(), 0
+        while start < len(resolved_rows) and idle.any():
+            stop = min(max(2 * start, FIRST_BLOCK), len(resolved_rows))
+            rows = resolved_rows[start:stop]
+            while idle.any() and len(rows := self.changes(before, [np.flatnonzero(idle)], rows, logs)[0][0]):
                 groups = np.flatnonzero(idle)
-                is_hit = [len(hits.rows) > 0 for hits in self.of_sets(groups, rows[:MAX_HITS], logs)]
+                is_hit = [len(hits) > 0 for hits, _ in self.changes(before, groups, rows[:MAX_HITS], logs)]
                 # Groups that change realizations only jointly are all influential.
                 idle[groups[is_hit] if any(is_hit) else groups] = False
             start = stop
-        return bool(idle.sum() < before)
+        return bool(idle.sum() < number)
 
 
 def effect_samples(samples: int, groups: int) -> int:
@@ -302,10 +275,10 @@ def narrowing_effects(trials: ScaledTrials) -> np.ndarray:
     """
     program = trials.engine.program
     limits = [program.limits(number) for number in range(len(program.nominal.measures))]
-    factors = 1 - STEP * np.eye(1 + len(trials), len(trials), -1)
-    rows = np.arange(effect_samples(trials.samples, len(trials)))
-    present, *narrowed_groups = trials.corrected_rows(list(factors), rows)
-    effects = np.zeros((len(limits), len(terms.EFFECTS), len(trials), len(terms.ESTIMATE)))
+    count = len(trials.groups)
+    rows = np.arange(effect_samples(trials.samples, count))
+    present, *narrowed_groups = trials.corrected_rows(list(np.log1p(-STEP * np.eye(1 + count, count, -1))), rows)
+    effects = np.zeros((len(limits), len(terms.EFFECTS), count, len(terms.ESTIMATE)))
     for group, narrowed in enumerate(narrowed_groups):
         if (np.abs(narrowed - present)[:MIN_DECISIVE].max(axis=0) <= NEGLIGIBLE * present.std(axis=0)).all():
             continue

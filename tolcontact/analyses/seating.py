@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import poses as pose, vocabulary as terms
-from tolcontact.analyses.analysis import Question
+from tolcontact.analyses.analysis import Analysis
 from tolcontact.compilation import Program, compile_program
 from tolcontact.discretization import raised_places
 from tolcontact.errors import OptionError
@@ -43,7 +43,7 @@ def seating(model: Model | Program, *, into: str | Path | None = None) -> xr.Dat
 
     `tc.analyses.seating("model.py", into="model.nc")`
     """
-    question = Question(terms.SEATING, model, solver=None, method=None, into=into)
+    question = Analysis(terms.SEATING, model, into=into)
     if not question.program.nominal.assembly.forces:
         raise OptionError(
             f'"{question.assembly}" has no forces, so nothing presses its parts onto their seats; declare them: '
@@ -66,7 +66,7 @@ def seating(model: Model | Program, *, into: str | Path | None = None) -> xr.Dat
     )
 
 
-def _pressed(question: Question, touching: Touching) -> list[Balance]:
+def _pressed(question: Analysis, touching: Touching) -> list[Balance]:
     """Return the balances of parts that forces press. Raises OptionError if nothing can hold them, even with friction."""
     pressed = [balance for balance in balances(touching) if balance.is_pressed]
     for balance in pressed:

@@ -4,6 +4,7 @@ from .reader import (
     model_of as model_of,
     open_archive as open_archive,
     open_unchecked as open_unchecked,
+    opened as opened,
 )
 from .rows import (
     Row as Row,

@@ -1,6 +1,8 @@
 """Reading an archive with xarray, and rebuilding its model."""
 
+import contextlib
 import json
+from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,7 +17,7 @@ from tolcontact.archive.inspection import check_archive
 from tolcontact.archive.variables import small_caches
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.document import from_document
-from tolcontact.errors import ArchiveError
+from tolcontact.errors import ArchiveError, OptionError
 from tolcontact.geometry import surfaces_of, with_known_surfaces
 from tolcontact.method import Method
 
@@ -42,6 +44,20 @@ def open_unchecked(path: Path) -> xr.DataTree:
     numbers = pd.RangeIndex(tree.sizes[terms.REALIZATION])
     tree.coords[terms.REALIZATION] = (terms.REALIZATION, numbers, terms.NUMBERS.all_attributes)
     return tree
+
+
+@contextlib.contextmanager
+def opened(results: xr.DataTree | str | Path) -> Iterator[xr.DataTree]:
+    """Open results as a tree; close them afterwards if they are given as the path of an archive."""
+    if isinstance(results, str | Path):
+        with open_archive(results) as tree:
+            yield tree
+    elif isinstance(results, xr.DataTree):
+        yield results
+    else:
+        raise OptionError(
+            f"results are a {type(results).__name__}; expected what tc.run or tc.open_archive returns, or an archive's path"
+        )
 
 
 def model_of(results: xr.DataTree) -> Assembly:

@@ -1,6 +1,6 @@
 """Realizations in an archive: whether they are undamaged, which ones are checked against surfaces, and their poses."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import netCDF4
 import numpy as np
@@ -41,45 +41,39 @@ def choose(file: netCDF4.Dataset, count: int, seed: int) -> tuple[np.ndarray, np
     sample of all certified realizations.
     """
     rows = len(file.dimensions[terms.REALIZATION]) if count else 0
-    deepest, busiest, random = (_Largest(count // 3), _Largest(count // 3), _Largest(count))
-    lot = np.random.default_rng([seed, rows])
-    for start, status, gap, carrying in _pieces(file, rows):
-        number = start + np.flatnonzero(np.isin(status, terms.CERTIFIED))
-        inside = -gap[number - start, 1].min(axis=1, initial=np.inf)
-        # Only what exceeds rounding is deeper than anything else.
-        deepest.add(number, np.where(inside > terms.ROUNDED, inside, 0.0))
-        busiest.add(number, carrying[number - start].sum(axis=1))
-        random.add(number, lot.random(len(number)))
-    fair = random.numbers[: count - 2 * (count // 3)]
-    numbers = np.array(list(dict.fromkeys([*fair, *deepest.numbers, *busiest.numbers, *random.numbers])), dtype=np.int64)
+    certified, depths, loads = _certified(file, rows)
+    lots = np.random.default_rng([seed, rows]).random(len(certified))
+    # Only what exceeds rounding is deeper than anything else.
+    deepest, busiest, random = (
+        certified[_largest(values, number)]
+        for values, number in ((np.where(depths > terms.ROUNDED, depths, 0.0), count // 3), (loads, count // 3), (lots, count))
+    )
+    fair = random[: count - 2 * (count // 3)]
+    numbers = np.array(list(dict.fromkeys([*fair, *deepest, *busiest, *random])), dtype=np.int64)
     chosen = np.sort(numbers[:count])
-    left_out = np.flatnonzero(~np.isin(random.numbers, chosen))
-    return chosen, np.isin(chosen, random.numbers[: left_out[0] if len(left_out) else None])
+    left_out = np.flatnonzero(~np.isin(random, chosen))
+    return chosen, np.isin(chosen, random[: left_out[0] if len(left_out) else None])
 
 
-def _pieces(file: netCDF4.Dataset, rows: int) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
+def _certified(file: netCDF4.Dataset, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the numbers (row,) of the certified realizations, their penetrations [mm], and their numbers of active points."""
+    found = [(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0, dtype=np.int64))]
     for start in range(0, rows, terms.PIECE_ROWS):
-        rows_of_piece = slice(start, min(start + terms.PIECE_ROWS, rows))
-        status, gap, carrying = (
-            np.ma.getdata(file[variable.name][rows_of_piece]) for variable in (terms.STATUS, terms.GAP_MIN, terms.CARRYING)
+        piece = slice(start, min(start + terms.PIECE_ROWS, rows))
+        status, gaps, carrying = (
+            np.ma.getdata(file[variable.name][piece]) for variable in (terms.STATUS, terms.GAP_MIN, terms.CARRYING)
         )
-        yield start, status, gap, carrying
+        places = np.flatnonzero(np.isin(status, terms.CERTIFIED))
+        depths = -gaps[places, terms.CORRECTED].min(axis=1, initial=np.inf)
+        found.append((start + places, depths, carrying[places].sum(axis=1)))
+    numbers, depths, loads = map(np.concatenate, zip(*found, strict=True))
+    return numbers, depths, loads
 
 
-class _Largest:
-    """The indices of the largest values above 0, the first of equals."""
-
-    def __init__(self, count: int) -> None:
-        self._count = count
-        self.numbers, self._values = np.zeros(0, dtype=np.int64), np.zeros(0)
-
-    def add(self, numbers: np.ndarray, values: np.ndarray) -> None:
-        """Add the values of later numbers."""
-        larger = values > (self._values[-1] if 0 < self._count == len(self._values) else 0.0)
-        numbers = np.concatenate([self.numbers, numbers[larger]])
-        values = np.concatenate([self._values, values[larger]])
-        order = np.lexsort((numbers, -values))[: self._count]
-        self.numbers, self._values = numbers[order], values[order]
+def _largest(values: np.ndarray, count: int) -> np.ndarray:
+    """Return the places of the largest values (row,) above 0, the first of equals."""
+    places = np.argsort(-values, kind="stable")[:count]
+    return places[values[places] > 0]
 
 
 def archived_poses(file: netCDF4.Dataset, rows: np.ndarray, stations: Sequence[str]) -> np.ndarray | None:

@@ -77,16 +77,12 @@ def without_stops(x: Sample, limits: Limits) -> Limits:
     Two equal values have probability 0 unless contact keeps them there. The index of such a limit would depend on how many
     values are there alone: it is 1, for any values in between, if these are more than 0.135 %.
     """
-    at_limits = np.sum([[(piece == limit).sum() for limit in limits[:2]] for piece in x.map(limits.settled).pieces()], axis=0)
-    if at_limits[0] >= MIN_AT_STOP and not _is_any(x.map(limits.below)):
+    settled = limits.settled(x.values)
+    if (settled == limits.lower).sum() >= MIN_AT_STOP and not limits.below(x.values).any():
         limits = limits._replace(lower=-math.inf)
-    if at_limits[1] >= MIN_AT_STOP and not _is_any(x.map(limits.above)):
+    if (settled == limits.upper).sum() >= MIN_AT_STOP and not limits.above(x.values).any():
         limits = limits._replace(upper=math.inf)
     return limits
-
-
-def _is_any(hits: Sample) -> bool:
-    return any(bool(piece.any()) for piece in hits.pieces())
 
 
 def by_percentiles(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
@@ -108,7 +104,7 @@ def by_percentiles(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
     if not limits.are_open:
         # Sides that are equally near must not bias their minimum: its upper bound is the least of all upper bounds. A small
         # sample may have missed that one limit is a stop; then only the other side counts.
-        may_be_stops = x.count < MIN_TAIL and not _is_any(x.map(limits.outside))
+        may_be_stops = x.count < MIN_TAIL and not limits.outside(x.values).any()
         worst = np.stack([_sides(lows[0], middle, highs[2], limits) for middle in (lows[1], highs[1])])
         best = np.stack([_sides(highs[0], middle, lows[2], limits) for middle in (lows[1], highs[1])])
         worst_of_all = np.fmin.reduce(worst, axis=(0, 1))

@@ -7,14 +7,14 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.realizations import EXISTS, assembled, pieces
+from tolcontact.realizations import EXISTS, assembled, column, pieces
 from tolcontact.statistics import intervals
 from tolcontact.statistics.sample import Sample
 from tolcontact.vocabulary import ArchiveVariable
 
 MAX_COMBINATIONS = 10  # of pairs under load at the same time
 MAX_PAIRS = 20  # of parts, the most frequent ones
-VARIABLES = [variable.name for variable in (terms.CLASHES, terms.CLASH_DEPTH, terms.CLASH_PART, terms.CLASH_OTHER)]
+CLASHES = (terms.CLASHES, terms.CLASH_DEPTH, terms.CLASH_PART, terms.CLASH_OTHER)
 
 
 def loaded(rows: xr.Dataset) -> np.ndarray:
@@ -33,8 +33,7 @@ def reactions(rows: xr.Dataset) -> np.ndarray:
     if EXISTS in rows.coords and not rows[EXISTS].values.any():
         return np.full((rows.sizes[terms.PAIR], 1 + len(terms.REACTION_PERCENTILES), len(terms.ESTIMATE)), np.nan)
     for pair in range(rows.sizes[terms.PAIR]):
-        reaction = rows[[terms.REACTION.name]].isel({terms.PAIR: pair})
-        x = Sample(lambda rows=reaction: (np.asarray(piece[terms.REACTION.name].values) for piece in pieces(rows)))  # type: ignore[misc]
+        x = Sample.of(column(rows, terms.REACTION, pair=pair))
         estimates.append([intervals.mean(x), *intervals.percentiles(x, terms.REACTION_PERCENTILES)])
     return np.array(estimates).reshape(-1, 1 + len(terms.REACTION_PERCENTILES), len(terms.ESTIMATE))
 
@@ -155,25 +154,20 @@ def clashes(rows: xr.Dataset) -> tuple[dict[ArchiveVariable, Any], list[str]]:
     most frequent pairs are those that are the deepest in their realization; their depth [mm] is NaN if none was measured.
     """
     names = [str(name) for name in rows[terms.PART].values]
-    watched, clashing, counts, depths = 0, 0, Counter[tuple[int, int, bool]](), dict[tuple[int, int, bool], float]()
-    for piece in pieces(rows[VARIABLES]):
-        clash_counts, depth, part, other = (np.asarray(piece[name].values) for name in VARIABLES)
-        watched += int((clash_counts >= 0).sum())
-        clashing += int((clash_counts > 0).sum())
-        is_pair = np.all([(index >= 0) & (index < len(names)) for index in (part, other)], axis=0)
-        parts_and_kind = np.column_stack([part, other, clash_counts == 0])[is_pair].astype(int)
-        labels, places = np.unique(parts_and_kind, axis=0, return_inverse=True)
-        for k, (first_part, second_part, is_declared) in enumerate(labels.tolist()):
-            pair, pair_depths = (first_part, second_part, bool(is_declared)), depth[is_pair][places.ravel() == k]
-            counts[pair] += len(pair_depths)
-            if np.isfinite(pair_depths).any():
-                depths[pair] = max(depths.get(pair, 0.0), float(np.nanmax(pair_depths)))
-    pairs = [pair for pair, _ in counts.most_common(MAX_PAIRS)]
+    clashing, depth, *parts = (column(rows, variable) for variable in CLASHES)
+    is_pair = np.all([(index >= 0) & (index < len(names)) for index in parts], axis=0)
+    labels, places, counts = np.unique(
+        np.column_stack([*parts, clashing == 0])[is_pair].astype(int), axis=0, return_inverse=True, return_counts=True
+    )
+    depths, order = np.full(len(labels), np.nan), np.argsort(-counts, kind="stable")[:MAX_PAIRS]
+    np.fmax.at(depths, places.ravel(), depth[is_pair])
+    watched = int((clashing >= 0).sum())
+    share = intervals.proportion_of(int((clashing > 0).sum()), watched) if watched else intervals.UNDEFINED
     values = {
         terms.WATCHED: watched,
-        terms.CLASH_SHARE: np.array(intervals.proportion_of(clashing, watched) if watched else intervals.UNDEFINED),
-        terms.CLASH_COUNT: np.array([counts[pair] for pair in pairs], dtype=np.int64),
-        terms.CLASH_LARGEST_DEPTH: np.array([depths.get(pair, np.nan) for pair in pairs]),
-        terms.CLASH_DECLARED: np.array([is_declared for *_, is_declared in pairs], dtype=np.int8),
+        terms.CLASH_SHARE: np.array(share),
+        terms.CLASH_COUNT: counts[order],
+        terms.CLASH_LARGEST_DEPTH: depths[order],
+        terms.CLASH_DECLARED: labels[order, 2].astype(np.int8),
     }
-    return values, [f"{names[first_part]} / {names[second_part]}" for first_part, second_part, _ in pairs]
+    return values, [f"{names[first_part]} / {names[second_part]}" for first_part, second_part, _ in labels[order]]

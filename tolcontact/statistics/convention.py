@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.realizations import pieces
+from tolcontact.realizations import column, pieces
 from tolcontact.statistics import intervals
 from tolcontact.statistics.measure_statistics import changes_of
 from tolcontact.statistics.sample import Sample
@@ -34,9 +34,8 @@ def offset_values(rows: xr.Dataset) -> dict[ArchiveVariable, Any]:
         is_certified = np.isin(piece[terms.STATUS.name].values, terms.CERTIFIED)
         beyond += (offsets > variations + ACCURACY).sum(axis=0)
         unexplained += ((offsets > variations + depths[:, None] + ACCURACY) & is_certified[:, None]).sum(axis=0)
-    for part in np.flatnonzero(np.isfinite(variations)):
-        offset = rows[[terms.LOCATOR_OFFSET.name]].isel({terms.PART: part})
-        x = Sample(lambda offset=offset: (piece[terms.LOCATOR_OFFSET.name].values for piece in pieces(offset)))  # type: ignore[misc]
+    for part in np.flatnonzero(np.isfinite(variations)).tolist():
+        x = Sample.of(column(rows, terms.LOCATOR_OFFSET, part=part))
         values[terms.OFFSET][part] = intervals.percentiles(x, list(terms.OFFSET_PERCENTILES.values()))
         values[terms.OFFSET_BEYOND][part] = intervals.proportion_of(int(beyond[part]), total)
         values[terms.OFFSET_UNEXPLAINED][part] = intervals.proportion_of(int(unexplained[part]), total)

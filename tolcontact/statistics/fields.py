@@ -82,11 +82,7 @@ class DisplacementFields:
         self._magnitudes = [_magnitudes(fields, len(part)) for part in self._parts]
         # A part that contact cannot move has one field.
         self._states = [[RAW, CORRECTED] if nominal.may_differ(index) else [RAW] for index in nominal.last_indices]
-        self.start_over()
-
-    def start_over(self) -> None:
-        """Clear all sums."""
-        self._sums = [[FieldSums(len(part)) for _ in states] for part, states in zip(self._parts, self._states, strict=True)]
+        self.resume_from([])
 
     @property
     def sizes(self) -> list[int]:
@@ -100,12 +96,9 @@ class DisplacementFields:
 
     def resume_from(self, numbers: Sequence[np.ndarray]) -> None:
         """Continue from earlier `numbers`, or from nothing if there are none."""
-        if not numbers:
-            self.start_over()
-            return
         self._sums = [
-            [FieldSums(len(part), sums[state].copy()) for state in states]
-            for part, states, sums in zip(self._parts, self._states, numbers, strict=True)
+            [FieldSums(len(part), sums[state].copy() if len(sums) else None) for state in states]
+            for part, states, sums in zip(self._parts, self._states, numbers or [np.zeros(0)] * len(self._parts), strict=True)
         ]
 
     def sums(self, poses: np.ndarray, start: int, status: np.ndarray) -> BlockSums:

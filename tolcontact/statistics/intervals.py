@@ -81,7 +81,7 @@ def from_standardized_influence(x: Sample, estimate: float, influence: Sequence[
         max(float(polynomial @ x.standardized_moments[: len(polynomial)] * x.count), 0.0)
         for polynomial in (square, np.convolve(square, square))
     )
-    widening = x.map(lambda piece: np.polyval(influence[::-1], (piece - x.mean) / scale)).widening
+    widening = x.map(lambda values: np.polyval(influence[::-1], (values - x.mean) / scale)).widening
     return from_influence(estimate, squares * widening**2, x.count, fourths * widening**4)
 
 
@@ -127,7 +127,7 @@ def variance(x: np.ndarray | Sample) -> Estimate:
     kurt, sixth = x.standardized_moments[[4, 6]].tolist()
     deviation = math.sqrt(max(kurt - 1, 0.0))  # of squares, relative to their mean
     skew = (sixth - 3 * kurt + 2) / deviation**3 if deviation > 0 else 0.0
-    widening = x.map(lambda piece: (piece - x.mean) ** 2).widening
+    widening = x.map(lambda values: (values - x.mean) ** 2).widening
     lower, upper = (1 - deviation * _back(sign * _Z * widening, skew, x.count) for sign in (1, -1))
     lower, upper = estimate * max(lower, 0.0), estimate * upper
     if x.count < MAX_SMALL:
@@ -159,27 +159,28 @@ def percentiles(x: np.ndarray | Sample, percents: Sequence[float]) -> list[Estim
     A bound is infinite if the sample is too small.
     """
     x = Sample.of(x)
-    ranks = [_quantile_ranks(x.count, percent / 100) for percent in percents]
-    values = _values_at(x, ranks)
-    widenings = [x.map(lambda piece, v=value: (piece <= v).astype(float)).widening for value in values[:, 2]]  # type: ignore[misc]
-    if any(widening != 1.0 for widening in widenings):
-        ranks = [quantile.widened(widening) for quantile, widening in zip(ranks, widenings, strict=True)]
-        values = _values_at(x, ranks)
-    estimates = []
-    for quantile, (low, high, floor, ceiling) in zip(ranks, values, strict=True):
-        lower = low if quantile.lower >= 0 else -np.inf
-        upper = high if quantile.upper < x.count else np.inf
-        # In small samples the interpolated value may lie beyond a bound.
-        value = np.clip(floor + (ceiling - floor) * quantile.fraction, lower, upper)
-        estimates.append(Estimate(float(value), float(lower), float(upper)))
-    return estimates
+    shares, last = np.array(percents) / 100, x.count - 1
+    places = last * shares  # ranks, from 0, of the percentiles and of the bounds of their intervals
+    floors = np.floor(places).astype(int)
+    lower, upper = np.array([binomial_quantile([_LOWER, _UPPER], x.count, share) for share in shares]).T
+    lower -= 1
+    below, above = x.ordered(floors), x.ordered(np.minimum(floors + 1, last))
+    widenings = np.array([x.map(lambda values, v=v: (values <= v).astype(float)).widening for v in below])  # type: ignore[misc]
+    if (widenings != 1.0).any():
+        lower = np.floor(places - widenings * (places - lower)).astype(int)
+        upper = np.ceil(places + widenings * (upper - places)).astype(int)
+    lows = np.where(lower >= 0, x.ordered(lower.clip(0, last)), -np.inf)
+    highs = np.where(upper <= last, x.ordered(upper.clip(0, last)), np.inf)
+    # In small samples the interpolated value may lie beyond a bound.
+    values = np.clip(below + (above - below) * (places - floors), lows, highs)
+    return [Estimate(*map(float, estimate)) for estimate in zip(values, lows, highs, strict=True)]
 
 
 def proportion(hits: np.ndarray | Sample) -> Estimate:
     """Return the share of True in a sample of booleans with the exact (Clopper-Pearson) interval."""
     hits = Sample.of(hits)
-    widening = hits.map(lambda piece: piece.astype(float)).widening
-    k, n = sum(int(piece.sum()) for piece in hits.pieces()), hits.count
+    widening = hits.map(lambda values: values.astype(float)).widening
+    k, n = int(hits.values.sum()), hits.count
     return proportion_of(k / widening**2, n / widening**2) if 0 < k < n and widening > 0 else proportion_of(k, n)
 
 
@@ -197,12 +198,13 @@ def variance_ratio(sample: np.ndarray | Sample, baseline: np.ndarray | Sample) -
     if is_constant(sample) or is_constant(baseline):
         return UNDEFINED
     # The influence of each realization on the logarithm of the ratio; their sum is zero.
-    influence = Sample(lambda: (
-        (a - sample.mean) ** 2 / variance_sample - (b - baseline.mean) ** 2 / variance_baseline
-        for a, b in zip(sample.pieces(), baseline.pieces(), strict=True)
-    ), sample.replicate)  # fmt: skip
-    squares = sum(float((piece**2).sum()) for piece in influence.pieces())
-    fourths = sum(float((piece**4).sum()) for piece in influence.pieces())
+    influence = Sample(
+        lambda: (
+            (sample.values - sample.mean) ** 2 / variance_sample - (baseline.values - baseline.mean) ** 2 / variance_baseline
+        ),
+        sample.replicate,
+    )
+    squares, fourths = float((influence.values**2).sum()), float((influence.values**4).sum())
     ratio, n = variance_sample / variance_baseline, sample.count
     if n < MIN_VARIANCE or not (sample.determines_moments and baseline.determines_moments):
         return Estimate(ratio, math.nan, math.nan)
@@ -232,37 +234,6 @@ def variance_from_moments(count: int, moment2: ArrayLike, moment4: ArrayLike) ->
 def is_constant(x: Sample, accuracy: float = 0.0) -> bool:
     """Return whether the spread of a sample may be due to rounding, or to a solver with a finite accuracy."""
     return not x.moments[0] > max(8 * np.finfo(float).eps * abs(x.mean), accuracy, x.accuracy) ** 2
-
-
-class _QuantileRanks(NamedTuple):
-    """Ranks, from 0: the bounds of a quantile's interval, and the two values around the quantile."""
-
-    lower: int
-    upper: int
-    floor: int
-    ceiling: int
-    fraction: float  # position of the quantile between the two values
-
-    def widened(self, widening: float) -> "_QuantileRanks":
-        """Return the ranks with the bounds moved away from the quantile by the factor `widening`."""
-        place = self.floor + self.fraction
-        return self._replace(
-            lower=int(np.floor(place - widening * (place - self.lower))),
-            upper=int(np.ceil(place + widening * (self.upper - place))),
-        )
-
-
-def _quantile_ranks(n: int, p: float) -> _QuantileRanks:
-    """Return the ranks for the quantile `p` of `n` values."""
-    place = (n - 1) * p
-    floor = int(np.floor(place))
-    lower, upper = (int(k) for k in binomial_quantile([_LOWER, _UPPER], n, p))
-    return _QuantileRanks(lower - 1, upper, floor, min(floor + 1, n - 1), place - floor)
-
-
-def _values_at(x: Sample, ranks: Sequence[_QuantileRanks]) -> np.ndarray:
-    """Return the values (quantile, 4) at ranks; ranks beyond the sample give its extremes."""
-    return x.ordered([min(max(rank, 0), x.count - 1) for quantile in ranks for rank in quantile[:4]]).reshape(-1, 4)
 
 
 def binomial_quantile(q: ArrayLike, n: ArrayLike, p: float) -> np.ndarray:

@@ -34,7 +34,9 @@ def required_realizations(contributors: int) -> int:
     return max(ROWS_PER_CONTRIBUTOR * (contributors + 1), 10 * BLOCKS)
 
 
-def joined_columns(owners: Sequence[str], sets: Sequence[Sequence[int]], columns: np.ndarray) -> dict[str, np.ndarray]:
+def joined_columns(
+    owners: Sequence[str], sets: Sequence[Sequence[int] | np.ndarray], columns: np.ndarray
+) -> dict[str, np.ndarray]:
     """Return some columns (k,) by group: all columns of an owner, and the columns of a set, are in the same group.
 
     owners   of all columns; the name of a group lists the owners of its columns

@@ -133,7 +133,7 @@ def measure_estimates(rows: xr.Dataset) -> tuple[np.ndarray, np.ndarray, dict[st
         before = raw.sample if existing is rows else measured_sample(existing, number, terms.STATES[terms.RAW])
         changes.append(changes_of(before, corrected.sample))
         stops.append(_stops(corrected))
-        undefined.append(sum(int((~np.isfinite(piece)).sum()) for piece in corrected.sample.pieces()))
+        undefined.append(int((~np.isfinite(corrected.sample.values)).sum()))
     notes = {terms.MEASURE_STOPS: np.array(stops, dtype=object), terms.NOT_A_NUMBER: np.array(undefined, dtype=np.int64)}
     return np.array(statistics), np.array(changes), notes
 

@@ -156,8 +156,8 @@ def _changes(
         hits = [_hits(*arguments, state) for arguments in zip(rows, numbers, limits, strict=True)]
         has_values = min(sample.count, baseline.count) > 1
         changes.append(_estimates(sample, baseline, hits, paired=is_paired) if has_values else nothing)
-        pairs = zip(sample.pieces(), baseline.pieces(), strict=True) if draws == terms.SAME_DRAWS else ()
-        furthest.append(max((float(np.abs(a - b).max()) for a, b in pairs), default=np.nan))
+        is_compared = draws == terms.SAME_DRAWS and sample.count
+        furthest.append(float(np.abs(sample.values - baseline.values).max()) if is_compared else np.nan)
     shape = (len(terms.STATES), len(measures))
     return draws, np.array(changes).reshape(*shape, *np.shape(changes[0])), np.array(furthest).reshape(shape)
 
@@ -167,10 +167,8 @@ def _hits(rows: xr.Dataset, measure: int, limits: Limits, state: str) -> Sample 
     values = measured_sample(rows, measure, state)
     if limits.are_open or state == terms.STATES[terms.RAW]:
         return None if limits.are_open else values.map(limits.outside)
-    return Sample(
-        lambda: (limits.outside(x) | ~is_assembled(y) for x, y in zip(values.pieces(), statuses(rows), strict=True)),
-        values.replicate,
-    )
+    exists = is_assembled(statuses(rows))
+    return values.map(lambda x: limits.outside(x) | ~exists)
 
 
 def _estimates(sample: Sample, baseline: Sample, hits: list[Sample | None], *, paired: bool) -> list[Estimate]:

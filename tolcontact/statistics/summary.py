@@ -161,7 +161,7 @@ def _coordinates(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int
 
 def _status_values(rows: xr.Dataset, rigid: np.ndarray) -> dict[ArchiveVariable, Any]:
     """Return the number of realizations of each status, and the resulting shares and conflicts of `rigid` pairs."""
-    by_status = np.sum([np.bincount(piece, minlength=len(terms.STATUS_MEANINGS)) for piece in statuses(rows)], axis=0)
+    by_status = np.bincount(statuses(rows), minlength=len(terms.STATUS_MEANINGS))
     total, not_assemblable = int(by_status.sum()), by_status[terms.Status.NOT_ASSEMBLABLE]
     return {
         terms.TOUCHED: np.array(intervals.proportion_of(total - by_status[terms.Status.UNTOUCHED], total)),

@@ -56,16 +56,16 @@ def share_shift(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:
     sample (Agresti and Caffo, 2000).
     """
     if paired:
-        change = sample.map(lambda piece: piece.astype(float)) - baseline.map(lambda piece: piece.astype(float))
+        change = sample.map(lambda values: values.astype(float)) - baseline.map(lambda values: values.astype(float))
         weight = _weight(change)
         n = weight * change.count
-        counts = [weight * sum(int((piece == sign).sum()) for piece in change.pieces()) for sign in (1, -1)]
+        counts = [weight * int((change.values == sign).sum()) for sign in (1, -1)]
         gained, lost = (intervals.proportion_of(count, n) for count in counts)
         least = _hypotenuse(gained.value - gained.lower, lost.upper - lost.value, gained.value, lost.value)
         most = _hypotenuse(gained.upper - gained.value, lost.value - lost.lower, gained.value, lost.value)
         difference = gained.value - lost.value
         return Estimate(difference, max(difference - least, -1.0), min(difference + most, 1.0))
-    hits = [x.map(lambda piece: piece.astype(float)) for x in (sample, baseline)]
+    hits = [x.map(lambda values: values.astype(float)) for x in (sample, baseline)]
     weights = [_weight(x) for x in hits]
     counts = [weight * x.count for weight, x in zip(weights, hits, strict=True)]
     shares = [(n * x.mean + 1) / (n + 2) for n, x in zip(counts, hits, strict=True)]

@@ -8,8 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
-from tolcontact.system.kind import IS_POSIX
-
+IS_POSIX = hasattr(os, "geteuid")  # users with numbers, links for everyone, open files that can be replaced and removed
 # A link is not followed, and a pipe not waited for. Windows has neither flag, but it changes line ends unless told not to.
 _FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
 _RETRY_SECONDS = (0.05, 0.1, 0.2, 0.4)  # a virus scanner or an indexer holds a new file open for a moment

@@ -8,8 +8,7 @@ import os
 import stat
 from pathlib import Path
 
-from tolcontact.system.files import is_link
-from tolcontact.system.kind import IS_POSIX
+from tolcontact.system.files import IS_POSIX, is_link
 
 try:
     import grp

@@ -13,8 +13,7 @@
         assert_same_run(results, "expected.nc")
 """
 
-import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 
@@ -22,7 +21,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive import model_of, open_archive
+from tolcontact.archive import model_of, opened
 from tolcontact.discretization import ContactPoints
 from tolcontact.errors import OptionError
 from tolcontact.geometry.meeting import Meeting
@@ -45,7 +44,7 @@ def assert_resolved(results: Results) -> None:
 
     Raises AssertionError with the number of all other realizations, by status, and the first of each status.
     """
-    with _opened(results) as tree:
+    with opened(results) as tree:
         status, numbers = _rows(tree)[terms.STATUS.name].values, _numbers(tree)
     unresolved = ~np.isin(status, terms.CERTIFIED)
     if unresolved.any():
@@ -59,7 +58,7 @@ def assert_no_clashes(results: Results) -> None:
     `tc.testing.assert_no_clashes(results)`
     Raises AssertionError with the number of realizations with clashes, or without a test, and the first of them.
     """
-    with _opened(results) as tree:
+    with opened(results) as tree:
         rows, numbers = _rows(tree), _numbers(tree)
         clashes, names = rows[terms.CLASHES.name].values, [str(name) for name in tree.to_dataset()[terms.PART].values]
         parts = [rows[variable.name].values for variable in (terms.CLASH_PART, terms.CLASH_OTHER)]
@@ -92,7 +91,7 @@ def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) ->
     Raises AssertionError with the largest difference and its location; also if the archive does not contain the poses (or, for
     unilateral locators, the deviations).
     """
-    with _opened(results) as tree:
+    with opened(results) as tree:
         rows, numbers = _rows(tree), _numbers(tree)
         archived, comparable = rows[terms.GAP_MIN.name], _comparable(rows)
         largest, place, meetings = 0.0, "", _meetings(tree)
@@ -124,7 +123,7 @@ def assert_datums_recompute(results: Results) -> None:
     A linear programme finds the plane with the least distance from the archived heights of each face, from the archive alone.
     Raises AssertionError with the first realization that has another plane, and if the archive has no deviations.
     """
-    with _opened(results) as tree:
+    with opened(results) as tree:
         rows, planes = _rows(tree), tangents(tree)
         if planes and terms.DEVIATION.name not in rows:
             raise AssertionError(f'datums cannot be computed again without "{terms.DEVIATION.name}", which was not kept')
@@ -148,7 +147,7 @@ def assert_same_run(a: Results, b: Results, *, variables: Sequence[str] | None =
     names = [variable.name for variable in terms.BY_REALIZATION]
     if unknown := [name for name in variables or () if name not in names]:
         raise OptionError(f"no realization has {', '.join(map(repr, unknown))}; expected some of: {', '.join(names)}")
-    with _opened(a) as expected, _opened(b) as actual:
+    with opened(a) as expected, opened(b) as actual:
         for dim in (terms.PART, terms.PAIR, terms.MEASURE):
             labels = [[str(label) for label in tree.coords[dim].values] for tree in (expected, actual)]
             if labels[0] != labels[1]:
@@ -163,20 +162,6 @@ def assert_same_run(a: Results, b: Results, *, variables: Sequence[str] | None =
     if differences:
         count = "1 variable" if len(differences) == 1 else f"{len(differences)} variables"
         raise AssertionError(f"the runs differ in {count}; first in {differences[0]}")
-
-
-@contextlib.contextmanager
-def _opened(results: Results) -> Iterator[xr.DataTree]:
-    """Open results as a tree; close them afterwards if they are given as a file name."""
-    if isinstance(results, str | Path):
-        with open_archive(results) as tree:
-            yield tree
-    elif isinstance(results, xr.DataTree):
-        yield results
-    else:
-        raise OptionError(
-            f"results are a {type(results).__name__}; expected what tc.run or tc.open_archive returns, or an archive's path"
-        )
 
 
 def _rows(tree: xr.DataTree) -> Rows:

@@ -21,7 +21,7 @@ CONTRIBUTOR, FEATURE_FACE, FREEDOM = "contributor", "feature_face", "freedom"
 NUMBER, CHECKED, BY_OBJECTIVE = "number", "checked", "by_objective"
 BLOCK_ROWS = 4096  # realizations of a block at most: they are simulated together
 PIECE_ROWS = 24 * BLOCK_ROWS  # realizations that are read at once
-SOLVER, RUN, DESIGN, STATUS_MEANING, EXTENT = "solver", "run", "design", "status_meaning", "extent"
+SOLVER, RUN, STATUS_MEANING, EXTENT = "solver", "run", "status_meaning", "extent"
 BOUNDS = ("lower", "upper")
 Plan = Literal["monte-carlo", "latin hypercube", "sobol"]  # sampling plans
 MONTE_CARLO, LATIN_HYPERCUBE, SOBOL = PLANS = get_args(Plan)

@@ -1,14 +1,12 @@
 """Summaries of results, and their accessor `results.tolcontact`, of `tc.run`, `tc.open_archive` or xarray itself."""
 
-from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from tolcontact import plot, report, vocabulary as terms
-from tolcontact.archive import check_rows, open_archive
+from tolcontact import report, vocabulary as terms
+from tolcontact.archive import check_rows, opened
 from tolcontact.errors import OptionError
 from tolcontact.realizations import finished
 from tolcontact.statistics import Summary, summarize as summary_of, touching
@@ -20,28 +18,9 @@ def summarize(results: xr.DataTree | str | Path) -> Summary:
     `tc.summarize("run.nc").statistic_value.sel(measure="gap", state="corrected", statistic="6 sigma")`
     Raises ArchiveError if realizations differ from what was written, or if fewer than two are finished.
     """
-    if isinstance(results, str | Path):
-        with open_archive(results) as tree:
-            return summarize(tree)
-    if not isinstance(results, xr.DataTree):
-        raise OptionError(
-            f"results are a {type(results).__name__}; expected what tc.run or tc.open_archive returns, or an archive's path"
-        )
-    check_rows(results)
-    return summary_of(results)
-
-
-class Plots:
-    """The functions of `tc.plot` for these results (see tolcontact.plot): histogram, field, assembly."""
-
-    def __init__(self, results: xr.DataTree) -> None:
-        self._results = results
-
-    def __getattr__(self, name: str) -> Any:
-        return partial(getattr(plot, name), self._results)
-
-    def __dir__(self) -> list[str]:
-        return list(plot.__all__)
+    with opened(results) as tree:
+        check_rows(tree)
+        return summary_of(tree)
 
 
 class Results:
@@ -49,11 +28,6 @@ class Results:
 
     def __init__(self, results: xr.DataTree) -> None:
         self._results = results
-
-    @cached_property
-    def plot(self) -> Plots:
-        """The pictures of these results."""
-        return Plots(self._results)
 
     def summary(self) -> Summary:
         """Return the statistics with their intervals (see tc.summarize)."""
@@ -97,7 +71,7 @@ class Results:
         return touching(self._results)
 
     def __repr__(self) -> str:
-        verbs = "summary(), field(part), realization(number), where_status(status), touching(), plot.histogram(measure)"
+        verbs = "summary(), field(part), realization(number), where_status(status), touching()"
         return f"{self._results.attrs.get('title', 'results')}: {verbs}"
 
     def _repr_html_(self) -> str:

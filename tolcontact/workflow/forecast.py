@@ -47,20 +47,15 @@ def check_affordable(program: Program, *, samples: int, seed: int, threads: int,
 
     By default the numbers are deviations, and measures in both states.
     """
-    check_memory(samples, kept or len(program.nominal.contributors) + 2 * len(program.nominal.measures))
-    if samples >= MIN_ANNOUNCED_ROWS:
-        _checked_seconds(program, samples, seed, threads)
-
-
-def check_memory(samples: int, kept: int) -> None:
-    """Raise OptionError if the machine has too little memory for `kept` numbers in each of `samples` realizations."""
-    needed = np.dtype(float).itemsize * samples * kept
-    memory = machine_memory()
+    numbers = kept or len(program.nominal.contributors) + 2 * len(program.nominal.measures)
+    needed, memory = np.dtype(float).itemsize * samples * numbers, machine_memory()
     if needed > memory:
         raise OptionError(
             f"{samples} realizations need {size_in_words(needed)} of memory, and this machine has {size_in_words(memory)}; "
             "ask for fewer samples"
         )
+    if samples >= MIN_ANNOUNCED_ROWS:
+        _checked_seconds(program, samples, seed, threads)
 
 
 def _checked_seconds(program: Program, samples: int, seed: int, threads: int) -> float:

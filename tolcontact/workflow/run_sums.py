@@ -33,20 +33,6 @@ def counted_realizations(nominal: Nominal) -> int:
     return min(MAX_REALIZATIONS, -(-MAX_GAPS // max(points, 1)))
 
 
-def gaps_need_deviations(nominal: Nominal) -> bool:
-    """Return whether gaps depend on deviations as well as on poses, as with supports and deviating faces."""
-    return any(pair.is_supports or any(face is not None for face in pair.deviating) for pair in nominal.pairs)
-
-
-def count_in_block(program: Program, block: Block, end: int) -> TouchingCounts:
-    """Return the counts over the realizations of a block before the realization `end`.
-
-    Realizations with reprojected contact points are left out, since their points differ from the points of the model.
-    """
-    rows = np.flatnonzero(block.searched[: max(end - block.start, 0)] == 0)
-    return count_touching(program, block.poses[rows, CORRECTED], block.deviations[rows])
-
-
 def count_touching(
     program: Program, poses: Float[Array, "n part 12"], deviations: Float[Array, "n contributor"]
 ) -> TouchingCounts:
@@ -95,7 +81,9 @@ class _BlockReduction(ProgramFunction):
     counted: int
 
     def __call__(self, program: Program, block: Block) -> ReducedBlock:
-        counts = count_in_block(program, block, self.counted)
+        # Reprojected contact points differ from the points of the model.
+        rows = np.flatnonzero(block.searched[: max(self.counted - block.start, 0)] == 0)
+        counts = count_touching(program, block.poses[rows, CORRECTED], block.deviations[rows])
         return row_values(block, self.kept, program.nominal), (self.fields.sums(block.poses, block.start, block.status), counts)
 
 
@@ -121,7 +109,9 @@ class RunSums:
         """Start from the last checkpoint of an archive, if it has one."""
         kept = {row.variable for row in writer.kept}
         # Touching points are counted only if a reader of the archive could recompute the gaps.
-        is_known = terms.ROTATION in kept and (terms.DEVIATION in kept or not gaps_need_deviations(self._program.nominal))
+        pairs = self._program.nominal.pairs
+        need_deviations = any(pair.is_supports or any(face is not None for face in pair.deviating) for pair in pairs)
+        is_known = terms.ROTATION in kept and (terms.DEVIATION in kept or not need_deviations)
         counted = counted_realizations(self._program.nominal) if is_known else 0
         self.of_blocks = _BlockReduction(tuple(row.label for row in writer.kept), self._fields, counted)
         self._fields.resume_from(writer.sums)

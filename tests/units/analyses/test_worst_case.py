@@ -186,6 +186,13 @@ def test_a_zone_grows_with_the_size_that_it_is_left():
     assert far[size] == pytest.approx(-0.2) and far[shifts] @ (0.6, 0.8) == pytest.approx(0.1 / 2, abs=1e-8)
 
 
+def is_inside(region, points):
+    """Whether points lie in the region: between its bounds, and on no tangent's wrong side."""
+    slack = 1e-9 * (region.upper - region.lower)
+    within = ((points >= region.lower - slack) & (points <= region.upper + slack)).all(axis=1)
+    return within & np.array([not len(region.planes(point)[0]) for point in points])
+
+
 @pytest.mark.parametrize("weight", [1.0, -1.0])
 def test_a_zone_grows_with_the_size_that_a_cause_drives(weight):
     zone = tc.Position(0.1, "A|B", material="M", rule="translation")
@@ -197,7 +204,7 @@ def test_a_zone_grows_with_the_size_that_a_cause_drives(weight):
     far = found.exactly_farthest(direction)
     assert direction @ far == pytest.approx((0.1 + 0.4 + 0.05) / 2, abs=1e-6)
     assert far[labels.index("wear")] == pytest.approx(0.05 * weight, abs=1e-6)
-    assert found.is_inside(found.farthest(np.random.default_rng(0).standard_normal((50, len(labels))))).all()
+    assert is_inside(found, found.farthest(np.random.default_rng(0).standard_normal((50, len(labels))))).all()
 
 
 def test_the_shift_of_a_datum_is_bounded_with_what_causes_add_to_its_tilt():
@@ -216,12 +223,12 @@ def test_steps_end_where_the_region_ends(name):
     found, labels = region(cases.model(name))
     rng = np.random.default_rng(2)
     inside = found.scattered(rng, 400)
-    assert found.is_inside(inside).all()
+    assert is_inside(found, inside).all()
     steps = rng.standard_normal(inside.shape) * (found.upper - found.lower)
     reach = found.reach(inside, steps)[:, None]
-    assert found.is_inside(inside + reach * steps).all()
+    assert is_inside(found, inside + reach * steps).all()
     stopped = reach[:, 0] < 0.99
-    assert not found.is_inside(inside + (reach + 0.01) * steps)[stopped].any() and stopped.mean() > 0.9
+    assert not is_inside(found, inside + (reach + 0.01) * steps)[stopped].any() and stopped.mean() > 0.9
     planes, ends = found.planes()
     assert (inside @ planes.T <= ends + 1e-9).all()
     goal = rng.standard_normal(len(labels))

@@ -43,11 +43,11 @@ def _estimates(x, limits):
 def test_an_interval_contains_its_estimate_and_is_never_0_wide(name, n):
     values = QUANTILES[name](np.random.default_rng(n).random(n))
     for limits in (Limits(0.0, 3.0, 1e-8), Limits(-np.inf, 1.0, 1e-8)):
-        for statistic, (value, lower, upper) in _estimates(Sample(lambda: [values], accuracy=1e-8), limits):
+        for statistic, (value, lower, upper) in _estimates(Sample(lambda: values, accuracy=1e-8), limits):
             is_given = np.isfinite(value) and not np.isnan(lower)
             is_wide = lower < upper or (name == "discrete" and statistic in ("Pp", "Ppk"))  # percentiles are certain there
             assert not is_given or (lower <= value <= upper and is_wide), (statistic, value, lower, upper)
-        outside = capability.share_outside(Sample(lambda: [values]), limits)
+        outside = capability.share_outside(Sample(lambda: values), limits)
         assert (outside.upper > 0) and (outside.value == limits.outside(values).mean())
 
 

@@ -134,7 +134,7 @@ def test_skewness_and_kurtosis_are_those_of_the_distribution(distribution, skew,
 
 
 def test_what_is_just_on_a_limit_is_inside():
-    x = Sample(lambda: [np.array([-1.0, 0.0, 1.0, 1.0])])
+    x = Sample.of(np.array([-1.0, 0.0, 1.0, 1.0]))
     for limit, below, above in ((-1.0, 0, 0.75), (0.0, 0.25, 0.5), (1.0, 0.5, 0), (-1 + 1e-9, 0, 0.75), (1 - 1e-9, 0.5, 0)):
         limits = Limits(limit, limit, accuracy=1e-8)
         assert capability.share_below(x, limits).value == below and capability.share_above(x, limits).value == above

@@ -55,7 +55,7 @@ def test_intervals_of_paired_shares_cover():
 def planned(name, seed, shift=0.0, replicates=20):
     """A run by a sampling plan: max(0, x) of standard normal x that is the sum of three, and a shift."""
     values = clipped(name, seed, replicates * REPLICATE) + shift
-    return Sample(lambda: [values[:3000], values[3000:]], 1 if name == MONTE_CARLO else REPLICATE)
+    return Sample(lambda: values, 1 if name == MONTE_CARLO else REPLICATE)
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def test_intervals_of_changes_between_planned_runs_cover(plan, reference_plan, p
         }
         for name, (_, lower, upper) in found.items():
             hits[name] += lower <= truths[name] <= upper
-        independent = two_samples.shift(*(Sample.of(np.concatenate(list(x.pieces()))) for x in (after, before)), paired=False)
+        independent = two_samples.shift(*(Sample.of(x.values) for x in (after, before)), paired=False)
         narrowest.append(np.ptp(found["shift"]) / np.ptp(independent))
     assert all(276 <= count <= 296 for count in hits.values()), hits
     assert np.median(narrowest) < (0.9 if plan == MONTE_CARLO else 0.6)

@@ -35,7 +35,7 @@ def test_intervals_with_an_incomplete_replicate_cover(name, rest):
     for seed in range(300):
         # Of a single contributor complete replicates tell nearly all.
         values = np.maximum(0.0, ndtri(Plan(name, LABELS).numbers(seed, 0, 16 * REPLICATE + rest)(LABELS[0])))
-        x = Sample(lambda values=values: [values[:3000], values[3000:]], REPLICATE)
+        x = Sample(lambda values=values: values, REPLICATE)
         share = intervals.proportion(x.map(lambda piece: piece > 1))
         for word, own in zip(truths, (intervals.mean(x), share, intervals.standard_deviation(x, times=6)), strict=True):
             errors[word].append((own.value - truths[word]) / (own.upper - own.lower) * 2 * intervals.student(15))
@@ -52,7 +52,7 @@ def test_intervals_of_replicates_cover(name):
     truths = {"mean": MEAN, "6 sigma": 6 * SIGMA, "share": stats.norm.sf(1), "95 %": stats.norm.ppf(0.95), "skewness": SKEW}
     for seed in range(repeats):
         values = clipped(name, seed, 20 * REPLICATE)
-        x = Sample(lambda values=values: [values[:3000], values[3000:]], REPLICATE)
+        x = Sample(lambda values=values: values, REPLICATE)
         found = {
             "mean": intervals.mean(x),
             "6 sigma": intervals.standard_deviation(x, times=6),
@@ -71,16 +71,16 @@ def test_intervals_of_replicates_cover(name):
 
 def test_few_replicates_have_the_intervals_of_independent_realizations():
     x = clipped(SOBOL, 1, 15 * REPLICATE)
-    assert intervals.mean(Sample(lambda: [x], REPLICATE)) == intervals.mean(x)
-    assert intervals.mean(Sample(lambda: [x], 1)) == intervals.mean(x)
-    nothing = Sample(lambda: [np.zeros(20 * REPLICATE, dtype=bool)], REPLICATE)
+    assert intervals.mean(Sample(lambda: x, REPLICATE)) == intervals.mean(x)
+    assert intervals.mean(Sample(lambda: x, 1)) == intervals.mean(x)
+    nothing = Sample(lambda: np.zeros(20 * REPLICATE, dtype=bool), REPLICATE)
     assert intervals.proportion(nothing) == intervals.proportion_of(0, 20 * REPLICATE)
 
 
 def test_replicates_that_hit_alike_have_the_interval_of_independent_realizations():
     """Their spread is nothing, which is no reason to be sure: 4096 coins that come up in turns."""
     coins = np.tile([True, False], 2048)
-    hits = Sample(lambda: [coins], replicate=256)
+    hits = Sample(lambda: coins, replicate=256)
     assert hits.map(lambda piece: piece.astype(float)).widening == 0
     own = intervals.proportion(hits)
     expected = stats.binomtest(2048, 4096).proportion_ci(0.95, method="exact")

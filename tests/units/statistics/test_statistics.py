@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 from tests import cases
 from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.discretization import discretize
-from tolcontact.errors import TolcontactError
 from tolcontact.statistics import DisplacementFields, intervals, two_samples
 from tolcontact.statistics.sample import Sample
 
@@ -45,33 +44,21 @@ def test_intervals_cover_the_truth_in_95_of_100(name):
 
 
 @pytest.mark.parametrize("ties", [False, True])
-def test_a_sample_that_is_read_in_pieces_gives_the_same_as_one_that_is_sorted(ties):
+def test_order_statistics_and_moments_are_those_of_the_values(ties):
     rng = np.random.default_rng(4)
     x, y = rng.standard_t(2, size=(2, 5003)) * np.exp(rng.normal(size=(2, 5003)) * 5)
     if ties:
         x = np.where(rng.random(5003) < 0.6, rng.choice([0.0, -1.0, 1e-300, 7.5], 5003), x)
-    pieces = [Sample(lambda values=values: iter(np.array_split(values, 7)), max_sorted=100) for values in (x, y)]
+    samples = [Sample.of(values) for values in (x, y)]
     ranks = [0, 1, 17, 2500, 2501, 5001, 5002]
-    assert (pieces[0].ordered(ranks) == np.sort(x)[ranks]).all()
+    assert (samples[0].ordered(ranks) == np.sort(x)[ranks]).all()
     for percent in (0.135, 5, 50, 99.865):
-        estimate, *bounds = intervals.percentiles(pieces[0], [percent])[0]
+        estimate, *bounds = intervals.percentiles(samples[0], [percent])[0]
         assert estimate == pytest.approx(np.percentile(x, percent), rel=1e-12)
         assert set(bounds) <= {-np.inf, np.inf, *x}
-    assert intervals.variance_ratio(*pieces) == pytest.approx(intervals.variance_ratio(x, y), rel=1e-12)
-    assert intervals.mean(pieces[0] - pieces[1]) == pytest.approx(intervals.mean(x - y), rel=1e-12)
-    assert np.isnan(Sample(lambda: iter([x, np.array([np.nan])]), max_sorted=100).ordered(ranks)).all()
-
-
-def test_a_full_disk_is_an_error_that_names_the_folder():
-    large = Sample(lambda: iter([np.zeros(10_000)]), max_sorted=100)
-    resource = pytest.importorskip("resource", reason="limits of POSIX")
-    limit = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limit[1]))
-    try:
-        with pytest.raises(TolcontactError, match=r"10000 values cannot be sorted: .*; folder .* needs room for 0.08 MB"):
-            large.ordered([0])
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
+    assert intervals.variance_ratio(*samples) == pytest.approx(intervals.variance_ratio(x, y), rel=1e-12)
+    assert intervals.mean(samples[0] - samples[1]) == pytest.approx(intervals.mean(x - y), rel=1e-12)
+    assert np.isnan(Sample.of(np.append(x, np.nan)).ordered(ranks)).all()
 
 
 def test_a_percentile_beyond_the_sample_has_no_bound():
@@ -83,7 +70,7 @@ def test_equal_values_are_certain_only_if_the_measure_does_not_vary_without_cont
     for value in (3.0, 17.3, 0.1):
         x = np.full(1000, value)
         for cause, spread in ((x, 0.0), (np.arange(1000.0), np.nan), (None, np.nan)):
-            sample = Sample(lambda x=x: [x], cause=None if cause is None else Sample.of(cause))
+            sample = Sample(lambda x=x: x, cause=None if cause is None else Sample.of(cause))
             assert intervals.mean(sample) == pytest.approx((value, value + spread, value + spread), nan_ok=True)
             assert intervals.variance(sample) == pytest.approx((0, spread, spread), nan_ok=True)
         assert np.isnan(intervals.variance_ratio(x, np.arange(1000.0))).all()
@@ -112,7 +99,7 @@ def test_no_interval_has_zero_length_and_solvers_agree_on_the_values_at_a_stop(n
             rng = np.random.default_rng([seed, size])
             x, y = DISTRIBUTIONS[name](rng.random((2, size)))
             scatter = rng.normal(0, 1e-13, size)
-            exact, scattered = ([Sample(lambda v=v: [v], accuracy=1e-8) for v in (x + e, y + e)] for e in (0.0, scatter))
+            exact, scattered = ([Sample(lambda v=v: v, accuracy=1e-8) for v in (x + e, y + e)] for e in (0.0, scatter))
             for statistic, estimate in MOMENTS.items():
                 found, other = estimate(*exact), estimate(*scattered)
                 assert found.lower != found.upper, (statistic, size, seed)

@@ -1,15 +1,15 @@
 """The data of a page's charts: histograms of each measure in both states, and the convergence of estimates."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.realizations import pieces
+from tolcontact.realizations import column
 from tolcontact.report.contributor_shares import ContributorShares
-from tolcontact.report.html.scene import packed
+from tolcontact.report.html.scene import Packed, packed
 from tolcontact.statistics import intervals
 
 BINS = 60
@@ -24,18 +24,15 @@ def charts_of(results: xr.DataTree, summary: xr.Dataset) -> list[dict[str, Any]]
     rows = results.to_dataset()[[terms.MEASURED.name]].isel({terms.REALIZATION: slice(summary.attrs["realizations"])})
     charts = []
     for number, name in enumerate(summary["measure"].values):
-        measure = summary.sel(measure=name)
-        states = [_convergence(rows, number, state) for state in range(len(terms.STATES))]
-        edges = _edges([_range(rows, number, state) for state in range(len(terms.STATES))])
-        for state, chart in enumerate(states):
-            chart["counts"] = _counts(rows, number, state, edges)
+        measure, values = summary.sel(measure=name), _values(rows, number)
+        edges = _edges(values)
         charts.append(
             {
                 "name": str(name),
                 "units": str(measure["measure_units"].values),
                 "limits": [_finite(measure["measure_lower"]), _finite(measure["measure_upper"])],
                 "edges": edges.tolist(),
-                "states": states,
+                "states": [{"settling": _convergence(x), "counts": _counts(x, edges).tolist()} for x in values],
                 **{key: [_finite(value) for value in _estimates(measure, figure)] for key, figure in FIGURES.items()},
             }
         )
@@ -58,25 +55,18 @@ def compared_charts(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> 
         for (name, run), count in zip(runs.items(), comparison["realizations"].values, strict=True)
     }
     for name in comparison["measure"].values:
-        positions = {run: table[terms.MEASURE].values.tolist().index(name) for run, table in rows.items()}
-        states = range(len(terms.STATES))
-        edges = _edges([_range(table, positions[run], state) for run, table in rows.items() for state in states])
-        shares = [
-            {
-                "name": run,
-                "shares": [
-                    [100 * k / table.sizes[terms.REALIZATION] for k in _counts(table, positions[run], s, edges)] for s in states
-                ],
-            }
-            for run, table in rows.items()
-        ]
+        values = {run: _values(table, table[terms.MEASURE].values.tolist().index(name)) for run, table in rows.items()}
+        edges = _edges([x for states in values.values() for x in states])
         charts.append(
             {
                 "name": str(name),
                 "units": str(comparison["measure_units"].sel(measure=name).values),
                 "limits": [_finite(comparison[f"measure_{side}"].sel(measure=name)[0]) for side in terms.BOUNDS],
                 "edges": edges.tolist(),
-                "runs": shares,
+                "runs": [
+                    {"name": run, "shares": [(100 * _counts(x, edges) / len(x)).tolist() for x in states]}
+                    for run, states in values.items()
+                ],
             }
         )
     return charts
@@ -104,43 +94,30 @@ def _estimates(measure: xr.Dataset, statistic: str) -> xr.DataArray:
     return measure["statistic_value"].sel(statistic=statistic, interval="estimate")
 
 
-def _convergence(rows: xr.Dataset, measure: int, state: int) -> dict[str, Any]:
-    """Return the mean of a measure by number of realizations, with the half width of its 95 % interval."""
-    total = rows.sizes[terms.REALIZATION]
-    steps = np.unique(np.geomspace(2, total, CONVERGENCE_STEPS).round().astype(int))
-    count, centre, sums, estimates = 0, None, np.zeros(2), []
-    for piece in pieces(rows):
-        x = piece[terms.MEASURED.name].values[:, state, measure]
-        centre = float(x[0]) if centre is None else centre
-        cumulated = np.cumsum([x - centre, (x - centre) ** 2], axis=1)
-        for n in steps[(steps > count) & (steps <= count + len(x))]:
-            mean, mean_square = (sums + cumulated[:, n - count - 1]) / n
-            s = float(np.sqrt(max(mean_square - mean**2, 0) * n / (n - 1)))
-            estimates.append([int(n), centre + mean, intervals.student(n - 1) * s / np.sqrt(n)])
-        sums, count = sums + cumulated[:, -1], count + len(x)
-    return {"settling": packed(np.array(estimates).reshape(-1, 3))}
+def _values(rows: xr.Dataset, measure: int) -> list[np.ndarray]:
+    """Return the values (realization,) of a measure in each state."""
+    return [column(rows, terms.MEASURED, state=state, measure=measure) for state in range(len(terms.STATES))]
 
 
-def _range(rows: xr.Dataset, measure: int, state: int) -> tuple[float, float]:
-    """Return the smallest and the largest value of a measure."""
-    values = [piece[terms.MEASURED.name].values[:, state, measure] for piece in pieces(rows)]
-    return min(float(x.min()) for x in values), max(float(x.max()) for x in values)
+def _convergence(x: np.ndarray) -> Packed:
+    """Return the mean of values (realization,) by number of realizations, with the half width of its 95 % interval."""
+    n = np.unique(np.geomspace(2, len(x), CONVERGENCE_STEPS).round().astype(int))
+    mean, mean_square = np.cumsum([x - x[0], (x - x[0]) ** 2], axis=1)[:, n - 1] / n
+    s = np.sqrt(np.maximum(mean_square - mean**2, 0) * n / (n - 1))
+    return packed(np.column_stack([n, x[0] + mean, [intervals.student(count - 1) for count in n] * s / np.sqrt(n)]))
 
 
-def _edges(ranges: list[tuple[float, float]]) -> np.ndarray:
-    low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
+def _edges(values: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the edges of common bins of several samples (realization,); none if a value is not finite."""
+    low, high = min(float(x.min()) for x in values), max(float(x.max()) for x in values)
     if not (np.isfinite(low) and np.isfinite(high)):
         return np.array([])
     return np.linspace(low, high, BINS + 1) if high > low else np.array([low - 0.5, high + 0.5])
 
 
-def _counts(rows: xr.Dataset, measure: int, state: int, edges: np.ndarray) -> list[int]:
-    if not edges.size:
-        return []
-    counts = np.zeros(len(edges) - 1, dtype=int)
-    for piece in pieces(rows):
-        counts += np.histogram(piece[terms.MEASURED.name].values[:, state, measure], edges)[0]
-    return counts.tolist()
+def _counts(x: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Return the number of values (realization,) in each bin."""
+    return np.histogram(x, edges)[0] if edges.size else edges
 
 
 def _finite(value: xr.DataArray) -> float | None:

@@ -42,7 +42,7 @@ class SingleStates:
         self._contact = {str(name): np.asarray(array.values) for name, array in results["contact"].to_dataset().items()}
         self._results, self._rows = results, rows
 
-    def _read(self, dataset: xr.Dataset, variable: terms.ArchiveVariable) -> np.ndarray:
+    def read(self, dataset: xr.Dataset, variable: terms.ArchiveVariable) -> np.ndarray:
         """Return the rows of a variable; they are read in ascending order."""
         rows, places = np.unique(self._rows, return_inverse=True)
         return np.asarray(dataset[variable.name].isel({terms.REALIZATION: rows}).values)[places]
@@ -50,13 +50,13 @@ class SingleStates:
     @cached_property
     def _deviations(self) -> np.ndarray:
         """The deviations (realization, contributor)."""
-        return self._read(self._results["sample"].to_dataset(), terms.DEVIATION)
+        return self.read(self._results["sample"].to_dataset(), terms.DEVIATION)
 
     @cached_property
     def _poses(self) -> tuple[np.ndarray, np.ndarray]:
         """The rotations (realization, state, part, 3, 3) and translations (realization, state, part, 3) [mm]."""
         dataset = self._results.to_dataset()
-        return self._read(dataset, terms.ROTATION), self._read(dataset, terms.TRANSLATION)
+        return self.read(dataset, terms.ROTATION), self.read(dataset, terms.TRANSLATION)
 
     @property
     def are_known(self) -> bool:

@@ -76,8 +76,8 @@ def scene_of(results: xr.DataTree, summary: xr.Dataset) -> Scene:
     scene = {
         "parts": _parts(results, states),
         **packed_marks(marks_of(results)),
-        "realizations": _realizations(results, singles),
-        "stations": _stations(results, singles),
+        "realizations": _realizations(results, singles, states),
+        "stations": _stations(results, states),
     }
     _add_contact(scene["contacts"], results, summary)
     _add_gaps(scene["contacts"], states, len(singles))
@@ -138,16 +138,14 @@ def _part(name: str, field: xr.Dataset, count: int, states: SingleStates) -> Sce
     return entries
 
 
-def _realizations(results: xr.DataTree, singles: dict[int, str]) -> Scene:
+def _realizations(results: xr.DataTree, singles: dict[int, str], states: SingleStates) -> Scene:
     """Return archived worst cases, then single realizations; motions (realization, state, part, 12) are R - I and t."""
-    ascending, places = np.unique(np.array(list(singles), dtype=int), return_inverse=True)
-    rows = results.to_dataset().isel({terms.REALIZATION: ascending})
-    worst = archived_analysis(results, terms.WORST_CASE)
+    rows, worst = results.to_dataset(), archived_analysis(results, terms.WORST_CASE)
     cases = [] if worst is None else [str(case).split(" ", 1) for case in worst[terms.CASE].values]
     names = [f"worst-case {terms.WORD_OF_END[end]}: {measure}" for end, measure in cases]
 
     def values_of(variable: terms.ArchiveVariable) -> np.ndarray:
-        values = rows[variable.name].values[places]
+        values = states.read(rows, variable)
         return values if worst is None else np.concatenate([worst[variable.name].values, values])
 
     entries: Scene = {
@@ -163,15 +161,13 @@ def _realizations(results: xr.DataTree, singles: dict[int, str]) -> Scene:
     return entries
 
 
-def _stations(results: xr.DataTree, singles: dict[int, str]) -> list[Scene]:
+def _stations(results: xr.DataTree, states: SingleStates) -> list[Scene]:
     """Return the scenes of stations, with the motions of archived worst cases, then of single realizations."""
-    worst = archived_analysis(results, terms.WORST_CASE)
-    rows, places = np.unique(np.array(list(singles), dtype=int), return_inverse=True)
-    stations = stations_of(results)
+    worst, stations = archived_analysis(results, terms.WORST_CASE), stations_of(results)
     for station in stations:
-        if (poses := station_poses(results, station["name"], rows)) is not None:
+        if (poses := station_poses(results, station["name"], states)) is not None:
             cases = worst_poses(results, station["name"], worst)
-            R, t = (np.concatenate([of_cases, of_rows[places]]) for of_cases, of_rows in zip(cases, poses, strict=True))
+            R, t = (np.concatenate(pair) for pair in zip(cases, poses, strict=True))
             station["motions"] = _motions(R - np.eye(3), t)
     return stations
 

@@ -8,6 +8,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.discretization import Nominal
+from tolcontact.report.html.form_scene import SingleStates
 
 Scene = dict[str, Any]
 
@@ -49,7 +50,7 @@ def stations_of_nominal(nominal: Nominal | None) -> list[Scene]:
     ]
 
 
-def station_poses(results: xr.DataTree, station: str, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def station_poses(results: xr.DataTree, station: str, states: SingleStates) -> tuple[np.ndarray, np.ndarray] | None:
     """Return R (row, state, part, 3, 3) and t (row, state, part, 3) [mm] of all parts in a station; None if not archived.
 
     Parts that the station does not hold are in their nominal pose.
@@ -57,7 +58,7 @@ def station_poses(results: xr.DataTree, station: str, rows: np.ndarray) -> tuple
     group = results[terms.station_group(station)].to_dataset()
     if terms.STATION_ROTATION.name not in group:
         return None
-    t_held, R_held = (group[variable.name].isel({terms.REALIZATION: rows}).values for variable in terms.STATION_POSES)
+    t_held, R_held = (states.read(group, variable) for variable in terms.STATION_POSES)
     return _of_all_parts(results, station, R_held, t_held)
 
 
