@@ -17,6 +17,21 @@ def test_what_an_error_of_gaps_does_to_measures_is_stated():
     assert 1e-8 <= accuracy["clearance"] <= 5e-8 and accuracy["turn"] == pytest.approx(1e-8)
 
 
+def test_the_accuracy_of_a_measure_depends_on_how_far_apart_the_contact_of_its_part_is():
+    """The upper block stands on a foot of 10: at a lever of 200, an error of a gap counts 2 / (10 sqrt 2) times 200 times."""
+    model = tc.Assembly("mast")
+    table = model.part("table", tc.Box(300, 300, 10), fixed=True)
+    plate = model.part("plate", tc.Box(200, 200, 10), at=(50, 50, 10))
+    mast = model.part("mast", tc.Box(10, 10, 200), at=(145, 145, 20))
+    for part, base in ((plate, table), (mast, plate)):
+        model.locate(part, tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x"), inset=2), tolerance=0.1)
+        model.contact(part.name, moving=part.face("-z"), reference=base.face("+z"))
+    model.measure("top", mast.point(0, 0, 200), along="x")
+    model.measure("edge", plate.point(200, 200, 10), along="z")
+    accuracy = tc.build(model).accuracies / 1e-8  # of gaps
+    assert accuracy == pytest.approx([1 + 2 * 200 / (10 * 2**0.5), 1 + 2 * 100 / 200], rel=0.1), accuracy
+
+
 def test_measures_at_a_kink_have_no_linear_model():
     """A minimum of equal gaps and an angle from 0 have none; a gap and a signed angle have."""
     program = tc.build(seated(), solver="daqp")
