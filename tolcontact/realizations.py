@@ -12,8 +12,8 @@ EXISTS = "exists"  # a coordinate of realizations, of which some are left out
 
 
 def pieces(rows: xr.Dataset) -> Iterator[xr.Dataset]:
-    """Yield the realizations in pieces that fit into memory, without those left out by `assembled`."""
-    for start in range(0, rows.sizes[terms.REALIZATION], terms.PIECE_ROWS):
+    """Yield the realizations in pieces that fit into memory, at least one, without those left out by `assembled`."""
+    for start in range(0, max(rows.sizes[terms.REALIZATION], 1), terms.PIECE_ROWS):
         piece = rows.isel({terms.REALIZATION: slice(start, start + terms.PIECE_ROWS)})
         # A file gives a whole piece thousands of times as fast as most of its rows.
         yield piece.load().isel({terms.REALIZATION: piece[EXISTS].values}) if EXISTS in piece.coords else piece
