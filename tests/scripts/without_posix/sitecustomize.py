@@ -4,13 +4,14 @@ Libraries keep what their parts for Linux need: `fcntl`, `os.uname`, `os.getuid`
 replaced nor removed under its name, as on Windows; only files of this process count.
 """
 
+import asyncio  # noqa: F401  (its parts for Linux, and those of psutil, need what is taken away below)
 import builtins
 import os
 import signal
 import sys
 from pathlib import Path
 
-import psutil  # noqa: F401  (its parts for Linux need what is taken away below)
+import psutil  # noqa: F401
 
 FLAGS = "O_NOFOLLOW O_CLOEXEC O_DIRECTORY O_NOCTTY O_SYNC"
 USERS = "geteuid getegid getgid getgroups getpgid getpgrp setpgid setsid setuid setgid chown lchown fchown fchmod"
