@@ -171,6 +171,13 @@ def test_the_command_prints_tables_json_and_csv(tmp_path):
     assert call(tmp_path, *options, "--cost", "b.A3").returncode == 2
 
 
+@pytest.mark.parametrize(("requirement", "needed"), [("top: ppm 1000", 10_000), ("top: Ppk 1.33", 7408)])
+def test_a_requirement_needs_ten_realizations_in_the_tail_that_it_is_about(requirement, needed):
+    """A Ppk is about the percentiles at 0.135 %."""
+    with pytest.raises(tc.OptionError, match=f"1024 realizations are too few .*; expected samples={needed} or more"):
+        tc.analyses.allocate(pile(0.6), [requirement], samples=1024, solver="daqp")
+
+
 @pytest.mark.slow
 def test_what_cannot_be_met_is_said_with_the_best_that_was_found(tmp_path):
     """Of N(0, s) at least 67.7 % lie outside 0.1 to 0.5, at s = 0.273; whoever asks for less has to move the nominal."""

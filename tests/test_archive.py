@@ -25,6 +25,8 @@ def test_it_is_read_with_xarray_alone_and_recomputes_its_own_gaps(search, tmp_pa
     done = run([sys.executable, "-I", SCRIPTS / "read_plainly.py", path])
     assert done.returncode == 0 and len(done.stdout.split()) == 300, done.stderr
     assert_gaps_recompute(path)
+    contact = xr.load_dataset(path, group="contact")
+    assert ("bounded" in contact) == ("plane_error" in contact) == (search == "bounded")
 
 
 @pytest.mark.slow
