@@ -26,6 +26,7 @@ for module, texts in AWAY.items():
 for name in ("resource", "grp", "pwd", "termios", "pty", "tty"):
     sys.modules[name] = None
 os.supports_fd.discard(os.utime)
+os.process_cpu_count = os.cpu_count  # from Python 3.13 on, where no process can be kept to some processors
 
 import_, replace, unlink = builtins.__import__, os.replace, os.unlink
 
