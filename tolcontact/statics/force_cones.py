@@ -78,6 +78,7 @@ class ForceCones:
         settings.verbose, settings.max_threads = False, 1
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = ACCURACY
         solution = clarabel.DefaultSolver(sparse.csc_matrix((count, count)), cost, A, b, cones, settings).solve()
+        # The solver fails where no forces balance each other and the load, or nearly none do: the load is not held there.
         if solution.status not in SOLVED:
             return 0.0, np.zeros(points)
         x = np.array(solution.x)
