@@ -74,7 +74,7 @@ CONTROL = CODECS[Size | GeometricTolerance] = Choice(
     "FeatureTolerance",
     f"kind: one of {', '.join(['size', *KINDS])}",
     Record(
-        Size, kind="size", omitted="tolerance_class",
+        Size, kind="size", omitted="tolerance_class envelope",
         nominal=Plain(POSITIVE), upper=Plain(float | str), distribution=DISTRIBUTION,
     ),
     *(
@@ -212,7 +212,8 @@ FEATURES = Field(
 )
 RECORDS = {
     "parts": Record(
-        Part, fields="geometry name at rotation fixed declared_at features", geometry=SHAPE, features=FEATURES
+        Part, fields="geometry name at rotation fixed standard declared_at features", omitted="standard", geometry=SHAPE,
+        features=FEATURES,
     ),
     "locations": Record(
         Location, omitted="floating station joint placing", scheme=SCHEME,

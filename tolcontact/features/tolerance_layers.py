@@ -56,10 +56,11 @@ def _zone(
     primary = system[0][0].geometry if system else None
     rows = tuple(zone_rows(tolerance, member, primary) for member in pattern.geometries)
     frame = datum_frame(system, pattern.centre, pattern.reach, columns, tolerance.orientation_only)
-    is_limited = system or len(pattern.members) > 1  # a common zone limits the members to each other
-    controlled = _controlled(rows, pattern, frame) if is_limited else np.zeros((pattern.count, 0))
+    is_combined = pattern.declared.combines(tolerance)
+    is_limited = system or is_combined  # a combined zone limits the members to each other
+    controlled = _controlled(rows, pattern, frame, is_combined=is_combined) if is_limited else np.zeros((pattern.count, 0))
     if any(map(len, rows)) and is_limited and not controlled.shape[1]:
-        reason = f"the datum system {tolerance.datums} does not lock any" if system else "a common zone limits nothing"
+        reason = f"the datum system {tolerance.datums} does not lock any" if system else "a combined zone limits nothing"
         raise GeometryFault(f"{tolerance.kind}: {reason} of what is toleranced; add the datum that does")
     return rows, frame, controlled
 
@@ -85,10 +86,16 @@ def _translations(tolerance: GeometricTolerance, pattern: NominalPattern, added:
     return _named_basis(translations, pattern, is_outer=is_outer)
 
 
-def _controlled(rows: Sequence[np.ndarray], pattern: NominalPattern, frame: DatumFrame) -> np.ndarray:
-    """Return the directions (coordinate, n) that the zone limits and that no free motion of the datum frame changes."""
+def _controlled(rows: Sequence[np.ndarray], pattern: NominalPattern, frame: DatumFrame, *, is_combined: bool) -> np.ndarray:
+    """Return the directions (coordinate, n) that the zone limits and that no free motion of the datum frame changes.
+
+    Combined zones of members move as one, other ones each by itself.
+    """
     limited = _span(np.asarray(scipy.linalg.block_diag(*(member.reshape(-1, member.shape[-1]).T for member in rows))))
-    controlled = _difference(limited, _span(limited @ limited.T @ pattern.values @ frame.free))
+    motions = pattern.values @ frame.free
+    if not is_combined:
+        motions = scipy.linalg.block_diag(*(motions[place] for place in pattern.slices))
+    controlled = _difference(limited, _span(limited @ limited.T @ motions))
     return _named_basis(controlled, pattern, is_outer=False)
 
 
