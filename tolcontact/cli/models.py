@@ -20,6 +20,7 @@ from tolcontact.declaration.values import key_faults
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError, OptionError, shown
 from tolcontact.geometry import parts_from
+from tolcontact.plausibility import drawing_remarks
 from tolcontact.report import nominal_and_faults, write_guide, write_page, write_view
 from tolcontact.workflow.accessor import summarize
 from tolcontact.workflow.models import DEFAULT_SOLVER, build
@@ -61,6 +62,7 @@ def check(
     solver: common.Solver = DEFAULT_SOLVER,
     resolution: common.Resolution = None,
     objective: common.Objective = None,
+    drawing: Annotated[bool, common.flag("--drawing", "Also say what the drawings leave open or take as perfect.")] = False,
     view: Annotated[bool, common.flag("--view", "Also open the page of `tolcontact view`, with marked faults.")] = False,
 ) -> None:
     """Check a model and its options without a run; list all faults and probable mistakes."""
@@ -86,6 +88,8 @@ def check(
         typer.echo(f"  {program.stored_coordinates}")
     if not program.nominal.assembly.forces and any(pair.round and not pair.round.are_beside for pair in program.nominal.pairs):
         typer.echo(f"  {PRESS}")
+    for remark in drawing_remarks(program.nominal) if drawing else ():
+        typer.echo(f"drawing: {shown(remark)}")
     common.show_warnings(doubts)
     count = {0: "", 1: ", 1 warning"}.get(len(doubts), f", {len(doubts)} warnings")
     typer.echo(f"no faults found{count}")

@@ -65,6 +65,16 @@ def _zone(
     return rows, frame, controlled
 
 
+def uncontrolled(pattern: NominalPattern, followed: np.ndarray) -> list[str]:
+    """Return the names of the freedoms of a pattern that no tolerance limits.
+
+    Those in the span of `followed` (coordinate, n) are left out: the frame of a datum follows them.
+    """
+    limited = _span(np.hstack([followed, *(layer.controlled for layer in pattern.layers)]))
+    rest = _difference(np.eye(pattern.count), limited)
+    return [pattern.freedom_name(direction) for direction in _named_basis(rest, pattern, is_outer=True).T]
+
+
 def _check_nesting(tolerance: GeometricTolerance, controlled: np.ndarray, layers: Sequence[Layer]) -> None:
     """Raise GeometryFault if a tolerance is narrower than one of the tolerances within it."""
     for layer in layers:
