@@ -47,6 +47,7 @@ class Job:
     seconds: float
     memory: int
     triangles: int
+    encoding: str = "utf-8"
     has_face_names: bool = False
     has_solids: bool = False
     has_pmi: bool = False

@@ -142,6 +142,7 @@ def _job(path: Path, chord: float | None, text: StepText | None, coarsening: flo
         seconds=limits.seconds + limits.seconds_per_mb * path.stat().st_size / 1e6,
         memory=limits.memory,
         triangles=limits.triangles,
+        encoding="utf-8" if text is None else text.encoding,
         has_face_names=text is not None and text.has_face_names,
         has_solids=text is not None and text.has_any(SOLIDS),
         has_pmi=text is not None and text.has_any(USAGES),
