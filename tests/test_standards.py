@@ -134,3 +134,69 @@ def test_the_standard_is_in_the_document_the_archive_the_summary_and_the_page(tm
         console = rich.console.Console(width=100, record=True, file=io.StringIO())
         console.print(summary_text(tc.summarize(results)))
     assert "standard of the drawings: part ASME, other ISO" in console.export_text()
+
+
+PIN_STOPS = (
+    ((0, 0, 0), "z"), ((3.75, 0, 0), "y"), ((0, 0, -20), "x"), ((0, 0, -20), "y"), ((0, 0, 0), "x"), ((0, 0, 0), "y"),
+)  # fmt: skip
+
+
+def bored(tolerance, standard: str, *own, mated: bool = False, holes: int = 1) -> tc.Assembly:
+    """A plate with a bore 8 (+0.2/0), datum B, and holes that are located to it; each is measured from the bore along x."""
+    _, plate, faces = plate_with_holes(1 + holes)
+    a = tc.Assembly("bored", standard=standard)
+    part = a.part("plate", plate.geometry, fixed=True)
+    for letter, datum in zip("AC", plate.features[::2], strict=True):
+        part.feature(letter, part.face(*datum.faces[0].selections), datum=letter)
+    bore = part.feature("bore", part.face(*faces[0].selections), tc.Size(8, 0.2, 0, distribution="uniform"), *own, datum="B")
+    for number, face in enumerate(faces[1:]):
+        hole = part.feature(f"hole {number}", part.face(*face.selections), tolerance)
+        for end in (0, 1):
+            a.measure(f"{hole.name} at {end}", hole.axis(end), to=bore.axis(end), along="x")
+    if mated:
+        pin = a.part("pin", tc.Pin(7.5, 20), at=(-30, 0, 10), fixed=False)
+        a.locate(pin, [tc.Locator(f"L{k}", place, way, 0) for k, (place, way) in enumerate(PIN_STOPS)])
+        a.contact("fit", moving=pin.face(tc.select.Cylinder(3.75)), reference=bore)
+    return a
+
+
+def test_a_datum_at_maximum_material_has_the_play_of_its_gauge():
+    """A bore 8 +0.2/0 as datum B(M), and a hole 0.1 to it: 0.05 and 0.1 in the worst case, and sums of variances."""
+    model = bored(tc.Position(0.1, "A|B(M)"), "ASME")
+    program, run = simulate(model, samples=20_000, solver="daqp")
+    assert [label for label in program.nominal.contributors if "mobility" in label] == [
+        "plate.bore.mobility shift x", "plate.bore.mobility shift y",
+    ]  # fmt: skip
+    worst = tc.analyses.worst_case(model)["worst"].sel(state="raw").values + 60
+    np.testing.assert_allclose(worst, [[-0.15, 0.15]] * 2, atol=1e-7)
+    _, still = simulate(bored(tc.Position(0.1, "A|B"), "ASME"), samples=20_000, solver="daqp")
+    alone = still["measured"][:, CORRECTED, 0].var()
+    # 99.73 % of a normal distribution in a plane lie within 3.44 sigma; half of the size's departure is the radius.
+    departure = scipy.stats.uniform(0, 0.2)
+    play = (departure.var() + departure.mean() ** 2) / 4 / scipy.stats.chi(2).ppf(0.9973002) ** 2
+    variance = run["measured"][:, CORRECTED, 0].var()
+    assert variance == pytest.approx(alone + play, rel=4 * np.sqrt(2 * 1.5 / 20_000))
+
+
+@pytest.mark.parametrize(
+    ("datums", "standard", "own", "mated", "found"),
+    [
+        ("A|B(M)", "ISO", (), False, 0.15),
+        ("A|B(L)", "ASME", (), False, 0.15),
+        ("A|B", "ASME", (), False, 0.05),
+        ("A|B(M)", "", (), False, 0.05),
+        ("A|B(M)", "ASME", (), True, 0.05),
+        ("A|B(M)", "ASME", (tc.Perpendicularity(0.04, "A"),), False, 0.15 + 0.02 + 0.02),  # virtual condition, and its own tilt
+    ],
+)
+def test_the_play_is_there_with_a_standard_and_without_a_mate(datums, standard, own, mated, found):
+    worst = tc.analyses.worst_case(bored(tc.Position(0.1, datums), standard, *own, mated=mated))["worst"].sel(state="raw")
+    np.testing.assert_allclose(worst.values[:2].max() + 60, found, atol=1e-6)
+
+
+def test_holes_that_refer_to_one_datum_share_its_gauge():
+    """Along x the play moves both holes alike: their distance has no share of it."""
+    _, run = simulate(bored(tc.Position(1e-4, "A|B(M)|C"), "ASME", holes=2), samples=500, solver="daqp")
+    first, second = run["measured"][:, CORRECTED, 0], run["measured"][:, CORRECTED, 2]
+    assert first.std() > 0.01
+    assert (first - second).std() < 1e-4

@@ -160,6 +160,11 @@ class GeometricTolerance(Checked):
         return tuple(compartment.endswith("><") for compartment in self._compartments)
 
     @property
+    def modifiers(self) -> tuple[str, ...]:
+        """The material modifier of each compartment: "M", "L" or none."""
+        return tuple((match[2] or "") for match in map(COMPARTMENT.fullmatch, self._compartments) if match)
+
+    @property
     def _compartments(self) -> list[str]:
         if not (self.datums and isinstance(self.datums, str)):
             return []

@@ -52,7 +52,10 @@ def _zone(
     absent = [letter for compartment in tolerance.system for letter in compartment if letter not in datums]
     if absent:
         raise GeometryFault(f"{tolerance.kind} refers to datum {absent[0]}, which could not be made; mend its feature first")
-    system = [[datum for letter in compartment for datum in datums[letter]] for compartment in tolerance.system]
+    system = [
+        [datum.at_gauge(columns) if modifier else datum for letter in compartment for datum in datums[letter]]
+        for compartment, modifier in zip(tolerance.system, tolerance.modifiers, strict=True)
+    ]
     primary = system[0][0].geometry if system else None
     rows = tuple(zone_rows(tolerance, member, primary) for member in pattern.geometries)
     frame = datum_frame(system, pattern.centre, pattern.reach, columns, tolerance.orientation_only)
@@ -120,6 +123,11 @@ def _span(vectors: np.ndarray) -> np.ndarray:
 def _difference(basis: np.ndarray, subtracted: np.ndarray) -> np.ndarray:
     """Return a basis of the part of a span that is orthogonal to another span; both are given by orthonormal columns."""
     return _span(basis - subtracted @ (subtracted.T @ basis))
+
+
+def named_span(vectors: np.ndarray, pattern: NominalPattern) -> np.ndarray:
+    """Return unit vectors with the span of columns (coordinate, n), along coordinates where the span has any."""
+    return _named_basis(_span(vectors), pattern, is_outer=False)
 
 
 def _named_basis(directions: np.ndarray, pattern: NominalPattern, *, is_outer: bool) -> np.ndarray:

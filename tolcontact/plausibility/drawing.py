@@ -28,6 +28,8 @@ def open_freedoms(nominal: Nominal) -> Iterator[str]:
     for pattern in nominal.patterns:
         if isinstance(pattern.declared, Pattern) and pattern.declared.borrowed:
             continue  # these have tolerances of their own
+        if pattern.members[0].mobility is not None:
+            continue  # a gauge element
         names = uncontrolled(pattern, _followed(nominal, pattern))
         if not names:
             continue
