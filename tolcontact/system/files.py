@@ -1,6 +1,5 @@
 """Files: opened without following links, replaced while others may have them open, removed while they are locked."""
 
-import ctypes
 import errno
 import os
 import stat
@@ -9,6 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
+import lazy_loader
+
+ctypes = lazy_loader.load("ctypes")  # on Windows
 IS_POSIX = hasattr(os, "geteuid")  # users with numbers, links for everyone, open files that can be replaced and removed
 # A link is not followed, and a pipe not waited for. Windows has neither flag, but it changes line ends unless told not to.
 _FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
@@ -63,7 +65,7 @@ def plain_path(path: Path) -> str:
         return os.fspath(path)
     short = ctypes.create_unicode_buffer(1 << 15)
     name = text if len(text) <= MAX_LENGTH else rf"\\?\{text}"
-    ctypes.windll.kernel32.GetShortPathNameW(name, short, len(short))  # type: ignore[attr-defined]
+    ctypes.windll.kernel32.GetShortPathNameW(name, short, len(short))
     plain = short.value.removeprefix("\\\\?\\")
     if not (plain and _is_plain(plain)):
         raise OSError(errno.EINVAL, NOT_PLAIN, str(path))
