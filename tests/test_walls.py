@@ -49,6 +49,7 @@ LAZY = {
     "trimesh": ("geometry/files/worker.py",),  # in a process that mostly reads STEP files
     "openpyxl": ("report/spreadsheet.py",),
     "psutil": ("system/",),  # where the system limits no process
+    "ctypes": ("system/files.py",),  # for short names, on Windows
     "tolcontact.kernel.step_document": ("geometry/files/worker.py",),  # in a process of its own
     "tolcontact.fasteners": ("__init__.py",),  # when a script asks
     "tolcontact.pmi": ("__init__.py",),  # when a script asks

@@ -25,6 +25,7 @@ from tolcontact.archive.variables import open_netcdf, overwrite
 from tolcontact.compilation import Program
 from tolcontact.errors import ArchiveError
 from tolcontact.replacing import replacing
+from tolcontact.system import files
 
 POINT_TOLERANCE = 1e-9  # mm: points may differ by rounding from one machine to the next
 
@@ -305,4 +306,5 @@ def keep(path: str | Path, record: terms.AnalysisRecord, dataset: "xr.Dataset", 
             stored = dataset.copy()
             for array in stored.variables.values():
                 array.encoding = {"fletcher32": True} | ({"dtype": "S1"} if array.dtype.kind in "UO" else {})
-            stored.to_netcdf(part, mode="a", group=f"{terms.ANALYSES_GROUP}/{record.name}", engine="netcdf4")
+            group = f"{terms.ANALYSES_GROUP}/{record.name}"
+            stored.to_netcdf(files.plain_path(part), mode="a", group=group, engine="netcdf4")
