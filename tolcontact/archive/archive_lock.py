@@ -62,7 +62,7 @@ def _acquire(holding: FileLock, lock: Path, path: str | Path) -> None:
 def _is_netcdf(path: Path) -> bool:
     """Return whether a file begins as netCDF files do, or is empty."""
     with path.open("rb") as file:
-        return file.read(8).startswith((b"\x89HDF\r\n\x1a\n", b"CDF")) or not path.stat().st_size
+        return file.read(8).startswith((b"\x89HDF\r\n\x1a\n", b"CDF\1", b"CDF\2", b"CDF\5")) or not path.stat().st_size
 
 
 def _check_replaceable(path: str | Path, real: Path, *, is_allowed: bool) -> None:

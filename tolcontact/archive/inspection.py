@@ -18,9 +18,11 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.child import ChildDiedError, run_child
-from tolcontact.errors import ArchiveError, shown
+from tolcontact.errors import ArchiveError
+from tolcontact.input_files import fault_of
 from tolcontact.system import files
 from tolcontact.system.resources import limit_resources
+from tolcontact.texts import CONTROL_CHARACTERS, shown
 from tolcontact.vocabulary import ArchiveVariable, archive, variation
 
 MAX_SECONDS, SECONDS_PER_GB = 20.0, 20.0  # of processor time
@@ -77,8 +79,8 @@ class DamagedError(Exception):
 
 def check_archive(path: Path) -> None:
     """Raise ArchiveError if there is no file at a path, or it fails the inspection."""
-    if not path.is_file():
-        raise ArchiveError(f'archive "{path}" does not exist; write one with: tolcontact run MODEL.py --out {path}')
+    if fault := fault_of(path):
+        raise ArchiveError(f'archive "{path}" {fault}; write one with: tolcontact run MODEL.py --out {path}')
     inspect(path)
 
 
@@ -179,7 +181,7 @@ def _check_attributes(thing: Any) -> None:
 def _check_text(name: str, text: str) -> None:
     if len(text) > MAX_TEXT:
         raise DamagedError(f"is damaged: {name} has {len(text)} characters")
-    if shown(text) != text:
+    if CONTROL_CHARACTERS.search(text):
         raise DamagedError(f"is damaged: {name} holds control characters ({shown(text)[:60]})")
 
 

@@ -13,7 +13,7 @@ from tolcontact.archive import locked_archive, open_archive, replacing_archive
 from tolcontact.cli import app as common
 from tolcontact.cli.output import check_outputs, console, print_data
 from tolcontact.declaration.script import load_model
-from tolcontact.errors import OptionError, shown
+from tolcontact.errors import OptionError
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
 from tolcontact.simulation.cluster import client_of
 from tolcontact.system import files
@@ -88,7 +88,7 @@ def compare(
     else:
         console().print((reports.runs_text if all(are_archives) else reports.comparison_text)(comparison))
         if report is not None:
-            typer.echo(f"\nreport: {shown(str(report))}")
+            common.echo(f"\nreport: {report}")
 
 
 def _compare_archives(archives: Sequence[Path], report: Path | None) -> xr.Dataset:

@@ -185,7 +185,10 @@ def _measured_values(measure: Measure, writing: Writing) -> Document:
 
 def _measured(values: Document, place: Place) -> Document:
     if len(values) != 1:
-        raise place.error('expected either "of", a point or a measurement, or "tape", the steps of an expression')
+        what = " and ".join(values) or "neither"
+        raise place.error(
+            f'it has {what}; expected either "of", a point or a measurement, or "tape", the steps of an expression'
+        )
     return {"of": next(iter(values.values()))}
 
 

@@ -134,7 +134,7 @@ class Part(Declaration):
         yield from self.geometry.faults()
         for label, value, example in (("at", self.at, "(0, 0, 10)"), ("rotation", self.rotation, "tc.degrees(0, 0, 90)")):
             if not is_finite(value):
-                yield f"{label} is not a vector of three finite numbers; give it as in {label}={example}"
+                yield f"{label} is {value!r}; expected three finite numbers, as in {label}={example}"
 
     def __str__(self) -> str:
         place = "" if self.at == (0.0, 0.0, 0.0) else " at ({:g}, {:g}, {:g})".format(*self.at)
@@ -176,7 +176,7 @@ class Point(Readable):
 
     def faults(self) -> Iterator[str]:
         if self.position is not None and not is_finite(self.position):
-            yield f'point of part "{self.part.name}" is not three finite numbers'
+            yield f'point of part "{self.part.name}" is {self.position!r}; expected three finite numbers'
         if self.position is None and self.on is None:
             yield f'point of part "{self.part.name}" has no position; an end of an axis needs the feature that it is on'
         elif self.position is None and self.end not in (0, 1):

@@ -12,7 +12,7 @@ import trimesh
 
 from tolcontact.declaration import Geometry, Mesh
 from tolcontact.declaration.geometry import UNITS
-from tolcontact.errors import GeometryFault, clipped
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.files import screening
 from tolcontact.geometry.files.product import (
     BREP,
@@ -27,6 +27,7 @@ from tolcontact.geometry.files.product import (
 from tolcontact.geometry.files.step_text import SOLIDS, USAGES, StepText
 from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING, rim
 from tolcontact.shape_worker import Job, UnfinishedRead, Worker, taken
+from tolcontact.texts import clipped
 
 MAX_ANGLE = 0.5  # [rad] between triangles of round faces
 COARSENINGS = (1, 30)  # times the usual chord, tried one after the other
