@@ -257,6 +257,8 @@ def _allocation(dataset: xr.Dataset) -> AnalysisReport:
     notes = [f"Requirements in fresh runs of {grouped(dataset.attrs['fresh'])} realizations; 95 % intervals."]
     least, most = (f"{dataset.attrs[name]:g} times" for name in ("floor", "ceiling"))
     notes.append(f"Tolerances may be {least} (smallest allowed) to {most} (largest allowed) those before.\n")
+    if choices := dataset.attrs.get("choices"):
+        notes.append(f"Choices: {choices}.\n")
     if dataset["idle"].values.any():
         count = dataset.attrs["idle_tried"]
         notes.append(
