@@ -10,7 +10,7 @@ Nonlinear effects of contact are in 1 - R^2, and in no share. With C the covaria
 
     (b_g.x_g y + cov(x_g, y).(C^-1 x)_g e - S_g y^2) / var(y),     e without the share that a realization has in its own fit.
 
-The interval of a share is that of the mean of these influences or, if wider, Student's t on the logit scale: a share lies
+The interval of a share is that of the mean of these influences or, if wider, the same on the logit scale: a share lies
 between 0 and 1. The residuals of few realizations, or those with heavy tails, do not tell how much no line explains.
 """
 
@@ -103,10 +103,8 @@ def linear_shares(x: np.ndarray, y: np.ndarray, groups: Sequence[np.ndarray]) ->
 
 def _with_interval(share: float, influences: np.ndarray) -> Estimate:
     """Return a share, with the interval that the influences of realizations (n,) give it."""
-    influences = influences - influences.mean()
-    squares = influences**2
-    _, lower, upper = intervals.mean(influences)
+    _, lower, upper = intervals.from_influences(0.0, influences - influences.mean())
     inner = min(max(share, MIN_SHARE), 1 - MIN_SHARE)
-    half = intervals.from_influence(0.0, squares.sum(), len(squares), (squares**2).sum()).upper / (inner * (1 - inner))
-    least, most = scipy.special.expit(scipy.special.logit(inner) + min(half, MAX_LOGIT) * np.array([-1, 1]))
+    steps = np.clip(np.array([lower, upper]) / (inner * (1 - inner)), -MAX_LOGIT, MAX_LOGIT)
+    least, most = scipy.special.expit(scipy.special.logit(inner) + steps)
     return Estimate(float(share), float(min(share + lower, least)), float(max(min(share + upper, 1.0), most, share)))
