@@ -298,6 +298,8 @@ def test_grades_of_sizes_are_choices_and_others_keep_any_range(tmp_path):
         ({-0.1: 1.0}, 'cost of "p0.Z" has the range -0.1; expected a full width above 0 in mm'),
         ({0.1: 0.0}, "expected costs above 0 by range"),
         ({}, "expected costs above 0 by range"),
+        ({0.1: True}, "expected costs above 0 by range"),
+        (True, 'cost of "p0.Z" is True; expected a number above 0, a function of the factor of its range, or a table'),
     ],
 )
 def test_tables_that_state_no_choices_are_refused(table, said):

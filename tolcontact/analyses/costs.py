@@ -173,4 +173,4 @@ def _size(program: Program, columns: np.ndarray) -> float | None:
 
 
 def _is_cost(value: object) -> bool:
-    return isinstance(value, int | float) and math.isfinite(value) and value > 0
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value) and value > 0
