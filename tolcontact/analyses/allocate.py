@@ -65,14 +65,12 @@ def allocate(
 
     Ranges without a table stay between a tenth and three times the present ones. Groups keep their ranges, or the next
     narrower choice, if no required measure changes in any resolved realization with all of them at either end. Each step
-    replaces the margins of the requirements by functions of squared ranges with the same values and slopes, on the same draws;
-    slopes come only from resolved realizations near the limits. SLSQP minimizes the cost within a trust region (a sequential
-    separable approximation; Svanberg, 1987). The region shrinks when a step fails; a step also fails if more realizations are
+    replaces margins by functions of squared ranges with the same values and slopes, on the same draws. SLSQP minimizes the
+    cost within a trust region (a sequential separable approximation; Svanberg, 1987). A step fails if more realizations are
     then not assemblable than may be outside. Choices come from a linear program with binary unknowns on such functions. If the
-    interval of the fresh run does not keep a requirement, the search continues with a larger margin. Effects come from samples
-    / 4 realizations, or 4 samples / groups if that is less, but at least 512. `progress` is called with the number of
-    simulated realizations, and about their total. Raises OptionError if no range varies. `model`, `seed`, `solver`, `method`,
-    `into` and `client` are as in all analyses: `tc.analyses.allocate("model.py", "gap: ppm 1000", by="part")`.
+    interval of the fresh run does not keep a requirement, the search continues with a larger margin. `progress` is called with
+    the number of realizations, and about their total. Raises OptionError if no range varies. `model`, `seed`, `solver`,
+    `method`, `into` and `client` are as in all analyses: `tc.analyses.allocate("model.py", "gap: ppm 1000", by="part")`.
     """
     analysis = Analysis(
         terms.ALLOCATION, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
