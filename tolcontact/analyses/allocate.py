@@ -65,12 +65,12 @@ def allocate(
 
     Ranges without a table stay between a tenth and three times the present ones. Groups keep their ranges, or the next
     narrower choice, if no required measure changes in any resolved realization with all of them at either end. Each step
-    replaces margins by functions of squared ranges with the same values and slopes, on the same draws. SLSQP minimizes the
-    cost within a trust region (a sequential separable approximation; Svanberg, 1987). A step fails if more realizations are
-    then not assemblable than may be outside. Choices come from a linear program with binary unknowns on such functions. If the
-    interval of the fresh run does not keep a requirement, the search continues with a larger margin. `progress` is called with
-    the number of realizations, and about their total. Raises OptionError if no range varies. `model`, `seed`, `solver`,
-    `method`, `into` and `client` are as in all analyses: `tc.analyses.allocate("model.py", "gap: ppm 1000", by="part")`.
+    replaces margins by functions of squared ranges with their values and slopes, on the same draws. SLSQP minimizes the cost
+    within a trust region (a sequential separable approximation; Svanberg, 1987). A step fails if more realizations are then
+    not assemblable than may be outside. Choices come from a linear program with binary unknowns on such functions. If a fresh
+    run does not keep a requirement, the margin of the search grows. `progress` is called with numbers of realizations. Raises
+    OptionError if no range varies. `model`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses:
+    `tc.analyses.allocate("model.py", "gap: ppm 1000", by="part")`.
     """
     analysis = Analysis(
         terms.ALLOCATION, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
@@ -78,8 +78,7 @@ def allocate(
     )  # fmt: skip
     program = analysis.program
     requirements = _requirements(require, program, samples)
-    groups = _groups(program, by)
-    curves = curves_of(costs, groups, ranges := _ranges(program, groups), program)
+    curves = curves_of(costs, groups := _groups(program, by), ranges := _ranges(program, groups), program)
     trials = ScaledTrials(analysis.engine(_expected(samples, len(groups))), list(groups.values()), requirements, seed, samples)
     prices = Curves(curves.get(name, 0.0) for name in groups)
     search = Search(trials, prices, np.array([name in curves for name in groups]))
