@@ -59,9 +59,9 @@ def allocate(
 
     `require` is "corner height: ppm 1000" or "corner height: Ppk 1.33", or a list of such texts. `costs` maps a group that may
     change to a number c, for the cost c * present range / new range, or to a function of the factor, or to a table of choices:
-    {0.1: 4, 0.2: 2.5} of full widths, or {"IT6": 4, "IT7": 2.5} of the grades that ISO 286-1 defines for the nominal size of a
-    group with a tc.Size; then its range is one of these. Groups without costs keep their ranges. If `costs` is left out, all
-    groups may change with c = 1. `by` is as in `contributions`: "contributor", "feature" or "part".
+    {0.1: 4, 0.2: 2.5} of full widths, or {"IT6": 4, "IT7": 2.5} of ISO 286-1 grades for a group with a tc.Size. Groups without
+    costs keep their ranges. If `costs` is left out, all groups may change with c = 1. `by` is as in `contributions`:
+    "contributor", "feature" or "part".
 
     Ranges without a table stay between a tenth and three times the present ones. Groups keep their ranges, or the next
     narrower choice, if no required measure changes in any resolved realization with all of them at either end. Each step
