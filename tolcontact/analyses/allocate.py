@@ -76,8 +76,7 @@ def allocate(
         terms.ALLOCATION, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
         progress=progress,
     )  # fmt: skip
-    program = analysis.program
-    requirements = _requirements(require, program, samples)
+    requirements = _requirements(require, program := analysis.program, samples)
     curves = curves_of(costs, groups := _groups(program, by), ranges := _ranges(program, groups), program)
     trials = ScaledTrials(analysis.engine(_expected(samples, len(groups))), list(groups.values()), requirements, seed, samples)
     prices = Curves(curves.get(name, 0.0) for name in groups)
@@ -95,9 +94,9 @@ def allocate(
         "effect": narrowing_effects(trials),
     }
     labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
-    limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR, "idle_tried": search.tested_rows}
-    limits["choices"] = prices.names(fresh.logs, list(groups))
-    return analysis.dataset(values, labels, samples=samples, fresh=VERIFICATION_FACTOR * samples, by=by, **limits)
+    limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR, "choices": prices.names(fresh.logs, list(groups))}
+    counts = {"samples": samples, "fresh": VERIFICATION_FACTOR * samples, "idle_tried": search.tested_rows}
+    return analysis.dataset(values, labels, by=by, **counts, **limits)
 
 
 def _requirements(require: str | Sequence[str], program: Program, samples: int) -> list[Requirement]:
