@@ -40,8 +40,10 @@ def write(script: str, results: dict[str, Table], to: Path | None = None) -> Non
 
 
 def with_interval(value: float, lower: float, upper: float) -> str:
-    """Return a value with its interval, rounded to two digits of the width of the interval."""
+    """Return a value with its interval, rounded to two digits of the width of the interval; without if it has none."""
     width = upper - lower
+    if math.isnan(width):
+        return f"{value:.1g}"
     digits = max(0, 1 - math.floor(math.log10(width))) if 1e-12 < width < math.inf else 4
     cells = (f"{round(float(number), digits) + 0.0:.{digits}f}" for number in (value, lower, upper))  # no -0
     return "{} [{}, {}]".format(*cells)

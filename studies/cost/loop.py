@@ -5,10 +5,12 @@ holds nothing but rows and solver. The QP starts from the points that are inside
 inside until none is left.
 """
 
+import importlib.util
+
 import numpy as np
-import qpsolvers
 from scipy.spatial.transform import Rotation
 
+qpsolvers = importlib.import_module("qpsolvers") if importlib.util.find_spec("qpsolvers") else None
 ETA, ACTIVITY = 1e-6, 1e-9
 BLOCK = 500
 
