@@ -10,7 +10,9 @@ import importlib.util
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-qpsolvers = importlib.import_module("qpsolvers") if importlib.util.find_spec("qpsolvers") else None
+has_qpsolvers = importlib.util.find_spec("qpsolvers") is not None
+if has_qpsolvers:
+    import qpsolvers
 ETA, ACTIVITY = 1e-6, 1e-9
 BLOCK = 500
 

@@ -18,7 +18,7 @@ import numpy as np
 
 import tolcontact as tc
 from models import ra1, ra2
-from studies.cost.loop import Loop, qpsolvers
+from studies.cost.loop import Loop, has_qpsolvers
 from studies.cost.scenes import AS1, AS1_BODIES, SCENES, scene, slab
 from studies.tables import Table, write
 from tolcontact.compilation import Program
@@ -86,7 +86,7 @@ def costs_of(assembly: tc.Assembly, method: str, solvers: list[str], seconds: fl
         apart = np.abs(measured[:count] - reference[0][:count])[is_certified].max(initial=0.0)
         if apart > APART:
             raise ValueError(f"{assembly.name}, {method}: {solver} and {solvers[0]} are {apart:.2g} mm apart")
-    if method == PAPER and reference is not None and qpsolvers is not None:
+    if method == PAPER and reference is not None and has_qpsolvers:
         costs[LOOP], looped = loop_cost(program, min(512, len(reference[1])), turns)
         apart = np.nanquantile(np.abs(looped - reference[0][: len(looped), 0]), 0.9)
         if apart > APART_LOOP:

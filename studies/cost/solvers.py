@@ -18,6 +18,7 @@ import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 sys.modules["highspy"] = None  # type: ignore[assignment]  # its HiGHS and CasADi's crash each other in one process
 
@@ -200,7 +201,7 @@ def separately(work: Callable[[], dict[str, float]]) -> dict[str, float] | str:
         process.kill()
 
 
-def table(rows: list[dict[str, object]]) -> Table:
+def table(rows: list[dict[str, Any]]) -> Table:
     """Return a row for each solver: its largest error in each problem, and its wrong answers in all of them."""
     names = list(dict.fromkeys(str(row["problem"]) for row in rows))
     lines: list[tuple[object, ...]] = [("solver", *(f"{name} [mm]" for name in names), "wrong, reported as success")]
@@ -221,7 +222,7 @@ def main() -> None:
     solvers = {f"CasADi {name}": (with_casadi, name) for name in (*usable_solvers(), *REFUSED)}
     solvers["graph"] = (on_graph, solvers.pop("CasADi graph")[1])
     solvers |= {name: (outside, name) for name in OUTSIDE}
-    rows: list[dict[str, object]] = []
+    rows: list[dict[str, Any]] = []
     for name, assembly in models().items():
         qps = problems(assembly, arguments.realizations)
         truth = [reference(qp) for qp in qps]

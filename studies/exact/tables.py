@@ -8,6 +8,7 @@ import runpy
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from tolcontact.vocabulary import CORRECTED, Status
 HERE = Path(__file__).resolve().parent
 LINEARIZED = tc.Method(resolution="linearized")
 EXACT = tc.Method(search="fixed", objective="active points")
+REGULARIZATIONS: tuple[Literal["identity", "points"], ...] = ("identity", "points")
 FAR = (1000.0, 0.0, 0.0)
 
 
@@ -93,7 +95,7 @@ def moved_assembly(samples: int) -> Table:
     rows: list[tuple[object, ...]] = [
         ("model", "resolution", "regularization", "6 sigma", "6 sigma, 1 m away", "largest difference [mm]")
     ]
-    for name, method, regularization in product(("ra1", "ra2"), (LINEARIZED, EXACT), ("identity", "points")):
+    for name, method, regularization in product(("ra1", "ra2"), (LINEARIZED, EXACT), REGULARIZATIONS):
         choice = replace(method, regularization=regularization)
         near, far = (simulate(assembly, samples, method=choice) for assembly in (model(name), shifted(model(name))))
         values = [run["measured"][:, CORRECTED, 0] for run in (near, far)]

@@ -82,7 +82,8 @@ def simulated(model: tc.Assembly, samples: int) -> tuple[dict[str, np.ndarray], 
 
 def gaps_of(models: dict[str, tc.Assembly], samples: int) -> tuple[Table, dict[str, np.ndarray]]:
     """Return a table with a row for each model, and the largest gaps by its name."""
-    largest, rows = {}, [("form", "contact points", "largest gap", "its 99 %", "mean gap", "height")]
+    largest: dict[str, np.ndarray] = {}
+    rows: list[tuple[str, ...]] = [("form", "contact points", "largest gap", "its 99 %", "mean gap", "height")]
     for name, model in models.items():
         measured, points = simulated(model, samples)
         largest[name] = measured["largest gap"]
@@ -94,7 +95,7 @@ def gaps_of(models: dict[str, tc.Assembly], samples: int) -> tuple[Table, dict[s
 
 def references(samples: int) -> Table:
     """Return RA1 and RA2 with form on one or three faces."""
-    rows = [("model", "flatness", "mean", "6 sigma")]
+    rows: list[tuple[str, ...]] = [("model", "flatness", "mean", "6 sigma")]
     for name, faces in (("ra1", 1), ("ra2", 1), ("ra2", 3)):
         for width in (0.0, 0.05, 0.5):
             measured, _ = simulated(with_form(name, width, faces), samples)
