@@ -116,6 +116,38 @@ def test_the_table_of_costs_has_the_figures_of_its_csv_file():
     assert tables(measure.HERE / "README.md")["measure.py: cost"] == text
 
 
+def corner_heights():
+    """Return mean corner heights of RA1 with their bounds, by objective, from the study of objectives (exact resolution)."""
+    _, rows = rows_by_label(tables(ROOT / "studies" / "objectives" / "README.md")["measure.py: objectives"])
+    means = {label[1]: cells[0] for label, cells in rows.items() if label[0] == "ra1, exact: corner height"}
+    return {name: [float(number) for number in re.findall(r"-?[\d.]+", mean)] for name, mean in means.items()}
+
+
+def test_the_readme_states_the_corner_heights_of_the_study():
+    limits = (ROOT / "README.md").read_text(encoding="utf-8").partition("\n## Limits\n")[2].partition("\n## ")[0]
+    heights = corner_heights()
+    for name, text in (
+        ("active points", r'([\d.]+) mm by the paper\'s\s+"active points"'), ("all points", r'([\d.]+) by "all points"'),
+        ("locator stiffness", r'([\d.]+) by "all points" \(default\) and by springs'), ("seating", r"([\d.]+) under a weight"),
+    ):  # fmt: skip
+        (stated,) = re.findall(text, limits)
+        mean, lower, upper = heights[name]
+        assert lower < float(stated) < upper and abs(float(stated) - mean) < 0.01
+
+
+@pytest.mark.slow
+def test_the_summary_of_ra1_states_corner_heights_that_agree_with_the_study():
+    done = run(
+        [sys.executable, "-m", "tolcontact", "run", ROOT / "models" / "ra1.py", "--resolution", "exact", "--solver", "daqp",
+         "--seed", "1", "--samples", "1000", "--fields", "none", "--surfaces", "0"], cwd=ROOT, timeout=600,
+    )  # fmt: skip
+    (line,) = [line for line in done.stdout.splitlines() if "corner height: mean" in line]
+    others = re.findall(r'\[([\d.]+), ([\d.]+)\] by "([^"]+)"', line)
+    assert {name for *_, name in others} == {"all points", "locator stiffness"}
+    for lower, upper, name in others:
+        assert float(lower) < corner_heights()[name][0] < float(upper)
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", STUDIES)
 def test_a_study_runs(name, tmp_path):
