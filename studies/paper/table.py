@@ -67,18 +67,19 @@ def measure_claims(name: str, runs: list[xr.DataTree], large: xr.DataTree) -> It
 
 
 def field_claims(name: str, runs: list[xr.DataTree], large: xr.DataTree) -> Iterator[tuple[str, ...]]:
-    """Range of the varying part's field, and its reduced maximum."""
+    """Range of the varying part's field without contact, and its reduced maximum, which the paper states for RA1 alone."""
     fields, most = [field_range(run, name) for run in runs], field_range(large, name)
     scale = "{:g} to {:g} (scale)".format(*PAPER[name].scale)
-    for k, state in enumerate(STATES):
-        for j, extreme in enumerate(("least", "largest")):
-            what = f"{extreme} 6 sigma magnitude of {PAPER[name].part}, {NAMES[state]} [mm]"
-            yield what, scale, least_to_largest([field[k, j] for field in fields]), f"{most[k, j]:.3f}"
-    theirs = f"{SENSITIVE:.1%}" if name == "RA1" else "-"
-    each = [1 - field[1, 1] / field[0, 1] for field in fields]
-    yield "largest reduced by, anywhere", theirs, least_to_largest(each, percent=True), f"{1 - most[1, 1] / most[0, 1]:.1%}"
-    each = [at_the_spot(run, name) for run in runs]
-    yield "largest reduced by, at its spot", theirs, least_to_largest(each, percent=True), f"{at_the_spot(large, name):.1%}"
+    for k, extreme in enumerate(("least", "largest")):
+        claim = f"{extreme} 6 sigma magnitude of {PAPER[name].part} without contact [mm]"
+        yield claim, scale, least_to_largest([field[0, k] for field in fields]), f"{most[0, k]:.3f}"
+    if name == "RA1":
+        each = [1 - field[1, 1] / field[0, 1] for field in fields]
+        reduced = f"{1 - most[1, 1] / most[0, 1]:.1%}"
+        yield "largest reduced by, anywhere", f"{SENSITIVE:.1%}", least_to_largest(each, percent=True), reduced
+        each = [at_the_spot(run, name) for run in runs]
+        reduced = f"{at_the_spot(large, name):.1%}"
+        yield "largest reduced by, at its spot", f"{SENSITIVE:.1%}", least_to_largest(each, percent=True), reduced
 
 
 def at_the_spot(run: xr.DataTree, name: str) -> float:
