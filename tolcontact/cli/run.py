@@ -12,7 +12,7 @@ from tolcontact.archive import Run, open_unchecked
 from tolcontact.cli import app as common, output
 from tolcontact.cli.output import print_summary
 from tolcontact.cli.progress import shown_progress, stopped
-from tolcontact.errors import OptionError, shown
+from tolcontact.errors import OptionError
 from tolcontact.simulation.cluster import client_of
 from tolcontact.statistics import Summary
 from tolcontact.temporary import temporary_folder
@@ -120,8 +120,8 @@ def _print_results(summary: Summary, out: Path | None, shortfall: str, *, quiet:
     """Print the summary of results. Raises typer.Exit with code 1 if they lack something."""
     print_summary(summary)
     if out is not None:
-        typer.echo(f"\narchive: {shown(str(out))}")
+        common.echo(f"\narchive: {out}")
     if shortfall:
         if quiet:  # otherwise the log has already stated it
-            typer.echo(shortfall, err=True)
+            common.echo(shortfall, err=True)
         raise typer.Exit(1)
