@@ -83,6 +83,8 @@ def contradictions(stated, written):
             if all(intervals):
                 (lower, upper), (other_lower, other_upper) = ([float(bound) for bound in match.groups()] for match in intervals)
                 is_equal = lower <= other_upper and other_lower <= upper
+            elif expected.startswith("below ") and actual.startswith("below "):
+                is_equal = float(actual[6:]) <= float(expected[6:])
             else:
                 are_estimates = NUMBER.fullmatch(expected) and NUMBER.fullmatch(actual) and not (expected + actual).isdigit()
                 is_equal = bool(are_estimates) or expected == actual
