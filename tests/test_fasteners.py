@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 from scipy.stats import binom
 
 import tolcontact as tc
 from tests.cases import STILL, Frame
-from tests.cases.fastened import THICKNESS, bolted, grown, held, hole, lying, placed, plate, shifts
+from tests.cases.fastened import FOUR, THICKNESS, bolted, grown, held, hole, lying, most_room, placed, plate, shifts
 from tests.cases.floating import SEATED
 from tests.helpers import nightly
 from tolcontact.simulation import simulate_block
@@ -20,7 +19,6 @@ from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 MOVED = Frame(turn=(0.3, -0.7, 1.1), shift=(300, -50, 20))
 DRILLED = 2e-6  # [mm] of holes: vertices are in single precision
-FOUR = [(x, y) for x in (-45.0, 45.0) for y in (-20.0, 20.0)]
 FITS, FAILS = (Status.UNTOUCHED, Status.RESOLVED), (Status.NOT_ASSEMBLABLE, Status.NOT_CONVERGED)
 AS1 = Path(__file__).resolve().parents[1] / "studies" / "cad" / "as1-oc-214.stp"
 
@@ -166,16 +164,6 @@ def test_four_fasteners_go_in_if_a_linear_program_finds_a_place_for_the_cover(in
     assert (np.isin(status, FAILS) == (most < 0))[sure].all()
     assert 0.05 < (most < 0).mean() < 0.95
     assert_gaps_recompute(results)
-
-
-def most_room(off: np.ndarray, room: np.ndarray) -> float:
-    """The largest room [mm] that all holes (hole, 2) can have at once, for a cover that shifts and turns a little."""
-    ways = np.linspace(0, 2 * np.pi, 360, endpoint=False)
-    n = np.column_stack([np.cos(ways), np.sin(ways)])
-    arms = np.column_stack([-np.array(FOUR)[:, 1], np.array(FOUR)[:, 0]])
-    rows = np.vstack([np.column_stack([n, n @ arm, np.ones(len(n))]) for arm in arms])
-    bounds = np.concatenate([r - n @ shift for shift, r in zip(off, room, strict=True)])
-    return float(-linprog([0, 0, 0, -1], rows, bounds, bounds=[(None, None)] * 4).fun)
 
 
 def stack(frame: Frame = STILL, **options) -> tc.Assembly:

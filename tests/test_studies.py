@@ -1,11 +1,15 @@
 """Each script of `studies/` runs, at a small size."""
 
 import importlib.util
+import re
 import shutil
 import sys
+from pathlib import Path
 
 import pytest
 
+from studies.cost import measure
+from studies.tables import markdown, tables
 from tests.helpers import ROOT, run
 
 STUDIES = {
@@ -13,8 +17,7 @@ STUDIES = {
     "benchmarks/pages.py": ["pages"],
     "benchmarks/references.py": ["linear_stack"],
     "benchmarks/run.py": ["linear_stack"],
-    "bodies/measure.py": ["--scenes", "ring", "--sizes", "3", "--methods", "linearized", "--figure", "cost.png"],
-    "cad/as1.py": ["--samples", "20"],
+    "cad/as1.py": ["--samples", "100", "--to", "."],
     "cad/as1_nine.py": ["--samples", "20", "--surfaces", "2"],
     "cad/compare_numbers.py": [ROOT / "studies" / "cad" / "as1-oc-214.stp"],
     "cad/pmi_fixture.py": [ROOT / "studies" / "cad"],
@@ -25,8 +28,11 @@ STUDIES = {
     "certificates/coincidences.py": ["--scenes", "6", "--samples", "3"],
     "certificates/ends.py": ["--scenes", "6", "--samples", "3"],
     "certificates/judge.py": ["--scenes", "3", "--samples", "20"],
-    "exact/tables.py": ["--samples", "20"],
-    "form/measure.py": ["--samples", "10", "--figure", "gaps.png"],
+    "cost/cluster.py": ["--samples", "20000", "--to", "."],
+    "cost/measure.py": ["--scenes", "ra1", "ring", "--sizes", "3", "--seconds", "0.01", "--to", "."],
+    "cost/solvers.py": ["--realizations", "2", "--to", "."],
+    "exact/tables.py": ["--samples", "300", "--to", "."],
+    "form/measure.py": ["--samples", "20", "--to", "."],
     "objectives/measure.py": ["--samples", "20", "--models", "ra1", "lid", "--to", "."],
     "paper/reproduce.py": ["--large", "2000", "--to", "."],
     "pictures/contact.py": ["contact.svg"],
@@ -39,22 +45,59 @@ STUDIES = {
     "robustness/processes.py": ["--killed", "1", "--writers", "1", "--stations", "1"],
     "robustness/scripts.py": ["--names", "1", "--pmi", "1", "--functions", "2"],
     "robustness/signals.py": ["--tries", "3"],
-    "round/measure.py": ["20"],
-    "scale/scale.py": ["--samples", "20000", "--kills", "2"],
+    "round/measure.py": ["--samples", "100", "--to", "."],
     "site/build.py": ["site", "--samples", "20"],
-    "solvers/measure.py": ["--realizations", "2", "--figure", "accuracy.png"],
-    "speed/measure.py": ["--quick", "--figure", "cost.png"],
-    "speed/springs.py": ["20"],
     "verification/intervals.py": ["--repeats", "3", "--sizes", "100"],
     "verification/rare.py": ["--seeds", "1", "--samples", "4000", "--only", "two ways", "does not fit"],
 }
+UNCOMPARED = ("cluster.py: cluster", "measure.py: cost", "solvers.py: solvers")  # times, and solvers of other packages
 EXTRAS = {
     "benchmarks/others.py": ["openturns", "otaf", "SALib"],
-    "solvers/measure.py": ["qpsolvers"],
-    "speed/measure.py": ["qpsolvers", "daqp"],
+    "cost/solvers.py": ["qpsolvers"],
     "report/picture.py": ["playwright"],
     "site/build.py": ["sphinx", "myst_parser", "furo"],
 }
+
+
+INTERVAL = re.compile(r"\[(-?[\d.]+|-?inf), (-?[\d.]+|-?inf)\]")
+NUMBER = re.compile(r"(?:below )?[-+]?\d\S*.*")
+
+
+def rows_by_label(table):
+    """Return the header, and the cells of each row by its leading texts."""
+    header, _, *rows = ([cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines())
+    labels = [next((k for k, cell in enumerate(row) if NUMBER.fullmatch(cell)), len(row)) for row in rows]
+    return header, {tuple(row[: max(count, 1)]): row[max(count, 1) :] for row, count in zip(rows, labels, strict=True)}
+
+
+def contradictions(stated, written):
+    """Return what differs between two tables: headers, rows, and intervals that do not overlap."""
+    (header, rows), (other_header, other_rows) = rows_by_label(stated), rows_by_label(written)
+    differences = [] if header == other_header else [f"{other_header} in place of {header}"]
+    for label, cells in other_rows.items():
+        if label not in rows or len(rows[label]) != len(cells):
+            differences.append(f"no such row: {label}")
+            continue
+        for expected, actual in zip(rows[label], cells, strict=True):
+            intervals = [INTERVAL.search(cell) for cell in (expected, actual)]
+            if all(intervals):
+                (lower, upper), (other_lower, other_upper) = ([float(bound) for bound in match.groups()] for match in intervals)
+                is_equal = lower <= other_upper and other_lower <= upper
+            elif expected.startswith("below ") and actual.startswith("below "):
+                is_equal = float(actual[6:]) <= float(expected[6:])
+            else:
+                are_estimates = NUMBER.fullmatch(expected) and NUMBER.fullmatch(actual) and not (expected + actual).isdigit()
+                is_equal = bool(are_estimates) or expected == actual
+            if not is_equal:
+                differences.append(f"{label}: {actual} in place of {expected}")
+    return differences
+
+
+def test_a_table_contradicts_another_row_interval_or_verdict():
+    table = "| case | points | mean | verdict |\n|---|---|---|---|\n| peg | 12 | 0.3 [0.2, 0.4] | agrees |\n"
+    assert not contradictions(table, table.replace("0.3 [0.2, 0.4]", "0.35 [0.1, 0.6]"))
+    for text, other in (("[0.2, 0.4]", "[0.5, 0.6]"), ("agrees", "differs"), ("peg", "pin"), ("mean", "median"), ("12", "13")):
+        assert len(contradictions(table, table.replace(text, other))) == 1
 
 
 def test_no_script_is_forgotten():
@@ -71,6 +114,43 @@ def test_pictures_of_the_guide_are_those_of_their_scripts(tmp_path):
             assert (tmp_path / file.name).read_text() == file.read_text(), file.name
 
 
+def test_the_table_of_costs_has_the_figures_of_its_csv_file():
+    text = markdown(measure.table(measure.read(measure.HERE / "cost.csv")))
+    assert tables(measure.HERE / "README.md")["measure.py: cost"] == text
+
+
+def corner_heights():
+    """Return mean corner heights of RA1 with their bounds, by objective, from the study of objectives (exact resolution)."""
+    _, rows = rows_by_label(tables(ROOT / "studies" / "objectives" / "README.md")["measure.py: objectives"])
+    means = {label[1]: cells[0] for label, cells in rows.items() if label[0] == "ra1, exact: corner height"}
+    return {name: [float(number) for number in re.findall(r"-?[\d.]+", mean)] for name, mean in means.items()}
+
+
+def test_the_readme_states_the_corner_heights_of_the_study():
+    limits = (ROOT / "README.md").read_text(encoding="utf-8").partition("\n## Limits\n")[2].partition("\n## ")[0]
+    heights = corner_heights()
+    for name, text in (
+        ("active points", r'([\d.]+) mm by the paper\'s\s+"active points"'), ("all points", r'([\d.]+) by "all points"'),
+        ("locator stiffness", r'([\d.]+) by "all points" \(default\) and by springs'), ("seating", r"([\d.]+) under a weight"),
+    ):  # fmt: skip
+        (stated,) = re.findall(text, limits)
+        mean, lower, upper = heights[name]
+        assert lower < float(stated) < upper and abs(float(stated) - mean) < 0.01
+
+
+@pytest.mark.slow
+def test_the_summary_of_ra1_states_corner_heights_that_agree_with_the_study():
+    done = run(
+        [sys.executable, "-m", "tolcontact", "run", ROOT / "models" / "ra1.py", "--resolution", "exact", "--solver", "daqp",
+         "--seed", "1", "--samples", "1000", "--fields", "none", "--surfaces", "0"], cwd=ROOT, timeout=600,
+    )  # fmt: skip
+    (line,) = [line for line in done.stdout.splitlines() if "corner height: mean" in line]
+    others = re.findall(r'\[([\d.]+), ([\d.]+)\] by "([^"]+)"', line)
+    assert {name for *_, name in others} == {"all points", "locator stiffness"}
+    for lower, upper, name in others:
+        assert float(lower) < corner_heights()[name][0] < float(upper)
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", STUDIES)
 def test_a_study_runs(name, tmp_path):
@@ -80,3 +160,9 @@ def test_a_study_runs(name, tmp_path):
         pytest.skip("there is no Chromium")
     done = run([sys.executable, ROOT / "studies" / name, *map(str, STUDIES[name])], cwd=tmp_path, timeout=1800)
     assert done.returncode == 0, done.stderr
+    if (page := tmp_path / "README.md").exists():
+        stated = tables((ROOT / "studies" / name).with_name("README.md"))
+        compared = {mark: text for mark, text in tables(page).items() if mark.startswith(Path(name).name + ":")}
+        assert compared
+        for mark, text in compared.items():
+            assert mark in UNCOMPARED or not contradictions(stated[mark], text), mark

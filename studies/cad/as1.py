@@ -5,13 +5,14 @@ toleranced: they stay where the file has them. Measured are the gap between the 
 the room between the rod's nuts. A tolerance is the full width of its zone [mm].
 
     tolcontact run studies/cad/as1.py --samples 10000
-    python -m studies.cad.as1 FIGURE.png         draws the assembly
+    python -m studies.cad.as1 [--samples 2000] [--to FOLDER]     figure and table of the page
 """
 
-import sys
+import argparse
 from pathlib import Path
 
 import tolcontact as tc
+from studies.tables import with_interval, write
 
 FILE = Path(__file__).with_name("as1-oc-214.stp")
 MOVING = ["l-bracket_1", "l-bracket_1 (2)", "nut_1", "nut_2"]
@@ -40,10 +41,23 @@ def assembly() -> tc.Assembly:
     return model
 
 
-def draw(figure: Path) -> None:
-    """Draw the assembly, with a colour for each part."""
-    tc.plot.assembly(assembly(), marks=False).screenshot(figure, window_size=(760, 560))
+def main() -> None:
+    """Draw the assembly, and write the table of its measures."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--samples", type=int, default=2000)
+    parser.add_argument("--to", type=Path, default=FILE.parent, help="folder of the figure and the page")
+    arguments = parser.parse_args()
+    model = assembly()
+    tc.plot.assembly(model, marks=False).screenshot(arguments.to / "as1.png", window_size=(760, 560))
+    run = tc.run(model, samples=arguments.samples, seed=1, solver="daqp", fields="none")
+    spreads = tc.summarize(run).statistic_value.sel(statistic="6 sigma")
+    rows: list[tuple[object, ...]] = [("measure", *(f"6 sigma, {state} [mm]" for state in run.state.values))]
+    for measure in run.measure.values:
+        rows.append(
+            (measure, *(with_interval(*spreads.sel(measure=measure, state=state).values) for state in run.state.values))
+        )
+    write(__file__, {"as1": rows}, arguments.to)
 
 
 if __name__ == "__main__":
-    draw(Path(sys.argv[1])) if len(sys.argv) > 1 and sys.argv[1].endswith(".png") else tc.main(assembly)
+    main()

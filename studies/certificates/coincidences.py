@@ -8,6 +8,7 @@ import argparse
 import collections
 import contextlib
 import re
+import sys
 import time
 import types
 import warnings
@@ -36,6 +37,7 @@ MIN_ARM = 0.03  # of the size of a body: root mean square distance of its contac
 STIFF = "locator stiffness"
 LISTED = 6  # wrong realizations of a scene
 CONTRADICTIONS = ("inside", "noticed", "missed", "falsely touched", "lifted off", "not told", "falsely told")
+WRONG = ("inside", "falsely touched", "crashed")  # which ends a run with exit code 1
 UNCERTIFIED = ("not converged", "not assemblable", "doubtful")
 OTHERS = ("liftable", "refused", "crashed", "seconds")
 COLUMNS: tuple[str, ...] = ("scenes", "rows", "stiff", "overlapping", "certified", *CONTRADICTIONS, "undeclared", "told")
@@ -219,7 +221,8 @@ def simulated(tally: Tally, seed: int, family: str, options: argparse.Namespace)
     tally.add(family, findings)
 
 
-def main() -> None:
+def main() -> int:
+    """Judge scenes; return 1 if a certified realization is inside or falsely touched."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--first", type=int, default=0, help="seed of the first scene")
     parser.add_argument("--scenes", type=int, default=1000)
@@ -241,7 +244,8 @@ def main() -> None:
             simulated(tally, seed, options.families[seed % len(options.families)], options)
     tally.print()
     print(f"{time.perf_counter() - start:.0f} s")
+    return int(any(counts[wrong] for counts in tally.counts.values() for wrong in WRONG))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -8,6 +8,7 @@ shares no code with the simulation.
 import argparse
 import collections
 import itertools
+import sys
 import time
 
 import numpy as np
@@ -137,6 +138,7 @@ def judged(assembly, bodies, samples, seed, solver):
 
 
 def main():
+    """Judge scenes; return 1 if a certificate is wrong."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--scenes", type=int, default=2000)
@@ -161,7 +163,8 @@ def main():
         if seed % COUNTED == COUNTED - 1:
             print(f"up to scene {seed}: {dict(total)}, deepest {deepest:.2g} mm", flush=True)
     print(dict(total), f"refused scenes: {refused}, deepest {deepest:.2g} mm, {time.perf_counter() - start:.0f} s")
+    return int(any(total[name] for name in ("false contact", "missed contact", "lifted off", "inside")))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -5,6 +5,7 @@ What is looked at is computed from poses and deviations alone, by formulae that 
 
 import argparse
 import collections
+import sys
 import time
 import warnings
 
@@ -144,7 +145,8 @@ def depth(nominal: Nominal, pair: ContactPoints, sides: Sides) -> float:
     return float(max(0.0, -distance.min()))
 
 
-def main() -> None:
+def main() -> int:
+    """Judge scenes; return 1 if a certificate is contradicted."""
     options = argparse.ArgumentParser()
     options.add_argument("--first", type=int, default=0)
     options.add_argument("--scenes", type=int, default=1000)
@@ -152,6 +154,7 @@ def main() -> None:
     said = options.parse_args()
     warnings.simplefilter("ignore")
     total: collections.Counter = collections.Counter()
+    contradicted = 0
     statuses: collections.Counter = collections.Counter()
     begin = time.perf_counter()
     for seed in range(said.first, said.first + said.scenes):
@@ -170,6 +173,7 @@ def main() -> None:
             found = contradictions(program, run)
             for what, count in found.items():
                 total[what] += count
+                contradicted += count
                 if count:
                     print(f"scene {seed} {solver} {method.resolution} {method.objective}: {what} in {count}", flush=True)
         if len(runs) == len(SOLVERS):
@@ -190,7 +194,8 @@ def main() -> None:
     print(dict(total))
     print({f"{solver} {status}": count for (solver, status), count in sorted(statuses.items())})
     print(f"{sum(statuses.values())} realizations in {time.perf_counter() - begin:.0f} s")
+    return int(contradicted > 0)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

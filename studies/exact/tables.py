@@ -1,17 +1,19 @@
-"""What one linear step leaves, and what repeated steps cost: the tables of this folder's README.
+"""What one linear step leaves, and what repeated steps change: the tables of this folder's README.
 
-Usage: python studies/exact/tables.py [--samples N]
+python -m studies.exact.tables [--samples N] [--to FOLDER]
 """
 
 import argparse
 import runpy
-import time
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 import tolcontact as tc
+from studies.tables import Table, with_interval, write
 from tolcontact.simulation import Block, simulate_blocks
 from tolcontact.statistics import intervals
 from tolcontact.vocabulary import CORRECTED, Status
@@ -19,6 +21,7 @@ from tolcontact.vocabulary import CORRECTED, Status
 HERE = Path(__file__).resolve().parent
 LINEARIZED = tc.Method(resolution="linearized")
 EXACT = tc.Method(search="fixed", objective="active points")
+REGULARIZATIONS: tuple[Literal["identity", "points"], ...] = ("identity", "points")
 FAR = (1000.0, 0.0, 0.0)
 
 
@@ -26,13 +29,10 @@ def model(name: str, *choices) -> tc.Assembly:
     return runpy.run_path(str(HERE.parents[1] / "models" / f"{name}.py"))["assembly"](*choices)
 
 
-def simulate(assembly: tc.Assembly, samples: int, *, method: tc.Method | None = None, solver: str = "daqp"):
-    """Arrays of all realizations by name, and the time [s] from draws to measures."""
-    program = tc.build(assembly, solver=solver, method=method or LINEARIZED)
-    start = time.perf_counter()
-    blocks = list(simulate_blocks(program, samples=samples, seed=1))
-    taken = time.perf_counter() - start
-    return vars(Block.joined(blocks)), taken
+def simulate(assembly: tc.Assembly, samples: int, *, method: tc.Method = LINEARIZED, solver: str = "daqp"):
+    """Return arrays of all realizations by name."""
+    program = tc.build(assembly, solver=solver, method=method)
+    return vars(Block.joined(list(simulate_blocks(program, samples=samples, seed=1))))
 
 
 def shifted(assembly: tc.Assembly, by=FAR) -> tc.Assembly:
@@ -43,83 +43,71 @@ def shifted(assembly: tc.Assembly, by=FAR) -> tc.Assembly:
 
 
 def spread(x: np.ndarray) -> str:
-    estimate, lower, upper = intervals.standard_deviation(x, times=6)
-    return f"{estimate:.4f} [{lower:.4f}, {upper:.4f}]"
+    return with_interval(*intervals.standard_deviation(x, times=6))
 
 
 def ratio(after: dict, before: dict, measure: int) -> str:
-    """Of the standard deviations, from the same draws."""
+    """Return the ratio of the standard deviations on the same draws."""
     values = intervals.variance_ratio(*(run["measured"][:, CORRECTED, measure] for run in (after, before)))
-    return "{:.4f} [{:.4f}, {:.4f}]".format(*np.sqrt(values))
+    return with_interval(*np.sqrt(values))
 
 
-def linearized_against_exact(samples: int) -> None:
-    print(
-        "| model, measure | 6 sigma, linearized | 6 sigma, exact | exact / linearized | difference, median | largest "
-        "| penetration left | steps |"
-    )
-    print("|---|---|---|---|---|---|---|---|")
-    for name, assembly in {
-        "RA1": model("ra1"),
-        "RA2": model("ra2"),
-        "channel": model("channel"),
-        "channel, flanges open by 15 degrees": model("channel", 15),
-    }.items():
-        linear, _ = simulate(assembly, samples)
-        exact, _ = simulate(assembly, samples, method=EXACT)
-        apart = np.abs(exact["measured"] - linear["measured"])[:, CORRECTED]
+def linearized_against_exact(samples: int) -> Table:
+    """Return both resolutions on the same draws."""
+    columns = ("model, measure", "6 sigma, linearized", "6 sigma, exact", "exact / linearized", "difference, median", "largest",
+               "penetration left by linearized, exact", "steps of exact, median and most")  # fmt: skip
+    rows: list[tuple[object, ...]] = [columns]
+    models = {"RA1": model("ra1"), "RA2": model("ra2"), "channel": model("channel"), "channel, open": model("channel", 15)}
+    for name, assembly in models.items():
+        linear, exact = simulate(assembly, samples), simulate(assembly, samples, method=EXACT)
+        differences = np.abs(exact["measured"] - linear["measured"])[:, CORRECTED]
         left = [max(0.0, -run["gap_min"][:, CORRECTED].min()) for run in (linear, exact)]
         steps = exact["iterations"][exact["status"] != Status.UNTOUCHED]
         for k, measure in enumerate(assembly.measures):
-            print(
-                f"| {name}, {measure.name} | {spread(linear['measured'][:, CORRECTED, k])} | "
-                f"{spread(exact['measured'][:, CORRECTED, k])} | {ratio(exact, linear, k)} | "
-                f"{np.median(apart[:, k]):.4f} | {apart[:, k].max():.3f} | "
-                f"{left[0]:.2g}, {left[1]:.1g} | {np.median(steps):g}, {steps.max()} |"
-            )
+            spreads = [spread(run["measured"][:, CORRECTED, k]) for run in (linear, exact)]
+            change = f"{np.median(differences[:, k]):.3f}", f"{differences[:, k].max():.2f}"
+            depths, counts = f"{left[0]:.2g}, {left[1]:.0e}", f"{np.median(steps):g}, {steps.max()}"
+            rows.append((f"{name}: {measure.name}", *spreads, ratio(exact, linear, k), *change, depths, counts))
+    return rows
 
 
-def opposed_faces(samples: int) -> None:
-    print("| channel | constrained points | solver | without slack infeasible | resolved | least gap (mm) | steps |")
-    print("|---|---|---|---|---|---|---|")
+def opposed_faces(samples: int) -> Table:
+    """Return how the channel without clearance is resolved."""
+    rows: list[tuple[object, ...]] = [
+        ("resolution", "constrained points", "solver", "not converged", "resolved", "least gap [mm]", "steps, median and most")
+    ]
     initial = tc.Method(resolution="linearized", active_set="initial")
     for method, points in ((initial, "active at first"), (LINEARIZED, "all"), (EXACT, "all")):
         for solver in ("qpoases", "daqp"):
-            run, _ = simulate(model("channel"), samples, method=method, solver=solver)
-            infeasible = intervals.proportion(run["status"] == Status.NOT_CONVERGED)
-            resolved = (run["status"] == Status.RESOLVED).mean()
-            print(
-                f"| {method.resolution} | {points} | {solver} | {100 * infeasible[0]:.1f} % "
-                f"[{100 * infeasible[1]:.1f}, {100 * infeasible[2]:.1f}] | {100 * resolved:.2f} % | "
-                f"{run['gap_min'][:, CORRECTED].min():.2g} | {np.median(run['iterations']):g}, {run['iterations'].max()} |"
-            )
+            run = simulate(model("channel"), samples, method=method, solver=solver)
+            shares = [
+                with_interval(*(100 * value for value in intervals.proportion(run["status"] == status)))
+                for status in (Status.NOT_CONVERGED, Status.RESOLVED)
+            ]
+            least, steps = run["gap_min"][:, CORRECTED].min(), run["iterations"]
+            counts = f"{np.median(steps):g}, {steps.max()}"
+            rows.append((method.resolution, points, solver, *(f"{share} %" for share in shares), f"{least:.2g}", counts))
+    return rows
 
 
-def where_it_stands(samples: int) -> None:
-    print("| model, measure | regularization | resolution | largest difference (mm) | 6 sigma | 6 sigma, 1 m away |")
-    print("|---|---|---|---|---|---|")
-    for name in ("RA1", "RA2"):
-        for method in (
-            replace(LINEARIZED, regularization="identity"), LINEARIZED, replace(EXACT, regularization="identity"), EXACT,
-        ):  # fmt: skip
-            still, _ = simulate(model(name.lower()), samples, method=method)
-            moved, _ = simulate(shifted(model(name.lower())), samples, method=method)
-            apart = np.abs(moved["measured"] - still["measured"])[:, CORRECTED]
-            for k, measure in enumerate(model(name.lower()).measures):
-                print(
-                    f"| {name}, {measure.name} | {method.regularization} | {method.resolution} | {apart[:, k].max():.2g} | "
-                    f"{spread(still['measured'][:, CORRECTED, k])} | {spread(moved['measured'][:, CORRECTED, k])} |"
-                )
+def moved_assembly(samples: int) -> Table:
+    """Return the results of the same assembly, and of the assembly 1 m away."""
+    rows: list[tuple[object, ...]] = [
+        ("model", "resolution", "regularization", "6 sigma", "6 sigma, 1 m away", "largest difference [mm]")
+    ]
+    for name, method, regularization in product(("ra1", "ra2"), (LINEARIZED, EXACT), REGULARIZATIONS):
+        choice = replace(method, regularization=regularization)
+        near, far = (simulate(assembly, samples, method=choice) for assembly in (model(name), shifted(model(name))))
+        values = [run["measured"][:, CORRECTED, 0] for run in (near, far)]
+        largest = f"{np.abs(values[1] - values[0]).max():.0e}"
+        rows.append((name.upper(), choice.resolution, regularization, *map(spread, values), largest))
+    return rows
 
 
 if __name__ == "__main__":
-    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    arguments.add_argument("--samples", type=int, default=10_000)
-    samples = arguments.parse_args().samples
-    for title, table in (
-        ("Linearized against exact", linearized_against_exact),
-        ("Opposed faces", opposed_faces),
-        ("The same assembly 1 m away", where_it_stands),
-    ):
-        print(f"\n## {title}, N = {samples}\n")
-        table(samples)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--samples", type=int, default=10_000)
+    parser.add_argument("--to", type=Path, help="folder of the page")
+    arguments = parser.parse_args()
+    tables = {"steps": linearized_against_exact, "opposed": opposed_faces, "moved": moved_assembly}
+    write(__file__, {name: table(arguments.samples) for name, table in tables.items()}, arguments.to)

@@ -1,11 +1,10 @@
 """Faces that are not flat: seats, a seal and its leak, RA1 and RA2, and what modes and points change.
 
-python studies/form/measure.py [--samples 1000] [--figure gaps.png]
+python -m studies.form.measure [--samples 1000] [--to FOLDER]
 """
 
 import argparse
 import runpy
-import time
 from pathlib import Path
 
 import manifold3d
@@ -14,8 +13,11 @@ import numpy as np
 import trimesh
 
 import tolcontact as tc
+from studies.tables import Table, with_interval, write
+from tolcontact.statistics import intervals
 
-MODELS = Path(__file__).parents[2] / "models"
+HERE = Path(__file__).resolve().parent
+MODELS = HERE.parents[1] / "models"
 SOLVER = "daqp"
 FLATNESS = (0.02, 0.05, 0.1)
 
@@ -70,50 +72,40 @@ def with_form(name: str, flatness: float, pairs: int) -> tc.Assembly:
     return model
 
 
-def simulated(model: tc.Assembly, samples: int, first: int = 16) -> tuple[dict[str, np.ndarray], int, float]:
-    """Return corrected measures by name, the number of contact points, and the processor time of a realization [us].
-
-    The `first` realizations are not timed: functions are compiled in them.
-    """
+def simulated(model: tc.Assembly, samples: int) -> tuple[dict[str, np.ndarray], int]:
+    """Return corrected measures by name, and the number of contact points."""
     program = tc.build(model, solver=SOLVER)
-    list(tc.simulate_blocks(program, samples=first, seed=2))
-    start = time.process_time()
-    blocks = list(tc.simulate_blocks(program, samples=samples, seed=1))
-    seconds = time.process_time() - start
-    measured = np.concatenate([block.measured[:, 1] for block in blocks])
+    measured = np.concatenate([block.measured[:, 1] for block in tc.simulate_blocks(program, samples=samples, seed=1)])
     points = sum(len(pair.P_m) for pair in program.nominal.pairs if not pair.is_supports)
-    return {measure.name: measured[:, k] for k, measure in enumerate(model.measures)}, points, 1e6 * seconds / samples
+    return {measure.name: measured[:, k] for k, measure in enumerate(model.measures)}, points
 
 
-def interval(values: np.ndarray, digits: int = 4) -> str:
-    """Return the mean with its 95 % interval, as a text."""
-    half = 1.96 * values.std(ddof=1) / np.sqrt(len(values))
-    return f"{values.mean():.{digits}f} ± {half:.{digits}f}"
-
-
-def row(*cells: object) -> None:
-    print(f"| {' | '.join(map(str, cells))} |")
-
-
-def heading(title: str, *columns: str) -> None:
-    print(f"\n## {title}\n")
-    row(*columns)
-    row(*["---"] * len(columns))
-
-
-def gaps_of(models: dict[str, tc.Assembly], samples: int) -> dict[str, np.ndarray]:
-    """Print a row for each model, and return the largest gaps by its name."""
-    largest = {}
+def gaps_of(models: dict[str, tc.Assembly], samples: int) -> tuple[Table, dict[str, np.ndarray]]:
+    """Return a table with a row for each model, and the largest gaps by its name."""
+    largest: dict[str, np.ndarray] = {}
+    rows: list[tuple[str, ...]] = [("form", "contact points", "largest gap", "its 99 %", "mean gap", "height")]
     for name, model in models.items():
-        measured, points, cost = simulated(model, samples)
+        measured, points = simulated(model, samples)
         largest[name] = measured["largest gap"]
-        quantile = np.quantile(measured["largest gap"], 0.99)
-        row(name, points, interval(measured["largest gap"]), f"{quantile:.4f}", interval(measured["mean gap"]),
-            interval(measured["height"]), f"{cost:.0f}")  # fmt: skip
-    return largest
+        means = (with_interval(*intervals.mean(measured[measure])) for measure in ("largest gap", "mean gap", "height"))
+        gap, mean_gap, height = means
+        rows.append((name, f"{points}", gap, f"{np.quantile(largest[name], 0.99):.3f}", mean_gap, height))
+    return rows, largest
 
 
-def draw(largest: dict[str, np.ndarray], path: str) -> None:
+def references(samples: int) -> Table:
+    """Return RA1 and RA2 with form on one or three faces."""
+    rows: list[tuple[str, ...]] = [("model", "flatness", "mean", "6 sigma")]
+    for name, faces in (("ra1", 1), ("ra2", 1), ("ra2", 3)):
+        for width in (0.0, 0.05, 0.5):
+            measured, _ = simulated(with_form(name, width, faces), samples)
+            values = next(iter(measured.values()))
+            estimates = intervals.mean(values), intervals.standard_deviation(values, times=6)
+            rows.append((f"{name.upper()}, {faces} of its faces", f"{width:g}", *(with_interval(*e) for e in estimates)))
+    return rows
+
+
+def draw(largest: dict[str, np.ndarray], path: Path) -> None:
     """Draw the distribution of the largest gap at the seal for each flatness."""
     figure, axes = plt.subplots(figsize=(7, 3.5))
     bins = np.linspace(0, max(values.max() for values in largest.values()), 50)
@@ -128,25 +120,19 @@ def draw(largest: dict[str, np.ndarray], path: str) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--samples", type=int, default=1000)
-    parser.add_argument("--figure", default=str(Path(__file__).parent / "gaps.png"))
-    options = parser.parse_args()
-    samples, columns = options.samples, ("model", "points", "largest gap", "its 99 %", "mean gap", "height", "us")
-    heading("A lid on its seal", *columns)
-    draw(gaps_of({f"flatness {width}": lid(width) for width in FLATNESS}, samples), options.figure)
-    heading("Flat on flat", *columns)
-    gaps_of({"plate": plate(), "both": plate(both=True)}, samples)
-    heading("Modes", *columns)
-    gaps_of({f"{modes} modes": lid(modes=modes) for modes in (3, 6, 10, 20, 40)}, samples)
-    heading("Points", *columns)
-    gaps_of({f"spacing {spacing} mm": lid(spacing=spacing) for spacing in (12, 8, 4, 2)}, samples)
-    heading("Correlation length", *columns)
-    gaps_of({f"1/{k} of 120 mm": lid(share=1 / k) for k in (2, 3, 5)}, samples)
-    heading("RA1 and RA2", "model", "flatness", "points", "mean", "6 sigma", "us")
-    for name, pairs in (("ra1", 1), ("ra2", 1), ("ra2", 3)):
-        for width in (0.0, 0.05, 0.5):
-            measured, points, cost = simulated(with_form(name, width, pairs), 4 * samples, first=8 * samples)
-            values = next(iter(measured.values()))
-            row(f"{name}, {pairs} faces", width or "none", points, interval(values), f"{6 * values.std():.4f}", f"{cost:.0f}")
+    parser.add_argument("--to", type=Path, default=HERE, help="folder of the figure and the page")
+    arguments = parser.parse_args()
+    cases = {
+        "seal": {f"flatness {width}": lid(width) for width in FLATNESS},
+        "plates": {"form of the plate": plate(), "form of plate and table": plate(both=True)},
+        "modes": {f"{modes} modes": lid(modes=modes) for modes in (3, 6, 10, 20, 40)}
+        | {f"spacing {spacing}": lid(spacing=spacing) for spacing in (12, 8, 4, 2)}
+        | {f"length 120 / {k}": lid(share=1 / k) for k in (2, 3, 5)},
+    }
+    results = {name: gaps_of(models, arguments.samples) for name, models in cases.items()}
+    draw(results["seal"][1], arguments.to / "gaps.png")
+    tables = {name: table for name, (table, _) in results.items()}
+    write(__file__, tables | {"references": references(4 * arguments.samples)}, arguments.to)
 
 
 if __name__ == "__main__":

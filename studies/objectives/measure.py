@@ -13,16 +13,16 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import tolcontact as tc
+from studies.tables import Table, with_interval, write
 from tolcontact.discretization import discretize
 from tolcontact.method import OBJECTIVES
 
 HERE = Path(__file__).resolve().parent
 MODELS = ("ra1", "ra2", "door", "cover", "tower", "lid")
-FACTORS = {"ra1": 5, "tower": 0.1}  # of the number of realizations: a tower takes long
+FACTORS = {"ra1": 10, "tower": 0.3}  # of the number of realizations: a tower takes long
 RESOLUTIONS = {"ra1": ("linearized", "exact"), "ra2": ("linearized",)}  # of others, their own
 PINNED = ("cover", "lid")  # pins hold them sideways, and their other locators are left out when forces press them
 SEATED = "seating"
-BEGIN, END = "<!-- table -->\n", "<!-- end of table -->"
 
 
 class Result(NamedTuple):
@@ -90,21 +90,14 @@ def results(name: str, samples: int) -> list[Result]:
     return rows
 
 
-def figure(values: np.ndarray) -> str:
-    """Return a value with its interval, rounded by the width of the interval."""
-    digits = max(0, int(np.ceil(-np.log10(max(values[2] - values[1], 1e-3)))) + 1)
-    value, lower, upper = (f"{round(float(number), digits) + 0.0:.{digits}f}" for number in values)  # no -0
-    return f"{value} [{lower}, {upper}]"
-
-
-def table(rows: list[Result]) -> str:
-    lines = ["| model, measure | objective | mean | 6 sigma | certified |", "|---|---|---|---|---|"]
-    for k, row in enumerate(rows):
-        is_new = k == 0 or (row.model, row.measure) != (rows[k - 1].model, rows[k - 1].measure)
-        label = f"{row.model}: {row.measure}" if is_new else ""
-        certified = f"{100 * row.certified:.4g} %"
-        lines.append(f"| {label} | {row.objective} | {figure(row.mean)} | {figure(row.spread)} | {certified} |")
-    return "\n".join(lines) + "\n"
+def table(rows: list[Result]) -> Table:
+    """Return a row for each result, with intervals."""
+    columns = ("model, measure", "objective", "mean", "6 sigma", "certified")
+    return [columns] + [
+        (f"{row.model}: {row.measure}", row.objective, with_interval(*row.mean), with_interval(*row.spread),
+         f"{100 * row.certified:.4g} %")
+        for row in rows
+    ]  # fmt: skip
 
 
 def draw(rows: list[Result], path: Path) -> None:
@@ -131,16 +124,13 @@ def draw(rows: list[Result], path: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--samples", type=int, default=2000, help="realizations by each objective (see FACTORS)")
+    parser.add_argument("--samples", type=int, default=1000, help="realizations by each objective (see FACTORS)")
     parser.add_argument("--models", nargs="+", default=MODELS, choices=MODELS)
     parser.add_argument("--to", type=Path, default=HERE, help="folder of the figure, and of a README with the table")
     options = parser.parse_args()
     rows = [row for name in options.models for row in results(name, max(20, int(options.samples * FACTORS.get(name, 1))))]
     draw(rows, options.to / "objectives.png")
-    readme = (HERE / "README.md").read_text(encoding="utf-8")
-    before, rest = readme.split(BEGIN)
-    text = before + BEGIN + table(rows) + END + rest.partition(END)[2]
-    (options.to / "README.md").write_text(text, encoding="utf-8")
+    write(__file__, {"objectives": table(rows)}, options.to)
 
 
 if __name__ == "__main__":

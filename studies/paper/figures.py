@@ -9,10 +9,10 @@ import pyvista as pv
 import trimesh
 import xarray as xr
 from PIL import Image
-from published import PAPER, STATES
 from scipy.spatial import Delaunay
 
 import tolcontact as tc
+from studies.paper.published import PAPER, STATES
 
 mpl.use("Agg")
 pv.vtk_verbosity("off")  # without a display VTK says so, and goes on

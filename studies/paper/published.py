@@ -1,8 +1,9 @@
 """What the paper prints of its two reference assemblies."""
 
 from dataclasses import dataclass
+from typing import Literal
 
-STATES = ("raw", "corrected")  # contactless, contact
+STATES: tuple[Literal["raw", "corrected"], ...] = ("raw", "corrected")  # contactless, contact
 
 
 @dataclass(frozen=True)

@@ -1,18 +1,18 @@
 """Table 1 and figures 3 to 7 of the paper, from our simulation of its two assemblies.
 
-Usage: python studies/paper/reproduce.py [--large N] [--to FOLDER]
+python -m studies.paper.reproduce [--large N] [--to FOLDER]
 """
 
 import argparse
 import runpy
 from pathlib import Path
 
-import figures
 import numpy as np
-import table
 import xarray as xr
 
 import tolcontact as tc
+from studies.paper import figures, table
+from studies.tables import Table, write
 
 HERE = Path(__file__).resolve().parent
 METHODS = {
@@ -27,26 +27,28 @@ def model(name: str, *choices) -> tc.Assembly:
 
 
 def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--large", type=int, default=100_000, help="realizations of the large runs")
-    options.add_argument("--to", type=Path, default=HERE, help="folder of the pictures")
-    chosen = options.parse_args()
-
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--large", type=int, default=100_000, help="realizations of the large runs")
+    parser.add_argument("--to", type=Path, default=HERE, help="folder of the figures and the page")
+    arguments = parser.parse_args()
     runs: dict[str, list[xr.DataTree]] = {}
-    large: dict[str, dict[str, np.ndarray]] = {}
+    large: dict[str, xr.DataTree] = {}
+    tables: dict[str, Table] = {}
+    penetration: list[tuple[str, ...]] = [("model", "method", "largest penetration left [mm]", "deeper than 1 um")]
     for name in ("RA1", "RA2"):
         program = tc.build(model(name))
         runs[name] = [tc.run(program, samples=1000, seed=seed) for seed in table.SEEDS]
-        measured, penetration = {}, []
-        for method, words in METHODS.items():
-            run = table.simulate(model(name), chosen.large, 1, "daqp", **words)
-            measured[f"{method}, N = {chosen.large}"] = table.heights(run)
-            penetration.append(f"{name}, {method}: penetration left {table.left(run)}")
+        measured: dict[str, np.ndarray] = {}
+        for method, options in METHODS.items():
+            run = table.simulate(model(name), arguments.large, 1, "daqp", **options)
+            measured[method] = table.heights(run)
+            penetration.append((name, method, *table.penetration_left(run)))
             large.setdefault(name, run)
-        print(*table.table_1(name, runs[name], measured), "", *penetration, "", sep="\n", flush=True)
-    print(*table.claims(runs, large), "", sep="\n")
-    print(*table.first_order(large["RA1"]), "", sep="\n")
-    figures.draw({name: of[0] for name, of in runs.items()}, chosen.to)
+        tables[name] = list(table.table_1(name, runs[name], measured))
+        print(name, "simulated", flush=True)
+    tables |= {"penetration": penetration, "claims": list(table.claims(runs, large))}
+    write(__file__, tables | {"first order": list(table.first_order(large["RA1"]))}, arguments.to)
+    figures.draw({name: seeds[0] for name, seeds in runs.items()}, arguments.to)
 
 
 if __name__ == "__main__":

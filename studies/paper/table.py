@@ -1,13 +1,14 @@
-"""Table 1 of the paper and the claims of its section 3.2, beside ours; as Markdown."""
+"""Table 1 of the paper and the claims of its section 3.2, compared with ours: rows of tables."""
 
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from published import PAPER, SENSITIVE, STATES
 
 import tolcontact as tc
+from studies.paper.published import PAPER, SENSITIVE, STATES
+from studies.tables import with_interval
 from tolcontact.statistics import intervals
 
 SEEDS = range(1, 21)
@@ -27,31 +28,28 @@ def heights(run: xr.DataTree) -> np.ndarray:
     return run.measured.isel(measure=0).values - run.measure_nominal.values[0]
 
 
-def table_1(name: str, runs: list[xr.DataTree], large: dict[str, np.ndarray]) -> Iterator[str]:
-    """One assembly: the paper's figures, ours of one seed and of all, and those of large runs by several methods."""
-    yield f"| {name} | paper | ours, seed 1 | {len(runs)} seeds, least to largest | {' | '.join(large)} |"
-    yield "|---|---|---|---|" + "---|" * len(large)
+def table_1(name: str, runs: list[xr.DataTree], large: dict[str, np.ndarray]) -> Iterator[tuple[str, ...]]:
+    """Yield the paper's figures of an assembly, ours of one seed and of all seeds, and figures of large runs by each method."""
+    yield name, "paper", "seed 1", f"{len(runs)} seeds, least to largest", *large
     samples = [heights(run) for run in runs]
     for k, state in enumerate(STATES):
         for (figure, estimate), paper in zip(FIGURES.items(), PAPER[name].figures[state], strict=True):
             scatter = [estimate(sample[:, k])[0] for sample in samples]
-            cells = [
+            yield (
                 f"{NAMES[state]} {figure}",
                 f"{paper:.4f}",
-                interval(estimate(samples[0][:, k]), 3),
+                with_interval(*estimate(samples[0][:, k])),
                 f"{min(scatter):.3f} to {max(scatter):.3f}",
-                *(interval(estimate(x[:, k]), 4) for x in large.values()),
-            ]
-            yield f"| {' | '.join(cells)} |"
+                *(with_interval(*estimate(x[:, k])) for x in large.values()),
+            )
 
 
-def claims(runs: dict[str, list[xr.DataTree]], large: dict[str, xr.DataTree]) -> Iterator[str]:
+def claims(runs: dict[str, list[xr.DataTree]], large: dict[str, xr.DataTree]) -> Iterator[tuple[str, ...]]:
     """Yield the rows for the statements that the paper makes in words."""
-    yield "| claim | paper | ours, N = 1000, 20 seeds | ours, large |"
-    yield "|---|---|---|---|"
+    yield "claim", "paper", "20 seeds, N = 1000", "large run"
     for name, run in large.items():
-        yield from (f"| {name}: {' | '.join(cells)} |" for cells in measure_claims(name, runs[name], run))
-        yield from (f"| {name}: {' | '.join(cells)} |" for cells in field_claims(name, runs[name], run))
+        for claim, *cells in (*measure_claims(name, runs[name], run), *field_claims(name, runs[name], run)):
+            yield f"{name}: {claim}", *cells
 
 
 def measure_claims(name: str, runs: list[xr.DataTree], large: xr.DataTree) -> Iterator[tuple[str, ...]]:
@@ -65,22 +63,23 @@ def measure_claims(name: str, runs: list[xr.DataTree], large: xr.DataTree) -> It
         yield f"{figure} reduced by", f"{theirs:.1%}", least_to_largest(each, percent=True), ours
     theirs = paper["corrected"][0] - paper["raw"][0]
     shift = [float((sample[:, 1] - sample[:, 0]).mean()) for sample in samples]
-    yield "mean shifted by [mm]", f"{theirs:+.4f}", least_to_largest(shift), interval(intervals.mean(x[:, 1] - x[:, 0]), 4)
+    yield "mean shifted by [mm]", f"{theirs:+.4f}", least_to_largest(shift), with_interval(*intervals.mean(x[:, 1] - x[:, 0]))
 
 
 def field_claims(name: str, runs: list[xr.DataTree], large: xr.DataTree) -> Iterator[tuple[str, ...]]:
-    """Range of the varying part's field, and its reduced maximum."""
+    """Range of the varying part's field without contact, and its reduced maximum, which the paper states for RA1 alone."""
     fields, most = [field_range(run, name) for run in runs], field_range(large, name)
     scale = "{:g} to {:g} (scale)".format(*PAPER[name].scale)
-    for k, state in enumerate(STATES):
-        for j, extreme in enumerate(("least", "largest")):
-            what = f"{extreme} 6 sigma magnitude of {PAPER[name].part}, {NAMES[state]} [mm]"
-            yield what, scale, least_to_largest([field[k, j] for field in fields]), f"{most[k, j]:.3f}"
-    theirs = f"{SENSITIVE:.1%}" if name == "RA1" else "-"
-    each = [1 - field[1, 1] / field[0, 1] for field in fields]
-    yield "largest reduced by, anywhere", theirs, least_to_largest(each, percent=True), f"{1 - most[1, 1] / most[0, 1]:.1%}"
-    each = [at_the_spot(run, name) for run in runs]
-    yield "largest reduced by, at its spot", theirs, least_to_largest(each, percent=True), f"{at_the_spot(large, name):.1%}"
+    for k, extreme in enumerate(("least", "largest")):
+        claim = f"{extreme} 6 sigma magnitude of {PAPER[name].part} without contact [mm]"
+        yield claim, scale, least_to_largest([field[0, k] for field in fields]), f"{most[0, k]:.3f}"
+    if name == "RA1":
+        each = [1 - field[1, 1] / field[0, 1] for field in fields]
+        reduced = f"{1 - most[1, 1] / most[0, 1]:.1%}"
+        yield "largest reduced by, anywhere", f"{SENSITIVE:.1%}", least_to_largest(each, percent=True), reduced
+        each = [at_the_spot(run, name) for run in runs]
+        reduced = f"{at_the_spot(large, name):.1%}"
+        yield "largest reduced by, at its spot", f"{SENSITIVE:.1%}", least_to_largest(each, percent=True), reduced
 
 
 def at_the_spot(run: xr.DataTree, name: str) -> float:
@@ -95,7 +94,7 @@ def field_range(run: xr.DataTree, name: str) -> np.ndarray:
     return np.stack([field.min("vertex").values, field.max("vertex").values], axis=1)
 
 
-def first_order(run: xr.DataTree) -> Iterator[str]:
+def first_order(run: xr.DataTree) -> Iterator[tuple[str, ...]]:
     """RA1 linear in the deviations: the base's plane where both faces cut each other in the contact area, else the top."""
     d = run["sample"].deviation.sel(contributor=[f"{part}.A{k}" for part in ("base", "top") for k in (1, 2, 3)]).values
 
@@ -106,8 +105,7 @@ def first_order(run: xr.DataTree) -> Iterator[str]:
     gap = np.min([height(top, TOP, x) - height(base, BASE, x) for x in CORNERS], axis=0)
     raw = height(top, TOP, MEASURED)
     linear, x = np.stack([raw, np.where(gap < 0, height(base, BASE, MEASURED), raw)], axis=1), heights(run)
-    yield "| RA1, first order in the deviations | mean | variance | second order adds to the mean | variance / first order |"
-    yield "|---|---|---|---|---|"
+    yield "RA1, linear in the deviations", "mean", "variance", "second order adds to the mean", "variance / first order"
     for k, state in enumerate(STATES):
         estimates = [
             intervals.mean(linear[:, k]),
@@ -115,21 +113,16 @@ def first_order(run: xr.DataTree) -> Iterator[str]:
             intervals.mean(x[:, k] - linear[:, k]),
             intervals.variance_ratio(x[:, k], linear[:, k]),
         ]
-        yield f"| {NAMES[state]} | {' | '.join(interval(e, 4) for e in estimates)} |"
+        yield NAMES[state], *(with_interval(*estimate) for estimate in estimates)
 
 
 def simulate(model: tc.Assembly, samples: int, seed: int, solver: str, **method: Any) -> xr.DataTree:
     return tc.run(model, samples=samples, seed=seed, solver=solver, method=tc.Method(**method))
 
 
-def interval(estimate: tuple[float, float, float], decimals: int) -> str:
-    value, lower, upper = (f"{figure:.{decimals}f}" for figure in estimate)
-    return f"{value} [{lower}, {upper}]"
-
-
 def reduction(ratio: tuple[float, float, float], power: float) -> str:
-    value, upper, lower = (f"{100 * (1 - r**power):.1f}" for r in ratio)
-    return f"{value}% [{lower}, {upper}]"
+    value, upper, lower = (100 * (1 - r**power) for r in ratio)
+    return f"{with_interval(value, lower, upper)} %"
 
 
 def least_to_largest(values: list[float], *, percent: bool = False) -> str:
@@ -137,7 +130,8 @@ def least_to_largest(values: list[float], *, percent: bool = False) -> str:
     return f"{form.format(min(values))} to {form.format(max(values))}"
 
 
-def left(x: xr.DataTree) -> str:
-    """Print the penetration that a method leaves."""
-    depth = -x.gap_min.sel(state="corrected").min("pair").values
-    return f"up to {depth.max():.2g} mm, more than 1 um in {(depth > 1e-3).mean():.2%} of the realizations"
+def penetration_left(run: xr.DataTree) -> tuple[str, str]:
+    """Return the largest penetration that a method leaves [mm], and the share of realizations with more than 1 um."""
+    depth = -run.gap_min.sel(state="corrected").min("pair").values
+    share = with_interval(*(100 * value for value in intervals.proportion(depth > 1e-3)))
+    return f"{depth.max():.2g}", f"{share} %"

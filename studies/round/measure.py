@@ -1,25 +1,25 @@
-"""Balls and shafts beside walls: how far off, and how long a realization takes, exact and on sampled points.
+"""Balls and shafts against walls: errors of round contact and of sampled points, compared with closed forms.
 
-python -m studies.round.measure            both, as round faces and with points=200 and points=1000
+python -m studies.round.measure [--samples 1000] [--to FOLDER]
 """
 
-import statistics
-import sys
-import time
+import argparse
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 import tolcontact as tc
+from studies.tables import with_interval, write
 from tests import cases
 from tests.cases import round_contact
 from tolcontact.simulation import simulate_blocks
+from tolcontact.statistics import intervals
 from tolcontact.vocabulary import CORRECTED, Status
 
 SEATED = tc.Method(objective="seating", resolution="exact")
-SAMPLES, REPEATS = 1000, 3
 Errors = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -69,34 +69,34 @@ def sampled(model: tc.Assembly, points: int | None) -> tc.Assembly:
     return model.replaced(pairs=[replace(pair, points=points) for pair in model.pairs])
 
 
-def measured(make: Callable[[], tc.Assembly], errors: Errors, points: int | None, samples: int) -> str:
-    """Return a row of the table."""
+def row(make: Callable[[], tc.Assembly], errors: Errors, points: int | None, samples: int) -> tuple[str, str, str]:
+    """Return the number of contact points, the share resolved, and the largest error of these as the next power of ten."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"\[coarse\]")
         program = tc.build(sampled(make(), points), solver="daqp", method=SEATED)
-    seconds = []
-    for _ in range(REPEATS):
-        start = time.perf_counter()
-        blocks = list(simulate_blocks(program, samples=samples, seed=1, threads=1))
-        seconds.append((time.perf_counter() - start) / samples)
+    blocks = list(simulate_blocks(program, samples=samples, seed=1, threads=1))
     status = np.concatenate([block.status for block in blocks])
     poses = np.concatenate([block.poses for block in blocks])[:, CORRECTED]
     R, t = poses[..., :9].reshape(*poses.shape[:-1], 3, 3), poses[..., 9:]
     resolved = status == Status.RESOLVED
-    error = np.abs(errors(R, t))[resolved].max() if resolved.any() else np.nan
-    rows = sum(len(pair.P_m) for pair in program.nominal.pairs if not pair.is_supports)
-    return f"{rows} | {resolved.mean():.1%} | {error:.1e} | {1e6 * statistics.median(seconds):.0f}"
+    bound = np.ceil(np.log10(np.abs(errors(R, t))[resolved].max())) if resolved.any() else np.nan
+    count = sum(len(pair.P_m) for pair in program.nominal.pairs if not pair.is_supports)
+    shares = with_interval(*(100 * share for share in intervals.proportion(resolved)))
+    return str(count), f"{shares} %", "" if np.isnan(bound) else f"below 1e{bound:.0f}"
 
 
 def main() -> None:
-    """Measure all cases, with as many realizations as the command line says."""
-    realizations = int(sys.argv[1]) if len(sys.argv) > 1 else SAMPLES
-    print("| case | contact | contact points | resolved | largest error [mm] | us a realization |")
-    print("|---|---|---|---|---|---|")
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--samples", type=int, default=1000, help="with sampled points a 25th")
+    parser.add_argument("--to", type=Path, help="folder of the page")
+    arguments = parser.parse_args()
+    rows: list[tuple[str, ...]] = [("case", "contact", "contact points", "resolved", "largest error [mm]")]
     for name, (make, errors) in CASES.items():
-        for points, said in ((None, "round"), (200, "200 points"), (1000, "1000 points")):
-            samples = realizations if points is None else max(1, realizations // 25)
-            print(f"| {name} | {said} | {measured(make, errors, points, samples)} |", flush=True)
+        for points, contact in ((None, "round"), (200, "200 points")):
+            samples = arguments.samples if points is None else max(1, arguments.samples // 25)
+            rows.append((name, contact, *row(make, errors, points, samples)))
+            print(*rows[-1], flush=True)
+    write(__file__, {"errors": rows}, arguments.to)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import types
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote, urlsplit
 
 from PIL import Image
 from sphinx.cmd.build import build_main
@@ -108,8 +109,25 @@ def changes() -> str:
     return f"# Changes\n\n{section}"
 
 
+def broken_links(folder: Path) -> list[str]:
+    """Return the relative links of all pages in a folder whose file or anchor does not exist."""
+    texts = {path.resolve(): path.read_text(encoding="utf-8") for path in folder.rglob("*.html")}
+    anchors = {path: set(re.findall(r'\b(?:id|name)="([^"]+)"', text)) for path, text in texts.items()}
+    broken = []
+    for path, text in texts.items():
+        for link in re.findall(r'<(?:a|img|link|script)\b[^>]*?\b(?:href|src)="([^"]*)"', text):
+            url = urlsplit(link)
+            target = (path.parent / unquote(url.path)).resolve() if url.path else path
+            is_there = target.exists() and (
+                not url.fragment or target not in anchors or unquote(url.fragment) in anchors[target]
+            )
+            if not (url.scheme or url.netloc or is_there):
+                broken.append(f"{path.relative_to(folder.resolve())}: {link}")
+    return broken
+
+
 def build(folder: Path, samples: int, scripts: Sequence[Path], chosen: Sequence[Problem]) -> None:
-    """Write the site of these models and problems into a folder. Raises RuntimeError if Sphinx warns of anything."""
+    """Write the site of these models and problems into a folder. Raises RuntimeError if Sphinx warns or a link is broken."""
     with tempfile.TemporaryDirectory() as temporary:
         source, extra = Path(temporary) / "source", Path(temporary) / "extra"
         shutil.copytree(GUIDE, source)
@@ -142,6 +160,8 @@ def build(folder: Path, samples: int, scripts: Sequence[Path], chosen: Sequence[
         options: list[Any] = ["-q", "-W", "--keep-going", "-D", f"html_extra_path={extra}"]
         if build_main([str(option) for option in [*options, source, folder]]):
             raise RuntimeError("the site has warnings; see above")
+    if broken := broken_links(folder):
+        raise RuntimeError("links lead nowhere: " + ", ".join(broken))
 
 
 def main() -> None:

@@ -25,9 +25,14 @@ add_module_names = False
 default_role = "code"
 
 
+# docutils writes the index of a letter with a bar below the letter.
+UNDER_BAR = re.compile(r'<munderover>\s*(<mi>.</mi>)\s*(<mi>.</mi>)\s*(<mo stretchy="false">ˉ</mo>)\s*</munderover>')
+BAR_WITH_INDEX = r'<msub><mover accent="true">\1\3</mover>\2</msub>'
+
+
 def _equation(visitor, node):  # MathML needs no script, and nothing is fetched
     is_block = isinstance(node, nodes.math_block)
-    mathml = tex2mathml(node.astext(), as_block=is_block)
+    mathml = UNDER_BAR.sub(BAR_WITH_INDEX, tex2mathml(node.astext(), as_block=is_block)).replace("ˉ", "¯")
     visitor.body.append(f'<div class="equation">{mathml}</div>' if is_block else mathml)
     raise nodes.SkipNode
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import trimesh
+from scipy.optimize import linprog
 
 import tolcontact as tc
 from tests.cases.frames import STILL, Frame
@@ -11,6 +12,7 @@ from tolcontact.declaration import GeometricTolerance
 
 LENGTH, WIDTH, THICKNESS = 120.0, 60.0, 8.0
 Place = tuple[float, float]
+FOUR = [(x, y) for x in (-45.0, 45.0) for y in (-20.0, 20.0)]
 
 
 def drilled(holes: Mapping[Place, float], sections: int = 48) -> trimesh.Trimesh:
@@ -65,6 +67,16 @@ def grown(results, part: str, holes: int) -> np.ndarray:
     """Deviations (realization, hole) [mm] of the diameters of the holes of a part."""
     drawn = results["sample"].deviation
     return np.array([drawn.sel(contributor=f"{part}.H{k}.size").values for k in range(holes)]).T
+
+
+def most_room(off: np.ndarray, room: np.ndarray) -> float:
+    """The largest room [mm] that all holes (hole, 2) can have at once, for a cover that shifts and turns a little."""
+    ways = np.linspace(0, 2 * np.pi, 360, endpoint=False)
+    n = np.column_stack([np.cos(ways), np.sin(ways)])
+    arms = np.column_stack([-np.array(FOUR)[:, 1], np.array(FOUR)[:, 0]])
+    rows = np.vstack([np.column_stack([n, n @ arm, np.ones(len(n))]) for arm in arms])
+    bounds = np.concatenate([r - n @ shift for shift, r in zip(off, room, strict=True)])
+    return float(-linprog([0, 0, 0, -1], rows, bounds, bounds=[(None, None)] * 4).fun)
 
 
 def bolted(

@@ -1,4 +1,4 @@
-"""Assemblies of any number of free bodies: a tower, a tree, a ring and a star; and one of a STEP file.
+"""Assemblies of any number of free bodies: a tower, a tree, a ring, a star; one of a STEP file; a slab of many points.
 
 Lengths in mm. A tolerance is the full width of its zone.
 """
@@ -15,6 +15,7 @@ from studies.cad import as1_nine
 HEIGHT, FIXTURE = 10.0, 1.0
 ROOT = 320.0  # width of the lowest block of a tree
 SMALL, PITCH = 30.0, 40.0  # width of a block of a star, and its distance from the next
+LONG, WIDE, THICK = 50.0, 25.0, 10.0  # of a slab
 CLEARANCE, ARC, THICKNESS = 0.2, 40.0, 20.0  # of a ring: between wedges, length of a wedge along it, and across it
 
 
@@ -84,6 +85,22 @@ def star(bodies: int) -> tc.Assembly:
     return model
 
 
+def slab(points: int, radius: float = np.inf) -> tc.Assembly:
+    """Return a slab set down on a base. Both faces are part of a sphere, or flat where `radius` [mm] is infinite."""
+    across = max(round(np.sqrt(points / 2)), 2)
+    a = tc.Assembly(f"slab of {points}")
+    base = a.part("base", tc.Mesh(_shell(LONG + 10, WIDE + 10, 60, 35, radius, -THICK)), fixed=True)
+    top = a.part("slab", tc.Mesh(_shell(LONG, WIDE, max(round(points / across), 2), across, radius, THICK)))
+    places = {
+        "Z1": ((-20, -10, 0), "z", 2), "Z2": ((20, -10, 0), "z", 2), "Z3": ((0, 10, 0), "z", 2),
+        "Y1": ((-20, 0, 5), "y", 0.5), "Y2": ((20, 0, 5), "y", 0.5), "X1": ((0, 0, 5), "x", 0.5),
+    }  # fmt: skip
+    a.locate(top, [tc.Locator(name, *place) for name, place in places.items()])
+    a.contact("interface", moving=top.face(_contact_side), reference=base.face(_contact_side), points="vertices", within=0.5)
+    a.measure("corner", top.point(LONG / 2, WIDE / 2, THICK), along="z", tolerance=1)
+    return a
+
+
 SCENES: dict[str, tuple[int, Callable[[int], tc.Assembly]]] = {  # with the least number of bodies
     "tower": (1, tower.assembly),
     "tree": (1, tree),
@@ -94,7 +111,7 @@ AS1, AS1_BODIES = "as1", 8  # of a STEP file, as it is: two brackets, a rod, two
 
 
 def scene(name: str, bodies: int) -> tc.Assembly:
-    """Return a scene of so many free bodies; as1 is as it is."""
+    """Return a scene with this number of free bodies; as1 has its own."""
     return as1_nine.assembly() if name == AS1 else SCENES[name][1](bodies)
 
 
@@ -107,3 +124,29 @@ def _block(model: tc.Assembly, name: str, size: tuple[float, float, float], corn
 
 def _towards(direction: np.ndarray) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
     return lambda centres, normals: normals @ direction > 0.99
+
+
+def _shell(long: float, wide: float, along: int, across: int, radius: float, thickness: float) -> trimesh.Trimesh:
+    """Return the body between the sphere and a plane at height `thickness`."""
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(-0.5, 0.5, along) * long, np.linspace(-0.5, 0.5, across) * wide))
+    z = radius - np.sqrt(radius**2 - x**2 - y**2) if np.isfinite(radius) else np.zeros_like(x)
+    first = (np.arange(across - 1)[:, None] * along + np.arange(along - 1)).ravel()
+    sheet = np.concatenate([np.column_stack([first, first + 1, first + along]),
+                            np.column_stack([first + 1, first + along + 1, first + along])])  # fmt: skip
+    count = along * across
+    right, back, left = (
+        np.arange(2 * along - 1, count, along),
+        np.arange(count - 2, count - along - 1, -1),
+        np.arange(count - 2 * along, 0, -along),
+    )
+    edge = np.concatenate([np.arange(along), right, back, left])
+    after = np.roll(edge, -1)
+    wall = np.concatenate([np.column_stack([edge, edge + count, after]), np.column_stack([after, edge + count, after + count])])
+    vertices = np.concatenate([np.column_stack([x, y, z]), np.column_stack([x, y, np.full(count, thickness)])])
+    mesh = trimesh.Trimesh(vertices, np.concatenate([sheet, sheet[:, ::-1] + count, wall]), process=False)
+    mesh.fix_normals()
+    return mesh
+
+
+def _contact_side(centres: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    return np.asarray((np.abs(normals[:, 2]) > 0.3) & (np.abs(centres[:, 2]) < THICK - 1e-6))

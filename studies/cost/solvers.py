@@ -1,6 +1,6 @@
-"""Accuracy and speed of QP solvers on contact problems with a row for every contact point.
+"""Accuracy of QP solvers on contact problems with a row for every contact point: solvers.csv and the table of the page.
 
-Usage: python studies/solvers/measure.py [--realizations 12] [--figure accuracy.png]
+    python -m studies.cost.solvers [--realizations 12] [--to FOLDER]
 
 The QPs are those of tolcontact, but with all rows, so that hundreds of them coincide or nearly do. Every solver gets the same
 ones, first in order, then reversed: an answer must not depend on the problem before it.
@@ -8,6 +8,7 @@ ones, first in order, then reversed: an answer must not depend on the problem be
 # ruff: noqa: E402
 
 import argparse
+import csv
 import functools
 import multiprocessing
 import queue
@@ -17,16 +18,18 @@ import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 sys.modules["highspy"] = None  # type: ignore[assignment]  # its HiGHS and CasADi's crash each other in one process
 
 import casadi as ca
-import matplotlib as mpl
 import numpy as np
 import qpsolvers
 from scipy.optimize import nnls
 
 import tolcontact as tc
+from studies.cost.scenes import slab
+from studies.tables import Table, write
 from tolcontact.compilation import conic_plugin, program as compilation
 from tolcontact.compilation.graph import GraphSolver
 from tolcontact.compilation.solvers import SOLVERS, usable_solvers
@@ -34,17 +37,15 @@ from tolcontact.mechanics.quiet import quiet
 from tolcontact.simulation import simulate_block
 from tolcontact.variation.draws import draw
 
-mpl.use("Agg")
-import matplotlib.pyplot as plt
-
 HERE = Path(__file__).resolve().parent
 PATIENCE = 10  # seconds
-WRONG = 1e-4  # mm: an answer that is farther off, and was not owned up to, is wrong
+WRONG = 1e-4  # mm: an answer with a larger error is wrong, unless the solver reports a failure
 REFUSED = {"ipqp": {}, "superscs": {"superscs": {"eps": 1e-9, "verbose": 0}}}
 OUTSIDE = {
     "daqp": {"primal_tol": 1e-11}, "quadprog": {}, "clarabel": {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11},
     "piqp": {"eps_abs": 1e-11}, "proxqp": {"eps_abs": 1e-10}, "osqp": {"eps_abs": 1e-9, "eps_rel": 1e-9},
 }  # fmt: skip
+COLUMNS = ("ms", "median", "largest", "wrong", "given up", "order", "of", "note")
 Problem = dict[str, np.ndarray]
 Solve = Callable[[Problem], tuple[np.ndarray, bool]]
 
@@ -54,7 +55,6 @@ def model(name: str, *choices) -> tc.Assembly:
 
 
 def models() -> dict[str, tc.Assembly]:
-    slab = runpy.run_path(str(HERE.parent / "speed" / "shapes.py"))["slab"]
     flat = tc.Assembly("coincident")  # the block only moves up and down: 400 rows are the same
     base, block = flat.part("base", tc.Box(50, 50, 10), fixed=True), flat.part("block", tc.Box(50, 50, 10), at=(0, 0, 10))
     places = {
@@ -180,7 +180,7 @@ def trial(make: Callable[[str, Problem], Solve], which: str, of: list[Problem], 
     return judge(make(which, of[0]), of, truth, limit=1.0)
 
 
-def apart(work: Callable[[], dict[str, float]]) -> dict[str, float] | str:
+def separately(work: Callable[[], dict[str, float]]) -> dict[str, float] | str:
     """Return the result of `work`, computed in a separate process: solvers may crash or never return."""
     context = multiprocessing.get_context("fork")
     answers = context.Queue()
@@ -201,41 +201,40 @@ def apart(work: Callable[[], dict[str, float]]) -> dict[str, float] | str:
         process.kill()
 
 
+def table(rows: list[dict[str, Any]]) -> Table:
+    """Return a row for each solver: its largest error in each problem, and its wrong answers in all of them."""
+    names = list(dict.fromkeys(str(row["problem"]) for row in rows))
+    lines: list[tuple[object, ...]] = [("solver", *(f"{name} [mm]" for name in names), "wrong, reported as success")]
+    for solver in dict.fromkeys(row["solver"] for row in rows):
+        results = {row["problem"]: row for row in rows if row["solver"] == solver}
+        errors = [f"{float(results[name]['largest']):.0e}" if results[name]["of"] else results[name]["note"] for name in names]
+        wrong, of = (sum(int(row[column] or 0) for row in results.values()) for column in ("wrong", "of"))
+        lines.append((solver, *errors, f"{wrong} of {of}"))
+    return lines
+
+
 def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--realizations", type=int, default=12)
-    options.add_argument("--figure", type=Path, default=HERE / "accuracy.png")
-    chosen = options.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--realizations", type=int, default=12)
+    parser.add_argument("--to", type=Path, default=HERE, help="folder of solvers.csv and of the page")
+    arguments = parser.parse_args()
     solvers: dict[str, tuple[Callable[[str, Problem], Solve], str]]
     solvers = {f"CasADi {name}": (with_casadi, name) for name in (*usable_solvers(), *REFUSED)}
     solvers["graph"] = (on_graph, solvers.pop("CasADi graph")[1])
-    solvers |= {f"{name} outside": (outside, name) for name in OUTSIDE}
-    print("| problem | solver | ms | median error [mm] | largest | wrong, unsaid | given up | order matters [mm] |")
-    print("|---|---|---:|---:|---:|---:|---:|---:|")
-    fig, axes = plt.subplots(2, 3, figsize=(11, 6.4), layout="constrained", sharex=True, sharey=True)
-    for (name, assembly), ax in zip(models().items(), axes.flat, strict=True):
-        of = problems(assembly, chosen.realizations)
-        truth = [reference(one) for one in of]
-        rows, size = of[0]["A"].shape
-        ax.set_title(f"{name}: {rows} rows, {size} variables", fontsize=9)
-        for k, (label, (make, which)) in enumerate(solvers.items()):
-            found = apart(functools.partial(trial, make, which, of, truth))
-            if isinstance(found, str):
-                print(f"| {name} | {label} | {found} ||||||", flush=True)
-                continue
-            print(
-                f"| {name} | {label} | {found['ms']:.3g} | {found['median']:.1g} | {found['largest']:.1g} | {found['wrong']} of"
-                f" {found['of']} | {found['given up']} | {found['order']:.1g} |",
-                flush=True,
-            )
-            marker, colour = ("o", f"C{k % 10}") if label.startswith("CasADi") else ("s", f"C{k % 10}")
-            ax.loglog(found["ms"], max(found["largest"], 1e-16), marker, color=colour, label=label)
-    for ax in axes[-1]:
-        ax.set_xlabel("ms per QP")
-    for ax in axes[:, 0]:
-        ax.set_ylabel("largest error [mm]")
-    fig.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False, fontsize=8)
-    fig.savefig(chosen.figure, dpi=120)
+    solvers |= {name: (outside, name) for name in OUTSIDE}
+    rows: list[dict[str, Any]] = []
+    for name, assembly in models().items():
+        qps = problems(assembly, arguments.realizations)
+        truth = [reference(qp) for qp in qps]
+        for solver, (make, which) in solvers.items():
+            result = separately(functools.partial(trial, make, which, qps, truth))
+            cells = {"note": result} if isinstance(result, str) else result
+            rows.append({"problem": name, "solver": solver, **dict.fromkeys(COLUMNS), **cells})
+    with (arguments.to / "solvers.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, ["problem", "solver", *COLUMNS], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    write(__file__, {"solvers": table(rows)}, arguments.to)
 
 
 if __name__ == "__main__":

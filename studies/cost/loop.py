@@ -1,66 +1,25 @@
-"""What a person would write instead: NumPy geometry, and a loop over a QP solver.
+"""The program that a person would write instead: NumPy geometry and a loop over QPs, solved by DAQP through qpsolvers.
 
-One part moves, the other one stays where its locators put it. Geometry is vectorized over realizations, in blocks; the loop
-holds nothing but rows and solver. It comes in three forms, by the rows of the QP: "first", the points that are inside at first,
-the paper's set and the least work, which leaves penetration where the correction drives other points in; "closed", which adds
-those and solves again until there are none, as ours does; and "every" point.
+One part moves, the other one stays where its locators place it. Geometry is vectorized over blocks of realizations; the loop
+holds nothing but rows and solver. The QP starts from the points that are inside, and adds the points that the correction drives
+inside until none is left.
 """
 
-from collections.abc import Callable
+import importlib.util
 
-import casadi as ca
-import daqp
 import numpy as np
-import qpsolvers
-import scipy.optimize
 from scipy.spatial.transform import Rotation
 
+has_qpsolvers = importlib.util.find_spec("qpsolvers") is not None
+if has_qpsolvers:
+    import qpsolvers
 ETA, ACTIVITY = 1e-6, 1e-9
 BLOCK = 500
-Solve = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray | None]
 
 
-def with_qpsolvers(name: str) -> Solve:
-    options = {"osqp": {"eps_abs": 1e-9, "eps_rel": 1e-9, "polishing": True}, "piqp": {"eps_abs": 1e-11},
-               "proxqp": {"eps_abs": 1e-10}, "daqp": {"primal_tol": 1e-11}}.get(name, {})  # fmt: skip
-    zero = np.zeros(6)
-    warm: dict = {}
-    starts = name in ("osqp", "proxqp")  # those that make use of a starting point
-
-    def solve(Q: np.ndarray, A: np.ndarray, b: np.ndarray) -> np.ndarray | None:
-        x = qpsolvers.solve_qp(Q, zero, -A, b, solver=name, initvals=warm.get("x") if starts else None, **options)
-        warm["x"] = x
-        return x
-
-    return solve
-
-
-def with_daqp(Q: np.ndarray, A: np.ndarray, b: np.ndarray) -> np.ndarray | None:
-    """DAQP by its own interface, without qpsolvers around it."""
-    none = np.full(len(b), 1e30)
-    x, _, status, _ = daqp.solve(Q, np.zeros(6), A, none, -b, np.zeros(len(b), dtype=np.intc), primal_tol=1e-11)
-    return x if status == 1 else None
-
-
-def with_scipy(Q: np.ndarray, A: np.ndarray, b: np.ndarray) -> np.ndarray | None:
-    found = scipy.optimize.minimize(
-        lambda x: 0.5 * x @ Q @ x, np.zeros(6), jac=lambda x: Q @ x, method="SLSQP",
-        constraints={"type": "ineq", "fun": lambda x: A @ x + b, "jac": lambda x: A}, options={"ftol": 1e-13, "maxiter": 200},
-    )  # fmt: skip
-    return found.x if found.success else None
-
-
-def with_casadi(plugin: str, rows: int) -> Solve:
-    """One conic Function with a row for every contact point."""
-    options = {"daqp": {}, "qpoases": {"printLevel": "none"}}[plugin]
-    S = ca.conic(
-        "S", plugin, {"h": ca.Sparsity.dense(6, 6), "a": ca.Sparsity.dense(rows, 6)}, {**options, "error_on_fail": False}
-    )
-
-    def solve(Q: np.ndarray, A: np.ndarray, b: np.ndarray) -> np.ndarray | None:
-        return S(h=ca.DM(Q), a=ca.DM(A), lba=ca.DM(-b), uba=ca.inf)["x"].full().ravel()
-
-    return solve
+def solve(Q: np.ndarray, A: np.ndarray, b: np.ndarray) -> np.ndarray | None:
+    """Minimize x Q x / 2 subject to A x + b >= 0."""
+    return qpsolvers.solve_qp(Q, np.zeros(6), -A, b, solver="daqp", primal_tol=1e-11)
 
 
 class Loop:
@@ -89,12 +48,12 @@ class Loop:
         measure = nominal.assembly.measures[0]
         self.at, self.along = nominal.position(measure.of), np.array(measure.along)
 
-    def measure(self, deviations: np.ndarray, solve: Solve, form: str) -> tuple[np.ndarray, np.ndarray]:
+    def measure(self, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Measures, and where the answer has no penetration left, for deviations (realization, locator)."""
-        blocks = [self._block(deviations[k : k + BLOCK], solve, form) for k in range(0, len(deviations), BLOCK)]
+        blocks = [self._block(deviations[k : k + BLOCK]) for k in range(0, len(deviations), BLOCK)]
         return np.concatenate([b[0] for b in blocks]), np.concatenate([b[1] for b in blocks])
 
-    def _block(self, deviations: np.ndarray, solve: Solve, form: str) -> tuple[np.ndarray, np.ndarray]:
+    def _block(self, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         poses, start = [], 0
         for inverse, centre in self.schemes:
             q = deviations[:, start : start + inverse.shape[1]] @ inverse.T
@@ -121,15 +80,9 @@ class Loop:
         Q *= scale * scale[:, None] / count[:, None, None]
         x = np.zeros((len(R), 6))
         for k, number in enumerate(touched):
-            rows = active[number] if form == "first" else np.ones(len(self.P), dtype=bool)
-            n = self.n[rows]
-            arm = (self.P[rows] - self.c) @ R[number].T
-            A = np.hstack([n, np.cross(arm, n) / self.length])
-            found = (
-                _closed(solve, Q[k], A, gaps[number], active[number])
-                if form == "closed"
-                else solve(Q[k], A, gaps[number, rows])
-            )
+            arm = (self.P - self.c) @ R[number].T
+            A = np.hstack([self.n, np.cross(arm, self.n) / self.length])
+            found = _closed(Q[k], A, gaps[number], active[number])
             x[number] = np.nan if found is None else found * scale
         centre = np.einsum("kij,j->ki", R, self.c) + t
         turn = np.eye(3) + _skew(x[:, 3:])
@@ -140,7 +93,7 @@ class Loop:
         return (world[0] @ self.at + world[1] - self.at) @ self.along, open_
 
 
-def _closed(solve: Solve, Q: np.ndarray, A: np.ndarray, gaps: np.ndarray, rows: np.ndarray) -> np.ndarray | None:
+def _closed(Q: np.ndarray, A: np.ndarray, gaps: np.ndarray, rows: np.ndarray) -> np.ndarray | None:
     rows = rows.copy()
     while True:
         found = solve(Q, A[rows], gaps[rows])
