@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from tolcontact.declaration.checks import direction_faults
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
-from tolcontact.declaration.values import Vector, direction
+from tolcontact.declaration.values import Vector, direction, is_length
 from tolcontact.readable import Readable
 
 MAX_DEPTH = 8  # of nested measurements
@@ -26,7 +26,7 @@ class Measurement(Readable):
     """
 
     kind: ClassVar[str]
-    units: ClassVar[str] = "mm"
+    units: str = "mm"
     depth = 0
 
     @property
@@ -231,6 +231,37 @@ class Angle(_OfTwoFaces):
     about: Vector | None = None
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Chain(Measurement):
+    """A dimension chain: the sum of deviations times their sensitivities, wherever contact places the parts.
+
+    `tc.Chain({"spacer.end.offset": -1, "wall.end.offset": 1}, nominal=0.4)`
+
+    sensitivities   factor of each link, by the name of a variable or the label of another contributor
+    nominal         value without deviations, to which variables with a nominal value add theirs times their factors
+    units           of the value
+    """
+
+    kind = "chain"
+
+    sensitivities: Mapping[str, float]
+    nominal: float = 0.0
+    units: str = "mm"
+
+    def faults(self) -> Iterator[str]:
+        if not self.sensitivities:
+            yield 'the chain has no links; give sensitivities={"part.locator": 1, ...}'
+        for label, factor in self.sensitivities.items():
+            if not (isinstance(label, str) and is_length(factor)):
+                yield f"sensitivities has {label!r}: {factor!r}; expected the label of a contributor, and a number"
+        if not is_length(self.nominal):
+            yield f"nominal is {self.nominal!r}; expected a number"
+
+    def __str__(self) -> str:
+        links = [f"{factor:+g} {label}" for label, factor in self.sensitivities.items()]
+        return f"chain of {len(links)} links" if len(links) > MAX_LISTED else f"chain {' '.join(links)}"
+
+
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class Combination(Measurement):
     """A value of several measurements, or of measures that were declared before, which may be given by name."""
@@ -304,7 +335,7 @@ class Difference(Combination):
 
 
 _KINDS: tuple[type[Measurement], ...] = (
-    Gap, Flush, Clearance, LargestGap, MeanGap, AxisDistance, Angle, Minimum, Maximum, Mean, Sum, Difference,
+    Gap, Flush, Clearance, LargestGap, MeanGap, AxisDistance, Angle, Minimum, Maximum, Mean, Sum, Difference, Chain,
 )  # fmt: skip
 MEASUREMENTS = {measurement.kind: measurement for measurement in _KINDS}
 

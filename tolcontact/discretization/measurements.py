@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 from tolcontact.declaration import (
     Angle,
     AxisDistance,
+    Chain,
     Clearance,
     Combination,
     Face,
@@ -29,6 +30,7 @@ from tolcontact.discretization.measured_geometry import (
     DirectionPair,
     FaceGap,
     Heights,
+    LinearForm,
     MeasuredFace,
     MeasuredPoint,
     MeshClearance,
@@ -42,7 +44,7 @@ from tolcontact.discretization.nominal import Nominal
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
-from tolcontact.errors import Faults, GeometryFault, designation
+from tolcontact.errors import Faults, GeometryFault, designation, nearest_name
 from tolcontact.geometry.analytic_surfaces import Cylinder, axes_across
 from tolcontact.geometry.faces import patch
 from tolcontact.geometry.nearest_elements import nearest_elements
@@ -330,9 +332,22 @@ def _nearest_places(moving: np.ndarray, reference: np.ndarray) -> np.ndarray:
     return np.array([moving[0] + nearest.x[0] * p, reference[0] + nearest.x[1] * q])
 
 
+def _chain(chain: Chain, faces: MeasuredFaces) -> LinearForm:
+    """Return a chain with numbers. Raises GeometryFault for a link that is no contributor."""
+    nominal, labels = faces.nominal, list(chain.sensitivities)
+    for label in labels:
+        if label not in nominal.contributors:
+            raise GeometryFault(f'its link "{label}" is no contributor{nearest_name(label, nominal.contributors)}')
+    values = {variable.name: float(variable.nominal or 0) for variable in nominal.assembly.variables}
+    factors = np.array([float(chain.sensitivities[label]) for label in labels])
+    constant = float(chain.nominal + factors @ [values.get(label, 0.0) for label in labels])
+    return LinearForm(NO_LINES, constant, np.array([nominal.contributors.index(label) for label in labels]), factors)
+
+
 Builder = Callable[[Any, MeasuredFaces], NominalMeasurement]
 BUILDERS: Mapping[type[Measurement], Builder] = {
     Gap: _gap, Flush: _gap, Clearance: _clearance, AxisDistance: _axis_distance, Angle: _angle,
+    Chain: _chain,
     LargestGap: lambda gap, faces: face_gap(*faces.pair(gap), is_largest=True),
     MeanGap: lambda gap, faces: face_gap(*faces.pair(gap), is_largest=False),
 }  # fmt: skip

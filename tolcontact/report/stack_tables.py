@@ -1,0 +1,61 @@
+"""Tables of a stack-up: worst case, RSS, inflated RSS and Monte Carlo range of each measurement."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as terms
+from tolcontact.report.figures import number
+from tolcontact.report.table import Table
+
+NOTES = (
+    "worst case, RSS: zones times sensitivities at the nominal assembly, about the centred value.",
+    "MRSS: RSS times the factor of Drake (ch. 9). 1.5 RSS: Bender.",
+    "99.73 %: between the percentiles 0.135 % and 99.865 % of the realizations; 95 % intervals.",
+    "Distributions, capabilities and correlations count in the realizations alone.",
+)
+
+
+def stack_up_tables(dataset: xr.Dataset) -> list[Table]:
+    """Return a table for each measure of a stack-up."""
+    return [_table(dataset.sel(measure=measure)) for measure in dataset["measure"].values]
+
+
+def _table(dataset: xr.Dataset) -> Table:
+    drawn, centred = float(dataset["drawn"]), float(dataset["centred"])
+    halves = dict(zip(terms.APPROACHES, map(float, dataset["half_width"].values), strict=True))
+    rows = []
+    for name, half in halves.items():
+        factor = f", factor {half / halves['RSS']:.3g}" if name == "MRSS" and half > 0 else ""
+        ends = [f"{centred + sign * half:.5g}" if math.isfinite(half) else "-" for sign in terms.SENSES]
+        rows.append([name + factor, *ends, f"{half:.4g}" if math.isfinite(half) else "-"])
+    for state, word in terms.WORD_OF_STATE.items():
+        ends = dataset["simulated"].sel(state=state).values
+        rows.append([f"99.73 %, {word}", *map(number, ends), f"{(ends[1, 0] - ends[0, 0]) / 2:.4g}"])
+    if np.array_equal(*dataset["simulated"].values, equal_nan=True):
+        rows[-2:] = [["99.73 %", *rows[-1][1:]]]
+    title = f"{dataset['measure'].values} [{dataset['measure_units'].values}]: {drawn:.6g} as drawn, {centred:.6g} centred"
+    return Table(title, ["", *terms.EXTREME_WORDS, "±"], rows, list(_remarks(dataset, centred, halves["RSS"])))
+
+
+def _remarks(dataset: xr.Dataset, centred: float, rss: float) -> Iterator[str]:
+    """Yield by how much RSS misses the simulated range, and what has no figure."""
+    if not math.isfinite(centred):
+        yield "No linear figures: it has a kink in the assembly as drawn, or no slope there."
+        return
+    if int(dataset["forms"]):
+        yield f"RSS has {int(dataset['forms'])} forms of faces with 3 sigma; worst case and MRSS have no figure for them."
+    states = dict(terms.WORD_OF_STATE)
+    if np.array_equal(*dataset["simulated"].values, equal_nan=True):
+        states.pop(terms.STATES[0])
+    for state, word in states.items():
+        where = f", {word}" if len(states) > 1 else ""
+        misses = []
+        for end, sense, extreme in zip(terms.ENDS, terms.SENSES, terms.EXTREME_WORDS, strict=True):
+            estimate, lower, upper = map(float, dataset["simulated"].sel(state=state, end=end).values)
+            if not lower <= centred + sense * rss <= upper:
+                misses.append(f"{centred + sense * rss - estimate:+.2g} at the {extreme}")
+        verdict = f"is off by {' and '.join(misses)}" if misses else "is within the intervals of both ends"
+        yield f"RSS{where} {verdict}."
