@@ -49,7 +49,8 @@ Every example in the guide is run by the tests.
 
 | purpose | `tc.` |
 |---|---|
-| declare | `Assembly`, `Stack`, `Part`, `Box`, `Mesh`, `Pin`, `Locator`, `three_two_one`, `Tolerance`, `TitleBlock`, `degrees` |
+| declare | `Assembly`, `Stack`, `Part`, `Box`, `Mesh`, `Pin`, `Locator`, `three_two_one`, `Tolerance`, |
+| | `TitleBlock`, `degrees` |
 | tolerance features | `Size`, `Position`, `Profile`, `LineProfile`, `Parallelism`, `Perpendicularity`, `Angularity`, |
 | | `Symmetry`, `Coaxiality`, `CircularRunout`, `TotalRunout`, `Straightness`, `Flatness`, `Roundness`, `Cylindricity`; |
 | | `Form`, `DatumTargets`, `Variable` |
@@ -60,7 +61,8 @@ Every example in the guide is run by the tests.
 | read results | `open_archive`, `summarize`, `compare_runs`, `Status`, `plot` |
 | errors and warnings | `TolcontactError` and its kinds `ModelError` and `OptionError`; `NominalWarning` |
 | choose faces, `tc.select` | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
-| analyse, `tc.analyses` | `contributions`, `stack_up`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate`, `seating` |
+| analyse, `tc.analyses` | `stack_up`, `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate`, |
+| | `seating` |
 | read and write files, `tc.io` | `bodies_in`, `faces_in`, `parts_from`, `read_pmi`, `features_from_pmi`, |
 | | `write_model`, `model_of` |
 | test your models, `tc.testing` | `assert_resolved`, `assert_no_clashes`, `assert_gaps_recompute`, |

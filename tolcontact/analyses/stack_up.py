@@ -73,7 +73,10 @@ def stack_up(
 
 
 def _linear_range(program: Program, region: AllowedRegion, slopes: np.ndarray) -> tuple[float, list[float], int, int]:
-    """Return the shift of the centre, half widths by approach, and the numbers of links and of forms, for slopes (contributor,)."""
+    """Return the shift of the centre, half widths by approach, and the numbers of links and of forms.
+
+    slopes   (contributor,) of a measure
+    """
     if not np.isfinite(slopes).all():
         return np.nan, [np.nan] * len(terms.APPROACHES), 0, 0
     high, low = slopes * region.exactly_farthest(slopes), slopes * region.exactly_farthest(-slopes)

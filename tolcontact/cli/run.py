@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from xarray import Dataset
 
-from tolcontact import report as reports
+from tolcontact import analyses, report as reports
 from tolcontact.archive import Run, open_unchecked
 from tolcontact.cli import app as common, output
 from tolcontact.cli.output import print_summary
@@ -16,11 +17,12 @@ from tolcontact.errors import OptionError, shown
 from tolcontact.simulation.cluster import client_of
 from tolcontact.statistics import Summary
 from tolcontact.temporary import temporary_folder
-from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
+from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS, STACK_UP
 from tolcontact.workflow.accessor import summarize
 from tolcontact.workflow.models import DEFAULT_SOLVER
 from tolcontact.workflow.runs import SURFACES, Target, write_run
 
+MAX_STACK = 100_000  # realizations of the table of a stack
 Until = Annotated[
     str | None,
     typer.Option(
@@ -95,8 +97,9 @@ def run(
             out or folder / "results.nc", solver=solver, method=method, overwrite=overwrite and out is not None,
             resume=resume, until=until, client=client, progress=progress,
         )  # fmt: skip
+        stack = _stack_up(path)
         summary, shortfall = _summed_up(path, until, report)
-    _print_results(summary, out, shortfall, quiet=quiet)
+    _print_results(summary, stack, out, shortfall, quiet=quiet)
 
 
 def _checked_page(model: Path, out: Path | None, report: Path | None, *, overwrite: bool, resume: bool) -> Path | None:
@@ -105,6 +108,15 @@ def _checked_page(model: Path, out: Path | None, report: Path | None, *, overwri
         raise OptionError("--overwrite and --resume need an archive; name one: --out FILE.nc")
     output.check_outputs([model], archive=out, page=report, overwrite=overwrite)
     return report and report.absolute()
+
+
+def _stack_up(path: Path) -> Dataset | None:
+    """Return the stack-up of the archive of a model without parts, which is added to it; None for an assembly."""
+    with open_unchecked(path) as results:
+        if results.sizes["part"]:
+            return None
+        settings = {"samples": min(int(results.attrs["realizations"]), MAX_STACK), "seed": int(results.attrs["seed"])}
+    return analyses.stack_up(path, into=path, **settings)
 
 
 def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Summary, str]:
@@ -116,9 +128,12 @@ def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Summ
         return summary, Target.of(until).shortfall(results) if until is not None else ""
 
 
-def _print_results(summary: Summary, out: Path | None, shortfall: str, *, quiet: bool) -> None:
+def _print_results(summary: Summary, stack: Dataset | None, out: Path | None, shortfall: str, *, quiet: bool) -> None:
     """Print the summary of results. Raises typer.Exit with code 1 if they lack something."""
     print_summary(summary)
+    if stack is not None:
+        typer.echo()
+        output.console().print(reports.analysis_text(STACK_UP, stack))
     if out is not None:
         typer.echo(f"\narchive: {shown(str(out))}")
     if shortfall:

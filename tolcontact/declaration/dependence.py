@@ -55,7 +55,7 @@ class Variable(Declaration):
         driven = f"; drives {drives}" if drives else ""
         if self.limits is None:
             return f"variable {self.name} [{self.units}]: {self.tolerance}{driven}"
-        return f"dimension {self.name} [{self.units}]: {self.nominal:.12g} {self.limits}, centred {self.centred}{driven}"
+        return f"dimension {self.name} [{self.units}]: {self.drawn}, centred {self.centred}{driven}"
 
     @property
     def limits(self) -> Deviations | None:
@@ -64,6 +64,11 @@ class Variable(Declaration):
             return None
         half, middle = float(self.tolerance.range or 0) / 2, self.tolerance.shift
         return Deviations(round(middle - half, DIGITS), round(middle + half, DIGITS))
+
+    @property
+    def drawn(self) -> str:
+        """The dimension with its limits as drawn: "0.375 0 -0.031"."""
+        return f"{self.nominal or 0:.12g} {self.limits or self.tolerance}"
 
     @property
     def centred(self) -> str:

@@ -12,7 +12,7 @@ from tolcontact.declaration.dependence import Variable
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import Chain
 from tolcontact.declaration.title_block import TitleBlock
-from tolcontact.declaration.tolerance import Tolerance, tolerance as _tolerance
+from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import is_length
 from tolcontact.declaration.written_tolerance import TextFault, written
 from tolcontact.errors import Faults, nearest_name, shown
@@ -77,8 +77,8 @@ class Stack(Assembly):
         """Declare the links of a table, a CSV file or an .xlsx workbook, and return them.
 
         Its columns are name, nominal, and tolerance, or upper and lower; others may be left out: sensitivity, distribution, cp,
-        cpk, description. A column "gap NAME" has the sensitivities of a gap, which is declared without limits. Raises ModelError
-        with all faults of the table.
+        cpk, description. A column "gap NAME" has the sensitivities of a gap, which is declared without limits. Raises
+        ModelError with all faults of the table.
         """
         heading, *rows = _rows(Path(path), self.name)
         faults, title = Faults(), shown(Path(path).name)
@@ -113,8 +113,9 @@ def _rows(path: Path, stack: str) -> list[list[str]]:
     try:
         check_inputs([path], MAX_BYTES)
         if path.suffix.lower() == ".xlsx":
-            table = importlib.import_module("pandas").read_excel(path, header=None, dtype=object)
-            rows = [["" if cell != cell else str(cell).strip() for cell in row] for row in table.itertuples(index=False)]
+            pandas = importlib.import_module("pandas")
+            table = pandas.read_excel(path, header=None, dtype=object)
+            rows = [["" if pandas.isna(cell) else str(cell).strip() for cell in row] for row in table.itertuples(index=False)]
         else:
             rows = _csv_rows(path.read_text(encoding="utf-8-sig"))
     except UnicodeDecodeError:
@@ -176,6 +177,6 @@ def _zone(row: Mapping[str, str], numbers: Mapping[str, float]) -> tuple[float, 
         raise ValueError(f'tolerance is "{shown(row.get("tolerance", ""))}"; {fault}') from fault
     options = {name: numbers[name] for name in ("cp", "cpk") if name in numbers}
     tolerance = Tolerance(zone, row.get("distribution") or "normal", **options)
-    if fault := next(tolerance.faults(), ""):
-        raise ValueError(fault)
-    return nominal, _tolerance(tolerance)
+    if reason := next(tolerance.faults(), ""):
+        raise ValueError(reason)
+    return nominal, tolerance

@@ -1,13 +1,13 @@
 """Tables of a stack-up: worst case, RSS, inflated RSS and Monte Carlo range of each measurement."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.report.figures import number
+from tolcontact.report.figures import grouped, number
 from tolcontact.report.table import Table
 
 NOTES = (
@@ -18,9 +18,10 @@ NOTES = (
 )
 
 
-def stack_up_tables(dataset: xr.Dataset) -> list[Table]:
-    """Return a table for each measure of a stack-up."""
-    return [_table(dataset.sel(measure=measure)) for measure in dataset["measure"].values]
+def stack_up_report(dataset: xr.Dataset, remarks: Sequence[str]) -> tuple[str, str, list[str], list[Table]]:
+    """Return name, number of realizations, notes and tables of a stack-up, with remarks on its realizations."""
+    count = f"{grouped(dataset.attrs['realizations'])} realizations"
+    return "Stack-up", count, [*NOTES, *remarks], [_table(dataset.sel(measure=name)) for name in dataset["measure"].values]
 
 
 def _table(dataset: xr.Dataset) -> Table:
@@ -29,12 +30,12 @@ def _table(dataset: xr.Dataset) -> Table:
     rows = []
     for name, half in halves.items():
         factor = f", factor {half / halves['RSS']:.3g}" if name == "MRSS" and half > 0 else ""
-        ends = [f"{centred + sign * half:.5g}" if math.isfinite(half) else "-" for sign in terms.SENSES]
-        rows.append([name + factor, *ends, f"{half:.4g}" if math.isfinite(half) else "-"])
+        figures = [f"{centred + sign * half:.5g}" for sign in terms.SENSES] + [f"{half:.4g}"]
+        rows.append([name + factor, *(figures if math.isfinite(half) else ["-"] * 3)])
     for state, word in terms.WORD_OF_STATE.items():
         ends = dataset["simulated"].sel(state=state).values
         rows.append([f"99.73 %, {word}", *map(number, ends), f"{(ends[1, 0] - ends[0, 0]) / 2:.4g}"])
-    if np.array_equal(*dataset["simulated"].values, equal_nan=True):
+    if _is_without_contact(dataset):
         rows[-2:] = [["99.73 %", *rows[-1][1:]]]
     title = f"{dataset['measure'].values} [{dataset['measure_units'].values}]: {drawn:.6g} as drawn, {centred:.6g} centred"
     return Table(title, ["", *terms.EXTREME_WORDS, "±"], rows, list(_remarks(dataset, centred, halves["RSS"])))
@@ -48,7 +49,7 @@ def _remarks(dataset: xr.Dataset, centred: float, rss: float) -> Iterator[str]:
     if int(dataset["forms"]):
         yield f"RSS has {int(dataset['forms'])} forms of faces with 3 sigma; worst case and MRSS have no figure for them."
     states = dict(terms.WORD_OF_STATE)
-    if np.array_equal(*dataset["simulated"].values, equal_nan=True):
+    if _is_without_contact(dataset):
         states.pop(terms.STATES[0])
     for state, word in states.items():
         where = f", {word}" if len(states) > 1 else ""
@@ -59,3 +60,9 @@ def _remarks(dataset: xr.Dataset, centred: float, rss: float) -> Iterator[str]:
                 misses.append(f"{centred + sense * rss - estimate:+.2g} at the {extreme}")
         verdict = f"is off by {' and '.join(misses)}" if misses else "is within the intervals of both ends"
         yield f"RSS{where} {verdict}."
+
+
+def _is_without_contact(dataset: xr.Dataset) -> bool:
+    """Return whether contact changes nothing in the range of a measure."""
+    raw, corrected = dataset["simulated"].values
+    return np.array_equal(raw, corrected, equal_nan=True)

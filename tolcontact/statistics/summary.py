@@ -190,7 +190,9 @@ def _field_values(results: xr.DataTree) -> dict[ArchiveVariable, Any]:
     extremes = [_field_extremes(field, count) for field, count in zip(fields, summed, strict=True)]
     magnitudes = [int(field[terms.MAGNITUDE_REALIZATIONS.name]) for field in fields]
     return {
-        terms.FIELD_EXTREME: np.array(extremes).reshape(len(parts), len(terms.STATES), len(terms.EXTREMES), len(terms.ESTIMATE)),
+        terms.FIELD_EXTREME: np.array(extremes).reshape(
+            len(parts), len(terms.STATES), len(terms.EXTREMES), len(terms.ESTIMATE)
+        ),
         terms.REALIZATIONS_IN_FIELDS: min(summed, default=0),
         terms.REALIZATIONS_IN_MAGNITUDES: min([*magnitudes, *summed], default=0),
     }

@@ -24,6 +24,7 @@ from tolcontact.report.contributor_shares import ContributorShares, contributor_
 from tolcontact.report.convention_text import offset_table
 from tolcontact.report.figures import grouped, limits_text
 from tolcontact.report.html.charts import bars_of, charts_of, compared_charts, relations_of
+from tolcontact.report.html.loop import loops_of
 from tolcontact.report.html.scene import gap_rows, scene_of, view_of
 from tolcontact.report.model_tables import archived_settings, model_tables
 from tolcontact.report.results_table import COLUMNS, SIDES, result_rows, share_heading
@@ -92,6 +93,8 @@ def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock |
         "results": _results(summary),
         "details": _details(summary, shares),
         "model": model_tables(results),
+        "loops": loops_of(results),
+        "has_parts": summary.sizes["part"] > 0,
         "contact": list(contact_lines(summary, summary.attrs["realizations"])),
         "pairs": pair_table(summary) if summary.sizes["pair"] else None,
         "offsets": offset_table(summary),
@@ -100,7 +103,7 @@ def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock |
         "contributions": (indices := contributions_of(results)),
         "max_rows": MAX_ROWS,
         "run": {name: str(value) for name, value in archived_settings(results).items()},
-        "missing": _missing(scene),
+        "missing": _missing(scene) if scene["parts"] else [],
         "stations": scene["stations"],
     }
     data = {
