@@ -90,7 +90,7 @@ def _linear_range(program: Program, region: AllowedRegion, slopes: np.ndarray) -
     rss = float(np.linalg.norm([*halves, *(THREE_SIGMA * sigma for sigma in sigmas.values())]))
     if sigmas:
         worst = np.nan
-    factor = 1 + (worst / rss - 1) / (2 * (np.sqrt(links) - 1)) if links > 1 else 1.0
+    factor = 1 + (worst / rss - 1) / (2 * (np.sqrt(links) - 1)) if links > 1 else worst / (rss or 1.0)
     return float((high + low).sum() / 2), [worst, rss, factor * rss, BENDER * rss], links, len(sigmas)
 
 

@@ -115,8 +115,8 @@ def _stack_up(path: Path) -> Dataset | None:
     with open_unchecked(path) as results:
         if results.sizes["part"]:
             return None
-        settings = {"samples": min(int(results.attrs["realizations"]), MAX_STACK), "seed": int(results.attrs["seed"])}
-    return analyses.stack_up(path, into=path, **settings)
+        samples, seed = min(int(results.attrs["realizations"]), MAX_STACK), int(results.attrs["seed"])
+    return analyses.stack_up(path, samples=samples, seed=seed, into=path)
 
 
 def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Summary, str]:

@@ -19,7 +19,7 @@ def assembly() -> tc.Assembly:
 
     # The gap shrinks as the parts inside grow. A link that is twice in the loop has the sensitivity 2 or -2.
     stack.link("block", 60, "+0/-0.16", sensitivity=-1)
-    stack.link("spacer", 40, tc.Tolerance("±0.05", "uniform"), sensitivity=-1)
+    stack.link("spacer", 40, tc.Tolerance(0.1, "uniform"), sensitivity=-1)
 
     # Links may also come from a table, stack.read("links.csv"), with columns name, nominal, tolerance and sensitivity.
     stack.gap("gap", limits=(0.1, 0.8))

@@ -54,12 +54,12 @@ from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import degrees
 
 __all__ = [
-    "OUTSIDE", "Angle", "Angularity", "Assembly", "AxisDistance", "Box", "Brep", "Chain", "CircularRunout", "Clearance", "Coaxiality",
-    "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets", "Difference", "Face", "Facing",
-    "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance", "Geometry", "Inside", "Joint", "Largest",
-    "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean", "MeanGap", "Measure", "Measurement", "Mesh",
-    "Minimum", "Near", "Overlap", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin", "Point", "Population",
-    "Position", "Profile", "Roundness", "Size", "Stack", "Station", "Straightness", "Sum", "Symmetry", "ThreeTwoOne", "TitleBlock",
-    "Tolerance", "TotalRunout", "Triangles", "Variable", "degrees", "stations",
+    "OUTSIDE", "Angle", "Angularity", "Assembly", "AxisDistance", "Box", "Brep", "Chain", "CircularRunout", "Clearance",
+    "Coaxiality", "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets", "Difference",
+    "Face", "Facing", "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance", "Geometry", "Inside",
+    "Joint", "Largest", "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean", "MeanGap", "Measure",
+    "Measurement", "Mesh", "Minimum", "Near", "Overlap", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked",
+    "Pin", "Point", "Population", "Position", "Profile", "Roundness", "Size", "Stack", "Station", "Straightness", "Sum",
+    "Symmetry", "ThreeTwoOne", "TitleBlock", "Tolerance", "TotalRunout", "Triangles", "Variable", "degrees", "stations",
     "three_two_one",
 ]  # fmt: skip

@@ -89,8 +89,10 @@ class Stack(Assembly):
         for number, cells in enumerate(rows, start=2):
             if not any(cells):
                 continue
-            row = dict(zip(heading, cells, strict=False))
+            row = dict.fromkeys(heading, "") | dict(zip(heading, cells, strict=False))
             try:
+                if len(cells) > len(heading):
+                    raise ValueError(f"it has {len(cells)} cells for {len(heading)} columns; write decimals with a point")
                 numbers = {name: _number(text, name) for name, text in row.items() if text and _is_number(name)}
                 links.append(self.link(row["name"], *_zone(row, numbers), sensitivity=numbers.get("sensitivity", 1.0)))
                 for name, factors in gaps.items():
@@ -140,10 +142,12 @@ def _csv_rows(text: str) -> list[list[str]]:
 
 
 def _heading_faults(heading: Sequence[str]) -> Iterator[str]:
-    for name in heading:
-        if name not in COLUMNS and not name.startswith(GAP):
-            known = f'{", ".join(COLUMNS)}, or "gap NAME"'
-            yield f'it has a column "{shown(name)}"{nearest_name(name, COLUMNS)}; expected some of: {known}'
+    unknown = [name for name in heading if name not in COLUMNS and not name.startswith(GAP)]
+    for name in unknown:
+        known = f'{", ".join(COLUMNS)}, or "gap NAME"'
+        yield f'it has a column "{shown(name)}"{nearest_name(name, COLUMNS)}; expected some of: {known}'
+    if unknown:  # other columns may only seem to be missing
+        return
     for name in dict.fromkeys(name for name in heading if heading.count(name) > 1):
         yield f'it has {heading.count(name)} columns "{shown(name)}"; expected one'
     for name in ("name", "nominal"):
@@ -165,16 +169,21 @@ def _number(text: str, column: str) -> float:
         raise ValueError(f'{column} is "{shown(text)}"; expected a number') from None
 
 
+def _limits(text: str, nominal: float) -> Any:
+    """Return what a cell states as a tolerance. Raises ValueError for a text that states none."""
+    try:
+        return written(text, nominal=nominal)
+    except TextFault as fault:
+        raise ValueError(f'tolerance is "{shown(text)}"; {fault}') from fault
+
+
 def _zone(row: Mapping[str, str], numbers: Mapping[str, float]) -> tuple[float, Any]:
     """Return the nominal value and the tolerance of a row. Raises ValueError for a cell that is empty or states neither."""
     needed = ("name", "nominal", *(("tolerance",) if "tolerance" in row else ("upper", "lower")))
     if empty := [name for name in needed if not row.get(name)]:
         raise ValueError(f"{' and '.join(empty)} {'is' if len(empty) == 1 else 'are'} empty")
     nominal = numbers["nominal"]
-    try:
-        zone = written(row["tolerance"] if "tolerance" in row else (numbers["lower"], numbers["upper"]), nominal=nominal)
-    except TextFault as fault:
-        raise ValueError(f'tolerance is "{shown(row.get("tolerance", ""))}"; {fault}') from fault
+    zone = _limits(row["tolerance"], nominal) if "tolerance" in row else written((numbers["lower"], numbers["upper"]))
     options = {name: numbers[name] for name in ("cp", "cpk") if name in numbers}
     tolerance = Tolerance(zone, row.get("distribution") or "normal", **options)
     if reason := next(tolerance.faults(), ""):

@@ -9,6 +9,7 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.report.figures import grouped, number
 from tolcontact.report.table import Table
+from tolcontact.statistics.capability import MIN_TAIL
 
 NOTES = (
     "worst case, RSS: zones times sensitivities at the nominal assembly, about the centred value.",
@@ -53,6 +54,9 @@ def _remarks(dataset: xr.Dataset, centred: float, rss: float) -> Iterator[str]:
         states.pop(terms.STATES[0])
     for state, word in states.items():
         where = f", {word}" if len(states) > 1 else ""
+        if not np.isfinite(dataset["simulated"].sel(state=state)).all():
+            yield f"RSS{where} is not judged: {MIN_TAIL} realizations bound the range, give --samples {MIN_TAIL} or more."
+            continue
         misses = []
         for end, sense, extreme in zip(terms.ENDS, terms.SENSES, terms.EXTREME_WORDS, strict=True):
             estimate, lower, upper = map(float, dataset["simulated"].sel(state=state, end=end).values)
