@@ -142,7 +142,7 @@ def test_a_form_has_three_sigma_in_rss_and_no_worst_case():
 def test_a_chain_of_an_assembly_is_its_measure_until_contact_moves_parts():
     measured = tc.run(stand(), samples=400, seed=2).measured.transpose("measure", "state", "realization")
     (raw, corrected), (drawn, still) = measured.values
-    assert np.abs(raw - drawn).max() < 1e-5  # of second order in the tilt: (0.2 / 40)^2 times the distance
+    assert np.abs(raw - drawn).max() < 3e-4  # of second order in the tilt, (0.26 / 15)^2
     assert np.array_equal(drawn, still) and (corrected > raw + 1e-3).mean() > 0.3
     text = _text(tc.analyses.stack_up(stand(), samples=3000), STACK_UP)
     assert "RSS, without contact is within the intervals of both ends" in text
