@@ -97,8 +97,7 @@ def run(
             out or folder / "results.nc", solver=solver, method=method, overwrite=overwrite and out is not None,
             resume=resume, until=until, client=client, progress=progress,
         )  # fmt: skip
-        stack = _stack_up(path)
-        summary, shortfall = _summed_up(path, until, report)
+        summary, stack, shortfall = _summed_up(path, until, report)
     _print_results(summary, stack, out, shortfall, quiet=quiet)
 
 
@@ -119,13 +118,14 @@ def _stack_up(path: Path) -> Dataset | None:
     return analyses.stack_up(path, samples=samples, seed=seed, into=path)
 
 
-def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Summary, str]:
-    """Return the summary of the archive at a path, and what it lacks that `until` states; write its page."""
+def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Summary, Dataset | None, str]:
+    """Return the summary and the stack-up of the archive at a path, and what it lacks that `until` states; write its page."""
+    stack = _stack_up(path)
     with open_unchecked(path) as results:
         summary = summarize(results)
         if report is not None:
             reports.write_page(results, summary, report)
-        return summary, Target.of(until).shortfall(results) if until is not None else ""
+        return summary, stack, Target.of(until).shortfall(results) if until is not None else ""
 
 
 def _print_results(summary: Summary, stack: Dataset | None, out: Path | None, shortfall: str, *, quiet: bool) -> None:

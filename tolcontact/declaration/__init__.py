@@ -42,9 +42,9 @@ from tolcontact.declaration.measurement import (
     Measurement,
     Minimum,
     Sum,
-    stations,
 )
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
+from tolcontact.declaration.seam import stations
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.sequence import Station
 from tolcontact.declaration.size import Form, Size

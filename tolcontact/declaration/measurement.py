@@ -3,7 +3,7 @@
 Each kind is a class, which `MEASUREMENTS` lists by the kind's name. Measurements can be nested: `tc.Minimum(tc.Gap(...), "m")`.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -14,7 +14,6 @@ from tolcontact.readable import Readable
 
 MAX_DEPTH = 8  # of nested measurements
 MAX_LISTED = 3  # measurements in a text
-MAX_STATIONS = 1000  # of a seam
 
 
 class Measurement(Readable):
@@ -338,22 +337,3 @@ _KINDS: tuple[type[Measurement], ...] = (
     Gap, Flush, Clearance, LargestGap, MeanGap, AxisDistance, Angle, Minimum, Maximum, Mean, Sum, Difference, Chain,
 )  # fmt: skip
 MEASUREMENTS = {measurement.kind: measurement for measurement in _KINDS}
-
-
-def stations(start: Point, end: Point, count: int) -> tuple[Point, ...]:
-    """Return `count` points of a part, evenly from `start` to `end`: the stations of a seam.
-
-    `tc.stations(door.point(0, 40, 0), door.point(0, 40, 700), 5)`
-    Points on a feature move with its deviation. Raises TypeError or ValueError for points of two parts or features.
-    """
-    if not (isinstance(start, Point) and isinstance(end, Point) and start.position and end.position):
-        raise TypeError("stations: expected two points part.point(x, y, z), or two of a feature")
-    if start.part is not end.part or start.on is not end.on:
-        raise ValueError(f"stations: {start} and {end} are not points of one part, or of one feature")
-    if type(count) is not int or not 2 <= count <= MAX_STATIONS:
-        raise ValueError(f"stations: count is {count!r}; expected a whole number from 2 to {MAX_STATIONS}")
-    point: Callable[..., Point] = start.on.point if start.on else start.part.point
-    shares = [k / (count - 1) for k in range(count)]
-    return tuple(
-        point(*((1 - share) * a + share * b for a, b in zip(start.position, end.position, strict=True))) for share in shares
-    )
