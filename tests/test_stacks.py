@@ -145,7 +145,7 @@ def test_a_chain_of_an_assembly_is_its_measure_until_contact_moves_parts():
     assert np.abs(raw - drawn).max() < 3e-4  # of second order in the tilt, (0.26 / 15)^2
     assert np.array_equal(drawn, still) and (corrected > raw + 1e-3).mean() > 0.3
     text = _text(tc.analyses.stack_up(stand(), samples=3000), STACK_UP)
-    assert "RSS, without contact is within the intervals of both ends" in text
+    assert "RSS, without contact agrees with the realizations" in text
     assert re.search(r"RSS, with contact is off by -0\.\d+ at the minimum", text)
 
 
