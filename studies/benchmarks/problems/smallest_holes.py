@@ -1,10 +1,10 @@
 """Floating and fixed fasteners, with and without a projected tolerance zone."""
 
-import numpy as np
+import trimesh
 from scipy import optimize
 
 import tolcontact as tc
-from studies.benchmarks import answers as an, parts
+from studies.benchmarks import answers as an
 from studies.benchmarks.problem import numbers
 
 N = numbers(__file__)
@@ -15,22 +15,43 @@ def solution():
 
 
 def check():
-    # In one direction: how far the axis of the screw may be from that of the clearance hole, from bounds of ends of axes.
-    def offset(top, bottom, at):
-        # the axis of the thread through its ends at heights `bottom` and `top`; of the clearance hole, at its two ends
-        share = (at - bottom) / (top - bottom)
-        return -optimize.linprog([-share, share - 1, 1.0], bounds=[(-N.t / 2, N.t / 2)] * 3).fun
+    half = N.t / 2
 
-    # A floating screw only has to share both holes: each clears it by half of hole less screw, on either side.
-    floating = optimize.linprog([1, 0, 0], [[-1, 1, -1], [-1, -1, 1]], [0, 0], bounds=[(0, None), *[(N.t / 2, N.t / 2)], *[(-N.t / 2,) * 2]])
-    projected = max(offset(N.p, 0.0, at) for at in (0.0, N.p))
-    tilted = max(offset(0.0, -N.d, at) for at in (0.0, N.p))
-    return N.f + floating.x[0], N.f + 2 * projected, N.f + 2 * tilted
+    def reach(low, high, at):
+        # How far an axis may be off at a height, if its ends at the heights `low` and `high` are in the zone.
+        share = (at - low) / (high - low)
+        return -optimize.linprog([share - 1, -share], bounds=[(-half, half)] * 2).fun
+
+    # The least clearance at which a screw at y is in both holes, which are off by half their zones in opposite directions.
+    rows = [[-0.5, 1], [-0.5, -1], [-0.5, 1], [-0.5, -1]]
+    clearance = optimize.linprog([1, 0], rows, [half, -half, -half, half], bounds=[(0, None), (None, None)]).fun
+    fixed = (max(reach(*ends, at) for at in (0.0, N.p)) for ends in ((0.0, N.p), (-N.d, 0.0)))
+    return N.f + clearance, *(N.f + 2 * (half + reached) for reached in fixed)
 
 
-def assembly(projected=None):
-    """Return a plate with a threaded hole, measured where the screw leaves the other plate."""
+def hole(model, name, x, z, height, position):
+    """Return a toleranced hole in a ring about (x, 0); its primary datum is the lower face at z."""
+    shape = trimesh.creation.annulus(N.f / 2, 2 * N.f, height, sections=48)
+    part = model.part(name, tc.Mesh(shape), at=(x, 0, z + height / 2), fixed=True)
+    part.feature("face", part.face("-z"), datum="A")
+    part.feature("rim", part.face(tc.select.Cylinder(inner=False)), datum="B")
+    return part.feature("hole", part.face(tc.select.Cylinder(inner=True)), position)
+
+
+def assembly():
     model = tc.Assembly("smallest holes")
-    position = tc.Position(N.t, "A|B") if projected is None else tc.Position(N.t, "A|B", projected=projected)
-    thread = parts.ring(model, N.f / 2, N.d, "bore", position)
-    return model, thread
+    shifted = tc.Position(N.t, "A|B", rule="translation")
+    threads = {"floating": shifted, "projected": tc.Position(N.t, "A|B", projected=N.p), "tilted": tc.Position(N.t, "A|B")}
+    for k, (name, position) in enumerate(threads.items()):
+        thread = hole(model, f"{name} thread", 100.0 * k, 0.0, N.d, position)
+        # The screw is measured where it leaves the clearance hole, in the middle of a thin ring.
+        clearance = hole(model, f"{name} clearance", 100.0 * k, -N.p - 1, 2.0, shifted)
+        model.measure(name, tc.AxisDistance(clearance, thread, along="y"))
+    return model
+
+
+def answers():
+    figures = tc.analyses.stack_up(assembly(), samples=3000, solver="daqp").sel(approach="worst case")
+    offsets = dict(zip(figures.measure.values.tolist(), figures.half_width.values.tolist(), strict=True))
+    holes = N.f + offsets["floating"], N.f + 2 * offsets["projected"], N.f + 2 * offsets["tilted"]
+    return an.Answers([an.within(size, 1e-5) for size in holes], 3000)
