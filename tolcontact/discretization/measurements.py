@@ -334,20 +334,17 @@ def _nearest_places(moving: np.ndarray, reference: np.ndarray) -> np.ndarray:
 
 def _chain(chain: Chain, faces: MeasuredFaces) -> LinearForm:
     """Return a chain with numbers. Raises GeometryFault for a link that is no contributor."""
-    nominal, labels = faces.nominal, list(chain.sensitivities)
-    for label in labels:
-        if label not in nominal.contributors:
-            raise GeometryFault(f'its link "{label}" is no contributor{nearest_name(label, nominal.contributors)}')
-    values = {variable.name: float(variable.nominal or 0) for variable in nominal.assembly.variables}
-    factors = np.array([float(chain.sensitivities[label]) for label in labels])
-    constant = float(chain.nominal + factors @ [values.get(label, 0.0) for label in labels])
-    return LinearForm(NO_LINES, constant, np.array([nominal.contributors.index(label) for label in labels]), factors)
+    labels, nominals = faces.nominal.contributors, {cause.name: cause.nominal for cause in faces.nominal.assembly.variables}
+    if unknown := [label for label in chain.sensitivities if label not in labels]:
+        raise GeometryFault(f'its link "{unknown[0]}" is no contributor{nearest_name(unknown[0], labels)}')
+    constant = chain.nominal + sum(factor * (nominals.get(label) or 0.0) for label, factor in chain.sensitivities.items())
+    columns = np.array([labels.index(label) for label in chain.sensitivities])
+    return LinearForm(NO_LINES, float(constant), columns, np.array(list(chain.sensitivities.values()), dtype=float))
 
 
 Builder = Callable[[Any, MeasuredFaces], NominalMeasurement]
 BUILDERS: Mapping[type[Measurement], Builder] = {
-    Gap: _gap, Flush: _gap, Clearance: _clearance, AxisDistance: _axis_distance, Angle: _angle,
-    Chain: _chain,
+    Gap: _gap, Flush: _gap, Clearance: _clearance, AxisDistance: _axis_distance, Angle: _angle, Chain: _chain,
     LargestGap: lambda gap, faces: face_gap(*faces.pair(gap), is_largest=True),
     MeanGap: lambda gap, faces: face_gap(*faces.pair(gap), is_largest=False),
 }  # fmt: skip

@@ -47,7 +47,7 @@ def assembly():
         wall = model.part(name, tc.Mesh(ring), at=(0, 0, z + N.wall / 2), fixed=True)
         model.contact(f"{name} bore", moving=barrel, reference=wall.face(tc.select.Cylinder(inner=True)))
     model.force("push", at=shaft.point(0, 0, N.force - N.z1 / 2), vector=(0, 10, 0))
-    # A ring around the axis at the height of the force: the axis is measured in its middle plane, which the shaft slides through.
+    # A ring at the height of the force: the axis is measured in its middle plane, through which the shaft slides.
     ring = tc.Mesh(trimesh.creation.annulus(N.b, 2 * N.b, 2.0, sections=96))
     gauge = model.part("gauge", ring, at=(0, 0, N.force), fixed=True)
     model.measure("height", tc.AxisDistance(gauge.face(tc.select.Cylinder(inner=True)), barrel, across="z"))
