@@ -55,7 +55,8 @@ class Variable(Declaration):
         driven = f"; drives {drives}" if drives else ""
         if self.limits is None:
             return f"variable {self.name} [{self.units}]: {self.tolerance}{driven}"
-        return f"dimension {self.name} [{self.units}]: {self.drawn}, centred {self.centred}{driven}"
+        centred = f", centred {self.centred}" if self.limits.middle else ""
+        return f"dimension {self.name} [{self.units}]: {self.drawn}{centred}{driven}"
 
     @property
     def limits(self) -> Deviations | None:
@@ -67,8 +68,9 @@ class Variable(Declaration):
 
     @property
     def drawn(self) -> str:
-        """The dimension with its limits as drawn: "0.375 0 -0.031"."""
-        return f"{self.nominal or 0:.12g} {self.limits or self.tolerance}"
+        """The dimension with its limits as drawn: "0.375 0 -0.031", "40 ±0.05"."""
+        is_equal = self.limits is not None and not self.limits.middle
+        return self.centred if is_equal else f"{self.nominal or 0:.12g} {self.limits or self.tolerance}"
 
     @property
     def centred(self) -> str:

@@ -1,26 +1,25 @@
 """Pictures of dimension chains: the links as arrows, one after the other, and the gap that they close."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
-
-import xarray as xr
 
 from tolcontact.declaration import Variable
 from tolcontact.report.figures import plain
-from tolcontact.report.model_tables import chains_of, declaration_of, dimensions_of
 
 MAX_LINKS = 60  # of a picture
 LEFT, RIGHT, ROW = 190.0, 640.0, 24.0  # ends of the drawing, and the height of a row, in units of the picture
 TICK = 3.0  # shortest length of an arrow; a shorter one is a tick
 
 
-def loops_of(results: xr.DataTree) -> dict[str, list[dict[str, Any]]]:
-    """Return the rows of the picture of each chain of dimensions, by the name of its measure; the last row is the gap."""
-    document = declaration_of(results)
-    dimensions = {dimension.name: dimension for dimension in dimensions_of(document)}
+def loops_of(chains: Mapping[str, Mapping[str, Any]], variables: Iterable[Variable]) -> dict[str, list[dict[str, Any]]]:
+    """Return the rows of the picture of each chain of dimensions, by the name of its measure; the last row is the gap.
+
+    chains   entries of chains in a document, by the names of their measures
+    """
+    dimensions = {variable.name: variable for variable in variables if variable.nominal is not None}
     return {
         name: _rows(name, chain, dimensions)
-        for name, chain in chains_of(document).items()
+        for name, chain in chains.items()
         if any(label in dimensions for label in chain["sensitivities"]) and len(chain["sensitivities"]) <= MAX_LINKS
     }
 
