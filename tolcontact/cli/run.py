@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 from xarray import Dataset
 
-from tolcontact import analyses, report as reports
+import tolcontact
+from tolcontact import report as reports
 from tolcontact.archive import Run, open_unchecked
 from tolcontact.cli import app as common, output
 from tolcontact.cli.output import print_summary
@@ -115,7 +116,7 @@ def _stack_up(path: Path) -> Dataset | None:
         if results.sizes["part"]:
             return None
         samples, seed = min(int(results.attrs["realizations"]), MAX_STACK), int(results.attrs["seed"])
-    return analyses.stack_up(path, samples=samples, seed=seed, into=path)
+    return tolcontact.analyses.stack_up(path, samples=samples, seed=seed, into=path)
 
 
 def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Summary, Dataset | None, str]:
