@@ -50,7 +50,7 @@ def assembly():
     # A ring at the height of the force: the axis is measured in its middle plane, through which the shaft slides.
     ring = tc.Mesh(trimesh.creation.annulus(N.b, 2 * N.b, 2.0, sections=96))
     gauge = model.part("gauge", ring, at=(0, 0, N.force), fixed=True)
-    model.measure("height", tc.AxisDistance(gauge.face(tc.select.Cylinder(inner=True)), barrel, across="z"))
+    model.measure("height", tc.AxisDistance(gauge.face(tc.select.Cylinder(inner=True)), barrel, across=(0.0, 0.0, 1.0)))
     return model
 
 

@@ -25,7 +25,7 @@ def check():
     # The least clearance at which a screw at y is in both holes, which are off by half their zones in opposite directions.
     rows = [[-0.5, 1], [-0.5, -1], [-0.5, 1], [-0.5, -1]]
     clearance = optimize.linprog([1, 0], rows, [half, -half, -half, half], bounds=[(0, None), (None, None)]).fun
-    fixed = (max(reach(*ends, at) for at in (0.0, N.p)) for ends in ((0.0, N.p), (-N.d, 0.0)))
+    fixed = (max(reach(low, high, at) for at in (0.0, N.p)) for low, high in ((0.0, N.p), (-N.d, 0.0)))
     return N.f + clearance, *(N.f + 2 * (half + reached) for reached in fixed)
 
 
@@ -46,7 +46,7 @@ def assembly():
         thread = hole(model, f"{name} thread", 100.0 * k, 0.0, N.d, position)
         # The screw is measured where it leaves the clearance hole, in the middle of a thin ring.
         clearance = hole(model, f"{name} clearance", 100.0 * k, -N.p - 1, 2.0, shifted)
-        model.measure(name, tc.AxisDistance(clearance, thread, along="y"))
+        model.measure(name, tc.AxisDistance(clearance, thread, along=(0.0, 1.0, 0.0)))
     return model
 
 
