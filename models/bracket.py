@@ -17,11 +17,11 @@ PLACE, DRILLED = 0.9, 0.05  # tolerances: position of a hole, its size to either
 SHANK = tc.Size(BOLT, 0.0, -0.1)
 
 
-def plate(model: tc.Assembly, name: str, z: float, **fixed: bool) -> tuple[tc.Part, list[tc.declaration.Feature]]:
+def plate(model: tc.Assembly, name: str, z: float, fixed: bool | None = None) -> tuple[tc.Part, list[tc.declaration.Feature]]:
     """Declare a bar between two eyes, with its back at a height z, and the holes in the eyes."""
     eyes = [trimesh.creation.annulus(HOLE / 2, 14, SHEET, sections=48).apply_translation((x, 0, SHEET / 2)) for x in XS]
     bar = trimesh.creation.box(bounds=[(-APART / 2 + 14, -14, 0), (APART / 2 - 14, 14, SHEET)])
-    part = model.part(name, tc.Mesh(trimesh.util.concatenate([bar, *eyes])), at=(0, 0, z), **fixed)
+    part = model.part(name, tc.Mesh(trimesh.util.concatenate([bar, *eyes])), at=(0, 0, z), fixed=fixed)
     for letter, direction in {"A": "-z", "B": "-y"}.items():
         part.feature(letter, part.face(direction, tc.select.Inside((-30, -15, -1), (30, 15, SHEET + 1))), datum=letter)
     middle = tc.select.Inside((-31.1, -15, -1), (-30.9, 15, SHEET + 1))

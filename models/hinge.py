@@ -26,11 +26,11 @@ def ring(x: float) -> trimesh.Trimesh:
 
 
 def bored(
-    model: tc.Assembly, name: str, xs: tuple[float, ...], plate: float, place: float, **fixed: bool
+    model: tc.Assembly, name: str, xs: tuple[float, ...], plate: float, place: float, fixed: bool | None = None
 ) -> list[tc.declaration.Feature]:
     """Declare a part with a bore at each of `xs`, toleranced to its plate at a height, and to the plate's side and end."""
     slab = trimesh.creation.box(extents=(100, 60, 4)).apply_translation((0, 0, plate))
-    part = model.part(name, tc.Mesh(trimesh.util.concatenate([slab, *map(ring, xs)])), **fixed)
+    part = model.part(name, tc.Mesh(trimesh.util.concatenate([slab, *map(ring, xs)])), fixed=fixed)
     for letter, direction, reach in (("A", "+z" if plate < 0 else "-z", 2), ("B", "-y", 30), ("C", "-x", 50)):
         k, sign = "xyz".index(direction[1]), -1 if direction[0] == "-" else 1
         level = sign * reach + (plate if k == 2 else 0)

@@ -9,6 +9,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
@@ -144,6 +145,22 @@ def contents(path, group=None):
     found = xr.load_dataset(path, group=group).drop_vars(CHECKPOINTS, errors="ignore")
     found.attrs.pop("history", None)
     return found
+
+
+def layout(path):
+    """The storage of every variable of an archive, and all attributes but the history: what is not data."""
+    groups, stored = [netCDF4.Dataset(path)], {}
+    with groups[0]:
+        while groups:
+            group = groups.pop()
+            groups += group.groups.values()
+            for thing in (group, *group.variables.values()):
+                name = thing.path if thing is group else f"{group.path}/{thing.name}"
+                stored[name] = {key: np.asarray(thing.getncattr(key)).tolist() for key in thing.ncattrs() if key != "history"}
+                if thing is not group:
+                    stored[name] |= {"kind": (thing.dtype, thing.dimensions, thing.shape), "filters": thing.filters()}
+                    stored[name] |= {"chunks": thing.chunking()}
+    return stored
 
 
 def assert_same_archive(found, expected):

@@ -15,9 +15,10 @@ from tests.kernel_annotations import (
     KernelTolerance,
     kernel_annotations,
 )
-from tolcontact.errors import GeometryFault, shown
+from tolcontact.errors import GeometryFault
 from tolcontact.pmi import Dimension, Pmi, Tolerance
 from tolcontact.readable import Readable
+from tolcontact.texts import shown
 
 PRECISION = 1e-9  # relative, of values that agree; units may be converted in another order
 ZERO = 1e-12  # [mm, rad], of limits that agree in 0

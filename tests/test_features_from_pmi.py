@@ -298,7 +298,7 @@ def test_a_part_without_pmi_gets_one_message(tmp_path):
         'part "box" is a box 1 x 2 x 3 mm; only a STEP file of AP242 states PMI': tc.Box(1, 2, 3),
         'part "empty": its file states no tolerances, dimensions or datums as AP242 does': tc.Mesh(empty),
         'part "plain": its file states no tolerances, dimensions or datums as AP242 does': tc.Mesh(COVER),
-        f'part "lost": "{tmp_path / "nowhere.stp"}" is not a file': tc.Mesh(tmp_path / "nowhere.stp"),
+        f'part "lost": "{tmp_path / "nowhere.stp"}" does not exist': tc.Mesh(tmp_path / "nowhere.stp"),
     }
     for message, geometry in parts.items():
         with pytest.raises(OptionError) as refused:

@@ -18,7 +18,7 @@ def assembly():
     return model
 """
 WIDTH = 'block.feature("width", block.face("+x"), block.face("-x"), {})'
-TURN = "give it as in rotation=tc.degrees(0, 0, 90)"
+TURN = "expected three finite numbers, as in rotation=tc.degrees(0, 0, 90)"
 EITHER = '"±0.1", "+0.1/-0.05" or (-0.05, 0.1)'
 
 MISTAKES = {
@@ -30,7 +30,7 @@ MISTAKES = {
     "degrees of a tuple": ({"part": ", rotation=tc.degrees((0, 0, 90))"},
         "expected finite numbers, as in tc.degrees(0, 0, 90)"),
     "degrees of a text": ({"part": ', rotation=tc.degrees("90")'}, "degrees of '90'; expected finite numbers"),
-    "at=5": ({"part": ", at=5"}, "give it as in at=(0, 0, 10)"),
+    "at=5": ({"part": ", at=5"}, "at is 5; expected three finite numbers, as in at=(0, 0, 10)"),
     "fixed='yes'": ({"part": ', fixed="yes"'}, "fixed is a str; expected True, False or None"),
     "fixed later": ({"line": "block.fixed = True"}, "declarations do not change; state it in the call that declares it"),
     "no file": ({"line": 'tc.io.parts_from(model, "none.stp")'}, "does not exist; give the path"),

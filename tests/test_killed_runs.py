@@ -1,13 +1,18 @@
 """What ends a run before its time leaves an archive to go on with, or nothing."""
 
+import contextlib
+import random
 import re
+import subprocess
+import sys
+import time
 
 import pytest
 import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import contents, finish, nightly, run, script, start
+from tests.helpers import ROOT, assert_same_archive, contents, finish, layout, nightly, run, script, start
 from tolcontact.archive import bytes_of_rows
 from tolcontact.errors import ArchiveError
 
@@ -105,3 +110,37 @@ def test_a_full_disk_is_told_and_the_run_goes_on_when_there_is_room(program, who
     tc.run(program, samples=20_000, seed=3, out=path, resume=True).close()
     assert contents(path).identical(contents(whole))
     assert sorted(p.name for p in tmp_path.iterdir()) == ["full.nc"]
+
+
+def killed_at_random(model, samples, seconds, folder, rng):
+    """The archive of a run that is killed at a random moment of those it takes, and then resumed."""
+    path = folder / "killed.nc"
+    path.unlink(missing_ok=True)
+    command = [sys.executable, "-m", "tolcontact", "run", model, "--samples", samples, "--out", path, "--quiet"]
+    command = list(map(str, command))
+    with start(command) as begun:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            begun.wait(rng.uniform(0.2, 1.0) * seconds)
+        begun.kill()
+    done = run([*command, "--resume"], timeout=1800)
+    assert "Traceback" not in done.stderr and done.returncode in (0, 1), done.stderr
+    assert [file.name for file in folder.iterdir() if "killed" in file.name] == [path.name]
+    return path
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("model", sorted((ROOT / "models").glob("*.py")), ids=lambda path: path.stem)
+def test_any_model_comes_to_the_same_archive_whenever_its_run_is_killed(model, tmp_path):
+    if model.stem == "cover_cad":
+        pytest.importorskip("build123d")
+    rng, whole, samples = random.Random(model.stem), tmp_path / "whole.nc", 5000
+    begin = time.monotonic()
+    done = run(
+        [sys.executable, "-m", "tolcontact", "run", model, "--samples", str(samples), "--out", whole, "--quiet"], timeout=1800
+    )
+    assert done.returncode in (0, 1), done.stderr
+    seconds = time.monotonic() - begin
+    for _ in range(3):
+        path = killed_at_random(model, samples, seconds, tmp_path, rng)
+        assert_same_archive(path, whole)
+        assert layout(path) == layout(whole)

@@ -36,6 +36,32 @@ def test_no_output_replaces_an_input_or_another_output(outputs, words, tmp_path)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
 
 
+@pytest.mark.parametrize("name", ["a.nc", "linked.nc", "hard.nc"])
+def test_a_run_from_python_replaces_neither_its_model_nor_a_file_of_another_kind(name, tmp_path):
+    tc.run(cases.stack(), samples=20, surfaces=0, fields="none", out=tmp_path / "a.nc").close()
+    (tmp_path / "linked.nc").symlink_to("a.nc")
+    (tmp_path / "hard.nc").hardlink_to(tmp_path / "a.nc")
+    before = (tmp_path / "a.nc").read_bytes()
+    with pytest.raises(tc.OptionError, match=f'{name}" would be the input and the archive'):
+        tc.run(tmp_path / "a.nc", samples=20, out=tmp_path / name, overwrite=True)
+    assert (tmp_path / "a.nc").read_bytes() == before
+
+
+@pytest.mark.parametrize("name, words", [
+    ("m.json", "would be the input and the JSON model"), ("./sub/../m.json", "would be the input and the JSON model"),
+    ("m.py", "is not the name of a JSON model"), ("part.stl", "is not the name of a JSON model"),
+], ids=["model", "other way", "script", "shape"])  # fmt: skip
+def test_a_written_model_replaces_neither_itself_nor_a_file_of_another_kind(name, words, tmp_path):
+    (tmp_path / "sub").mkdir()
+    tc.io.write_model(cases.stack(), tmp_path / "m.json")
+    for other in ("m.py", "part.stl"):
+        (tmp_path / other).write_text("text")
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
+    with pytest.raises(tc.OptionError, match=words):
+        tc.io.write_model(tmp_path / "m.json", tmp_path / name)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
+
+
 def test_a_comparison_replaces_none_of_the_runs_that_it_compares(tmp_path):
     for name in ("a.nc", "b.nc"):
         tc.run(cases.stack(), samples=20, surfaces=0, fields="none", out=tmp_path / name).close()

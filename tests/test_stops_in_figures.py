@@ -1,12 +1,15 @@
 """Figures of a measurement that rests on its stop in most realizations: an interval that covers, or none."""
 
 import io
+import re
 
 import numpy as np
+import pytest
 from rich.console import Console
 from scipy import special, stats
 
 import tolcontact as tc
+from tests.helpers import nightly
 from tolcontact.report import summary_text
 
 
@@ -67,3 +70,33 @@ def test_a_limit_that_contact_keeps_is_no_proof_of_tolerances_that_meet_it():
     assert line.endswith("] below")
     inside = verdicts(tc.summarize(simulated(resting(0.08, limits=(-0.1, None)), 2000)))
     assert inside == ["height: meets its limits"]
+
+
+@pytest.mark.parametrize("share", [0.5, *nightly(0.05, 0.01)])
+def test_solvers_agree_on_every_figure_of_a_measurement_at_its_stop(share):
+    """The values of three solvers at a stop scatter by 1e-17 to 1e-13 mm, on either side."""
+    model, limits = resting(share, limits=(0, 0.2)), {"rtol": 1e-6, "atol": 1e-6, "equal_nan": True}
+    first, *others = (
+        tc.summarize(tc.run(model, samples=300, seed=3, surfaces=0, fields="none", solver=solver))
+        for solver in ("qpoases", "daqp", "graph")
+    )
+    for other in others:
+        for name in ("statistic_value", "change", "touched"):
+            np.testing.assert_allclose(other[name].values, first[name].values, **limits)
+        assert other.measure_stops.values.tolist() == first.measure_stops.values.tolist() == ["lower"]
+        assert verdicts(other) == verdicts(first)
+
+
+def test_a_table_says_from_how_many_realizations_on_a_figure_has_an_interval():
+    """The stated number suffices, with room for chance; fewer realizations have no interval."""
+    model = resting(0.04, limits=(None, 0.4))
+    console = Console(width=200, file=io.StringIO())
+    console.print(summary_text(tc.summarize(simulated(model, 200))))
+    text = console.file.getvalue()
+    (stated,) = re.findall(r"at a stop, moments need 20 values off it: about ([0-9 ]+) realizations", text)
+    assert "Pp and Ppk need 2 730 realizations, 3 240 with two limits" in text
+    assert "skewness and kurtosis need 1000 realizations, and a kurtosis below 3.5" in text
+    required = int(stated.replace(" ", ""))
+    for count, has_interval in ((required // 2, False), (2 * required, True)):
+        figures = tc.summarize(simulated(model, count)).statistic_value.sel(measure="height", state="corrected")
+        assert np.isfinite(figures.sel(statistic="6 sigma", interval="upper")) == has_interval

@@ -5,6 +5,7 @@ import os
 import re
 import sys
 from collections.abc import Iterator
+from types import MappingProxyType
 
 import pytest
 
@@ -80,10 +81,10 @@ def test_what_all_systems_have_is_allowed(source):
     assert not list(posix_names(ast.parse(source)))
 
 
-def stripped(command: list, **options):
+def stripped(command: list, environment=MappingProxyType({}), **options):
     """A process without what only POSIX has."""
     folders = os.pathsep.join(map(str, (SCRIPTS / "without_posix", ROOT)))
-    return run(list(map(str, command)), env={**os.environ, "PYTHONPATH": folders}, **options)
+    return run(list(map(str, command)), env={**os.environ, "PYTHONPATH": folders, **environment}, **options)
 
 
 def python(code: str, *arguments, **options):
@@ -165,6 +166,81 @@ def test_a_run_says_that_its_archive_is_open_and_works_when_it_is_closed(tmp_pat
     (line,) = done.stdout.splitlines()
     assert "run.nc" in line and "results.close()" in line
     assert [path.name for path in tmp_path.iterdir()] == ["run.nc"]
+
+
+UMLAUTS = """
+import sys
+import tolcontact as tc
+from pathlib import Path
+from models.ra1 import assembly
+options = {"samples": 20, "method": tc.Method(resolution="linearized")}
+tc.run(assembly(), **options).close()
+out = Path(sys.argv[1])
+for resume in (False, True):
+    tc.run(assembly(), out=out, resume=resume, **options).close()
+tc.analyses.sensitivities(out, into=out)
+with tc.open_archive(out) as results:
+    print(results.sizes["realization"], *results["statistics"].children, *(path.name for path in out.parent.iterdir()))
+"""
+
+
+@pytest.mark.slow
+def test_archives_may_have_letters_beyond_ascii(tmp_path):
+    folder = tmp_path / "Jürgen Ω"
+    for path in (folder / "temp", tmp_path / "short", folder / "runs"):
+        path.mkdir(parents=True)
+    environment = {"SHORT_NAMES": str(tmp_path / "short"), "TMPDIR": str(folder / "temp")}
+    done = stripped([sys.executable, "-c", UMLAUTS, folder / "runs" / "prüf.nc"], environment)
+    assert done.stdout == "20 sensitivities prüf.nc\n", done.stderr
+
+
+UNBUILT = """
+import sys
+import tolcontact as tc
+def assembly():
+    raise AssertionError("it is built")
+try:
+    tc.run(assembly, out=sys.argv[1])
+except tc.errors.ArchiveError as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("prüf.nc", "netCDF opens paths of 259 ASCII letters at most"),
+        ("x" * 150 + ".nc", "Windows takes paths of 259 letters at most"),
+    ],
+)
+def test_a_path_that_cannot_be_an_archive_is_named_before_anything_is_built(name, sentence, tmp_path):
+    path = tmp_path / name if "ü" in name else tmp_path / name.rjust(255 - len(str(tmp_path)), "x")
+    done = python(UNBUILT, path)
+    assert done.stderr == "" and done.stdout.startswith(f'archive "{path}" cannot be written: {sentence}')
+    assert done.stdout.count("\n") == 1 and not list(tmp_path.iterdir())
+
+
+def test_an_archive_that_the_library_cannot_open_is_named(tmp_path):
+    path = tmp_path / "prüf.nc"
+    path.touch()
+    done = python("import sys, tolcontact as tc; tc.open_archive(sys.argv[1])", path)
+    assert f'"{path}" cannot be read: netCDF opens paths' in done.stderr.splitlines()[-1]
+
+
+PLUGINS = """
+import os, sys
+from tolcontact.__main__ import command_line
+sys.argv[1:] = ["--version"]
+try:
+    command_line()
+finally:
+    print(os.environ.get("HDF5_PLUGIN_PRELOAD"))
+"""
+
+
+def test_commands_look_for_plugins_of_hdf5_only_where_that_is_quick():
+    assert python(PLUGINS).stdout.splitlines()[-1] == "::"
+    assert run([sys.executable, "-c", PLUGINS], env={**os.environ, "PYTHONPATH": str(ROOT)}).stdout.splitlines()[-1] == "None"
 
 
 CACHE = """

@@ -75,6 +75,25 @@ def test_the_table_of_tails_says_what_is_not_defined(tmp_path):
     assert failed.stderr.startswith('error: "x": measurement "lg": not a finite number')
 
 
+def test_a_measure_that_is_never_a_number_says_so_once(tmp_path):
+    (script := tmp_path / "block.py").write_text("""import casadi, tolcontact as tc
+def assembly():
+    a = tc.Assembly("block")
+    block = a.part("block", tc.Box(50, 25, 10))
+    a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=5), tolerance=0.1)
+    wall = a.part("wall", tc.Box(50, 25, 10), at=(0, 0, 10), fixed=True)
+    a.contact("seat", moving=block.face("+z"), reference=wall.face("-z"))
+    def function(poses):
+        x = poses.rotation(block)[2, 0]
+        return casadi.sqrt(-1 - x**2)
+    a.measure("u", function, limits=(-1, 1))
+    return a
+""")
+    done = call(tmp_path, "run", script, "--samples", "200", "--solver", "daqp", "--quiet")
+    assert "u: not a number in 100 % of the realizations, so it has no verdict" in done.stdout
+    assert done.returncode == 1 and "warning" not in done.stderr
+
+
 @pytest.mark.parametrize(("limits", "code", "word"), [("limits=(-1, 1)", 1, "verdict"), ("units='mm'", 0, "statistics")])
 def test_a_measure_that_is_not_a_number_says_so(tmp_path, limits, code, word):
     (script := tmp_path / "block.py").write_text(f"""import casadi, tolcontact as tc

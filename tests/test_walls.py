@@ -49,6 +49,7 @@ LAZY = {
     "trimesh": ("geometry/files/worker.py",),  # in a process that mostly reads STEP files
     "openpyxl": ("report/spreadsheet.py",),
     "psutil": ("system/",),  # where the system limits no process
+    "ctypes": ("system/files.py",),  # for short names, on Windows
     "tolcontact.kernel.step_document": ("geometry/files/worker.py",),  # in a process of its own
     "tolcontact.fasteners": ("__init__.py",),  # when a script asks
     "tolcontact.pmi": ("__init__.py",),  # when a script asks
@@ -66,7 +67,7 @@ APART = {
 }
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
-    "version", "errors", "texts", "user_functions", "input_files", "system", "interrupts", "readable", "child",
+    "version", "texts", "errors", "user_functions", "input_files", "system", "interrupts", "readable", "child",
     "stored_coordinates", "shape_worker", "kernel", "vocabulary", "realizations", "arrays", "method", "poses", "limits",
     "code_cache", "replacing", "temporary", "compiled", "declaration", "select", "geometry", "features", "fasteners", "pmi",
     "discretization", "interference", "variation", "mechanics", "compilation", "statics", "contact", "simulation",

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from tolcontact import cli, interrupts
-from tolcontact.system import streams
+from tolcontact.system import machine, streams
 from tolcontact.system.resources import address_space
 
 MIN_ADDRESS_SPACE = 1_500_000_000  # bytes
@@ -23,6 +23,7 @@ def command_line() -> None:
             check_threads()
             # Linear algebra has one thread: starting more takes longer than a run, and blocks have threads of their own.
             os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+            machine.skip_plugins()
             gc.set_threshold(MIN_GARBAGE)
             _imported()()
     except KeyboardInterrupt:  # between the end of a command and that of the process

@@ -4,31 +4,12 @@ A message states what was expected, what was got (naming the part, locator, pair
 """
 
 import difflib
-import re
 from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any, Protocol
 
-# Control characters but tab and line feed, separators of lines and paragraphs, overrides of the writing direction, halves of
-# surrogate pairs (bytes of a file name that are not text): they steer a terminal, or cannot be written to it.
-CONTROL_CHARACTERS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+from tolcontact.texts import shown
 
 MIN_LIKENESS = 0.5  # of a name that another one may have been meant for
-
-
-def shown(text: str) -> str:
-    """Return a text as it may be printed: characters that would steer a terminal become escapes."""
-    return CONTROL_CHARACTERS.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
-
-
-def shown_name(name: str) -> str:
-    """Return a name as it may be printed on one line: tabs and line breaks become escapes, too."""
-    return shown(name).replace("\t", "\\t").replace("\n", "\\n")
-
-
-def clipped(text: str, max_length: int = 400) -> str:
-    """Return the text of a file as a message may quote it: on one line, printable and short."""
-    line = " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
-    return line if len(line) <= max_length else f"{line[:max_length]}..."
 
 
 class NamedDeclaration(Protocol):

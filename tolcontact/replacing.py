@@ -1,12 +1,29 @@
-"""Files that appear under their names only when they are complete."""
+"""Files that appear under their names only when they are complete, and replace no input and no other output."""
 
 import contextlib
 import glob
+import itertools
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
+from tolcontact.errors import OptionError
 from tolcontact.system import files
+
+
+def check_identities(inputs: Iterable[object], outputs: Mapping[str, Path]) -> None:
+    """Raise OptionError for an output, by its kind, that is an input or another output, by whatever name."""
+    named = [("input", Path(path)) for path in inputs if isinstance(path, str | Path)]
+    for (name, path), (other, taken) in itertools.combinations([*named, *outputs.items()], 2):
+        if other in outputs and _is_same(path, taken):
+            raise OptionError(f'"{taken}" would be the {name} and the {other}; choose another name for the {other}')
+
+
+def _is_same(path: Path, other: Path) -> bool:
+    """Return whether two paths lead to one file; names that differ only in case do on some systems."""
+    if path.exists() and other.exists():
+        return path.samefile(other)
+    return str(path.resolve()).casefold() == str(other.resolve()).casefold()
 
 
 @contextlib.contextmanager

@@ -20,9 +20,11 @@ from pathlib import Path
 from typing import Any, Self
 
 from tolcontact.child import environment
-from tolcontact.errors import GeometryFault, clipped
+from tolcontact.errors import GeometryFault
+from tolcontact.input_files import fault_of
 from tolcontact.system.exit_codes import TIME_LIMIT, crash
 from tolcontact.system.watch import Watch
+from tolcontact.texts import clipped
 
 PROGRAM = Path(__file__).parent / "geometry" / "files" / "worker.py"
 LOAD_KERNEL = "--kernel"  # argument of the program: load the CAD kernel before the first job
@@ -47,6 +49,7 @@ class Job:
     seconds: float
     memory: int
     triangles: int
+    encoding: str = "utf-8"
     has_face_names: bool = False
     has_solids: bool = False
     has_pmi: bool = False
@@ -151,8 +154,10 @@ def start_early(arguments: Iterable[str]) -> Worker | None:
 def _needs_kernel(argument: str) -> bool:
     path = Path(argument)
     try:
+        if fault_of(path):
+            return False
         if STEP_FILE.search(argument):
-            return path.is_file()
+            return True
         is_model = path.suffix.lower() in (".py", ".json")
         return is_model and bool(QUOTED_STEP_FILE.search(path.read_text(encoding="utf-8", errors="ignore")))
     except (OSError, ValueError):  # not a file

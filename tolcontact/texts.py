@@ -1,23 +1,48 @@
-"""Texts of models and files on their way into other formats, whose readers must not take them for anything else."""
+"""Texts of models and files on their way out: each format has one rule, so that no reader takes a text for anything else.
+
+terminal, CSV, spreadsheet   shown, shown_name, csv_cell, sheet_cell
+Python source                literal
+JSON                         the escapes of its library
+page                         the escapes of its templates
+archive                      names with control characters are refused when they are declared
+"""
 
 import json
 import re
 from typing import Any
 
-# Characters that XML, and with it a spreadsheet, cannot hold.
-NOT_IN_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
-FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")  # a cell of a CSV file that begins with one may be run as a formula
+# Control characters but tab and line feed, separators of lines and paragraphs, overrides of the writing direction, halves of
+# surrogate pairs (bytes of a file name that are not text): they steer a terminal, or cannot be written to it.
+CONTROL_CHARACTERS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+_NOT_SHOWN = re.compile(f"{CONTROL_CHARACTERS.pattern}|[\ufffe\uffff]")  # XML, and with it a spreadsheet, lacks the last two
+_FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")  # a cell of a CSV file that begins with one may be run as a formula
+
+
+def shown(text: str) -> str:
+    """Return a text as it may be printed: characters that would steer a terminal become escapes."""
+    return _NOT_SHOWN.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
+
+
+def shown_name(name: str) -> str:
+    """Return a name as it may be printed on one line: tabs and line breaks become escapes, too."""
+    return shown(name).replace("\t", "\\t").replace("\n", "\\n")
+
+
+def clipped(text: str, max_length: int = 400) -> str:
+    """Return the text of a file as a message may quote it: on one line, printable and short."""
+    line = " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+    return line if len(line) <= max_length else f"{line[:max_length]}..."
 
 
 def sheet_cell(value: Any) -> Any:
-    """Return a value as a spreadsheet can hold it: characters that XML lacks become escapes; numbers stay."""
-    return NOT_IN_XML.sub(lambda match: match[0].encode("unicode_escape").decode(), value) if isinstance(value, str) else value
+    """Return a value as a cell of a spreadsheet; numbers are unchanged."""
+    return shown(value) if isinstance(value, str) else value
 
 
 def csv_cell(value: Any) -> Any:
-    """Return a value as a cell of a CSV file; an apostrophe stands before a text that a spreadsheet would take as a formula."""
+    """Return a value as a cell of a CSV file; an apostrophe precedes a text that a spreadsheet would take as a formula."""
     value = sheet_cell(value)
-    return f"'{value}" if isinstance(value, str) and value.lstrip(" ").startswith(FORMULA_SIGNS) else value
+    return f"'{value}" if isinstance(value, str) and value.lstrip(" ").startswith(_FORMULA_SIGNS) else value
 
 
 def literal(value: Any) -> str:

@@ -3,11 +3,13 @@
 import os
 import re
 import signal
+import subprocess
 import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
+from datetime import date
 from pathlib import Path
 from typing import NamedTuple
 
@@ -99,6 +101,21 @@ class Table:
         yield "|---" * (len(endings) + 2) + "|"
         for name, counter in self.counts.items():
             yield f"| {name} | {counter.total()} | {' | '.join(str(counter[ending]) for ending in endings)} |"
+
+
+def write_table(name: str, table: Table) -> None:
+    """Print a table; with TOLCONTACT_RECORD set, write it into the README between the markers of its name, too."""
+    lines = "\n".join(table.lines())
+    print(lines)
+    if os.environ.get("TOLCONTACT_RECORD"):
+        readme = Path(__file__).with_name("README.md")
+        commit = subprocess.run(
+            ["git", "describe", "--always"], cwd=readme.parent, capture_output=True, text=True, check=True
+        ).stdout
+        note = f"{tolcontact.__version__} ({commit.strip()}), {date.today()}: `{' '.join(sys.argv[1:])}`"
+        begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
+        head, _, rest = readme.read_text(encoding="utf-8").partition(begin)
+        readme.write_text(f"{head}{begin}\n{note}\n\n{lines}\n{end}{rest.partition(end)[2]}", encoding="utf-8")
 
 
 def contents(folder: Path) -> Mapping[str, bytes]:

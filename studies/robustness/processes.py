@@ -4,6 +4,7 @@ python -m studies.robustness.processes --killed 30 --writers 50 --seed 0
 """
 
 import argparse
+import multiprocessing
 import os
 import random
 import signal
@@ -12,17 +13,19 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import psutil
 import xarray as xr
 
 import tolcontact as tc
-from studies.robustness.attempts import Table
+from studies.robustness.attempts import Table, write_table
+from tests.helpers import layout
 from tolcontact.archive import check_rows
 
 ROOT = Path(__file__).resolve().parents[2]
 MODEL = str(ROOT / "models/ra1.py")
-SAMPLES = 60_000
+SAMPLES, STATION_SAMPLES = 60_000, 12_000
 VARYING = ("summed_rows", "sums")
 
 
@@ -129,20 +132,56 @@ def writers(count: int, rng: random.Random, folder: Path, expected: Path, table:
         table.add("two writers", fault or "one wrote, one was refused", f"{number}: {words}", is_fault=bool(fault))
 
 
+def stations(count: int, rng: random.Random, folder: Path, table: Table) -> None:
+    """Kill runs of a model with stations at random moments, resume them, and compare with an undisturbed run, attributes too.
+
+    The processes are forks that have the compiled model, so that most of their time is that of the run itself.
+    """
+    program, path, expected = tc.build(ROOT / "models/rail.py", solver="daqp"), folder / "run.nc", folder / "whole rail.nc"
+    begun = time.monotonic()
+    _forked(program, expected).join()
+    seconds = time.monotonic() - begun
+    for number in range(count):
+        for left in folder.glob("*run.nc*"):
+            left.unlink()
+        process = _forked(program, path)
+        process.join(rng.uniform(0.02, 1.0) * seconds)
+        process.kill()
+        process.join()
+        how = "resumed" if (folder / ".run.nc.rows").exists() else "had ended" if path.exists() else "begun anew"
+        process = _forked(program, path, resume=True)
+        process.join(600)
+        fault = "" if process.exitcode == 0 else f"not resumed: {process.exitcode}"
+        fault = fault or is_whole(path, expected) or ("" if layout(path) == layout(expected) else "other attributes")
+        table.add("killed stations", fault or how, str(number), is_fault=bool(fault))
+
+
+def _forked(program: tc.Program, out: Path, **options: Any) -> Any:
+    process = multiprocessing.get_context("fork").Process(
+        target=lambda: tc.run(program, samples=STATION_SAMPLES, out=out, **options).close()
+    )
+    process.start()
+    return process
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--killed", type=int, default=30)
     parser.add_argument("--writers", type=int, default=50)
+    parser.add_argument("--stations", type=int, default=0)
     parser.add_argument("--seed", type=int, default=0)
     options, table = parser.parse_args(), Table()
     rng = random.Random(options.seed)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         whole = folder / "whole.nc"
-        tc.run(MODEL, samples=SAMPLES, out=whole).close()
+        if options.writers or options.killed:
+            tc.run(MODEL, samples=SAMPLES, out=whole).close()
         writers(options.writers, rng, folder, whole, table)
         killed(options.killed, rng, folder, whole, table)
-    print("\n".join(table.lines()))
+        if options.stations:
+            stations(options.stations, rng, folder, table)
+    write_table("processes", table)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from studies.robustness.attempts import Table, attempt
+from studies.robustness.attempts import Table, attempt, write_table
 from studies.robustness.files import stand
 from studies.robustness.step_texts import damaged
 from tests.pmi_records import Annotated
@@ -84,25 +84,30 @@ VALUES = (
 )  # fmt: skip
 
 
+def renamed(document: Any, rng: random.Random) -> Any:
+    """Return the document of a model with hostile names."""
+    for entry in (document, *document["parts"], document["pairs"][0], document["measures"][0]):
+        name = "".join(rng.choices(LETTERS, k=rng.randint(1, 4)))
+        if rng.random() < 0.95:  # else it may be refused
+            name = "".join(letter for letter in name if letter not in CONTROL).strip() or "@"
+            name = name if entry is document else f"a{name.replace('/', '')}"
+        entry["name"] = name
+    base, block = (part["name"] for part in document["parts"])
+    for face in (
+        *document["locations"][0]["scheme"]["three_two_one"],
+        document["pairs"][0]["moving"],
+        document["measures"][0]["of"],
+    ):
+        face["part"] = block
+    document["locations"][0]["part"], document["pairs"][0]["reference"]["part"] = block, base
+    document["measures"][0]["units"] = rng.choice(("mm", "=1+1", "@", "\ufffe"))
+    return document
+
+
 def names(count: int, rng: random.Random, folder: Path, table: Table) -> None:
     """Run models with hostile names, and read what was written: spreadsheets, CSV, JSON, pages."""
     for _ in range(count):
-        document = stand()
-        for entry in (document, *document["parts"], document["pairs"][0], document["measures"][0]):
-            name = "".join(rng.choices(LETTERS, k=rng.randint(1, 4)))
-            if rng.random() < 0.95:  # else it may be refused
-                name = "".join(letter for letter in name if letter not in CONTROL).strip() or "@"
-                name = name if entry is document else f"a{name.replace('/', '')}"
-            entry["name"] = name
-        base, block = (part["name"] for part in document["parts"])
-        for face in (
-            *document["locations"][0]["scheme"]["three_two_one"],
-            document["pairs"][0]["moving"],
-            document["measures"][0]["of"],
-        ):
-            face["part"] = block
-        document["locations"][0]["part"], document["pairs"][0]["reference"]["part"] = block, base
-        document["measures"][0]["units"] = rng.choice(("mm", "=1+1", "@", "\ufffe"))
+        document = renamed(stand(), rng)
         (folder / "m.json").write_text(json.dumps(document))
         ending = attempt(["run", "m.json", "--samples", "40", "--out", "m.nc", "--overwrite", "--quiet"], folder)
         if ending.fault or ending.code == 2:
@@ -216,7 +221,7 @@ def main() -> None:
     for kind in (names, pmi, functions):
         with tempfile.TemporaryDirectory() as folder:
             kind(getattr(options, kind.__name__), random.Random(options.seed), Path(folder), table)
-    print("\n".join(table.lines()))
+    write_table("scripts", table)
 
 
 if __name__ == "__main__":

@@ -1,25 +1,39 @@
-"""How often 95 % intervals cover the truth: every statistic of a measure, eight distributions, samples of 100 to 10 000.
+"""How often 95 % intervals cover the truth: every statistic of a measure, 13 distributions, samples of 20 to 5000.
 
 Distributions have closed quantiles, and moments by quadrature. Limits lie at 1.2 times the distance of the outer percentiles.
+With `--write` the tables of the README are replaced, and the picture is drawn.
 """
 
 import argparse
 import itertools
 import zlib
+from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 from scipy import special, stats
 
 from tolcontact.limits import Limits
-from tolcontact.statistics import capability, intervals
+from tolcontact.statistics import capability, intervals, two_samples
+from tolcontact.statistics.linear_shares import linear_shares, required_realizations
 from tolcontact.statistics.sample import Sample
 from tolcontact.statistics.sobol_indices import sobol_indices
+from tolcontact.variation.plans import Plan
+from tolcontact.vocabulary import LATIN_HYPERCUBE, REPLICATE, SOBOL
 
-SIZES = (100, 300, 2000, 10_000)
+README, BEGIN, END = Path(__file__).with_name("README.md"), "<!-- coverage -->\n", "<!-- end of coverage -->"
+PICTURE = "coverage.png"
+SIZES = (20, 100, 300, 5000)
+REPLICATES = 20  # of a run with a sampling plan
 TARGET = 92.5
+STATED = 0.1  # of the samples: if fewer have an interval, it counts as none
 PERCENTS = (0.135, 5.0, 50.0, 95.0, 99.865)
-STOP = float(special.ndtri(0.93))
+STOP, LATER_STOP = float(special.ndtri(0.93)), float(special.ndtri(0.99))
+LOW_STOP, HIGH_STOP = -0.5, 1.0
+CLASSES = 5
 MODES = 2.5
+CHANGED = 0.02  # share of realizations that differ between two paired runs
+SLOPES, PRODUCT = np.array([1.0, 0.5]), 0.3  # of a sum of two contributors and of their product
 
 
 def two_modes(p):
@@ -36,8 +50,14 @@ QUANTILES = {
     "half at a stop": lambda p: np.maximum(0.0, special.ndtri(p)),
     "93 % at a stop": lambda p: np.maximum(0.0, special.ndtri(p) - STOP),
     "two modes": two_modes,
+    "exponential": stats.expon.ppf,
+    "Pareto": stats.pareto(3.5).ppf,
+    "99 % at a stop": lambda p: np.maximum(0.0, special.ndtri(p) - LATER_STOP),
+    "two stops": lambda p: np.clip(special.ndtri(p), LOW_STOP, HIGH_STOP),
+    "discrete": lambda p: np.floor(CLASSES * p),
 }
-MOMENTS = {"t5": stats.t(5)}  # whose tails reach beyond the quadrature
+MOMENTS = {"t5": stats.t(5), "Pareto": stats.pareto(3.5)}  # whose tails reach beyond the quadrature
+KINKS = [STOP, LATER_STOP, LOW_STOP, HIGH_STOP, *special.ndtri(np.arange(1, CLASSES) / CLASSES)]
 
 
 class Truth:
@@ -45,9 +65,9 @@ class Truth:
 
     def __init__(self, name):
         quantile = QUANTILES[name]
-        # Gauss' rule in normal scores, split where the stops are.
+        # Gauss' rule in normal scores, split where quantiles have kinks and jumps.
         nodes, weights = np.polynomial.legendre.leggauss(200)
-        edges = list(itertools.pairwise(np.sort(np.append(np.linspace(-8, 8, 65), STOP))))
+        edges = list(itertools.pairwise(np.sort(np.append(np.linspace(-8, 8, 65), KINKS))))
         z = np.concatenate([(b - a) / 2 * nodes + (a + b) / 2 for a, b in edges])
         w = np.concatenate([(b - a) / 2 * weights for a, b in edges]) * stats.norm.pdf(z)
         x = quantile(special.ndtr(z))
@@ -61,6 +81,8 @@ class Truth:
         self.percentiles = quantile(np.array(PERCENTS) / 100)
         low, middle, high = self.percentiles[[0, 2, 4]]
         self.limits = Limits(middle - 1.2 * (middle - low) if low < middle else -np.inf, middle + 1.2 * (high - middle))
+        # Standardized contributors: the share of a slope in the variance of a sum with a product, and that of both slopes.
+        self.linear = np.array([SLOPES[0] ** 2, SLOPES @ SLOPES]) / (SLOPES @ SLOPES + PRODUCT**2)
         clipped = np.maximum(x, self.mean)
         self.clipped = float((w * clipped**2).sum() - (w * clipped).sum() ** 2) / self.variance
         p = special.ndtr(np.linspace(-8, 8, 200_001))
@@ -96,44 +118,122 @@ def figures(draws, truth):
     }
     values = intervals.percentiles(sample, PERCENTS)
     table |= {f"{p:g} %": (value, true) for p, value, true in zip(PERCENTS, values, truth.percentiles, strict=True)}
+    return table | paired_figures(x, other, truth)
+
+
+def paired_figures(x, other, truth):
+    """Return the change of a share where few realizations change, and linear shares, with their true values."""
+    rng = np.random.default_rng(zlib.crc32(x.tobytes()))
+    hits = [rng.random(len(x)) < 0.05]
+    hits.append(np.where(rng.random(len(x)) < CHANGED, rng.random(len(x)) < 0.05, hits[0]))
+    shift = two_samples.share_shift(*map(Sample.of, hits), paired=True)
+    table = {"shift of a share": (shift, 0.0)}
+    if len(x) >= required_realizations(2):
+        z = (np.column_stack([x, other]) - truth.mean) / np.sqrt(truth.variance)
+        (shares,) = linear_shares(z, (z @ SLOPES + PRODUCT * z.prod(axis=1))[:, None], [np.array([0]), np.array([1])])
+        assert shares is not None
+        of_line = (intervals.Estimate(*values) for values in (shares.shares[0], shares.r2))
+        table |= dict(zip(("linear share", "R2"), zip(of_line, truth.linear, strict=True), strict=True))
     return table
 
 
-def coverage(name, size, repeats):
-    """Return by statistic: coverage in percent of the intervals that there are, and the share of samples that have one."""
-    truth, rng = Truth(name), np.random.default_rng([size, zlib.crc32(name.encode())])
-    covered: dict[str, int] = {}
-    stated: dict[str, int] = {}
-    for _ in range(repeats):
-        draws = QUANTILES[name](rng.random((4, size)))
+def counted(draw, repeats, figures_of, truth):
+    """Return by statistic: coverage in percent of the intervals that there are; NaN if few samples have one."""
+    covered: dict[str, list[bool]] = {}
+    for repeat in range(repeats):
+        draws = draw(repeat)
         if np.ptp(draws[0]) == 0:
             continue
-        for statistic, (estimate, true) in figures(draws, truth).items():
+        for statistic, (estimate, true) in figures_of(draws, truth).items():
+            rows = covered.setdefault(statistic, [])
             if not (np.isnan(true) or np.isnan(estimate.lower)):
-                covered[statistic] = covered.get(statistic, 0) + bool(estimate.lower <= true <= estimate.upper)
-                stated[statistic] = stated.get(statistic, 0) + 1
-    return {s: (100 * covered[s] / stated[s], stated[s] / repeats) for s in covered if stated[s] >= repeats / 10}
+                rows.append(bool(estimate.lower <= true <= estimate.upper))
+    return {s: 100 * float(np.mean(rows)) if len(rows) >= STATED * repeats else np.nan for s, rows in covered.items()}
+
+
+def coverage(name, size, repeats):
+    """Return the coverage of all figures of independent realizations of a distribution."""
+    rng = np.random.default_rng([size, zlib.crc32(name.encode())])
+    return counted(lambda _: QUANTILES[name](rng.random((4, size))), repeats, figures, Truth(name))
+
+
+def coverage_of_plan(plan, name, repeats):
+    """Return the coverage of the figures of a run with a sampling plan: a function of the sum of three contributors."""
+
+    def draw(seed):
+        numbers = Plan(plan, ["a", "b", "c"]).numbers(seed, 0, REPLICATES * REPLICATE)
+        score = sum(special.ndtri(numbers(label)) for label in "abc") / np.sqrt(3)
+        return QUANTILES[name](special.ndtr(score))[None]
+
+    def planned_figures(draws, truth):
+        x, limits = Sample(lambda: draws[0], REPLICATE), Limits(-np.inf, truth.percentiles[3])
+        five, ninety_five = intervals.percentiles(x, [5, 95])
+        beyond = 0.05 if truth.percentiles[3] < truth.percentiles[4] else 0.0
+        return {
+            "mean": (intervals.mean(x), truth.mean),
+            "6 sigma": (intervals.standard_deviation(x, times=6), 6 * np.sqrt(truth.variance)),
+            "outside": (capability.share_outside(x, limits), beyond),
+            "5 %": (five, truth.percentiles[1]),
+            "95 %": (ninety_five, truth.percentiles[3]),
+            "Ppk": (capability.by_percentiles(x, truth.limits)[1], 1.2),
+        }
+
+    return counted(draw, repeats, planned_figures, Truth(name))
+
+
+PLANNED = ("normal", "lognormal", "half at a stop", "uniform")
+
+
+def table_of(rows):
+    """Yield a table: for each row, the number of figures with an interval, and the least coverage."""
+    yield "| | realizations | figures with an interval | least coverage % | of | below " + f"{TARGET:g} % |"
+    yield "|---" * 6 + "|"
+    for (name, size), column in rows.items():
+        stated = {statistic: percent for statistic, percent in column.items() if not np.isnan(percent)}
+        worst = min(stated, key=lambda statistic: stated[statistic])
+        below = [f"{statistic} {percent:.1f}" for statistic, percent in stated.items() if percent < TARGET]
+        cells = [name, str(size), str(len(stated)), f"{stated[worst]:.1f}", worst, ", ".join(below) or "none"]
+        yield "| " + " | ".join(cells) + " |"
+
+
+def draw_picture(rows, path):
+    """Draw the coverage of each figure (column) by distribution and number of realizations (row)."""
+    figures_of_all = list(dict.fromkeys(figure for column in rows.values() for figure in column))
+    values = np.array([[column.get(figure, np.nan) for figure in figures_of_all] for column in rows.values()])
+    figure, axes = plt.subplots(figsize=(9, 12), layout="constrained")
+    colours = plt.get_cmap("RdYlBu").copy()
+    colours.set_bad("0.9")
+    image = axes.imshow(values, cmap=colours, vmin=90, vmax=100, aspect="auto")
+    axes.set_xticks(range(len(figures_of_all)), figures_of_all, rotation=90)
+    axes.set_yticks(range(len(rows)), [f"{name}, {size}" for name, size in rows], fontsize=7)
+    figure.colorbar(image, label="coverage of 95 % intervals, % (grey: no interval)", extend="min")
+    figure.savefig(path, dpi=110)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=1000)
     parser.add_argument("--sizes", type=int, nargs="*", default=SIZES)
+    parser.add_argument("--write", action="store_true", help="replace the tables of the README, and draw the picture")
     options = parser.parse_args()
-    below = []
-    for size in options.sizes:
-        table = {name: coverage(name, size, options.repeats) for name in QUANTILES}
-        print(f"\n{size} realizations, coverage in % (* below {TARGET}; - no interval)\n\n| | " + " | ".join(table) + " |")
-        print("|---" * (1 + len(table)) + "|")
-        for statistic in figures(np.random.default_rng(0).random((4, 100)), Truth("normal")):
-            cells = []
-            for name, column in table.items():
-                percent = column.get(statistic, (np.nan, 0))[0]
-                cells.append("-" if np.isnan(percent) else f"{percent:.1f}" + "*" * (percent < TARGET))
-                if percent < TARGET:
-                    below.append(f"{statistic} of {name} at {size}: {percent:.1f}")
-            print(f"| {statistic} | " + " | ".join(cells) + " |", flush=True)
-    print(f"\nBelow {TARGET}: " + ("; ".join(below) or "none"))
+    rows = {(name, size): coverage(name, size, options.repeats) for name in QUANTILES for size in options.sizes}
+    planned = {
+        (f"{name}, {plan}", REPLICATES * REPLICATE): coverage_of_plan(plan, name, options.repeats)
+        for plan in (LATIN_HYPERCUBE, SOBOL)
+        for name in PLANNED
+    }
+    cells = [percent for column in [*rows.values(), *planned.values()] for percent in column.values() if not np.isnan(percent)]
+    below = sum(percent < TARGET for percent in cells)
+    lines = [
+        f"{options.repeats} samples for each row; {len(cells)} intervals, of which {below} cover in less than {TARGET:g} %.",
+        "",
+    ]
+    lines += [*table_of(rows), "", "With a sampling plan:", "", *table_of(planned)]
+    print("\n".join(lines))
+    if options.write:
+        before, _, rest = README.read_text(encoding="utf-8").partition(BEGIN)
+        README.write_text(before + BEGIN + "\n".join(lines) + "\n" + END + rest.partition(END)[2], encoding="utf-8")
+        draw_picture(rows, README.with_name(PICTURE))
 
 
 if __name__ == "__main__":

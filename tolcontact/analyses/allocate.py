@@ -1,7 +1,7 @@
 """Tolerance ranges of least cost for requirements on measures, with contact, and the tolerance to tighten first."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Progress, owners
+from tolcontact.analyses.costs import MAX_FACTOR, MIN_FACTOR, Cost, Curves, cheapest, cost_of, curves_of
 from tolcontact.analyses.scaled_trials import (
     MIN_DECISIVE,
     STEP,
@@ -27,14 +28,13 @@ from tolcontact.method import Solver
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.workflow.models import Choice, Model
 
-MIN_FACTOR, MAX_FACTOR = 0.1, 3.0  # times the present range
 MAX_STEPS, USUAL_STEPS = 24, 8  # of one search: at most, and for the forecast
 FIRST_RADIUS, LAST_RADIUS = 0.5, 0.015  # of the trust region of a step, in logarithms of the factors
 COMMON_FACTORS = np.geomspace(MIN_FACTOR, MAX_FACTOR, 13)  # of all ranges, where requirements cannot be met
 PENALTY = 10.0  # for missed margins, as a multiple of the cost that these margins save to first order
 MIN_GAIN, LAST_GAIN = 1e-4, 1e-3  # of the cost: smallest gain of an accepted step; smallest gain that leads to another step
+MAX_CHOICES = 8  # binary programs of one search
 VERIFICATIONS, AIM_GAIN = 6, 1.2  # fresh runs; the share of a missing margin that the next search aims for
-Cost = float | Callable[[float], float]
 
 
 def allocate(
@@ -58,36 +58,35 @@ def allocate(
                                                          a tenth narrower: which to tighten first
 
     `require` is "corner height: ppm 1000" or "corner height: Ppk 1.33", or a list of such texts. `costs` maps a group that may
-    change to a number c, for the cost c * present range / new range, or to a function of the factor. Groups without costs keep
-    their ranges. If `costs` is left out, all groups may change with c = 1. `by` is as in `contributions`: "contributor",
-    "feature" or "part".
+    change to a number c, for the cost c * present range / new range, or to a function of the factor, or to a table of choices:
+    {0.1: 4, 0.2: 2.5} of full widths, or {"IT6": 4, "IT7": 2.5} of ISO 286-1 grades for a group with a tc.Size. Groups without
+    costs keep their ranges. If `costs` is left out, all groups may change with c = 1. `by` is as in `contributions`:
+    "contributor", "feature" or "part".
 
-    Ranges stay between a tenth and three times the present ones. Groups keep their ranges if no required measure changes in any
-    resolved realization with all of them at either end. Each step replaces the margins of the requirements by functions of
-    squared ranges with the same values and slopes, on the same draws; slopes come only from resolved realizations near the
-    limits. SLSQP minimizes the cost within a trust region (a sequential separable approximation; Svanberg, 1987). The region
-    shrinks when a step fails; a step also fails if more realizations are then not assemblable than may be outside. If the
-    interval of the fresh run does not keep a requirement, the search continues with a larger margin. Effects come from
-    samples / 4 realizations, or 4 samples / groups if that is less, but at least 512. `progress` is called with the number of
-    simulated realizations, and about their total. Raises OptionError if no range varies. `model`, `seed`, `solver`, `method`,
-    `into` and `client` are as in all analyses: `tc.analyses.allocate("model.py", "gap: ppm 1000", by="part")`.
+    Ranges without a table stay between a tenth and three times the present ones. Groups keep their ranges, or the next
+    narrower choice, if no required measure changes in any resolved realization with all of them at either end. Each step
+    replaces margins by functions of squared ranges with their values and slopes, on the same draws. SLSQP minimizes the cost
+    within a trust region (a sequential separable approximation; Svanberg, 1987). A step fails if more realizations are then
+    not assemblable than may be outside. Choices come from a linear program with binary unknowns on such functions. If a fresh
+    run does not keep a requirement, the margin of the search grows. `progress` is called with numbers of realizations. Raises
+    OptionError if no range varies. `model`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses:
+    `tc.analyses.allocate("model.py", "gap: ppm 1000", by="part")`.
     """
     analysis = Analysis(
         terms.ALLOCATION, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
         progress=progress,
     )  # fmt: skip
-    program = analysis.program
-    requirements = _requirements(require, program, samples)
-    curves = _curves(costs, groups := _groups(program, by))
+    requirements = _requirements(require, program := analysis.program, samples)
+    curves = curves_of(costs, groups := _groups(program, by), ranges := _ranges(program, groups), program)
     trials = ScaledTrials(analysis.engine(_expected(samples, len(groups))), list(groups.values()), requirements, seed, samples)
-    prices = [curves.get(name, 0.0) for name in groups]
+    prices = Curves(curves.get(name, 0.0) for name in groups)
     search = Search(trials, prices, np.array([name in curves for name in groups]))
     fresh, estimates, is_met = _allocated(search, _expected(samples, 0))
     factors = np.exp(np.stack([np.zeros(len(groups)), fresh.logs], axis=1))
     values = {
-        "range": np.array(_ranges(program, groups))[:, None] * factors,
+        "range": np.array(ranges)[:, None] * factors,
         "factor": factors[:, 1],
-        "cost": [[_cost(curve, factor) for factor in row] for curve, row in zip(prices, factors, strict=True)],
+        "cost": [[cost_of(curve, factor) for factor in row] for curve, row in zip(prices, factors, strict=True)],
         "kept": np.array(estimates).swapaxes(0, 1),
         "met": np.array(is_met, dtype=np.int8),
         "required": [requirement.value for requirement in requirements],
@@ -95,8 +94,9 @@ def allocate(
         "effect": narrowing_effects(trials),
     }
     labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
-    limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR, "idle_tried": search.tested_rows}
-    return analysis.dataset(values, labels, samples=samples, fresh=VERIFICATION_FACTOR * samples, by=by, **limits)
+    limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR, "choices": prices.names(fresh.logs, list(groups))}
+    counts = {"samples": samples, "fresh": VERIFICATION_FACTOR * samples, "idle_tried": search.tested_rows}
+    return analysis.dataset(values, labels, by=by, **counts, **limits)
 
 
 def _requirements(require: str | Sequence[str], program: Program, samples: int) -> list[Requirement]:
@@ -128,25 +128,6 @@ def _ranges(program: Program, groups: Mapping[str, np.ndarray]) -> list[float]:
     return [widths.pop() if len(widths) == 1 else np.nan for widths in ranges]
 
 
-def _curves(costs: Mapping[str, Cost] | None, groups: Mapping[str, np.ndarray]) -> dict[str, Cost]:
-    if costs is None:
-        return dict.fromkeys(groups, 1.0)
-    for name, curve in costs.items():
-        if name not in groups:
-            raise OptionError(f'costs has "{name}"; expected some of: {", ".join(groups)}')
-        if not callable(curve) and not (isinstance(curve, int | float) and np.isfinite(curve) and curve > 0):
-            raise OptionError(
-                f'cost of "{name}" is {curve!r}; expected a number above 0, or a function of the factor of its range'
-            )
-    if not costs:
-        raise OptionError("costs is empty; name the groups that may change, or leave it out")
-    return dict(costs)
-
-
-def _cost(curve: Cost, factor: float) -> float:
-    return float(curve(factor)) if callable(curve) else float(curve / factor)
-
-
 def _expected(samples: int, groups: int) -> int:
     """Return the approximate number of realizations of a search and its verification, with slopes and effects of groups."""
     of_groups = USUAL_STEPS * MIN_DECISIVE + effect_samples(samples, groups)
@@ -160,7 +141,7 @@ def _allocated(search: "Search", expected: int) -> tuple[Trial, list[list[Estima
     """
     trials, requirements, nothing = search.trials, search.trials.requirements, np.zeros(len(search.priced))
     before = _estimates(requirements, trials.trial(nothing, verification=1))
-    aims, searched = np.zeros(len(requirements)), trials.trial(nothing)
+    aims, searched = np.zeros(len(requirements)), trials.trial(search.curves.narrowed(nothing))
     search.release(searched)
     for number in range(VERIFICATIONS):
         searched = search.least_cost(searched, aims)
@@ -198,8 +179,9 @@ class Search:
     """
 
     trials: ScaledTrials
-    curves: Sequence[Cost]
+    curves: Curves
     priced: np.ndarray
+    chosen: bool = field(init=False, default=False)  # whether groups with a table keep their choices
     idle: np.ndarray = field(init=False)  # (group,) whether a group has no known influence on any requirement
     tested_rows: int = field(init=False, default=0)  # number of realizations in the latest test of that
 
@@ -209,17 +191,18 @@ class Search:
     @property
     def is_free(self) -> np.ndarray:
         """Whether the range of a group may change, (group,)."""
-        return self.priced & ~self.idle
+        return self.priced & ~self.idle & ~(self.chosen & self.curves.has_table)
 
     def cost(self, logs: np.ndarray) -> float:
         """Return the cost of the groups that may change, at logarithms of the factors (group,)."""
         factors = zip(self.curves, np.exp(logs), self.priced, strict=True)
-        return math.fsum(_cost(curve, factor) for curve, factor, is_priced in factors if is_priced)
+        return math.fsum(cost_of(curve, factor) for curve, factor, is_priced in factors if is_priced)
 
     def release(self, trial: Trial) -> bool:
         """Free the ranges of idle groups that have an influence at a trial; return whether there are any."""
         before, self.tested_rows = self.idle, int(trial.is_resolved.sum())
-        self.idle = self.trials.idle(trial, before, (MIN_FACTOR, MAX_FACTOR))
+        lower, upper = self.curves.ends
+        self.idle = self.trials.idle(trial, before, (math.exp(lower.min()), math.exp(upper.max())))
         return bool((before & ~self.idle).any())
 
     def least_cost(self, trial: Trial, aims: np.ndarray) -> Trial:
@@ -230,7 +213,30 @@ class Search:
         trial = self._descend(trial, aims)
         while self.release(trial):
             trial = self._descend(trial, aims)
-        return trial
+        return self._choose(trial, aims) if (self.curves.has_table & self.is_free).any() else trial
+
+    def _choose(self, trial: Trial, aims: np.ndarray) -> Trial:
+        """Return the trial of least cost with choices of tables, of those that are best by approximations of the margins.
+
+        Each approximation is made at the choices before. Ranges without a table are searched with the choices kept. If no
+        choices have sufficient margins, the narrowest are taken.
+        """
+        best, tried = None, set[bytes]()
+        for _ in range(MAX_CHOICES):
+            margins = _margins(self.trials.requirements, trial.corrected) - aims
+            logs = cheapest(self.curves, trial.logs, self.is_free, margins, self._slopes(trial))
+            logs = np.where(self.is_free, self.curves.ends[0], trial.logs) if logs is None else logs
+            if logs.tobytes() in tried:
+                break
+            tried.add(logs.tobytes())
+            trial = self.trials.trial(logs)
+            self.chosen = True
+            trial = self._descend(trial, aims) if self.is_free.any() else trial
+            self.chosen = False
+            is_met = (_margins(self.trials.requirements, trial.corrected) >= aims).all()
+            if is_met and (best is None or self.cost(trial.logs) < self.cost(best.logs)):
+                best = trial
+        return best or self.trials.trial(np.where(self.is_free, self.curves.ends[0], trial.logs))
 
     def _descend(self, trial: Trial, aims: np.ndarray) -> Trial:
         """Return the trial of least cost that is reached by steps from a trial.
@@ -273,7 +279,8 @@ class Search:
 
         Margins lead to points where a quantile is near its limit, which may be far from most values.
         """
-        common = [np.where(self.is_free, log, 0.0) for log in np.log(COMMON_FACTORS[::-1])]  # the widest that miss nothing
+        logs = np.log(COMMON_FACTORS[::-1])  # the widest that miss nothing
+        common = [self.curves.narrowed(np.where(self.is_free, log, trial.logs)) for log in logs]
         return min([trial, *map(self.trials.trial, common)], key=self._missing)
 
     def _missing(self, trial: Trial) -> float:
@@ -314,8 +321,9 @@ class Search:
         def approximate(point: np.ndarray) -> np.ndarray:
             return np.asarray(margins + slopes @ (np.exp(2 * (point - logs)) - 1) / 2)
 
-        lower = np.where(self.is_free, np.maximum(logs - radius, np.log(MIN_FACTOR)), logs)
-        upper = np.where(self.is_free, np.minimum(logs + radius, np.log(MAX_FACTOR)), logs)
+        least, most = self.curves.ends
+        lower = np.where(self.is_free, np.maximum(logs - radius, least), logs)
+        upper = np.where(self.is_free, np.minimum(logs + radius, most), logs)
         bounds = scipy.optimize.Bounds(lower, upper)
         solution = scipy.optimize.minimize(
             self.cost, logs, method="SLSQP", bounds=bounds, constraints={"type": "ineq", "fun": approximate},

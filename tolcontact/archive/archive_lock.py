@@ -12,6 +12,8 @@ from tolcontact.errors import ArchiveError, OptionError
 from tolcontact.replacing import remove_abandoned
 from tolcontact.system import files
 
+LONGEST_SUFFIX = f".checkpoint.{'0' * 8}.part"  # of the working files of a run
+
 
 @contextlib.contextmanager
 def locked_archive(path: str | Path, *, overwrite: bool = False, resume: bool = False) -> Iterator[Path]:
@@ -47,7 +49,9 @@ def locked_archive(path: str | Path, *, overwrite: bool = False, resume: bool = 
 def _acquire(holding: FileLock, lock: Path, path: str | Path) -> None:
     try:
         # Fails with a reason if it cannot be made. The lock itself does not say one.
+        files.check_length(lock.with_suffix(LONGEST_SUFFIX))
         files.make_writable(lock)
+        files.plain_path(lock)  # else the library would fail at the end of the run
         holding.acquire()
     except Timeout as error:
         raise ArchiveError(f'archive "{path}" is being written by another run; wait, or write to a new file') from error
@@ -58,7 +62,7 @@ def _acquire(holding: FileLock, lock: Path, path: str | Path) -> None:
 def _is_netcdf(path: Path) -> bool:
     """Return whether a file begins as netCDF files do, or is empty."""
     with path.open("rb") as file:
-        return file.read(8).startswith((b"\x89HDF\r\n\x1a\n", b"CDF")) or not path.stat().st_size
+        return file.read(8).startswith((b"\x89HDF\r\n\x1a\n", b"CDF\1", b"CDF\2", b"CDF\5")) or not path.stat().st_size
 
 
 def _check_replaceable(path: str | Path, real: Path, *, is_allowed: bool) -> None:

@@ -18,8 +18,11 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.child import ChildDiedError, run_child
-from tolcontact.errors import ArchiveError, shown
+from tolcontact.errors import ArchiveError
+from tolcontact.input_files import fault_of
+from tolcontact.system import files
 from tolcontact.system.resources import limit_resources
+from tolcontact.texts import CONTROL_CHARACTERS, shown
 from tolcontact.vocabulary import ArchiveVariable, archive, variation
 
 MAX_SECONDS, SECONDS_PER_GB = 20.0, 20.0  # of processor time
@@ -76,8 +79,8 @@ class DamagedError(Exception):
 
 def check_archive(path: Path) -> None:
     """Raise ArchiveError if there is no file at a path, or it fails the inspection."""
-    if not path.is_file():
-        raise ArchiveError(f'archive "{path}" does not exist; write one with: tolcontact run MODEL.py --out {path}')
+    if fault := fault_of(path):
+        raise ArchiveError(f'archive "{path}" {fault}; write one with: tolcontact run MODEL.py --out {path}')
     inspect(path)
 
 
@@ -87,7 +90,9 @@ def inspect(path: Path) -> None:
     size = path.stat().st_size
     seconds = math.ceil(MAX_SECONDS + SECONDS_PER_GB * size / 1e9)
     try:
-        fault = run_child(Path(__file__), os.fspath(path), memory=MEMORY + 4 * size, seconds=seconds)
+        fault = run_child(Path(__file__), files.plain_path(path), memory=MEMORY + 4 * size, seconds=seconds)
+    except OSError as error:
+        raise ArchiveError(f'"{path}" cannot be read: {error.strerror}') from error
     except ChildDiedError as error:
         raise ArchiveError(f'"{path}" is damaged, or not an archive of tolcontact: {error}') from error
     if fault:
@@ -152,10 +157,15 @@ def _check_claims(group: netCDF4.Dataset, size: int) -> None:
         _check_attributes(stored)
         if not isinstance(stored.datatype, np.dtype) or stored.datatype.kind not in "iufS":
             raise DamagedError(f"is not an archive of tolcontact: {where} holds neither numbers nor characters")
-        is_packed = any((stored.filters() or {}).get(name) for name in ("zlib", "szip", "zstd", "bzip2", "blosc"))
-        if math.prod(stored.shape) * stored.datatype.itemsize > size * (MAX_DEFLATION if is_packed else 1):
+        claim = math.prod(stored.shape) * stored.datatype.itemsize
+        if claim > size * MAX_DEFLATION or (claim > size and not _is_packed(stored)):
             count = " x ".join(map(str, stored.shape))
             raise DamagedError(f"is damaged: {where} claims {count} values, more than the file can hold")
+
+
+def _is_packed(stored: netCDF4.Variable) -> bool:
+    """Return whether a variable is compressed. On Windows the library loads all its plugins for that, which takes long."""
+    return any((stored.filters() or {}).get(name) for name in ("zlib", "szip", "zstd", "bzip2", "blosc"))
 
 
 def _check_attributes(thing: Any) -> None:
@@ -171,7 +181,7 @@ def _check_attributes(thing: Any) -> None:
 def _check_text(name: str, text: str) -> None:
     if len(text) > MAX_TEXT:
         raise DamagedError(f"is damaged: {name} has {len(text)} characters")
-    if shown(text) != text:
+    if CONTROL_CHARACTERS.search(text):
         raise DamagedError(f"is damaged: {name} holds control characters ({shown(text)[:60]})")
 
 

@@ -20,6 +20,7 @@ from tolcontact.declaration.document import from_document
 from tolcontact.errors import ArchiveError, OptionError
 from tolcontact.geometry import surfaces_of, with_known_surfaces
 from tolcontact.method import Method
+from tolcontact.system import files
 
 
 def open_archive(path: str | Path) -> xr.DataTree:
@@ -38,7 +39,8 @@ def open_unchecked(path: Path) -> xr.DataTree:
     try:
         with small_caches():
             # Numbers of realizations are not read, which takes as much memory as all else together: they are 0, 1, 2, ...
-            tree = xr.open_datatree(path, engine="netcdf4", drop_variables=terms.REALIZATION, decode_times=False)
+            plain = files.plain_path(path)
+            tree = xr.open_datatree(plain, engine="netcdf4", drop_variables=terms.REALIZATION, decode_times=False)
     except Exception as error:  # libraries may find a fault that the inspection did not
         raise ArchiveError(f'"{path}" cannot be read: {type(error).__name__}: {error}') from error
     numbers = pd.RangeIndex(tree.sizes[terms.REALIZATION])

@@ -57,6 +57,7 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
         "kept": run.keep,
         "fields": str(run.fields),
         "block_rows": np.int64(block_rows(program)),
+        **({terms.STANDARD: standards} if (standards := program.nominal.assembly.standards) else {}),
         **({terms.STORED_COORDINATES: program.stored_coordinates} if program.stored_coordinates else {}),
     }
 

@@ -16,6 +16,7 @@ from xarray.backends import NetCDF4DataStore
 from tolcontact import vocabulary as terms
 from tolcontact.compilation import Program
 from tolcontact.discretization import Nominal
+from tolcontact.system import files
 from tolcontact.vocabulary import ArchiveVariable
 
 CACHE_BYTES = 1 << 20  # a chunk of most variables; with the usual size, all caches would take as much memory as all else
@@ -30,7 +31,7 @@ with netCDF4.Dataset("in memory", "w", diskless=True) as _file:
 @contextlib.contextmanager
 def open_netcdf(path: Path, mode: Literal["w", "r+", "r"]) -> Iterator[netCDF4.Dataset]:
     """Open a file whose values are read and written as they are, without masks. Meanwhile xarray uses no netCDF file."""
-    with XARRAY_LOCK, small_caches(), netCDF4.Dataset(path, mode, format="NETCDF4") as file:
+    with XARRAY_LOCK, small_caches(), netCDF4.Dataset(files.plain_path(path), mode, format="NETCDF4") as file:
         file.set_auto_maskandscale(False)
         yield file
 

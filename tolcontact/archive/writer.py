@@ -15,7 +15,7 @@ import numpy as np
 from tolcontact import vocabulary as terms
 from tolcontact.archive.archive_lock import locked_archive
 from tolcontact.archive.header import contact_values, write_header
-from tolcontact.archive.inspection import inspect
+from tolcontact.archive.inspection import check_archive, inspect
 from tolcontact.archive.journal import Checkpoint, Journal
 from tolcontact.archive.reader import open_unchecked
 from tolcontact.archive.rows import check_room, kept_rows
@@ -25,6 +25,7 @@ from tolcontact.archive.variables import open_netcdf, overwrite
 from tolcontact.compilation import Program
 from tolcontact.errors import ArchiveError
 from tolcontact.replacing import replacing
+from tolcontact.system import files
 
 POINT_TOLERANCE = 1e-9  # mm: points may differ by rounding from one machine to the next
 
@@ -283,9 +284,7 @@ if TYPE_CHECKING:
 def check_room_for(path: str | Path, record: terms.AnalysisRecord, program: Program) -> None:
     """Raise ArchiveError unless an archive is of the program's model and does not hold this analysis yet."""
     archive = Path(os.path.realpath(path))
-    if not archive.is_file():
-        raise ArchiveError(f'archive "{path}" does not exist; write one with: tolcontact run MODEL.py --out {path}')
-    inspect(archive)
+    check_archive(archive)
     with open_netcdf(archive, "r") as file:
         check_same_model(file, archive, program)
         if terms.ANALYSES_GROUP in file.groups and record.name in file[terms.ANALYSES_GROUP].groups:
@@ -305,4 +304,5 @@ def keep(path: str | Path, record: terms.AnalysisRecord, dataset: "xr.Dataset", 
             stored = dataset.copy()
             for array in stored.variables.values():
                 array.encoding = {"fletcher32": True} | ({"dtype": "S1"} if array.dtype.kind in "UO" else {})
-            stored.to_netcdf(part, mode="a", group=f"{terms.ANALYSES_GROUP}/{record.name}", engine="netcdf4")
+            group = f"{terms.ANALYSES_GROUP}/{record.name}"
+            stored.to_netcdf(files.plain_path(part), mode="a", group=group, engine="netcdf4")

@@ -72,12 +72,18 @@ def _with_costs(options: dict[str, Any]) -> dict[str, Any]:
     return options | {"costs": dict(map(_cost, costs)) if costs else None}
 
 
-def _cost(text: str) -> tuple[str, float]:
+def _cost(text: str) -> tuple[str, float | dict[str | float, float]]:
     name, _, value = text.rpartition("=")
     try:
-        return name, float(value)
+        if ":" not in value:
+            return name, float(value)
+        rows = [row.rpartition(":") for row in value.split(",")]
+        return name, {key if key.startswith("IT") else float(key): float(cost) for key, _, cost in rows}
     except ValueError:
-        raise OptionError(f'--cost is "{text}"; expected a group and a number, such as --cost top.A1=2') from None
+        raise OptionError(
+            f'--cost is "{text}"; expected a group and a number, such as --cost top.A1=2, or costs of full widths or grades, '
+            "such as --cost top.A1=0.1:4,0.2:2.5 or --cost pin.d.size=IT6:4,IT7:2.5"
+        ) from None
 
 
 def _with_corners(options: dict[str, Any]) -> dict[str, Any]:
@@ -167,7 +173,9 @@ COMMANDS = (
                 Annotated[
                     list[str] | None,
                     typer.Option(
-                        metavar="GROUP=COST", help="Present cost of a group; it grows as the ranges shrink. Default: 1 each."
+                        metavar="GROUP=COST",
+                        help="Present cost of a group; it grows as the ranges shrink. Default: 1 each. A table of costs offers "
+                        "choices: pin.d.size=IT6:4,IT7:2.5 or base.A1=0.1:4,0.2:2.5.",
                     ),
                 ],
                 None,

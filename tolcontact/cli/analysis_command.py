@@ -79,7 +79,7 @@ def _run(
         console().print(analysis_text(command.record, dataset))
     if "met" in dataset and not dataset["met"].all():
         names = ", ".join(f'"{name}"' for name in dataset["requirement"].values[dataset["met"].values == 0])
-        typer.echo(f"error: not met: {names}", err=True)
+        common.echo(f"error: not met: {names}", err=True)
         raise typer.Exit(1)
 
 

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tolcontact.cli.commands import Commands
-from tolcontact.errors import OptionError, TolcontactError, shown
+from tolcontact.errors import OptionError, TolcontactError
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
 from tolcontact.system import streams
+from tolcontact.texts import shown
 from tolcontact.version import __version__
 
 if TYPE_CHECKING:
@@ -31,6 +32,11 @@ app: typer.Typer = typer.Typer(
 )
 
 
+def echo(text: object, *, err: bool = False, nl: bool = True) -> None:
+    """Print a text as a terminal may get it, whatever its letters are; tables are printed by a console."""
+    typer.echo(shown(str(text)), err=err, nl=nl)
+
+
 def flag(name: str, purpose: str, **settings: Any) -> Any:
     """Return an option without a value; an empty `metavar` hides the type in its help."""
     return typer.Option(name, metavar="", help=purpose, **settings)
@@ -38,7 +44,7 @@ def flag(name: str, purpose: str, **settings: Any) -> Any:
 
 def _show_version(is_set: bool) -> None:
     if is_set:
-        typer.echo(f"tolcontact {__version__}")
+        echo(f"tolcontact {__version__}")
         raise typer.Exit
 
 
@@ -120,13 +126,13 @@ def command_line(arguments: list[str] | None = None) -> None:
             warnings.showwarning = _show_warning
             app(arguments)
     except TolcontactError as error:
-        typer.echo(f"error: {error}", err=True)
+        echo(f"error: {error}", err=True)
         sys.exit(2)
     except MemoryError as error:
-        typer.echo(f"error: there is not enough memory ({shown(str(error)) or 'no details'}); ask for fewer samples", err=True)
+        echo(f"error: there is not enough memory ({str(error) or 'no details'}); ask for fewer samples", err=True)
         sys.exit(2)
     except OSError as error:
-        typer.echo(f"error: the operating system reports: {shown(str(error))}", err=True)
+        echo(f"error: the operating system reports: {error}", err=True)
         sys.exit(2)
 
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from tolcontact import archive as archives, report as reports, workflow
-from tolcontact.cli.app import Archive, AsCsv, AsJson, Overwrite, app, examples, flag, only_one
+from tolcontact.cli.app import Archive, AsCsv, AsJson, Overwrite, app, echo, examples, flag, only_one
 from tolcontact.cli.output import (
     Author,
     Company,
@@ -23,7 +23,6 @@ from tolcontact.cli.output import (
 )
 from tolcontact.cli.progress import waiting
 from tolcontact.declaration.title_block import title_block_of
-from tolcontact.errors import shown
 from tolcontact.vocabulary import ESTIMATE, MEASURE_UNITS, STATISTIC, units_of
 
 
@@ -78,4 +77,4 @@ def report(
             reports.write_spreadsheet(results, summary, xlsx, titles)
     for kind, path in (("report", page), ("spreadsheet", xlsx)):
         if path is not None:
-            typer.echo(f"{kind}: {shown(str(path))}")
+            echo(f"{kind}: {path}")

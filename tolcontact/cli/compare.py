@@ -13,9 +13,10 @@ from tolcontact.archive import locked_archive, open_archive, replacing_archive
 from tolcontact.cli import app as common
 from tolcontact.cli.output import check_outputs, console, print_data
 from tolcontact.declaration.script import load_model
-from tolcontact.errors import OptionError, shown
+from tolcontact.errors import OptionError
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
 from tolcontact.simulation.cluster import client_of
+from tolcontact.system import files
 from tolcontact.workflow.comparison import compare as compare_solvers, compare_runs, named_archives
 from tolcontact.workflow.models import DEFAULT_SOLVER
 
@@ -81,18 +82,18 @@ def compare(
             # Texts as characters: HDF5's variable-length strings crash some versions of the netCDF library.
             texts = {name: {"dtype": "S1"} for name in comparison.variables if comparison[name].dtype.kind == "U"}
             with replacing_archive(path) as part:
-                comparison.to_netcdf(part, engine="netcdf4", encoding=texts)
+                comparison.to_netcdf(files.plain_path(part), engine="netcdf4", encoding=texts)
     if as_json:
         print_data(comparison)
     else:
         console().print((reports.runs_text if all(are_archives) else reports.comparison_text)(comparison))
         if report is not None:
-            typer.echo(f"\nreport: {shown(str(report))}")
+            common.echo(f"\nreport: {report}")
 
 
-def _compare_archives(files: Sequence[Path], report: Path | None) -> xr.Dataset:
+def _compare_archives(archives: Sequence[Path], report: Path | None) -> xr.Dataset:
     with contextlib.ExitStack() as stack:
-        runs = {name: stack.enter_context(open_archive(path)) for name, path in named_archives(files).items()}
+        runs = {name: stack.enter_context(open_archive(path)) for name, path in named_archives(archives).items()}
         comparison = compare_runs(runs)
         if report is not None:
             reports.write_comparison(runs, comparison, report)

@@ -18,8 +18,9 @@ from tolcontact.declaration.geometry import STEP
 from tolcontact.declaration.script import load_model
 from tolcontact.declaration.values import key_faults
 from tolcontact.discretization import Nominal
-from tolcontact.errors import ModelError, OptionError, shown
+from tolcontact.errors import ModelError, OptionError
 from tolcontact.geometry import parts_from
+from tolcontact.plausibility import drawing_remarks
 from tolcontact.report import nominal_and_faults, write_guide, write_page, write_view
 from tolcontact.workflow.accessor import summarize
 from tolcontact.workflow.models import DEFAULT_SOLVER, build
@@ -55,7 +56,7 @@ def new(
         raise OptionError(f'"{path}" exists already, and was not changed; choose another name') from error
     except OSError as error:
         raise OptionError(f'"{path}" cannot be written: {error.strerror}') from error
-    typer.echo(f"model: {shown(str(path))}\nnext: tolcontact check {shown(str(path))}")
+    common.echo(f"model: {path}\nnext: tolcontact check {path}")
 
 
 @common.app.command(epilog=common.examples("check model.py", "check model.py --view"))
@@ -64,6 +65,7 @@ def check(
     solver: common.Solver = DEFAULT_SOLVER,
     resolution: common.Resolution = None,
     objective: common.Objective = None,
+    drawing: Annotated[bool, common.flag("--drawing", "Also say what the drawings leave open or take as perfect.")] = False,
     view: Annotated[bool, common.flag("--view", "Also open the page of `tolcontact view`, with marked faults.")] = False,
 ) -> None:
     """Check a model and its options without a run; list all faults and probable mistakes."""
@@ -79,25 +81,27 @@ def check(
         raise
     if view:
         _open_view(assembly, program.nominal, (), temporary_page(model))
-    typer.echo(program.nominal.assembly)
+    common.echo(program.nominal.assembly)
     for part in program.nominal.last_parts:
         size = " x ".join(f"{length:.4g}" for length in part.body.extents.round(9))
-        typer.echo(f"  part {part.name}: {size} mm along x, y, z of the assembly, {len(part.mesh.faces)} triangles")
+        common.echo(f"  part {part.name}: {size} mm along x, y, z of the assembly, {len(part.mesh.faces)} triangles")
     for k, pair in enumerate(program.nominal.pairs):
-        typer.echo(f"  contact {pair.name}: {program.contact_in_words(k)}")
+        common.echo(f"  contact {pair.name}: {program.contact_in_words(k)}")
     if program.stored_coordinates:
-        typer.echo(f"  {program.stored_coordinates}")
+        common.echo(f"  {program.stored_coordinates}")
     if not program.nominal.assembly.forces and any(pair.round and not pair.round.are_beside for pair in program.nominal.pairs):
-        typer.echo(f"  {PRESS}")
+        common.echo(f"  {PRESS}")
+    for remark in drawing_remarks(program.nominal) if drawing else ():
+        common.echo(f"drawing: {remark}")
     common.show_warnings(doubts)
     count = {0: "", 1: ", 1 warning"}.get(len(doubts), f", {len(doubts)} warnings")
-    typer.echo(f"no faults found{count}")
+    common.echo(f"no faults found{count}")
 
 
 def _open_view(model: Assembly, nominal: Nominal | None, faults: Sequence[str], path: Path) -> None:
     """Write the view of a model, and open it in the browser."""
     write_view(model, nominal, faults, path)
-    typer.echo(f"page: {shown(str(path))}")
+    common.echo(f"page: {path}")
     typer.launch(str(path))
 
 
@@ -127,7 +131,7 @@ def view(
         else:
             model = load_model(source)
             write_view(model, *nominal_and_faults(model), path)
-    typer.echo(f"page: {shown(str(out or path))}")
+    common.echo(f"page: {out or path}")
     if out is None:
         typer.launch(str(path))
 
@@ -136,7 +140,7 @@ def view(
 def guide() -> None:
     """Open the installed guide in the browser: tutorials, how-tos, theory, reference, glossary."""
     page = write_guide(temporary_page(Path("guide")).parent)
-    typer.echo(f"page: {shown(str(page))}")
+    common.echo(f"page: {page}")
     typer.launch(str(page))
 
 

@@ -1,6 +1,5 @@
 """Output of results, checks of output files, and the options that replace entries of a title block of a report."""
 
-import itertools
 import json
 import sys
 from collections.abc import Iterable, Mapping
@@ -13,9 +12,11 @@ import xarray as xr
 from rich.console import Console
 
 from tolcontact import report
+from tolcontact.cli.app import echo
 from tolcontact.declaration import Assembly, TitleBlock
 from tolcontact.declaration.script import load_model
-from tolcontact.errors import OptionError, shown
+from tolcontact.errors import OptionError
+from tolcontact.replacing import check_identities
 from tolcontact.texts import csv_cell
 from tolcontact.vocabulary import BY_STATUS, UNRESOLVED
 
@@ -53,9 +54,7 @@ def check_outputs(
     """
     named = {"archive": archive, "page": page, "spreadsheet": spreadsheet}
     outputs = {name: path for name, path in named.items() if path is not None}
-    for (name, path), (other, taken) in itertools.combinations([*(("input", path) for path in inputs), *outputs.items()], 2):
-        if other in outputs and _is_same(path, taken):
-            raise OptionError(f'"{taken}" would be the {name} and the {other}; choose another name for the {other}')
+    check_identities(inputs, outputs)
     for name, path in outputs.items():
         if name == "archive":
             continue
@@ -69,13 +68,6 @@ def check_outputs(
             raise OptionError(f'"{path}" exists{what}; choose another name, or replace it with --overwrite')
 
 
-def _is_same(path: Path, other: Path) -> bool:
-    """Return whether two paths lead to one file; names that differ only in case do on some systems."""
-    if path.exists() and other.exists():
-        return path.samefile(other)
-    return str(path.resolve()).casefold() == str(other.resolve()).casefold()
-
-
 def print_summary(summary: xr.Dataset) -> None:
     """Print the summary of a run. Raises typer.Exit with code 1 if too many realizations were not resolved.
 
@@ -84,7 +76,7 @@ def print_summary(summary: xr.Dataset) -> None:
     console().print(report.summary_text(summary))
     failed = sum(int(summary[BY_STATUS.name][status]) for status in UNRESOLVED)
     if failed > FAILED_SHARE * summary.attrs["realizations"]:
-        typer.echo(f"error: {failed} realizations were not resolved, more than {FAILED_SHARE:.1%} of all", err=True)
+        echo(f"error: {failed} realizations were not resolved, more than {FAILED_SHARE:.1%} of all", err=True)
     if failed > FAILED_SHARE * summary.attrs["realizations"] or report.has_no_verdict(summary):
         raise typer.Exit(1)
 
@@ -93,13 +85,13 @@ def print_data(dataset: xr.Dataset) -> None:
     """Print a dataset as JSON, which has no NaN or infinity: they are null, and the texts "Infinity" and "-Infinity"."""
     data = dataset.reset_coords()
     numbers = {name: values.copy(data=_as_json(values.values)) for name, values in data.items() if values.dtype.kind == "f"}
-    typer.echo(json.dumps(data.assign(numbers).to_dict(), allow_nan=False, default=_plain))
+    echo(json.dumps(data.assign(numbers).to_dict(), allow_nan=False, default=_plain))
 
 
 def print_csv(frame: "pd.DataFrame") -> None:
     """Print a table as CSV, which a spreadsheet opens without running any text in it as a formula."""
     cells = frame.rename(index=csv_cell, columns=csv_cell).map(csv_cell)
-    typer.echo(cells.to_csv(lineterminator="\n"), nl=False)
+    echo(cells.to_csv(lineterminator="\n"), nl=False)
 
 
 def _as_json(values: np.ndarray) -> np.ndarray:
@@ -122,10 +114,9 @@ def title_entries(*options: str | None) -> dict[str, str | None]:
 def note_kept_title(archive: Path | None, entries: Mapping[str, str | None]) -> None:
     """Print a note that a resumed archive keeps its title block, if the options state another one."""
     if archive is not None and archive.exists() and any(entries.values()):
-        name = shown(str(archive))
-        typer.echo(
-            f"{name} keeps the title block that it was begun with; another one for its page: "
-            f"tolcontact report {name} --title ...",
+        echo(
+            f"{archive} keeps the title block that it was begun with; another one for its page: "
+            f"tolcontact report {archive} --title ...",
             err=True,
         )
 

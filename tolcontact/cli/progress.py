@@ -8,14 +8,14 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Column
 
 from tolcontact import interrupts
-from tolcontact.errors import shown
+from tolcontact.cli.app import echo
 from tolcontact.report.figures import grouped
+from tolcontact.texts import shown
 from tolcontact.workflow.forecast import duration
 
 LINE_INTERVAL = 10.0  # s
@@ -80,7 +80,7 @@ def shown_progress(
         bar.update(task, completed=done, total=total, description=shown(name), pace=speed, refresh=done == total)
         if bar.disable and not quiet and time.monotonic() - last > interval:
             last = time.monotonic()
-            typer.echo(f"{shown(name)}: {grouped(done)} of {grouped(total)}{', ' if speed else ''}{speed}", err=True)
+            echo(f"{name}: {grouped(done)} of {grouped(total)}{', ' if speed else ''}{speed}", err=True)
 
     with bar, _log_shown(console, lambda message: bar.update(task, description=message), quiet=quiet):
         yield show

@@ -14,7 +14,7 @@ from tolcontact.archive import Run, open_unchecked
 from tolcontact.cli import app as common, output
 from tolcontact.cli.output import print_summary
 from tolcontact.cli.progress import shown_progress, stopped
-from tolcontact.errors import OptionError, shown
+from tolcontact.errors import OptionError
 from tolcontact.simulation.cluster import client_of
 from tolcontact.statistics import Summary
 from tolcontact.temporary import temporary_folder
@@ -136,8 +136,8 @@ def _print_results(summary: Summary, stack: Dataset | None, out: Path | None, sh
         typer.echo()
         output.console().print(reports.analysis_text(STACK_UP, stack))
     if out is not None:
-        typer.echo(f"\narchive: {shown(str(out))}")
+        common.echo(f"\narchive: {out}")
     if shortfall:
         if quiet:  # otherwise the log has already stated it
-            typer.echo(shortfall, err=True)
+            common.echo(shortfall, err=True)
         raise typer.Exit(1)

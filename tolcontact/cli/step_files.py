@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 import sys
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
@@ -16,10 +17,10 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from tolcontact.cli.app import AsJson, StepFile, app, examples, flag, only_one
+from tolcontact.cli.app import AsJson, StepFile, app, echo, examples, flag, only_one
 from tolcontact.cli.output import console
 from tolcontact.cli.progress import waiting
-from tolcontact.errors import OptionError, clipped, shown, shown_name
+from tolcontact.errors import OptionError
 from tolcontact.geometry import bodies_in, faces_in, group_lines
 from tolcontact.geometry.step_listing import FacesOfRecords
 from tolcontact.pmi import Datum, Dimension, Pmi, Tolerance, read_pmi
@@ -27,7 +28,7 @@ from tolcontact.pmi.claims import Annotation
 from tolcontact.pmi.declared import DeclaredFile, declared_file
 from tolcontact.pmi.script import script
 from tolcontact.report.table import FILE_WIDTH
-from tolcontact.texts import csv_cell
+from tolcontact.texts import clipped, csv_cell, shown, shown_name
 
 MAX_ROWS = 2000  # of a table, which takes a second; a drawing has about a hundred
 _CSV = (
@@ -54,17 +55,17 @@ def pmi(file: StepFile, as_json: AsJson = False, as_csv: AsCsv = False, as_scrip
         information = read_pmi(file)
         declared = _declared(file, information)
     if as_script and information.is_empty:
-        raise OptionError(f"{_reason(information, shown(str(file)))}, so there is nothing to declare")
+        raise OptionError(f"{_reason(information, file)}, so there is nothing to declare")
     if as_script and not declared.parts:
         raise OptionError(f'"{file}": none of its tolerances, dimensions and datums applies to a face that is listed')
     if as_script:
-        typer.echo(script(file, declared), nl=False)
+        echo(script(file, declared), nl=False)
     elif as_csv:
-        typer.echo(_csv(declared), nl=False)
+        echo(_csv(declared), nl=False)
     elif information.is_empty and not as_json:
-        typer.echo(_reason(information, shown(str(file))))
+        echo(_reason(information, file))
     elif as_json:
-        typer.echo(json.dumps(_entries(declared), allow_nan=False))
+        echo(json.dumps(_entries(declared), allow_nan=False))
     else:
         _print_tables(declared)
 
@@ -76,10 +77,10 @@ def _declared(file: Path, information: Pmi) -> DeclaredFile:
     try:
         declared = declared_file(file, information)
     except OptionError as error:
-        typer.echo(f"warning: nothing is declared, and faces have no numbers: {error}", err=True)
+        echo(f"warning: nothing is declared, and faces have no numbers: {error}", err=True)
         return DeclaredFile(information, (), (), {})
     for fault in declared.faults:
-        typer.echo(f"warning: nothing is declared of {fault}", err=True)
+        echo(f"warning: nothing is declared of {fault}", err=True)
     return declared
 
 
@@ -92,7 +93,7 @@ def _entries(declared: DeclaredFile) -> dict[str, Any]:
     return asdict(declared.pmi) | {"faces": faces, "declared": declarations}
 
 
-def _reason(information: Pmi, name: str) -> str:
+def _reason(information: Pmi, name: Path) -> str:
     """Return a sentence about a file without annotations, with the reason if it is known."""
     if not information.is_ap242:
         schema = clipped(information.schema, 100) or "not stated"
@@ -231,18 +232,18 @@ def _csv(declared: DeclaredFile) -> str:
     rows.writerow(_CSV)
     for tolerance in information.tolerances:
         rows.writerow(map(csv_cell, (
-            "tolerance", tolerance.number, tolerance.record, tolerance.kind, shown(tolerance.name), tolerance.value, None, None,
-            "mm", shown(tolerance.zone), tolerance.details, tolerance.datum_system, tolerance.refines,
+            "tolerance", tolerance.number, tolerance.record, tolerance.kind, tolerance.name, tolerance.value, None, None,
+            "mm", tolerance.zone, tolerance.details, tolerance.datum_system, tolerance.refines,
             _numbers(tolerance.face_records), _numbers(tolerance.other_records), None, None,
-            _named(tolerance.face_records, faces), None, *map(shown, declarations.get(tolerance.record, ("", ""))),
+            _named(tolerance.face_records, faces), None, *declarations.get(tolerance.record, ("", "")),
         )))  # fmt: skip
     for dimension in information.dimensions:
         rows.writerow(map(csv_cell, (
-            "dimension", dimension.number, dimension.record, dimension.kind, shown(dimension.name), dimension.nominal,
+            "dimension", dimension.number, dimension.record, dimension.kind, dimension.name, dimension.nominal,
             dimension.lower, dimension.upper, dimension.unit, None, dimension.details, None, None,
             _numbers(dimension.face_records), _numbers(dimension.other_records), _numbers(dimension.end_face_records),
             _numbers(dimension.end_other_records), _named(dimension.face_records, faces),
-            _named(dimension.end_face_records, faces), *map(shown, declarations.get(dimension.record, ("", ""))),
+            _named(dimension.end_face_records, faces), *declarations.get(dimension.record, ("", "")),
         )))  # fmt: skip
     return text.getvalue()
 
@@ -264,28 +265,28 @@ def bodies(file: StepFile, as_json: AsJson = False) -> None:
         _print_rows(listing)
         return
     if listing and listing[0].units:
-        typer.echo(f"lengths in the file: {listing[0].units}; here: mm, along x, y, z of the assembly")
+        echo(f"lengths in the file: {listing[0].units}; here: mm, along x, y, z of the assembly")
     parents: tuple[str, ...] = ()
     for body in listing:
         *products, _ = body.path or ("",)
         for depth, name in enumerate(products):
             if parents[: depth + 1] != tuple(products[: depth + 1]):
-                typer.echo(f"{'  ' * depth}{shown_name(name)}")
+                echo(f"{'  ' * depth}{shown_name(name)}")
         parents = tuple(products)
-        typer.echo(f"{'  ' * len(products)}{body}")
+        echo(f"{'  ' * len(products)}{body}")
 
 
 @app.command(epilog=examples("faces parts.stp --body lid"))
 def faces(file: StepFile, body: Body = None, as_json: AsJson = False) -> None:
     """List the faces of a body of a STEP file: numbers (tc.select.Brep), kinds, axes, radii, areas, slots, hole patterns."""
     with waiting(f"reading {file}"):
-        listing = faces_in(file, int(body) if body is not None and body.isdigit() else body)
+        listing = faces_in(file, int(body) if body and re.fullmatch("[0-9]{1,9}", body) else body)
     if as_json:
         _print_rows(listing)
         return
     for line in (*listing, *group_lines(listing)):
-        typer.echo(line)
+        echo(line)
 
 
 def _print_rows(rows: Sequence[Any]) -> None:
-    typer.echo(json.dumps([asdict(row) for row in rows]))
+    echo(json.dumps([asdict(row) for row in rows]))

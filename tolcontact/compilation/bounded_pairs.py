@@ -15,11 +15,12 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.discretization import ContactPoints, Nominal, raised_places
-from tolcontact.errors import ContactWarning, ModelError, shown
+from tolcontact.errors import ContactWarning, ModelError
 from tolcontact.geometry.meeting import Meeting, Reach, meeting
 from tolcontact.interference import Watch, ordered
 from tolcontact.mechanics.groups import Group
 from tolcontact.method import Method
+from tolcontact.texts import shown
 from tolcontact.variation import Draws
 
 TRIALS = 1024  # raw poses

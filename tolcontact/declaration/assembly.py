@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar, get_args
 
-from tolcontact.declaration.checks import FRICTION, Checked
+from tolcontact.declaration.checks import FRICTION, Checked, one_of
 from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overlap
 from tolcontact.declaration.declarations import Declarations, expect
 from tolcontact.declaration.dependence import (
@@ -17,7 +17,7 @@ from tolcontact.declaration.dependence import (
 from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.part import Feature, Part
+from tolcontact.declaration.part import Feature, Part, Standard
 from tolcontact.declaration.sequence import Station, in_order, joined_before, present_parts, sequence_faults, settings_of
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.title_block import TitleBlock
@@ -57,10 +57,12 @@ class Assembly(Declarations, Pictured, Checked):
 
     The methods only record declarations; `faults()` lists everything that is wrong with them. `method` states how contact in
     this model is resolved; a run may state another one. `title_block` heads its reports. `mu` is the coefficient of friction of
-    all contacts; `tc.analyses.seating` uses it. Raises TypeError for an argument of a wrong type.
+    all contacts; `tc.analyses.seating` uses it. `standard` is that of the drawings, "ISO" or "ASME": under ISO the zones of a
+    pattern are separate, and sizes do not limit form; under ASME zones are combined, and form is inside the envelope of sizes.
+    Without one, zones are combined, and sizes do not limit form. Raises TypeError for an argument of a wrong type.
     """
 
-    checks: ClassVar = {"mu": FRICTION}
+    checks: ClassVar = {"mu": FRICTION, "standard": one_of(get_args(Standard))}
     parts = Declared[Part]()
     locations = Declared[Location]()
     pairs = Declared[ContactPair]()
@@ -74,14 +76,21 @@ class Assembly(Declarations, Pictured, Checked):
     overlaps = Declared[Overlap]()
 
     def __init__(
-        self, name: str, *, method: Method | None = None, title_block: TitleBlock | None = None, mu: float | None = None
-    ) -> None:  # fmt: skip
+        self,
+        name: str,
+        *,
+        method: Method | None = None,
+        title_block: TitleBlock | None = None,
+        mu: float | None = None,
+        standard: Standard = "",
+    ) -> None:
         expect(f'assembly "{name}": method', method, Method | None, "tc.Method(...)")
         expect(f'assembly "{name}": title_block', title_block, TitleBlock | None, "tc.TitleBlock(...)")
         self.name = name
         self.method = method
         self.title_block = title_block
         self.mu = mu
+        self.standard = standard
         self._declared: dict[str, list[Any]] = {name: [] for name in MAX_COUNTS}
 
     @property
@@ -95,11 +104,19 @@ class Assembly(Declarations, Pictured, Checked):
 
     def replaced(self, **lists: Iterable[Any]) -> "Assembly":
         """Return a copy with other lists, as in replaced(parts=..., pairs=...). Raises TypeError for other names."""
-        copy = Assembly(self.name, method=self.method, title_block=self.title_block, mu=self.mu)
+        copy = Assembly(self.name, method=self.method, title_block=self.title_block, mu=self.mu, standard=self.standard)
         copy._declared |= {name: list(lists.pop(name, things)) for name, things in self._declared.items()}
         if lists:
             raise TypeError(f"an assembly has no list {', '.join(lists)}; its lists are: {', '.join(MAX_COUNTS)}")
         return copy
+
+    @property
+    def standards(self) -> str:
+        """The standards of the drawings as archives state them: one for all parts, or by part; empty if none is stated."""
+        stated = dict.fromkeys(part.standard for part in self.parts)
+        if len(stated) < 2:
+            return next(iter(stated), "")
+        return ", ".join(f"{part.name} {part.standard}" for part in self.parts if part.standard)
 
     @property
     def features(self) -> tuple[Feature, ...]:
@@ -107,8 +124,15 @@ class Assembly(Declarations, Pictured, Checked):
         return tuple(feature for part in self.parts for feature in part.features)
 
     def part(
-        self, name: str, geometry: Geometry, *, at: Any = (0, 0, 0), rotation: Any = (0, 0, 0), fixed: bool | None = None
-    ) -> Part:  # fmt: skip
+        self,
+        name: str,
+        geometry: Geometry,
+        *,
+        at: Any = (0, 0, 0),
+        rotation: Any = (0, 0, 0),
+        fixed: bool | None = None,
+        standard: Standard = "",
+    ) -> Part:
         """Declare a part (see Part).
 
         name       of the part; it also names groups of archives
@@ -116,12 +140,14 @@ class Assembly(Declarations, Pictured, Checked):
         at         (x, y, z) [mm] of its frame in the nominal assembly; by default the origin
         rotation   rotation vector [rad]; tc.degrees(0, 0, 90) is a quarter turn about z
         fixed      True: contact does not move it; None (default): it is free if it is the moving side of a pair (see Part)
+        standard   of its drawing, "ISO" or "ASME"; by default that of the assembly
 
         `block = model.part("block", tc.Box(60, 40, 20), at=(30, 20, 10))`
         """
         expect(f'part "{name}": geometry', geometry, Geometry, "tc.Box(x, y, z) or tc.Mesh(file)")
         expect(f'part "{name}": fixed', fixed, bool | None, "True, False or None")
-        return self._add("parts", Part(name, geometry, _vector(at), _vector(rotation), fixed, script_line()))
+        standard = standard or self.standard
+        return self._add("parts", Part(name, geometry, _vector(at), _vector(rotation), fixed, standard, script_line()))
 
     def station(self, name: str) -> Station:
         """Declare the next station, of this `name`, of an assembly that is built in steps: `weld = line.station("weld")`."""

@@ -91,4 +91,4 @@ class Declaration(Checked):
 def direction_faults(name: str, value: Vector | None) -> Iterator[str]:
     """Yield the fault of a direction, or of one that may be left out."""
     if value is not None and not is_finite(value):
-        yield f'{name} is neither "+x" to "-z" nor a nonzero vector of three finite numbers'
+        yield f'{name} is {value!r}; expected "+x" to "-z", or a nonzero vector of three finite numbers'

@@ -93,7 +93,7 @@ class Force(Declaration):
     def faults(self) -> Iterator[str]:
         yield from self.at.faults()
         if not (is_finite(self.vector) and any(self.vector)):
-            yield "vector is not a nonzero vector of three finite numbers [N]"
+            yield f"vector is {self.vector!r}; expected a nonzero vector of three finite numbers [N]"
 
     def __str__(self) -> str:
         return f"force {self.name}: ({', '.join(f'{c:g}' for c in self.vector)}) N at {self.at}"

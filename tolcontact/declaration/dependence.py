@@ -15,8 +15,8 @@ from tolcontact.declaration.checks import Declaration
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import is_length, is_line
 from tolcontact.declaration.written_tolerance import DIGITS, Deviations
-from tolcontact.errors import shown
 from tolcontact.input_files import check_inputs
+from tolcontact.texts import shown
 
 SEPARATORS = {";": "semicolons", "\t": "tabs"}
 MIN_EIGENVALUE = 1e-12  # of a correlation matrix; of a smaller absolute value it is zero
@@ -95,7 +95,7 @@ class Correlation(Declaration):
 
     def faults(self) -> Iterator[str]:
         if len(set(self.labels)) < len(self.labels) or len(self.labels) < 2:
-            yield "expected two or more different labels of contributors"
+            yield f"its labels are {', '.join(map(str, self.labels)) or 'none'}; expected two or more different contributors"
         try:
             matrix = np.array(self.matrix, dtype=float)
         except (TypeError, ValueError):

@@ -3,20 +3,20 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import msgspec
 from msgspec import UNSET, UnsetType
 
 from tolcontact.declaration.assembly import MAX_COUNTS, Assembly
-from tolcontact.declaration.checks import NOT_NEGATIVE
+from tolcontact.declaration.checks import NOT_NEGATIVE, text_type
 from tolcontact.declaration.codec import Document, Items, definitions
 from tolcontact.declaration.dependence import Variable
 from tolcontact.declaration.entries import CONTROL, METHOD, RECORDS, TARGETS, TITLE_BLOCK, TOLERANCED
 from tolcontact.declaration.face_entries import Writing
 from tolcontact.declaration.feature_tolerance import GeometricTolerance
 from tolcontact.declaration.measure import Tape
-from tolcontact.declaration.part import Face
+from tolcontact.declaration.part import Face, Standard
 from tolcontact.declaration.place import EntryError, Place, Sources
 from tolcontact.declaration.size import Size
 from tolcontact.errors import ArchiveError
@@ -30,6 +30,7 @@ DOCUMENT = msgspec.defstruct("Document", [
     ("name", str), ("parts", Items(RECORDS["parts"]).wire), ("measures", Items(RECORDS["measures"]).wire),
     ("schema", str | UnsetType, UNSET), ("method", METHOD.wire | None, None),
     ("title_block", TITLE_BLOCK.wire | None, None), ("mu", NOT_NEGATIVE | None, None),
+    ("standard", text_type(get_args(Standard)), ""),
     *((name, Items(record).wire, []) for name, record in RECORDS.items() if name not in ("parts", "measures")),
 ], forbid_unknown_fields=True, rename={"schema": "$schema"})  # fmt: skip
 
@@ -58,8 +59,9 @@ def to_document(
     }
     titles = {} if assembly.title_block is None else {"title_block": TITLE_BLOCK.encode(assembly.title_block, writing)}
     friction = {} if assembly.mu is None else {"mu": float(assembly.mu)}
+    standard = {"standard": assembly.standard} if assembly.standard else {}
     method = None if assembly.method is None else METHOD.encode(assembly.method, writing)
-    return {"name": assembly.name, "method": method, **titles, **friction, **lists}
+    return {"name": assembly.name, "method": method, **titles, **friction, **standard, **lists}
 
 
 def tolerance_of_entry(entry: Any) -> Size | GeometricTolerance:
@@ -100,7 +102,7 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
         part = RECORDS["parts"].decode(entry, place["parts"][k])
         if part.name in sources.parts:
             raise place["parts"][k]["name"].mismatch("a name that no other part has", part.name)
-        sources.parts[part.name] = part
+        sources.parts[part.name] = part if part.standard else replace(part, standard=struct.standard)
     parts = list(sources.parts.values())
     for k, (part, entry) in enumerate(zip(parts, struct.parts, strict=True)):
         of_part = replace(place["parts"][k]["features"], part=part)
@@ -119,7 +121,8 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
     things["measures"] = Items(RECORDS["measures"]).decode(struct.measures, Place(sources)["measures"])
     method = None if struct.method is None else METHOD.decode(struct.method, place["method"])
     title_block = None if struct.title_block is None else TITLE_BLOCK.decode(struct.title_block, place["title_block"])
-    assembly = Assembly(struct.name, method=method, title_block=title_block, mu=struct.mu).replaced(**things)
+    settings: dict[str, Any] = {"method": method, "title_block": title_block, "mu": struct.mu, "standard": struct.standard}
+    assembly = Assembly(struct.name, **settings).replaced(**things)
     for station in assembly.stations:
         station.belonging_to(assembly)
     for fault in assembly.faults():  # a model with faults is never archived

@@ -74,7 +74,7 @@ CONTROL = CODECS[Size | GeometricTolerance] = Choice(
     "FeatureTolerance",
     f"kind: one of {', '.join(['size', *KINDS])}",
     Record(
-        Size, kind="size", omitted="tolerance_class",
+        Size, kind="size", omitted="tolerance_class envelope",
         nominal=Plain(POSITIVE), upper=Plain(float | str), distribution=DISTRIBUTION,
     ),
     *(
@@ -185,7 +185,10 @@ def _measured_values(measure: Measure, writing: Writing) -> Document:
 
 def _measured(values: Document, place: Place) -> Document:
     if len(values) != 1:
-        raise place.error('expected either "of", a point or a measurement, or "tape", the steps of an expression')
+        what = " and ".join(values) or "neither"
+        raise place.error(
+            f'it has {what}; expected either "of", a point or a measurement, or "tape", the steps of an expression'
+        )
     return {"of": next(iter(values.values()))}
 
 
@@ -212,7 +215,8 @@ FEATURES = Field(
 )
 RECORDS = {
     "parts": Record(
-        Part, fields="geometry name at rotation fixed declared_at features", geometry=SHAPE, features=FEATURES
+        Part, fields="geometry name at rotation fixed standard declared_at features", omitted="standard", geometry=SHAPE,
+        features=FEATURES,
     ),
     "locations": Record(
         Location, omitted="floating station joint placing", scheme=SCHEME,

@@ -35,6 +35,7 @@ OPTION_CHECKS = {
         "a length in mm above 0, or two of them, as in per=(25, 25)",
     ),
     "tangent": TRUTH,
+    "combined": TRUTH,
 }
 COMPARTMENT = re.compile(r"([A-Z]{1,2}(?:-[A-Z]{1,2})*)(?:\(([ML])\))?(><)?")
 
@@ -49,6 +50,7 @@ class ToleranceOptions(TypedDict, total=False):
     outside: float | None
     per: float | tuple[float, float] | None
     tangent: bool
+    combined: bool | None
     form: Form | None
     rule: Rule
     cp: float
@@ -61,7 +63,7 @@ class ToleranceKind(Readable):
 
     kind         its name in messages, JSON and archives
     meaning      what it limits, with its clause of ISO 1101
-    options      the fields among zone, along, material, projected, outside, per and tangent that it accepts
+    options      the fields among zone, along, material, projected, outside, per, tangent and combined that it accepts
     is_form      whether it limits form alone, and draws it by its `form`
     around       kinds whose zones contain the zone of a form; all others if there are none
     """
@@ -102,6 +104,8 @@ class GeometricTolerance(Checked):
     outside     [mm] of a profile: the part of the zone that lies outside the material; by default half
     per         [mm] of flatness or straightness: it applies to any part of the surface of this length, or of two such lengths
     tangent     True for a zone of the plane that touches a plane from outside the material; its form may then be outside
+    combined    of a pattern: True if the zones of its members keep their places to each other (CZ of ISO 5458), False if each
+                has its own (SZ); by default as the `standard` of the part has it: separate under ISO, else combined
     form        of a tolerance of form, or a profile without datums: how the form deviates; None if it is stated alone, and the
                 feature keeps its shape
     rule        from the zone to the spread of all freedoms together. "99.73 % inside" (default): this share of features lies
@@ -121,6 +125,7 @@ class GeometricTolerance(Checked):
     outside: float | None = None
     per: float | tuple[float, float] | None = None
     tangent: bool = False
+    combined: bool | None = None
     form: Form | None = USUAL_FORM
     rule: Rule = "99.73 % inside"
     cp: float = 1.0
@@ -153,6 +158,11 @@ class GeometricTolerance(Checked):
     def orientation_only(self) -> tuple[bool, ...]:
         """Whether a compartment locks directions alone: one for each."""
         return tuple(compartment.endswith("><") for compartment in self._compartments)
+
+    @property
+    def modifiers(self) -> tuple[str, ...]:
+        """The material modifier of each compartment: "M", "L" or none."""
+        return tuple((match[2] or "") for match in map(COMPARTMENT.fullmatch, self._compartments) if match)
 
     @property
     def _compartments(self) -> list[str]:
@@ -237,7 +247,8 @@ class GeometricTolerance(Checked):
         unit = f"/{'×'.join(f'{length:g}' for length in self._unit_lengths)}" if self._unit_lengths else ""
         projected = "" if self.projected is None else f" Ⓟ{self.projected:g}"
         unequal = "" if self.outside is None else f" Ⓤ{self.outside:g}"
-        frame = f"{self.kind} {diameter}{self.width:g}{unit}{unequal}{material}{projected}{' Ⓣ' if self.tangent else ''}"
+        tangent = " Ⓣ" if self.tangent else ""
+        frame = f"{self.kind} {diameter}{self.width:g}{unit}{unequal}{material}{projected}{tangent}{self._zones}"
         return " ".join([frame, *(re.sub(r"\(([ML])\)", lambda m: f" {SYMBOLS[m[1]]}", datum) for datum in self._compartments)])
 
     @property
@@ -247,27 +258,36 @@ class GeometricTolerance(Checked):
         unit = f" per {' x '.join(f'{length:g}' for length in self._unit_lengths)} mm" if self._unit_lengths else ""
         tangent, datums = " of the tangent plane" if self.tangent else "", f" to {self.datums}" if self.datums else ""
         uneven = "" if self.outside is None else f", {self.outside:g} mm of it outside,"
-        return f"{self.kind} {round_}{self.width:g}{self.material} mm{unit}{uneven}{tangent}{datums}"
+        return f"{self.kind} {round_}{self.width:g}{self.material} mm{unit}{uneven}{tangent}{self._zones}{datums}"
+
+    @property
+    def _zones(self) -> str:
+        return {None: "", True: " CZ", False: " SZ"}[self.combined]
 
 
-AXIS_OPTIONS = ("zone", "along", "material", "tangent")
+AXIS_OPTIONS = ("zone", "along", "material", "tangent", "combined")
 Position = ToleranceKind(
     "position", "position of an axis, a centre, or a plane (ISO 1101, 17.12); in a pattern without datums it is a common zone",
     (*AXIS_OPTIONS, "projected"),
 )  # fmt: skip
 Coaxiality = ToleranceKind(
-    "coaxiality", "coaxiality of an axis with the axis of its datums: a round zone (ISO 1101, 17.13)", ("material",)
+    "coaxiality",
+    "coaxiality of an axis with the axis of its datums: a round zone (ISO 1101, 17.13)",
+    ("material", "combined"),
 )
 Symmetry = ToleranceKind(
     "symmetry", "symmetry of the middle of two opposed planes, or of an axis between planes, to its datums (ISO 1101, 17.14)",
-    ("zone", "along", "material"),
+    ("zone", "along", "material", "combined"),
 )  # fmt: skip
 Profile = ToleranceKind(
     "profile", "profile of a surface (ISO 1101, 17.8): its location, if its datums lock it; without datums it is form alone",
-    ("outside", "tangent"), needs_datums=False,
+    ("outside", "tangent", "combined"), needs_datums=False,
 )  # fmt: skip
 LineProfile = ToleranceKind(  # the zones of all lines are taken as one zone of the surface
-    "line profile", "profile of any line of a surface (ISO 1101, 17.7)", ("outside",), needs_datums=False
+    "line profile",
+    "profile of any line of a surface (ISO 1101, 17.7)",
+    ("outside", "combined"),
+    needs_datums=False,
 )
 Parallelism = ToleranceKind("parallelism", "parallelism of a plane or an axis to its datums (ISO 1101, 17.9)", AXIS_OPTIONS)
 Perpendicularity = ToleranceKind(

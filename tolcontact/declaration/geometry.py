@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from tolcontact.declaration.checks import LENGTH, TRUTH, Checked, one_of
-from tolcontact.errors import shown
+from tolcontact.input_files import fault_of
+from tolcontact.texts import shown
 
 
 @dataclass(frozen=True, repr=False)
@@ -74,11 +75,8 @@ class Mesh(Checked):
         if self.units is not None and self.is_step:
             yield f'"{self.source}" is a STEP file, which states its own units; leave units out'
         if isinstance(self.source, str | Path):
-            path = Path(self.source)
-            if path.is_dir():
-                yield f'"{path}" is a folder; give the path of an STL, OBJ, PLY, GLB or STEP file in it'
-            elif not path.is_file():
-                yield f'mesh file "{path}" does not exist; give the path of an STL, OBJ, PLY, GLB or STEP file'
+            if fault := fault_of(Path(self.source)):
+                yield f'mesh file "{self.source}" {fault}; give the path of an STL, OBJ, PLY, GLB or STEP file'
         elif not (hasattr(self.source, "vertices") and hasattr(self.source, "faces")):
             yield f"mesh source is a {type(self.source).__name__}; expected a file's path or a trimesh.Trimesh"
 

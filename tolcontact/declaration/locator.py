@@ -71,7 +71,7 @@ class Locator(Checked):
 
     def faults(self) -> Iterator[str]:
         if not is_finite(self.point):
-            yield "point is not three finite numbers"
+            yield f"point is {self.point!r}; expected three finite numbers"
         yield from direction_faults("direction", self.direction)
         if self.tolerance is not None:
             yield from self.tolerance.faults()

@@ -17,6 +17,7 @@ D = TypeVar("D", bound=Declaration)
 
 Association = Literal["outside", "least squares"]  # from a plane to a datum, ISO 5459
 OUTSIDE, LEAST_SQUARES = ASSOCIATIONS = get_args(Association)
+Standard = Literal["", "ISO", "ASME"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -25,7 +26,7 @@ class Part(Declaration):
 
     A point `p` of the part lies at `rotation * p + at` in the nominal assembly frame; `rotation` is a rotation vector [rad],
     `at` a position [mm]. With `fixed=None` a part is free if it is the moving side of a contact pair, floats, or has
-    one-sided locators; otherwise it is fixed.
+    one-sided locators; otherwise it is fixed. The `standard` of its drawing is explained by Assembly.
     """
 
     name: str
@@ -33,8 +34,10 @@ class Part(Declaration):
     at: Vector = (0.0, 0.0, 0.0)
     rotation: Vector = (0.0, 0.0, 0.0)
     fixed: bool | None = None
+    standard: Standard = ""
     declared_at: str = field(default_factory=script_line)
     noun: ClassVar[str] = "part"
+    checks: ClassVar = {"standard": one_of(get_args(Standard))}
     _declared: "list[Feature | Pattern | DatumTargets]" = field(default_factory=list, init=False)
 
     @property
@@ -127,10 +130,11 @@ class Part(Declaration):
         return Face(self, tuple(map(criterion, selections)))
 
     def faults(self) -> Iterator[str]:
+        yield from super().faults()
         yield from self.geometry.faults()
         for label, value, example in (("at", self.at, "(0, 0, 10)"), ("rotation", self.rotation, "tc.degrees(0, 0, 90)")):
             if not is_finite(value):
-                yield f"{label} is not a vector of three finite numbers; give it as in {label}={example}"
+                yield f"{label} is {value!r}; expected three finite numbers, as in {label}={example}"
 
     def __str__(self) -> str:
         place = "" if self.at == (0.0, 0.0, 0.0) else " at ({:g}, {:g}, {:g})".format(*self.at)
@@ -172,7 +176,7 @@ class Point(Readable):
 
     def faults(self) -> Iterator[str]:
         if self.position is not None and not is_finite(self.position):
-            yield f'point of part "{self.part.name}" is not three finite numbers'
+            yield f'point of part "{self.part.name}" is {self.position!r}; expected three finite numbers'
         if self.position is None and self.on is None:
             yield f'point of part "{self.part.name}" has no position; an end of an axis needs the feature that it is on'
         elif self.position is None and self.end not in (0, 1):
@@ -252,7 +256,7 @@ class Pattern(Toleranced):
     size. Only a pattern without tolerances, which is a datum alone, may have unlike members and features declared before.
     """
 
-    noun, has_common_zone = "pattern", True
+    noun, has_members = "pattern", True
 
     name: str
     part: Part

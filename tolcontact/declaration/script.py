@@ -20,8 +20,10 @@ from tolcontact.declaration.geometry import Mesh
 from tolcontact.declaration.measure import Tape
 from tolcontact.declaration.part import Face
 from tolcontact.declaration.place import EntryError, Sources
-from tolcontact.errors import ScriptError, TolcontactError, clipped, nearest_name
-from tolcontact.input_files import check_inputs
+from tolcontact.errors import ScriptError, TolcontactError, nearest_name
+from tolcontact.input_files import fault_of
+from tolcontact.replacing import replacing
+from tolcontact.texts import clipped
 
 UNEXPECTED = re.compile(r"([\w.]+)\(\) got an unexpected keyword argument '(\w+)'")  # a TypeError of Python
 PACKAGES = ("tolcontact.declaration", "tolcontact.geometry", "tolcontact.fasteners")  # whose functions scripts call
@@ -36,7 +38,6 @@ def read_json(path: Path) -> Assembly:
     structure.
     """
     try:
-        check_inputs([path], MAX_BYTES)
         document = json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=_unique)
     except (OSError, ValueError, RecursionError) as error:
         raise ScriptError(f'model "{path}" cannot be read as JSON: {error}') from error
@@ -58,14 +59,18 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def write_json(assembly: Assembly, path: Path, triangles: Callable[[Face], list[int]], tapes: Mapping[str, Tape]) -> None:
     """Write the declarations of an assembly as JSON; `triangles` returns the triangles of a face that a function picks.
 
-    Raises ScriptError for a shape that is not in a file.
+    Raises ScriptError for a shape that is not in a file, or if the file cannot be written.
     """
     for part in assembly.parts:
         if isinstance(part.geometry, Mesh) and not isinstance(part.geometry.source, str | Path):
             raise ScriptError(f'part "{part.name}": its mesh is no file, so JSON cannot name it; save it as STL first')
     document = to_document(assembly, triangles, tapes, path.resolve().parent)
     text = json.dumps({"$schema": SCHEMA_NAME, **document}, indent=1, ensure_ascii=False)
-    path.write_text(text + "\n", encoding="utf-8")
+    try:
+        with replacing(path) as new:
+            new.write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise ScriptError(f'"{path}" cannot be written: {error.strerror}') from error
 
 
 if __name__ == "__main__":
@@ -80,8 +85,8 @@ def load_model(path: Path) -> Assembly:
 
     Raises ScriptError if the file is missing, fails, or has no function `assembly()` that returns an Assembly.
     """
-    if not path.is_file():
-        raise ScriptError(f'model script "{path}" does not exist')
+    if fault := fault_of(path, MAX_BYTES):
+        raise ScriptError(f'model script "{path}" {fault}')
     if path.suffix.lower() == ".json":
         return read_json(path)
     # The module's name has a space: a model random.py must not shadow the module `random`.

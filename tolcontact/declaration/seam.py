@@ -14,7 +14,9 @@ def stations(start: Point, end: Point, count: int) -> tuple[Point, ...]:
     Points on a feature move with its deviation. Raises TypeError or ValueError for points of two parts or features.
     """
     if not (isinstance(start, Point) and isinstance(end, Point) and start.position and end.position):
-        raise TypeError("stations: expected two points part.point(x, y, z), or two of a feature")
+        raise TypeError(
+            f"stations: start is {start!r}, end is {end!r}; expected two points part.point(x, y, z), or two of a feature"
+        )
     if start.part is not end.part or start.on is not end.on:
         raise ValueError(f"stations: {start} and {end} are not points of one part, or of one feature")
     if type(count) is not int or not 2 <= count <= MAX_STATIONS:

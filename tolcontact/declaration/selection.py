@@ -9,8 +9,8 @@ import numpy as np
 
 from tolcontact.declaration.checks import LENGTH, TRUTH, Checked, one_of
 from tolcontact.declaration.values import DIRECTIONS, Direction, Vector, direction as _direction, is_finite, is_length, vector
-from tolcontact.errors import shown
 from tolcontact.readable import Readable
+from tolcontact.texts import shown
 from tolcontact.vocabulary import SURFACE_KINDS, SurfaceKind
 
 Picker = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -90,7 +90,7 @@ class Inside(Readable):
 
     def faults(self) -> Iterator[str]:
         if not (is_finite(self.lower) and is_finite(self.upper)):
-            yield "a box needs two corners of three finite numbers each"
+            yield f"a box is from {self.lower!r} to {self.upper!r}; expected two corners of three finite numbers each"
         elif not all(low < up for low, up in zip(self.lower, self.upper, strict=True)):
             yield f"box from {self.lower} to {self.upper} is empty; its first corner must be the lower one in x, y and z"
 
@@ -141,8 +141,9 @@ class Brep(Readable):
     def faults(self) -> Iterator[str]:
         if not self.which:
             yield "B-rep faces need numbers, names, or points"
-        if any(isinstance(face, tuple) and not is_finite(face) for face in self.which):
-            yield "a B-rep face needs its number, its name, or a point on it, three finite numbers"
+        for face in self.which:
+            if isinstance(face, tuple) and not is_finite(face):
+                yield f"a B-rep face is {face!r}; expected its number, its name, or a point on it, three finite numbers"
         if "" in self.which:
             yield "a B-rep face has an empty name; give its number, or a point on it"
         if not (isinstance(self.whole, bool) or self.whole in FACE_GROUPS):

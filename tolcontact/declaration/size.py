@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
 from typing import ClassVar, Literal, get_args
 
-from tolcontact.declaration.checks import LENGTH, Checked, one_of, whole_number
+from tolcontact.declaration.checks import LENGTH, TRUTH, Checked, one_of, whole_number
 from tolcontact.declaration.tolerance import Distribution, Tolerance
 from tolcontact.declaration.tolerance_class import tolerance_class
 from tolcontact.declaration.values import is_length
@@ -27,12 +27,13 @@ class Size(Checked):
     "H7")` with a `tolerance_class` of ISO 286-1. Sizes vary about the midpoint of the limits by `distribution` (see
     tc.Tolerance). `moves` states which of two planes moves with the size: "both" by half each (default), or the "first" or
     "second" alone. `cp` and `cpk` are the capability of its process: by default six standard deviations equal `upper` less
-    `lower`, with the mean in their middle.
+    `lower`, with the mean in their middle. With `envelope` the form of the feature stays inside the envelope of perfect form at
+    maximum material (ISO 8015, ASME Y14.5 Rule #1); by default as the `standard` of its part has it.
     """
 
     kind: ClassVar[str] = "size"
     letters: ClassVar[tuple[str, ...]] = ()  # of datums
-    checks: ClassVar = {"moves": one_of(MOVES)}
+    checks: ClassVar = {"moves": one_of(MOVES), "envelope": TRUTH}
 
     nominal: float
     upper: float  # a text or a pair only if it is no tolerance
@@ -43,6 +44,7 @@ class Size(Checked):
     moves: Moves = "both"
     distribution: Distribution = "normal"
     tolerance_class: str = ""
+    envelope: bool | None = None
 
     def __post_init__(self) -> None:
         if self.lower is not None or not is_length(self.nominal):
@@ -99,7 +101,8 @@ class Size(Checked):
         if not (is_length(self.nominal) and is_length(self.upper) and is_length(self.lower)):
             return f"size {self.nominal!r} {self.upper!r}"
         stated = f"{self.tolerance_class} " if self.tolerance_class else ""
-        return f"size {self.nominal:g} {stated}{self.upper:+g} {self.lower:+g} mm"
+        envelope = " Ⓔ" if self.envelope else ""
+        return f"size {self.nominal:g} {stated}{self.upper:+g} {self.lower:+g} mm{envelope}"
 
 
 @dataclass(frozen=True, repr=False)

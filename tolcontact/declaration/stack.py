@@ -15,8 +15,9 @@ from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import is_length
 from tolcontact.declaration.written_tolerance import TextFault, written
-from tolcontact.errors import Faults, nearest_name, shown
+from tolcontact.errors import Faults, nearest_name
 from tolcontact.input_files import check_inputs
+from tolcontact.texts import shown
 
 GAP = "gap "  # heading of a column with the sensitivities of a gap
 COLUMNS = "name", "nominal", "tolerance", "upper", "lower", "sensitivity", "distribution", "cp", "cpk", "description"

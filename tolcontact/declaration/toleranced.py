@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from tolcontact.declaration.checks import Declaration
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Position
@@ -17,12 +17,13 @@ class Toleranced(Declaration):
     """A feature or a pattern, with its tolerances.
 
     noun              its name in messages
-    has_common_zone   True if the zones of a position without datums keep their relative positions
+    has_members   whether it has several members, whose zones may be combined
     """
 
     noun: ClassVar[str] = "feature"
-    has_common_zone: ClassVar[bool] = False
+    has_members: ClassVar[bool] = False
 
+    part: Any
     tolerances: tuple[Control, ...]
 
     @property
@@ -45,10 +46,24 @@ class Toleranced(Declaration):
 
     def _datum_faults(self) -> Iterator[str]:
         for tolerance in self.geometric:
-            is_common = self.has_common_zone and tolerance.of is Position
+            is_common = self.combines(tolerance) and tolerance.of is Position
             if tolerance.of.needs_datums and not tolerance.datums and not is_common:
                 example = f'tc.{tolerance.of.name}({tolerance.width!r}, "A|B|C")'
                 yield f"{tolerance.kind}: it needs datums; give them as in {example}"
+
+            if tolerance.combined is not None and not self.has_members:
+                yield f"{tolerance.kind}: combined zones are for patterns; leave combined out"
+
+    def combines(self, tolerance: GeometricTolerance) -> bool:
+        """Return whether the zones of its members keep their places to each other."""
+        return self.has_members and (self.part.standard != "ISO" if tolerance.combined is None else tolerance.combined)
+
+    @property
+    def is_enveloped(self) -> bool:
+        """Whether its form stays inside the envelope of its size."""
+        if self.size is None:
+            return False
+        return bool(self.part.standard == "ASME" if self.size.envelope is None else self.size.envelope)
 
     def _size_faults(self, faces: int) -> Iterator[str]:
         if sum(isinstance(tolerance, Size) for tolerance in self.tolerances) > 1:

@@ -3,6 +3,7 @@
 import math
 import numbers
 import re
+import reprlib
 import sys
 import unicodedata
 from collections import Counter
@@ -12,7 +13,7 @@ from typing import Any, Literal, get_args, overload
 
 import numpy as np
 
-from tolcontact.errors import CONTROL_CHARACTERS, shown
+from tolcontact.texts import CONTROL_CHARACTERS, shown
 
 MAX_NAME = 500  # characters
 MAX_NUMBER = 1e15  # of a length [mm], a force, a stiffness: nothing overflows
@@ -71,30 +72,43 @@ Direction = Side | Literal["x", "y", "z"] | str | Sequence[float] | np.ndarray  
 _PACKAGE = str(Path(__file__).resolve().parents[1])
 _AXES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 DIRECTIONS = get_args(Side)
-NOT_A_VECTOR: Vector = (math.nan, math.nan, math.nan)
+
+
+class NotAVector(tuple[float, ...]):
+    """Three times NaN in place of an `entry` that is no vector, as which it prints: `faults()` reports it with all others."""
+
+    entry: Any
+
+    def __new__(cls, entry: Any) -> Any:
+        wrong = super().__new__(cls, (math.nan,) * 3)
+        wrong.entry = entry
+        return wrong
+
+    def __repr__(self) -> str:
+        return reprlib.repr(self.entry)
 
 
 def vector(value: Any) -> Vector:
-    """Return three floats; NaN if `value` is not a vector, so that `faults()` reports it with all others."""
+    """Return three floats; NotAVector if `value` is not a vector."""
     try:
         x, y, z = (math.nan if isinstance(component, bool) else float(component) for component in value)
-    except (TypeError, ValueError):
-        return NOT_A_VECTOR
-    return (x, y, z)
+    except (TypeError, ValueError, OverflowError):
+        return NotAVector(value)  # type: ignore[no-any-return]
+    return (x, y, z) if is_finite((x, y, z)) else NotAVector(value)
 
 
 def direction(value: Any) -> Vector:
-    """Return the unit vector of "+x", "-z", "y" or of three numbers; NaN if `value` is not a direction."""
+    """Return the unit vector of "+x", "-z", "y" or of three numbers; NotAVector if `value` is not a direction."""
     if isinstance(value, str):
         sign, axis = (-1.0, value[1:]) if value.startswith("-") else (1.0, value.removeprefix("+"))
         if axis not in _AXES:
-            return NOT_A_VECTOR
+            return NotAVector(value)  # type: ignore[no-any-return]
         x, y, z = _AXES[axis]
         return (sign * x + 0.0, sign * y + 0.0, sign * z + 0.0)
     x, y, z = vector(value)
     length = math.hypot(x, y, z)
     if not (math.isfinite(length) and length > 0):
-        return NOT_A_VECTOR
+        return NotAVector(value)  # type: ignore[no-any-return]
     return (x / length, y / length, z / length)
 
 

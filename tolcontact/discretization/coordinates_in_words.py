@@ -3,8 +3,8 @@
 import numpy as np
 
 from tolcontact.discretization.nominal import Nominal
-from tolcontact.errors import shown
 from tolcontact.geometry.triangle_mesh import coordinate_error, coordinate_spacing
+from tolcontact.texts import shown
 from tolcontact.vocabulary import STATED_ERROR_SHARE
 
 NOTICED_SHARE = 0.01  # of the error of a pair: a smaller error of one of its parts is not stated

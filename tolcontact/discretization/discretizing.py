@@ -42,7 +42,8 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
     scenes = scenes_of(assembly, presses=presses) if is_sound or not assembly.stations else ()
     entries = [(scene, part) for scene in scenes for part in scene.assembly.parts]
     parts = [_nominal_part(scene, part, meshes, faults) for scene, part in entries]
-    features = Features(sum(len(part.locators) for part in parts if part is not None))
+    mated = frozenset(face for pair in assembly.pairs for face in (pair.moving, pair.reference))
+    features = Features(sum(len(part.locators) for part in parts if part is not None), mated)
     if is_sound and None not in parts:
         _add_features(assembly, {part: number for number, (_, part) in enumerate(entries)}, meshes, features, faults)
         features.use_touched([part.placement for part in parts if part is not None])

@@ -72,6 +72,7 @@ class NominalFeature:
     areas        its faces on the part's mesh
     coordinates  (coordinate, column) per unit deviation of the freedoms of its pattern and of all freedoms before
     size_column  the column of its size; None if its size is not toleranced
+    mobility     (coordinate, column) of its gauge element as a datum at its material boundary; None without play
     form         of its face; None if the feature keeps its shape
     form_columns the columns of the coefficients of the form
     """
@@ -83,6 +84,7 @@ class NominalFeature:
     areas: tuple[FaceArea, ...]
     coordinates: np.ndarray
     size_column: int | None = None
+    mobility: np.ndarray | None = None
     form: FormField | None = None
     form_columns: range = range(0)
 
@@ -94,6 +96,15 @@ class NominalFeature:
     def varies(self) -> bool:
         """Whether the feature deviates at all."""
         return self.size_column is not None or self.form is not None or bool(self.coordinates.any())
+
+    def at_gauge(self, columns: int) -> "NominalFeature":
+        """Return the datum as its gauge element has it, with a number of columns."""
+        if self.mobility is None:
+            return self
+        coordinates = np.zeros((len(self.coordinates), columns))
+        for part in (self.coordinates, self.mobility):
+            coordinates[:, : part.shape[1]] += part
+        return replace(self, coordinates=coordinates)
 
     def face_with(self, position: np.ndarray) -> int | None:
         """Return the index of the face that a point (3,) [mm] is on; None, for the centre, if it is on none.

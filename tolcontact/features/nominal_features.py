@@ -8,7 +8,8 @@ import numpy as np
 
 from tolcontact.declaration import DatumTargets, Face, Feature, Pattern
 from tolcontact.errors import GeometryFault
-from tolcontact.features.datum_frames import DatumShift, Declared, padded
+from tolcontact.features.datum_frames import DatumShift, Declared, datum_frame, padded
+from tolcontact.features.datum_mobility import mobile
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.freedoms import DATUM, FEATURE, FORM, Freedom
@@ -27,9 +28,11 @@ class Features:
     """The features of a model while it is discretized, and the faces that deviate with them.
 
     first_column  of the freedoms of features
+    mated         faces of contact pairs: contact decides where such a datum at its material boundary lies
     """
 
     first_column: int
+    mated: frozenset[Face] = frozenset()
     patterns: list[NominalPattern] = field(default_factory=list)
     features: dict[Feature, NominalFeature] = field(default_factory=dict)
     _targets: dict[tuple[int, str], tuple[NominalFeature, ...]] = field(default_factory=dict)
@@ -64,6 +67,7 @@ class Features:
         )
         if declared.tolerances and (fault := unlike_members(pattern.geometries)):
             raise GeometryFault(fault)
+        self._add_mobilities(declared, part)
         # The order of the freedoms is the order of their columns: displacements, datum shifts, sizes, modes of forms.
         start = self.first_column + len(self.freedoms)
         pattern = replace(pattern, layers=tolerance_layers(pattern, self.datums(part), start))
@@ -89,6 +93,25 @@ class Features:
                 self.features[member] = replace(recognized[member], coordinates=coordinates[place])
         members = tuple(self.features[member] for member in declared.members)
         self.patterns.append(replace(pattern, members=members, freedoms=tuple(freedoms), shifts=tuple(shifts), form=form))
+
+    def _add_mobilities(self, declared: Feature | Pattern, part: int) -> None:
+        """Add the freedoms of gauge elements that tolerances refer to, each once, if the standard of the part is stated."""
+        for tolerance in declared.geometric if declared.part.standard else ():
+            for k, (letters, modifier) in enumerate(zip(tolerance.system, tolerance.modifiers, strict=True)):
+                known = self.datums(part)
+                datums = [other for other in self.patterns if other.part == part and other.declared.datum == letters[0]]
+                if not modifier or len(letters) > 1 or not datums or any(self._has_play(datum) for datum in datums):
+                    continue
+                before = [[datum for letter in earlier for datum in known.get(letter, ())] for earlier in tolerance.system[:k]]
+                start = self.first_column + len(self.freedoms)
+                frame = datum_frame(before, datums[0].centre, datums[0].reach, start, tolerance.orientation_only[:k])
+                if (added := mobile(datums[0], frame.free, modifier, start)) is not None:
+                    self.patterns.append(added)
+
+    def _has_play(self, datum: NominalPattern) -> bool:
+        """Return whether the play of a datum is known already: it has a gauge element, or a mate in a contact pair."""
+        members = datum.members
+        return any(member.mobility is not None or not self.mated.isdisjoint(member.feature.faces) for member in members)
 
     def _add_targets(self, targets: DatumTargets, part: int) -> None:
         """Add a datum whose features have been added before. Raises GeometryFault for a target that is not on its feature."""

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.declaration import Feature, feature_tolerance as declared
+from tolcontact.declaration import feature_tolerance as declared
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, ToleranceKind
 from tolcontact.declaration.toleranced import Toleranced
 from tolcontact.errors import GeometryFault
@@ -204,8 +204,8 @@ def form_tolerance(toleranced: Toleranced, feature: FeatureGeometry) -> Geometri
     tolerances = [
         tolerance for tolerance in toleranced.geometric
         if tolerance.form is not None
-        # Without datums, a profile of a pattern limits its members to each other.
-        and (tolerance.is_form or (tolerance.limits_form_alone and isinstance(toleranced, Feature)))
+        # Without datums, a profile with combined zones limits the members of a pattern to each other.
+        and (tolerance.is_form or (tolerance.limits_form_alone and not toleranced.combines(tolerance)))
     ]  # fmt: skip
     for tolerance in tolerances:
         if tolerance.per is not None or type(feature) not in TOLERANCES[tolerance.of].forms:

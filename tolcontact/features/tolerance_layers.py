@@ -52,16 +52,30 @@ def _zone(
     absent = [letter for compartment in tolerance.system for letter in compartment if letter not in datums]
     if absent:
         raise GeometryFault(f"{tolerance.kind} refers to datum {absent[0]}, which could not be made; mend its feature first")
-    system = [[datum for letter in compartment for datum in datums[letter]] for compartment in tolerance.system]
+    system = [
+        [datum.at_gauge(columns) if modifier else datum for letter in compartment for datum in datums[letter]]
+        for compartment, modifier in zip(tolerance.system, tolerance.modifiers, strict=True)
+    ]
     primary = system[0][0].geometry if system else None
     rows = tuple(zone_rows(tolerance, member, primary) for member in pattern.geometries)
     frame = datum_frame(system, pattern.centre, pattern.reach, columns, tolerance.orientation_only)
-    is_limited = system or len(pattern.members) > 1  # a common zone limits the members to each other
-    controlled = _controlled(rows, pattern, frame) if is_limited else np.zeros((pattern.count, 0))
+    is_combined = pattern.declared.combines(tolerance)
+    is_limited = system or is_combined  # a combined zone limits the members to each other
+    controlled = _controlled(rows, pattern, frame, is_combined=is_combined) if is_limited else np.zeros((pattern.count, 0))
     if any(map(len, rows)) and is_limited and not controlled.shape[1]:
-        reason = f"the datum system {tolerance.datums} does not lock any" if system else "a common zone limits nothing"
+        reason = f"the datum system {tolerance.datums} does not lock any" if system else "a combined zone limits nothing"
         raise GeometryFault(f"{tolerance.kind}: {reason} of what is toleranced; add the datum that does")
     return rows, frame, controlled
+
+
+def uncontrolled(pattern: NominalPattern, followed: np.ndarray) -> list[str]:
+    """Return the names of the freedoms of a pattern that no tolerance limits.
+
+    Those in the span of `followed` (coordinate, n) are left out: the frame of a datum follows them.
+    """
+    limited = _span(np.hstack([followed, *(layer.controlled for layer in pattern.layers)]))
+    rest = _difference(np.eye(pattern.count), limited)
+    return [pattern.freedom_name(direction) for direction in _named_basis(rest, pattern, is_outer=True).T]
 
 
 def _check_nesting(tolerance: GeometricTolerance, controlled: np.ndarray, layers: Sequence[Layer]) -> None:
@@ -85,10 +99,16 @@ def _translations(tolerance: GeometricTolerance, pattern: NominalPattern, added:
     return _named_basis(translations, pattern, is_outer=is_outer)
 
 
-def _controlled(rows: Sequence[np.ndarray], pattern: NominalPattern, frame: DatumFrame) -> np.ndarray:
-    """Return the directions (coordinate, n) that the zone limits and that no free motion of the datum frame changes."""
+def _controlled(rows: Sequence[np.ndarray], pattern: NominalPattern, frame: DatumFrame, *, is_combined: bool) -> np.ndarray:
+    """Return the directions (coordinate, n) that the zone limits and that no free motion of the datum frame changes.
+
+    Combined zones of members move as one, other ones each by itself.
+    """
     limited = _span(np.asarray(scipy.linalg.block_diag(*(member.reshape(-1, member.shape[-1]).T for member in rows))))
-    controlled = _difference(limited, _span(limited @ limited.T @ pattern.values @ frame.free))
+    motions = pattern.values @ frame.free
+    if not is_combined:
+        motions = scipy.linalg.block_diag(*(motions[place] for place in pattern.slices))
+    controlled = _difference(limited, _span(limited @ limited.T @ motions))
     return _named_basis(controlled, pattern, is_outer=False)
 
 
@@ -103,6 +123,11 @@ def _span(vectors: np.ndarray) -> np.ndarray:
 def _difference(basis: np.ndarray, subtracted: np.ndarray) -> np.ndarray:
     """Return a basis of the part of a span that is orthogonal to another span; both are given by orthonormal columns."""
     return _span(basis - subtracted @ (subtracted.T @ basis))
+
+
+def named_span(vectors: np.ndarray, pattern: NominalPattern) -> np.ndarray:
+    """Return unit vectors with the span of columns (coordinate, n), along coordinates where the span has any."""
+    return _named_basis(_span(vectors), pattern, is_outer=False)
 
 
 def _named_basis(directions: np.ndarray, pattern: NominalPattern, *, is_outer: bool) -> np.ndarray:

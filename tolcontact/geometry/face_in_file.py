@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from tolcontact.declaration.selection import FACE_GROUPS
 from tolcontact.declaration.values import Vector
-from tolcontact.errors import shown_name
 from tolcontact.readable import Readable
+from tolcontact.texts import shown_name
 
 GENERAL = "general"  # kind of a face without an analytic surface
 

@@ -11,7 +11,7 @@ import trimesh
 from tolcontact.declaration import Brep, Cylinder, Face, Facing, Inside, Largest, Near, Part, Picked, Triangles
 from tolcontact.declaration.selection import FACE_ANGLE
 from tolcontact.declaration.values import Vector
-from tolcontact.errors import GeometryFault, shown_name
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.brep_face import analytic_surfaces, describe_faces, faces_at, number_faces
 from tolcontact.geometry.face_in_file import FaceInFile, group_lines
 from tolcontact.geometry.files import BREP, STATED_FACES
@@ -19,6 +19,7 @@ from tolcontact.geometry.shapes import placement_of
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.tolerances import OPPOSING_COSINE, ROUNDING, SAME_SIZE
 from tolcontact.geometry.triangle_mesh import have_area, overlaps, subdivided
+from tolcontact.texts import shown_name
 from tolcontact.user_functions import FunctionError, called
 
 NEAR_DIVISIONS = 100

@@ -1,8 +1,8 @@
 """Planes, cylinders, cones and spheres fitted to the corners of triangles, where a file states no surface. Lengths in mm."""
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -27,18 +27,14 @@ def fit_surface(triangles: np.ndarray, tolerance: float) -> AnalyticSurface | No
 
     Both a sphere and a cone pass through two rings of vertices: the simpler one is used. Triangles in fewer than
     MIN_DIRECTIONS directions are a plane or a fold, and a round surface needs MIN_SPARE vertices that do not determine it.
-    Fasteners, features and contact pairs request the same faces, and parts of one shape share them: each face is fitted once.
+    Fasteners, features and contact pairs request the same faces, and parts of one shape share them: a face is fitted once.
     """
-    key = hashlib.blake2b(triangles.tobytes()).digest(), tolerance
-    if key not in _known_fits:
-        _known_fits[key] = _fit(triangles, tolerance)
-    return _known_fits[key]
+    return _fit(np.asarray(triangles, dtype=float).tobytes(), tolerance)
 
 
-_known_fits: dict[tuple[bytes, float], AnalyticSurface | None] = {}
-
-
-def _fit(triangles: np.ndarray, tolerance: float) -> AnalyticSurface | None:
+@lru_cache(maxsize=256)
+def _fit(corner_bytes: bytes, tolerance: float) -> AnalyticSurface | None:
+    triangles = np.frombuffer(corner_bytes).reshape(-1, 3, 3)
     vertices = _vertices(triangles)
     if len(vertices) < 4:
         return None

@@ -1,5 +1,6 @@
 """Measured points of faces: files with a point in each line (CSV), or clouds and meshes (PLY). One file is one part."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from tolcontact.errors import GeometryFault
 from tolcontact.input_files import check_inputs
 
 MIN_FILES = 3  # smallest number of parts with a meaningful spread
+NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?(inf|nan)", re.IGNORECASE)
 EXPECTED = "expected lines of three numbers x, y, z [mm], in the frame of the part"
 
 
@@ -17,7 +19,10 @@ def measured_points(pattern: str) -> dict[Path, np.ndarray]:
 
     Raises GeometryFault for too few files, and for a file without points.
     """
-    paths = sorted(Path(pattern).parent.glob(Path(pattern).name))
+    try:
+        paths = sorted(Path(pattern).parent.glob(Path(pattern).name))
+    except (OSError, ValueError) as error:
+        raise GeometryFault(f"measured={pattern!r} cannot be read: {error}") from error
     if len(paths) < MIN_FILES:
         raise GeometryFault(
             f"measured={pattern!r} names {len(paths)} files; expected at least {MIN_FILES}, one for each measured part, "
@@ -56,18 +61,10 @@ def _of_table(path: Path) -> np.ndarray:
         for number, line in enumerate(lines, start=1)
         if line.strip() and not line.lstrip().startswith("#")
     ]
-    if rows and not any(map(_is_number, rows[0][1])):  # a heading
+    if rows and not re.search("[0-9]", lines[rows[0][0] - 1]):  # a heading
         rows = rows[1:]
     for number, row in rows:
-        if len(row) != 3 or not all(map(_is_number, row)):
+        if len(row) != 3 or not all(map(NUMBER.fullmatch, row)):
             advice = "; write decimals with points" if ";" in lines[number - 1] and "," in lines[number - 1] else ""
             raise ValueError(f"line {number} is {lines[number - 1][:60]!r}; {EXPECTED}{advice}")
     return np.array([row for _, row in rows], dtype=float).reshape(-1, 3)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -13,13 +13,14 @@ from scipy.spatial.transform import Rotation
 from tolcontact.declaration import Assembly, Mesh, Part
 from tolcontact.declaration.geometry import STEP
 from tolcontact.declaration.values import Vector
-from tolcontact.errors import CONTROL_CHARACTERS, GeometryFault, ModelError, OptionError, nearest_name, shown, shown_name
+from tolcontact.errors import GeometryFault, ModelError, OptionError, nearest_name
 from tolcontact.geometry.brep_face import describe_faces, plain_vector
 from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
 from tolcontact.geometry.files import STATED_FACES, key_of, read_files
 from tolcontact.geometry.files.product import MAX_LISTED, Body, Product
 from tolcontact.readable import Readable
 from tolcontact.shape_worker import UnfinishedRead
+from tolcontact.texts import CONTROL_CHARACTERS, shown, shown_name
 
 LISTING_CHORD = 0.5  # [mm] of triangles that only show which faces exist and which of them touch
 

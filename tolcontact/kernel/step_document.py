@@ -34,6 +34,7 @@ try:
 except ModuleNotFoundError:  # release 7.9 of OCP, which CadQuery 2.8 installs
     from OCP.TDF import TDF_LabelSequence as LabelSequence
 
+CODE_PAGES = {"utf-8": "UTF8", "gb18030": "GB", "shift_jis": "SJIS", "latin-1": "iso8859-1"}  # as the kernel calls them
 NAMELESS, LABEL = ("NONE", ""), "=>["  # some systems' names of nameless faces; begins the kernel's label of a nameless shape
 
 
@@ -48,7 +49,9 @@ class BodyShape:
     face_count: int = 0
 
 
-def read(path: Path, chord: float, angle: float, *, has_face_names: bool, has_solids: bool, has_pmi: bool) -> dict[str, Any]:
+def read(
+    path: Path, chord: float, angle: float, *, encoding: str, has_face_names: bool, has_solids: bool, has_pmi: bool
+) -> dict[str, Any]:
     """Return the shapes of a STEP file, each in the frame of its product, and the bodies in their places.
 
     shapes         a dictionary for each: `triangulation`, and of each B-rep face of it the surface, None if it is not simple,
@@ -58,7 +61,7 @@ def read(path: Path, chord: float, angle: float, *, has_face_names: bool, has_so
                    place, the names of the products that contain it, and its own name
     record_count   number of records in the file, if it has PMI
     """
-    document = Document(path, has_face_names=has_face_names, has_solids=has_solids, has_pmi=has_pmi)
+    document = Document(path, encoding, has_face_names=has_face_names, has_solids=has_solids, has_pmi=has_pmi)
     indices: dict[str, list[int]] = {}  # of shapes, by the label
     shapes: list[tuple[BodyShape, dict[str, Any]]] = []
     placed: list[tuple[int, Place]] = []
@@ -115,13 +118,14 @@ class Place(NamedTuple):
 class Document:
     """A STEP file in the kernel's document. It owns all that is taken from it."""
 
-    def __init__(self, path: Path, *, has_face_names: bool, has_solids: bool, has_pmi: bool) -> None:
+    def __init__(self, path: Path, encoding: str, *, has_face_names: bool, has_solids: bool, has_pmi: bool) -> None:
         self.document = TDocStd_Document(TCollection_ExtendedString("STEP"))
         self.reader = STEPCAFControl_Reader()
         self.reader.SetNameMode(True)
         for content in ("Color", "Layer", "Props", "GDT", "Mat"):
             getattr(self.reader, f"Set{content}Mode")(False)
         Interface_Static.SetIVal_s("read.stepcaf.subshapes.name", 1)  # names of solids and faces
+        Interface_Static.SetCVal_s("read.step.codepage", CODE_PAGES[encoding])
         if self.reader.ReadFile(str(path)) != IFSelect_RetDone or not self.reader.Transfer(self.document):
             raise Refusal("cannot be read as STEP: it is cut off, damaged, or holds no shape; export it again")
         self.transfer = self.reader.Reader().WS().TransferReader()

@@ -3,6 +3,7 @@
 .. include:: ../guide/plausibility.md
 """
 
+from tolcontact.plausibility.drawing import drawing_remarks
 from tolcontact.plausibility.nominal_check import KINDS, warn_of_nominal
 
-__all__ = ["KINDS", "warn_of_nominal"]
+__all__ = ["KINDS", "drawing_remarks", "warn_of_nominal"]

@@ -1,12 +1,13 @@
 """Tolerances without the effect that they seem to have: points and locators on a face that do not follow it, unused faces."""
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from tolcontact.compilation import Program
-from tolcontact.declaration import Measure, Point
+from tolcontact.declaration import Feature, Measure, Pattern, Point
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.discretization.measured_geometry import Combined, Heights, NominalMeasurement
 from tolcontact.features import FaceDeviation, NominalFeature
@@ -69,10 +70,10 @@ def unused_features(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence on the features whose tolerances displace nothing that is measured, located or in contact."""
     nominal = draws.program.nominal
     numbers = {label: number for number, label in enumerate(nominal.contributors)}
-    columns = {
-        pattern.declared: [numbers[freedom.label] for freedom in pattern.freedoms if freedom.source in (FEATURE, FORM)]
-        for pattern in nominal.patterns
-    }
+    columns = defaultdict[Feature | Pattern, list[int]](list)
+    for pattern in nominal.patterns:
+        drawn = [freedom.label for freedom in pattern.freedoms if freedom.source in (FEATURE, FORM)]
+        columns[pattern.declared] += [numbers[label] for label in drawn]
     varied = {declared: drawn for declared, drawn in columns.items() if draws.deviations[:, drawn].std(axis=0).any()}
     used = _used_columns(draws.program) if varied else np.zeros(0)
     unused = [declared for declared, drawn in varied.items() if not used[drawn].any()]

@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Callable, Iterator
 
 from tolcontact.compilation import Program
-from tolcontact.errors import NominalWarning, shown
+from tolcontact.errors import NominalWarning
 from tolcontact.plausibility.bodies import body_overlaps, clashes, clashes_beyond_faces
 from tolcontact.plausibility.declared_points import doubtful_units, far_points, unfit_directions
 from tolcontact.plausibility.effects import unfollowed_by_locators, unfollowed_by_measures, unused_features
@@ -19,6 +19,7 @@ from tolcontact.plausibility.pairs import (
     unused_forces,
 )
 from tolcontact.plausibility.trial_draws import TrialDraws
+from tolcontact.texts import shown
 
 KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
     "units": (doubtful_units, population_units),

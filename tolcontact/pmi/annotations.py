@@ -6,8 +6,8 @@ Records are numbers of the file: #12 is 12. `face_records` are B-rep faces; `oth
 from dataclasses import dataclass
 
 from tolcontact.declaration.values import Vector
-from tolcontact.errors import shown
 from tolcontact.readable import Readable
+from tolcontact.texts import shown
 
 _SIGNS = {
     "maximum material requirement": "M", "least material requirement": "L", "reciprocity requirement": "R", "free state": "F",

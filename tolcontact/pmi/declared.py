@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tolcontact.declaration import Assembly, Mesh, Part
-from tolcontact.errors import GeometryFault, OptionError, shown
+from tolcontact.errors import GeometryFault, OptionError
 from tolcontact.features.datum_frames import Declared
 from tolcontact.geometry.brep_face import describe_faces
 from tolcontact.geometry.shapes import shape
@@ -15,6 +15,7 @@ from tolcontact.pmi.claims import NO_FACE, Annotation, Claim, DeclaredAnnotation
 from tolcontact.pmi.drafts import declare_features
 from tolcontact.pmi.reading import read_pmi
 from tolcontact.readable import Readable
+from tolcontact.texts import shown
 
 
 @dataclass(frozen=True, repr=False)

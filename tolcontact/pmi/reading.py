@@ -3,13 +3,15 @@
 import re
 from pathlib import Path
 
-from tolcontact.errors import OptionError, clipped
+from tolcontact.errors import OptionError
+from tolcontact.input_files import fault_of
 from tolcontact.pmi.annotations import Pmi
 from tolcontact.pmi.aspects import Aspects
 from tolcontact.pmi.datums import datums_of
 from tolcontact.pmi.dimensions import dimensions_of
 from tolcontact.pmi.part21 import Records
 from tolcontact.pmi.tolerances import tolerances_of
+from tolcontact.texts import clipped
 
 MAX_SIZE = 2_000_000_000  # [byte]; reading takes several times as much memory
 HEAD_SIZE = 10_000  # [byte] of a file that show its kind
@@ -47,16 +49,12 @@ def read_pmi(path: str | Path) -> Pmi:
 
 def _content(path: Path) -> bytes:
     """Return the content of a STEP file. Raises OptionError for any other file."""
+    if fault := fault_of(path, MAX_SIZE):
+        raise OptionError(f'"{path}" {fault}; {_EXPECTED}')
     try:
-        if not path.is_file():
-            raise OptionError(f'"{path}" is not a file; {_EXPECTED}')
-        size = path.stat().st_size
-        if size > MAX_SIZE:
-            raise OptionError(f'"{path}" has {size} bytes, more than the limit of {MAX_SIZE}; export a part of it')
         content = path.read_bytes()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "its name cannot be used"
-        raise OptionError(f'"{path}" cannot be opened ({reason}); {_EXPECTED}') from error
+    except OSError as error:
+        raise OptionError(f'"{path}" cannot be opened ({error.strerror}); {_EXPECTED}') from error
     head = content[:HEAD_SIZE]
     if b"ISO-10303-21" in head:
         return content

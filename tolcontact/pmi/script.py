@@ -10,10 +10,9 @@ from typing import Any
 from tolcontact.declaration import Brep, Face, Feature, Mesh, Part, Pattern, Point
 from tolcontact.declaration.feature_tolerance import GeometricTolerance
 from tolcontact.declaration.size import Size
-from tolcontact.errors import shown
 from tolcontact.pmi.annotations import Tolerance
 from tolcontact.pmi.declared import DeclaredFile
-from tolcontact.texts import literal
+from tolcontact.texts import literal, shown
 
 MAX_WIDTH = 120  # of a line that can be broken
 COMMENT: dict[str, Any] = {"initial_indent": "    # ", "subsequent_indent": "    #   "}

@@ -73,9 +73,8 @@ def _unresolved(dataset: xr.Dataset) -> int:
     return int(dataset["by_status"].values[list(terms.UNRESOLVED)].sum())
 
 
-def _ppm(values: np.ndarray, sign: str = "") -> str:
-    estimate, lower, upper = (1e6 * float(value) for value in values)
-    return f"{estimate:{sign}.0f} ppm [{lower:.0f}, {upper:.0f}]"
+def _ppm(values: np.ndarray, *, sign: bool = False) -> str:
+    return number(1e6 * np.asarray(values), sign=sign, max_decimals=0).replace(" [", " ppm [")
 
 
 def _contributions(dataset: xr.Dataset) -> AnalysisReport:
@@ -259,6 +258,8 @@ def _allocation(dataset: xr.Dataset) -> AnalysisReport:
     notes = [f"Requirements in fresh runs of {grouped(dataset.attrs['fresh'])} realizations; 95 % intervals."]
     least, most = (f"{dataset.attrs[name]:g} times" for name in ("floor", "ceiling"))
     notes.append(f"Tolerances may be {least} (smallest allowed) to {most} (largest allowed) those before.\n")
+    if choices := dataset.attrs.get("choices"):
+        notes.append(f"Choices: {choices}.\n")
     if dataset["idle"].values.any():
         count = dataset.attrs["idle_tried"]
         notes.append(
@@ -285,7 +286,7 @@ def _effects(effect: xr.DataArray) -> Table:
     rows = []
     for k in np.argsort(effect.values[0, :, 0], kind="stable"):
         spread, outside = effect.values[:, k]
-        rows.append([str(effect["group"].values[k]), number(spread, sign=True), _ppm(outside, "+")])
+        rows.append([str(effect["group"].values[k]), number(spread, sign=True), _ppm(outside, sign=True)])
     title = f"{effect['measure'].values} [{effect['measure_units'].values}]: changes if zones were a tenth narrower than before"
     return Table(title, ["", *terms.EFFECTS], rows)
 
@@ -298,7 +299,7 @@ def _relocation(dataset: xr.Dataset) -> AnalysisReport:
     for stage, point, reached in zip(terms.STAGES, dataset["point"].values, dataset["reached"].values, strict=True):
         rows.append([f"{stage}: ({', '.join(f'{c:.4g}' for c in point)})", text(reached)])
     change = dataset["change"].values
-    rows.append(["after minus before", _ppm(change, "+")] if is_share else ["after / before", number(change)])
+    rows.append(["after minus before", _ppm(change, sign=True)] if is_share else ["after / before", number(change)])
     columns = [dataset.attrs["locator"], statistic if is_share else f"{statistic} [{dataset['measure_units'].values}]"]
     samples, fresh = (grouped(dataset.attrs[word]) for word in ("samples", "fresh"))
     notes = [

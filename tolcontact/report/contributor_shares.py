@@ -8,10 +8,18 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.report.figures import grouped, percent
-from tolcontact.statistics.linear_shares import MIN_R2, LinearShares, joined_columns, linear_shares, required_realizations
+from tolcontact.report.figures import NO_INTERVAL, grouped, percent
+from tolcontact.statistics.linear_shares import (
+    MIN_R2,
+    MIN_RESIDUALS,
+    LinearShares,
+    joined_columns,
+    linear_shares,
+    required_realizations,
+)
 
 MAX_REALIZATIONS = 20_000  # for the estimate of shares; more would not change the displayed digits
+ROUNDED = 5e-5  # of the variance: less is not displayed
 MAX_CONTRIBUTORS = 1000  # above this, a regression would take too long
 
 
@@ -53,7 +61,7 @@ def contributor_shares(results: xr.DataTree, realizations: int) -> list[Contribu
 def _shown(names: list[str], shares: LinearShares | None, count: int) -> ContributorShares:
     if shares is None:
         return _without("The measurement does not vary, or is not a number.")
-    r2 = percent(np.maximum(shares.r2, 0.0))  # adjusted for the number of contributors, so it may be negative
+    r2 = percent(np.maximum(shares.r2, 0.0)).removesuffix(f" {NO_INTERVAL}")  # adjusted, so it may be negative
     if not shares.r2[0] >= MIN_R2:
         return _without(
             f"A linear model explains only {r2} of the variance with contact, so linear shares would mislead; "
@@ -64,6 +72,8 @@ def _shown(names: list[str], shares: LinearShares | None, count: int) -> Contrib
         f"Shares of the variance with contact, by linear regression on {grouped(count)} realizations, which explains {r2}; "
         "the rest is due to contact and other nonlinearities."
     )
+    if np.isnan(shares.r2[1]) and not shares.r2[0] > 1 - ROUNDED:
+        note += f" An interval of it needs {MIN_RESIDUALS} realizations, and residuals without heavy tails."
     return ContributorShares([names[k] for k in order], shares.shares[order], note)
 
 

@@ -22,6 +22,8 @@ CONVENTIONS = {  # what decides the pose of a part that contact moves
 
 def convention_lines(summary: xr.Dataset) -> Iterator[str]:
     """Yield what the objective of the run assumes, and by how much results depend on it."""
+    if standard := summary.attrs[terms.STANDARD]:
+        yield f"standard of the drawings: {standard}"
     yield f"convention: {CONVENTIONS.get(summary.attrs['objective'], summary.attrs['objective'])}"
     counts = summary["compared_by_objective"].values
     if not summary.sizes[terms.BY_OBJECTIVE] or not counts.any():

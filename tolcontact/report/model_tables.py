@@ -17,7 +17,7 @@ from tolcontact.report.table import Cell, Table
 
 Entry = dict[str, Any]
 SETTINGS = (
-    "solver", "resolution", "objective", "regularization", "active_set", "search", "method_from", "sampler", "seed",
+    "solver", "standard", "resolution", "objective", "regularization", "active_set", "search", "method_from", "sampler", "seed",
     "samples", "kept", "fields", "versions", "history", "format",
 )  # fmt: skip
 
@@ -196,4 +196,4 @@ def _triple(values: Sequence[float]) -> str:
 
 def archived_settings(results: xr.DataTree) -> dict[str, Any]:
     """Return the settings that an archive states, by the names of its attributes."""
-    return {name: results.attrs[name] for name in SETTINGS}
+    return {name: results.attrs[name] for name in SETTINGS if name != terms.STANDARD or name in results.attrs}

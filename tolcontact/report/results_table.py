@@ -172,7 +172,7 @@ def verdict_lines(summary: xr.Dataset) -> Iterator[str]:
 
 def _rounded_share(share: float) -> str:
     """Return a share in percent with two digits, never rounded to 0 or to all."""
-    return f"{100 * share:.2g} %" if share == 1 or share < 0.995 else "more than 99 %"
+    return f"{100 * share:.2g} %" if share < 0.995 else "100 %" if share == 1 else "more than 99 %"
 
 
 def has_no_verdict(summary: xr.Dataset) -> bool:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+import numpy as np
 import xarray as xr
 from rich.console import Group
 from rich.padding import Padding
@@ -15,7 +16,8 @@ from tolcontact.report.convention_text import convention_lines, offset_lines, of
 from tolcontact.report.figures import NO_INTERVAL, grouped, limits_text, number, percent, settled, share
 from tolcontact.report.results_table import full_name, overview_table, verdict_lines
 from tolcontact.report.table import Table
-from tolcontact.statistics.intervals import CONFIDENCE
+from tolcontact.statistics.capability import MIN_TAIL, MIN_TAILS
+from tolcontact.statistics.intervals import CONFIDENCE, MAX_KURTOSIS, MIN_SHAPE, MIN_VARIANCE
 from tolcontact.statistics.sample import MIN_APART
 
 RAW, CORRECTED = terms.STATES
@@ -27,11 +29,11 @@ APART = (
     "* differs from the index by percentiles by more than chance explains: the measurement is not normally distributed\n"
     "(95 % confidence for all measurements of this run together)"
 )
-WITHOUT = (
-    f"{NO_INTERVAL} no interval: std. dev., 6 sigma and variance need 10 realizations; at a stop\n"
-    f"these and the mean need {MIN_APART} values off it; skewness and kurtosis need 1000\n"
-    "realizations, and a kurtosis below 3.5"
-)
+NEEDS = {  # realizations, of statistics that have no interval
+    terms.VARIANCE: f"std. dev., 6 sigma and variance need {MIN_VARIANCE} realizations",
+    terms.SKEWNESS: f"skewness and kurtosis need {MIN_SHAPE} realizations, and a kurtosis below {MAX_KURTOSIS:g}",
+    terms.PPK: f"Pp and Ppk need {grouped(MIN_TAIL)} realizations, {grouped(MIN_TAILS)} with two limits",
+}
 
 
 def summary_text(summary: xr.Dataset) -> Group:
@@ -89,8 +91,19 @@ def measure_table(measure: xr.Dataset, measures: int) -> Table:
     subtitle = ", ".join(text for text in (quantity, limits_text(measure)) if text)
     title, rows = f"{full_name(measure)} ({units}){': ' if subtitle else ''}{subtitle}", _measure_rows(measure, measures)
     cells = [cell for row in rows for cell in row]
-    marks = {APART: any(cell.startswith("*") for cell in cells), WITHOUT: any(NO_INTERVAL in cell for cell in cells)}
-    return Table(title, ["", *terms.STATE_WORDS, "change"], rows, [note for note, is_there in marks.items() if is_there])
+    notes = [APART] if any(cell.startswith("*") for cell in cells) else []
+    return Table(title, ["", *terms.STATE_WORDS, "change"], rows, [*notes, *_needs(measure)])
+
+
+def _needs(measure: xr.Dataset) -> Iterator[str]:
+    """Yield from how many realizations on the statistics of a measurement that have no interval would have one."""
+    if required := int(measure[terms.REQUIRED].values):
+        yield f"{NO_INTERVAL} at a stop, moments need {MIN_APART} values off it: about {grouped(required)} realizations"
+    for statistic in measure["statistic"].values:
+        estimates = measure["statistic_value"].sel(statistic=statistic).transpose("interval", ...).values
+        is_told = statistic not in NEEDS or (required and statistic == terms.VARIANCE)
+        if not is_told and (np.isfinite(estimates[0]) & np.isnan(estimates[1:]).all(axis=0)).any():
+            yield f"{NO_INTERVAL} {NEEDS[statistic]}"
 
 
 def _is_apart(estimate: Sequence[float], other: Sequence[float], tests: int) -> bool:

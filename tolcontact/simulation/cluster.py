@@ -121,6 +121,7 @@ def running_cluster(address: str) -> Iterator[Any]:
                 "DASK_DISTRIBUTED__COMM__TLS__CA_FILE, ..._TLS__CLIENT__CERT and ..._TLS__CLIENT__KEY"
             )
         try:
+            distributed.comm.get_address_host_port(address)  # else a client would fail again when it is collected
             distributed.Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False).close()
             # The timeout is also how long this client waits for a lost scheduler.
             client = distributed.Client(address, timeout=WORKER_TIMEOUT, set_as_default=False)

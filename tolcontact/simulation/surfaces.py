@@ -8,8 +8,9 @@ import numpy as np
 from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import Program
-from tolcontact.errors import ContactWarning, shown
+from tolcontact.errors import ContactWarning
 from tolcontact.simulation.block import simulate_block
+from tolcontact.texts import shown
 from tolcontact.vocabulary import CORRECTED
 
 ON_PLANE_GAP = 1e-6  # mm: a contact point with a smaller gap touches its plane

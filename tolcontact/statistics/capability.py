@@ -34,7 +34,7 @@ from tolcontact.statistics.sample import Sample
 
 PERCENTS = 0.135, 50.0, 99.865
 MIN_AT_STOP = 2  # values at a limit that is a stop
-MIN_TAIL = 2730  # realizations that bound a tail of 0.135 %
+MIN_TAIL, MIN_TAILS = 2730, 3240  # realizations that bound a tail of 0.135 %; that bound both
 TRIALS = 1 << 11  # simulated triples of percentiles; an interval covers 95 % of them
 ALLOWED_SHARE = 0.0027  # share of a normal distribution beyond three standard deviations: Ppk 1 on both sides
 MEETS, FAILS, UNDECIDED, CONSTANT = "meets", "does not meet", "undecided", "does not vary"
@@ -72,17 +72,32 @@ def share_outside(x: Sample, limits: Limits, missing: int = 0) -> Estimate:
 
 
 def without_stops(x: Sample, limits: Limits) -> Limits:
-    """Return the limits without stops. At a stop no value lies beyond, and at least two values are the limit itself.
+    """Return the limits without stops. At a stop no value lies beyond, and at least two values are kept at the limit itself.
 
-    Two equal values have probability 0 unless contact keeps them there. The index of such a limit would depend on how many
-    values are there alone: it is 1, for any values in between, if these are more than 0.135 %.
+    The index of such a limit would depend on how many values are there alone: it is 1, for any values in between, if these are
+    more than 0.135 %.
     """
     settled = limits.settled(x.values)
-    if (settled == limits.lower).sum() >= MIN_AT_STOP and not limits.below(x.values).any():
+    if _are_kept(x, settled == limits.lower) and not limits.below(x.values).any():
         limits = limits._replace(lower=-math.inf)
-    if (settled == limits.upper).sum() >= MIN_AT_STOP and not limits.above(x.values).any():
+    if _are_kept(x, settled == limits.upper) and not limits.above(x.values).any():
         limits = limits._replace(upper=math.inf)
     return limits
+
+
+def _are_kept(x: Sample, equal: np.ndarray) -> bool:
+    """Return whether values that are `equal` (realization,) are kept where they are: contact moved two of them there.
+
+    Otherwise the other values decide. Two equal values have probability 0 where these are distinct; where these are repeated,
+    as those of a measured population are, equal values are no stop.
+    """
+    if equal.sum() < MIN_AT_STOP:
+        return False
+    if x.cause is not None and (np.abs(x.values - x.cause.values)[equal] > x.accuracy).sum() >= MIN_AT_STOP:
+        return True
+    others = np.sort(x.values[~equal])
+    repeats = np.diff(np.flatnonzero(np.diff(others, prepend=-math.inf, append=math.inf) > x.accuracy))
+    return not len(repeats) or bool(np.median(repeats) == 1)
 
 
 def by_percentiles(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
@@ -90,7 +105,8 @@ def by_percentiles(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
 
     The numbers of values below the three percentiles are multinomial for any distribution. Each percentile lies between the
     two order statistics next to its simulated number. The interval uses the conservative one, and leaves out 2.5 % of the
-    simulated indices on either side. The lower bound of a sample that is too small to bound a tail is 0.
+    simulated indices on either side. A sample that is too small to bound a tail has the lower bound 0, if values lie outside
+    of the limits, and no interval otherwise: any index of such a sample is possible.
     """
     if is_constant(x, limits.accuracy) or not np.isfinite(x.mean):
         return UNDEFINED, UNDEFINED
@@ -102,16 +118,19 @@ def by_percentiles(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
         worst, best = _pp(lows[0], highs[2], limits), _pp(highs[0], lows[2], limits)
         pp = _with_interval(_pp(low, high, limits), worst, [best])
     if not limits.are_open:
-        # Sides that are equally near must not bias their minimum: its upper bound is the least of all upper bounds. A small
-        # sample may have missed that one limit is a stop; then only the other side counts.
-        may_be_stops = x.count < MIN_TAIL and not limits.outside(x.values).any()
+        # Sides that are equally near must not bias their minimum: its upper bound is the least of all upper bounds.
         worst = np.stack([_sides(lows[0], middle, highs[2], limits) for middle in (lows[1], highs[1])])
         best = np.stack([_sides(highs[0], middle, lows[2], limits) for middle in (lows[1], highs[1])])
-        worst_of_all = np.fmin.reduce(worst, axis=(0, 1))
         best_sides = list(np.fmax.reduce(best, axis=0))
-        best_of_all = [np.fmax.reduce(best_sides)] if may_be_stops else best_sides
-        ppk = _with_interval(np.min(_sides(low, median, high, limits)), worst_of_all, best_of_all)
-    return pp, ppk
+        ppk = _with_interval(np.min(_sides(low, median, high, limits)), np.fmin.reduce(worst, axis=(0, 1)), best_sides)
+    if limits.outside(x.values).any():
+        return pp, ppk
+    return _bounded(pp), _bounded(ppk)
+
+
+def _bounded(index: Estimate) -> Estimate:
+    """Return an index, without its interval if the lower bound says nothing."""
+    return index if index.lower > 0 else Estimate(index.value, math.nan, math.nan)
 
 
 def as_normal(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:

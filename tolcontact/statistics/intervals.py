@@ -15,7 +15,8 @@ from scipy import special
 from tolcontact.statistics.sample import Sample
 
 CONFIDENCE = 0.95
-MIN_VARIANCE, MAX_SMALL = 10, 1000  # realizations: variances of fewer have no interval; below the second, the wider of two
+MIN_VARIANCE, MAX_SMALL = 10, 1000  # realizations: variances of fewer have no interval; below the second, one by influences
+MIN_RATIO = 50  # realizations: ratios of variances of fewer have no interval
 MIN_SHAPE, MAX_KURTOSIS = 1000, 3.5  # realizations, and their kurtosis: otherwise skewness and kurtosis have no interval
 MIN_SKEW = 1e-6
 
@@ -55,18 +56,31 @@ def student(freedom: float) -> float:
     return float(special.stdtrit(freedom, _UPPER))
 
 
-def from_influence(estimate: float, squares: float, count: int, fourths: float | None = None) -> Estimate:
-    """Return an estimate whose influence function over `count` realizations has the sum of squares `squares`.
+def from_influences(estimate: float, influences: np.ndarray) -> Estimate:
+    """Return an estimate whose influence function has the value `influences` (realization,) for each realization.
 
-    The influence of a realization is its contribution to the estimate times `count`. See Serfling, Approximation Theorems of
-    Mathematical Statistics (1980), chapter 6. The sum of their fourth powers, `fourths`, gives the effective degrees of freedom
-    of Student's t: there are fewer if the spread comes from few realizations.
+    The influence of a realization is its contribution to the estimate times their number; their sum is 0. See Serfling,
+    Approximation Theorems of Mathematical Statistics (1980), chapter 6.
     """
-    freedom = count - 1.0
-    if fourths is not None and squares > 0:
-        freedom = min(max(2 * count / max(count * fourths / squares**2 - 1, 1e-12), 1.0), freedom)
-    half = student(freedom) * math.sqrt(squares / count / (count - 1))
-    return Estimate(float(estimate), float(estimate - half), float(estimate + half))
+    squares = influences**2
+    return _from_sums(
+        estimate, len(squares), float(squares.sum()), float((squares * influences).sum()), float((squares**2).sum())
+    )
+
+
+def _from_sums(estimate: float, count: int, squares: float, cubes: float, fourths: float) -> Estimate:
+    """Return an estimate whose influence function over `count` realizations has sums of powers.
+
+    The fourth powers give the effective degrees of freedom of Student's t: there are fewer if the spread comes from few
+    realizations. The interval contains that of Hall's transformation, which accounts for skewed influences.
+    """
+    if not squares > 0:
+        return Estimate(float(estimate), float(estimate), float(estimate))
+    freedom = min(max(2 * count / max(count * fourths / squares**2 - 1, 1e-12), 1.0), count - 1.0)
+    deviation, t, skew = math.sqrt(squares / (count - 1)), student(freedom), cubes / squares**1.5 * math.sqrt(count)
+    half = t * deviation / math.sqrt(count)
+    below, above = (deviation * _back(sign * t, skew, count) for sign in (1, -1))
+    return Estimate(float(estimate), float(estimate - max(half, below)), float(estimate + max(half, -above)))
 
 
 def from_standardized_influence(x: Sample, estimate: float, influence: Sequence[float]) -> Estimate:
@@ -77,12 +91,12 @@ def from_standardized_influence(x: Sample, estimate: float, influence: Sequence[
     if x.count < MIN_VARIANCE or not x.determines_moments:
         return Estimate(float(estimate), math.nan, math.nan)
     scale, square = np.sqrt(x.moments[0]), np.convolve(influence, influence)
-    squares, fourths = (  # sums over the standardized values, without rounding below 0
-        max(float(polynomial @ x.standardized_moments[: len(polynomial)] * x.count), 0.0)
-        for polynomial in (square, np.convolve(square, square))
+    squares, cubes, fourths = (  # sums over the standardized values
+        float(polynomial @ x.standardized_moments[: len(polynomial)] * x.count)
+        for polynomial in (square, np.convolve(square, influence), np.convolve(square, square))
     )
     widening = x.map(lambda values: np.polyval(influence[::-1], (values - x.mean) / scale)).widening
-    return from_influence(estimate, squares * widening**2, x.count, fourths * widening**4)
+    return _from_sums(estimate, x.count, squares * widening**2, cubes * widening**3, fourths * widening**4)
 
 
 def is_shape_known(x: Sample) -> bool:
@@ -115,24 +129,23 @@ def kurtosis(x: np.ndarray | Sample) -> Estimate:
 def variance(x: np.ndarray | Sample) -> Estimate:
     """Return the variance with the interval of Hall's transformation (1992), which accounts for the skewness of squares.
 
-    Small samples use Bonett's interval if it is wider (see variance_from_moments); the smallest have none, and so have samples
-    with too few values apart from a stop.
+    Small samples use the influences on the logarithm of the variance; the smallest have no interval, and so have samples with
+    too few values apart from a stop.
     """
     x = Sample.of(x)
-    estimate, *bonett = (float(value) for value in variance_from_moments(x.count, *x.moments))
+    estimate = x.moments[0] * x.count / (x.count - 1)
     if x.count < MIN_VARIANCE or not x.determines_moments:
         return Estimate(estimate, math.nan, math.nan)
     if not estimate > 0:
-        return Estimate(estimate, *bonett)
+        return Estimate(estimate, estimate, estimate)
+    if x.count < MAX_SMALL:
+        return Estimate(*(estimate * math.exp(change) for change in from_standardized_influence(x, 0.0, [-1, 0, 1])))
     kurt, sixth = x.standardized_moments[[4, 6]].tolist()
     deviation = math.sqrt(max(kurt - 1, 0.0))  # of squares, relative to their mean
     skew = (sixth - 3 * kurt + 2) / deviation**3 if deviation > 0 else 0.0
     widening = x.map(lambda values: (values - x.mean) ** 2).widening
     lower, upper = (1 - deviation * _back(sign * _Z * widening, skew, x.count) for sign in (1, -1))
-    lower, upper = estimate * max(lower, 0.0), estimate * upper
-    if x.count < MAX_SMALL:
-        lower, upper = min(lower, bonett[0]), max(upper, bonett[1])
-    return Estimate(estimate, min(lower, estimate), max(upper, estimate))
+    return Estimate(estimate, estimate * min(max(lower, 0.0), 1.0), estimate * max(upper, 1.0))
 
 
 def _back(z: float, skew: float, count: int) -> float:
@@ -204,13 +217,13 @@ def variance_ratio(sample: np.ndarray | Sample, baseline: np.ndarray | Sample) -
         ),
         sample.replicate,
     )
-    squares, fourths = float((influence.values**2).sum()), float((influence.values**4).sum())
     ratio, n = variance_sample / variance_baseline, sample.count
-    if n < MIN_VARIANCE or not (sample.determines_moments and baseline.determines_moments):
+    if n < MIN_RATIO or not (sample.determines_moments and baseline.determines_moments):
         return Estimate(ratio, math.nan, math.nan)
+    squares, cubes, fourths = (float((influence.values**k).sum()) for k in (2, 3, 4))
     # The correction for small samples is Bonett's for one variance.
-    half = from_influence(0.0, squares + 3, n, fourths).upper * influence.widening
-    return Estimate(ratio, ratio * math.exp(-half), ratio * math.exp(half))
+    _, lower, upper = _from_sums(0.0, n, squares + 3, cubes, fourths)
+    return Estimate(ratio, ratio * math.exp(lower * influence.widening), ratio * math.exp(upper * influence.widening))
 
 
 def variance_from_moments(count: int, moment2: ArrayLike, moment4: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

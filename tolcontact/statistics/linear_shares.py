@@ -6,9 +6,15 @@ With deviations x (standardized), a measurement y and least squares y = b0 + b.x
 
 For independent groups S_g is the share of variance that the group explains linearly. Least squares on n realizations with p
 contributors explain (1 - R^2) p / (n - 1 - p) of the variance by chance; each share is corrected for this overfitting.
-Nonlinear effects of contact are in 1 - R^2, and in no share. Intervals use the delete-one-block jackknife with Student's t.
+Nonlinear effects of contact are in 1 - R^2, and in no share. With C the covariance of x, a realization changes S_g by 1 / n of
+
+    (b_g.x_g y + cov(x_g, y).(C^-1 x)_g e - S_g y^2) / var(y),     e without the share that a realization has in its own fit.
+
+The interval of a share is that of the mean of these influences or, if wider, the same on the logit scale: a share lies
+between 0 and 1. The residuals of few realizations, or those with heavy tails, do not tell how much no line explains.
 """
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -16,9 +22,12 @@ import numpy as np
 import scipy
 
 from tolcontact.statistics import intervals
+from tolcontact.statistics.intervals import Estimate
 
-BLOCKS = 20  # of the jackknife
-ROWS_PER_CONTRIBUTOR = 5  # fewer realizations give no shares
+MIN_ROWS, ROWS_PER_CONTRIBUTOR = 200, 5  # fewer realizations give no shares
+MIN_RESIDUALS, MAX_KURTOSIS = 1000, 10.0  # realizations, and the kurtosis of their residuals: otherwise R^2 has no interval
+MAX_LEVERAGE = 0.9  # of a realization in its own fit
+MIN_SHARE, MAX_LOGIT = 1e-6, 50.0  # of the logit scale
 MIN_R2 = 0.5  # below this, linear shares do not describe a measurement
 
 
@@ -31,7 +40,7 @@ class LinearShares(NamedTuple):
 
 def required_realizations(contributors: int) -> int:
     """Return the smallest number of realizations for an estimate of shares."""
-    return max(ROWS_PER_CONTRIBUTOR * (contributors + 1), 10 * BLOCKS)
+    return max(ROWS_PER_CONTRIBUTOR * (contributors + 1), MIN_ROWS)
 
 
 def joined_columns(
@@ -63,34 +72,39 @@ def linear_shares(x: np.ndarray, y: np.ndarray, groups: Sequence[np.ndarray]) ->
     if n < required_realizations(count):
         raise ValueError(f"{n} realizations of {count} contributors; expected at least {required_realizations(count)}")
     x = (x - x.mean(axis=0)) / x.std(axis=0)
-    is_sound = np.isfinite(y).all(axis=0)
-    y = np.where(is_sound, y, 0.0)
-    y = y - y.mean(axis=0)
-    scale = np.abs(y).max(axis=0)
-    varies = is_sound & (scale > 0)
-    y = y / np.where(varies, scale, 1.0)
-    # Sums of products of 1, x and y over each block, (block, 1 + contributor + measure, 1 + contributor + measure).
-    moments = np.array([z.T @ z for z in np.array_split(np.column_stack([np.ones(n), x, y]), BLOCKS)])
-    total = moments.sum(axis=0)
-    membership = np.zeros((len(groups), count))
-    for k, group in enumerate(groups):
-        membership[k, group] = 1
-    estimates = _shares(total, count, membership)
-    replicates = np.array([_shares(total - block, count, membership) for block in moments])
-    half = intervals.student(BLOCKS - 1) * np.sqrt((BLOCKS - 1) * replicates.var(axis=0))
-    values = np.stack([estimates, estimates - half, estimates + half], axis=-1)
-    return [LinearShares(values[k, :-1], values[k, -1]) if varies[k] else None for k in range(y.shape[1])]
+    inverse = np.linalg.pinv(x.T @ x / n, rcond=1e-10, hermitian=True)
+    normalized = x @ inverse
+    independent = 1 - np.minimum((normalized * x).sum(axis=1) / n + 1 / n, MAX_LEVERAGE)
+    # The members of each group, and of all of them.
+    members = [*groups, np.arange(count)]
+    columns, rows = np.concatenate(members), np.repeat(np.arange(len(members)), [len(group) for group in members])
+    membership = scipy.sparse.csr_array((np.ones(len(columns)), (rows, columns)), shape=(len(members), count))
+    sizes = membership.sum(axis=1)
+    shares: list[LinearShares | None] = []
+    for values in y.T:
+        centred = values - values.mean()
+        if not (np.isfinite(values).all() and (scale := np.abs(centred).max()) > 0):
+            shares.append(None)
+            continue
+        centred = centred / scale
+        with_y, variance = x.T @ centred / n, (centred**2).mean()
+        slopes = inverse @ with_y
+        residuals = centred - x @ slopes
+        explained = membership @ (slopes * with_y) / variance
+        estimates = explained - sizes * (1 - explained[-1]) / (n - 1 - count)
+        fitted, through_slopes = (membership @ (matrix * row).T for matrix, row in ((x, slopes), (normalized, with_y)))
+        influences = (fitted * centred + through_slopes * residuals / independent - estimates[:, None] * centred**2) / variance
+        found = [_with_interval(*pair) for pair in zip(estimates, influences, strict=True)]
+        if n < MIN_RESIDUALS or not n * (residuals**4).sum() < MAX_KURTOSIS * (residuals**2).sum() ** 2:
+            found[-1] = Estimate(found[-1].value, math.nan, math.nan)
+        shares.append(LinearShares(np.array(found[:-1]).reshape(-1, 3), np.array(found[-1])))
+    return shares
 
 
-def _shares(moments: np.ndarray, count: int, membership: np.ndarray) -> np.ndarray:
-    """Return shares (measure, group + 1) from moments; the last one is R^2 of each measure."""
-    n = moments[0, 0]
-    means = moments[0, 1:] / n
-    covariance = moments[1:, 1:] / n - np.outer(means, means)
-    of_x, with_y, of_y = covariance[:count, :count], covariance[:count, count:], covariance[count:, count:].diagonal()
-    slopes = np.linalg.lstsq(of_x, with_y, rcond=1e-10)[0]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        explained = (slopes * with_y / of_y).T  # (measure, contributor)
-        by_chance = (1 - explained.sum(axis=1, keepdims=True)) / (n - 1 - count)
-    adjusted = explained - by_chance
-    return np.column_stack([adjusted @ membership.T, adjusted.sum(axis=1)])
+def _with_interval(share: float, influences: np.ndarray) -> Estimate:
+    """Return a share, with the interval that the influences of realizations (n,) give it."""
+    _, lower, upper = intervals.from_influences(0.0, influences - influences.mean())
+    inner = min(max(share, MIN_SHARE), 1 - MIN_SHARE)
+    steps = np.clip(np.array([lower, upper]) / (inner * (1 - inner)), -MAX_LOGIT, MAX_LOGIT)
+    least, most = scipy.special.expit(scipy.special.logit(inner) + steps)
+    return Estimate(float(share), float(min(share + lower, least)), float(max(min(share + upper, 1.0), most, share)))

@@ -125,8 +125,9 @@ def measure_estimates(rows: xr.Dataset) -> tuple[np.ndarray, np.ndarray, dict[st
     notes       MEASURE_STOPS (measure,)               the sides, "lower" or "upper" or both, at which corrected values stop
                                                        (see without_stops)
                 NOT_A_NUMBER (measure,)                number of corrected values that are not a number
+                REQUIRED (measure,)                    number of realizations that moments need, where a stop leaves too few
     """
-    statistics, changes, stops, undefined, (existing,) = [], [], [], [], assembled(rows)
+    statistics, changes, stops, undefined, required, (existing,) = [], [], [], [], [], assembled(rows)
     for number, limits_of_measure in enumerate(limits(rows)):
         raw, corrected = (MeasuredValues(rows, number, state, limits_of_measure) for state in terms.STATES)
         statistics.append([[x.estimate(statistic) for statistic in STATISTICS] for x in (raw, corrected)])
@@ -134,7 +135,9 @@ def measure_estimates(rows: xr.Dataset) -> tuple[np.ndarray, np.ndarray, dict[st
         changes.append(changes_of(before, corrected.sample))
         stops.append(_stops(corrected))
         undefined.append(int((~np.isfinite(corrected.sample.values)).sum()))
-    notes = {terms.MEASURE_STOPS: np.array(stops, dtype=object), terms.NOT_A_NUMBER: np.array(undefined, dtype=np.int64)}
+        required.append(max(x.sample.required if x.sample.count else 0 for x in (raw, corrected)))
+    counts = {terms.NOT_A_NUMBER: undefined, terms.REQUIRED: required}
+    notes = {terms.MEASURE_STOPS: np.array(stops, dtype=object), **{k: np.array(v, dtype=np.int64) for k, v in counts.items()}}
     return np.array(statistics), np.array(changes), notes
 
 

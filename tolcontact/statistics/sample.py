@@ -87,11 +87,26 @@ class Sample:
         """
         if not np.isfinite(self.mean):
             return True
-        median = np.partition(self.values, self.count // 2)[self.count // 2]
-        at_stop = int((np.abs(self.values - median) <= self.accuracy).sum())
-        if at_stop == self.count:
+        if self._apart == 0:
             return self.cause is not None and self.cause.moments[0] <= max(ROUNDING * self.cause.mean**2, self.accuracy**2)
-        return at_stop <= 1 or self.count - at_stop >= MIN_APART
+        return self._apart >= min(MIN_APART, self.count - 1)
+
+    @property
+    def required(self) -> int:
+        """The number of realizations from which a moment would have an interval; 0 if it has one.
+
+        If no value is apart from a stop, their share is at most 1 - 0.025^(1 / n), and the number a least one.
+        """
+        if self.determines_moments:
+            return 0
+        share = self._apart / self.count or -np.expm1(np.log(0.025) / self.count)
+        return int(np.ceil(MIN_APART / share))
+
+    @cached_property
+    def _apart(self) -> int:
+        """The number of values that differ from the median."""
+        median = np.partition(self.values, self.count // 2)[self.count // 2]
+        return int((np.abs(self.values - median) > self.accuracy).sum())
 
     @cached_property
     def count(self) -> int:

@@ -25,7 +25,7 @@ import math
 
 import numpy as np
 
-from tolcontact.statistics.intervals import UNDEFINED, Estimate, from_influence
+from tolcontact.statistics.intervals import UNDEFINED, Estimate, from_influences
 
 MIN_EFFECTIVE = 100  # effective number of realizations behind the variance: with fewer, an index has no interval
 CONSTANT = 1e-24  # of the square of the mean: a smaller variance is rounding
@@ -69,5 +69,4 @@ def ratio(u: np.ndarray, v: np.ndarray) -> Estimate:
     estimate = float(u.mean() / mean_v)
     if not v.sum() ** 2 >= MIN_EFFECTIVE * (v**2).sum():
         return Estimate(estimate, math.nan, math.nan)
-    squares = ((u - estimate * v) / mean_v) ** 2
-    return from_influence(estimate, float(squares.sum()), len(u), float((squares**2).sum()))
+    return from_influences(estimate, (u - estimate * v) / mean_v)

@@ -110,6 +110,7 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
             "smallest_range": smallest,
             terms.INTERFERENCE_DEPTH: float(results.attrs.get(terms.INTERFERENCE_DEPTH, np.nan)),
             terms.NOT_WATCHED: str(results.attrs.get(terms.NOT_WATCHED, "")),
+            terms.STANDARD: str(results.attrs.get(terms.STANDARD, "")),
             terms.STORED_COORDINATES: str(results.attrs.get(terms.STORED_COORDINATES, "")),
         },
     )

@@ -14,7 +14,7 @@ from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
 from tolcontact.features.datum_frames import Shifts
 from tolcontact.variation.plans import STREAM, Numbers, Plan
-from tolcontact.variation.spreads import fill_zones
+from tolcontact.variation.spreads import envelopes, fill_zones
 from tolcontact.vocabulary import MONTE_CARLO
 
 MIN_UNIFORM = 1e-16  # smallest distance of a number from 0 and 1
@@ -26,6 +26,7 @@ class Draws:
 
     contributors  the freedoms of the model with their spreads, in the order of the columns of deviations
     zones         that components of features fill
+    envelopes     of perfect form at maximum material, in which forms stay
     mean_widths   [mm] of the minimum zones of forms, by feature
     shifts        of datum planes, which follow from other deviations
     correlated    for each correlation its labels, and the lower factor of its matrix (Cholesky)
@@ -34,6 +35,7 @@ class Draws:
 
     def __init__(self, nominal: Nominal) -> None:
         self.contributors, self.zones, self.mean_widths = fill_zones(nominal)
+        self.envelopes = envelopes(nominal)
         self.shifts = [shift for pattern in nominal.patterns for shift in pattern.shifts]
         self._assembly = assembly = nominal.assembly
         self._column = {contributor.label: k for k, contributor in enumerate(self.contributors)}
@@ -123,10 +125,14 @@ class Draws:
         """Add shared causes to sizes, scale components by the bonus of their sizes, and add shared causes to the rest."""
         measured = [column for columns, _ in self.populations for column in columns]
         sizes = {int(size) for zone in self.zones if zone.sizes is not None for size in zone.sizes}
+        sizes |= {envelope.size for envelope in self.envelopes}
         self._add_causes(deviations, lambda column: column in sizes)
         for zone in (zone for zone in self.zones if zone.sizes is not None):
             columns = np.setdiff1d(zone.added, measured)  # measured parts have used their bonus
             deviations[:, columns] *= zone.scale(deviations)[:, None]
+        for envelope in self.envelopes:
+            columns = np.setdiff1d(envelope.columns, measured)
+            deviations[:, columns] *= envelope.scale(deviations)[:, None]
         self._add_causes(deviations, lambda column: column not in sizes)
 
     @property
@@ -144,6 +150,7 @@ class Draws:
         sets += [list(map(int, columns)) for columns, _ in self.populations]
         together = [[*shift.columns, *map(int, shift.sources)] for shift in self.shifts]
         together += [sorted({*map(int, zone.sizes), *map(int, zone.added)}) for zone in self.zones if zone.sizes is not None]
+        together += [[envelope.size, *map(int, envelope.columns)] for envelope in self.envelopes]
         # What follows from others by more than a sum also follows from the causes that drive them.
         followed = {column for columns in together for column in columns}
         of_causes = [

@@ -20,6 +20,7 @@ from tolcontact.variation import zones
 from tolcontact.variation.zones import SHARE, FormedZone, MemberZone, chi_share, directions
 
 DIRECTIONS = 1 << 12
+ENVELOPED, TINY = 1024, 1e-300  # realizations whose heights are computed at once; mm
 FACES = 500  # that are drawn for the mean width of measured ones
 MIN_SPREAD, MAX_SPREAD = 1e-6, 1e3  # of the width
 INNER_SHARE_TOLERANCE = 1e-3  # share of features that narrower tolerances may leave outside of a wider one, beyond 0.27 %
@@ -101,6 +102,51 @@ class ComponentZone:
         sizes = deviations[:, np.unique(self.sizes)]
         bonus = np.maximum(self.growth * (sizes - self.limit), 0.0)
         return np.asarray((self.width + bonus.min(axis=1)) / self.drawn_width)
+
+
+@dataclass(frozen=True, eq=False)
+class Envelope:
+    """The envelope of perfect form at maximum material of a feature of size (ISO 8015; ASME Y14.5, Rule #1).
+
+    A form that would leave it is scaled until it touches the envelope about the feature's own axis or centre.
+
+    columns  of the deviations: the coefficients of the form
+    heights  (mode, place) [mm] of the form outside the material, for coefficients of 1
+    size     column of the size
+    limit    its deviation [mm] at maximum material
+    growth   1.0 if larger sizes have less material (a hole), else -1.0
+    """
+
+    columns: np.ndarray
+    heights: np.ndarray
+    size: int
+    limit: float
+    growth: float
+
+    def scale(self, deviations: np.ndarray) -> np.ndarray:
+        """Return the factor (n,), 0 to 1, of the form for deviations (n, contributor)."""
+        highest = np.zeros(len(deviations))
+        for start in range(0, len(deviations), ENVELOPED):
+            rows = slice(start, start + ENVELOPED)
+            heights = np.einsum("nm,mp->np", deviations[rows, self.columns], self.heights)
+            highest[rows] = heights.max(axis=1)
+        room = np.maximum(self.growth * (deviations[:, self.size] - self.limit), 0.0) / 2
+        return np.minimum(room / np.maximum(highest, TINY), 1.0)
+
+
+def envelopes(nominal: Nominal) -> list[Envelope]:
+    """Return the envelopes of features whose form is drawn and has to stay inside."""
+    found = []
+    for pattern in (pattern for pattern in nominal.patterns if pattern.declared.is_enveloped):
+        size = pattern.declared.size
+        for member in pattern.members:
+            if member.form is None or size is None or member.size_column is None:
+                continue
+            is_inner = isinstance(member.geometry, FeatureOfSize) and member.geometry.is_inner
+            limit, growth = (size.lower, 1.0) if is_inner else (size.upper, -1.0)
+            columns = np.array(member.form_columns)
+            found.append(Envelope(columns, member.form.place_heights, member.size_column, limit, growth))
+    return found
 
 
 def fill_zones(nominal: Nominal) -> tuple[list[Freedom], list[ComponentZone], dict[str, float]]:

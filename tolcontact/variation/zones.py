@@ -7,7 +7,6 @@ quasi-random sequence of directions gives it to some 1e-5, without draws of feat
 """
 
 import functools
-import hashlib
 import pickle
 from collections import Counter
 from collections.abc import Sequence
@@ -129,17 +128,15 @@ def equal_spread(members: Sequence[MemberZone], inner_spreads: np.ndarray, count
     The components of `members` are those with `inner_spreads` (component,), which are standard deviations, and then these.
     Features with the same zones, as holes of one size have, have the same spread: it is computed once.
     """
-    contents = [[type(member), *(getattr(member, field.name) for field in fields(member))] for member in members]
-    key = hashlib.blake2b(pickle.dumps((contents, inner_spreads, count, width))).digest()
-    if key not in _known_spreads:
-        _known_spreads[key] = _equal_spread(members, inner_spreads, count, width)
-    return _known_spreads[key]
+    contents = [(type(member), [getattr(member, field.name) for field in fields(member)]) for member in members]
+    return _equal_spread(pickle.dumps((contents, inner_spreads, count, width)))
 
 
-_known_spreads: dict[bytes, float] = {}
+@functools.lru_cache(maxsize=256)
+def _equal_spread(zones: bytes) -> float:
+    contents, inner_spreads, count, width = pickle.loads(zones)
+    members = [kind(*values) for kind, values in contents]
 
-
-def _equal_spread(members: Sequence[MemberZone], inner_spreads: np.ndarray, count: int, width: float) -> float:
     def excess(spread: float) -> float:
         return share_inside(members, np.concatenate([inner_spreads, np.full(count, spread)]), width) - SHARE
 

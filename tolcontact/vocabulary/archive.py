@@ -73,7 +73,8 @@ ROTATION = variable(
 )
 GAP_MIN = variable(
     "f8 gap_min(realization, state, pair)",
-    "smallest gap of all contact points of a pair, larger by coordinate_error if there is one; negative: penetration",
+    "smallest gap of all contact points of a pair, larger by coordinate_error if there is one; negative: penetration; "
+    "infinite: the faces are opposite each other nowhere",
     "mm",
 )
 ACTIVE = variable("i4 active(realization, pair)", "number of active contact points in the raw state", "1")

@@ -28,6 +28,7 @@ MONTE_CARLO, LATIN_HYPERCUBE, SOBOL = PLANS = get_args(Plan)
 REPLICATE = 256  # realizations that the last two draw together, independent of all others
 # Attributes of archives and summaries: the largest depth [mm] in the test for interference, and what is not tested.
 INTERFERENCE_DEPTH, NOT_WATCHED = "interference_depth", "not_watched"
+STANDARD = "standard"  # attribute of archives and summaries: of the drawings, if a model states it
 METHOD_ATTRIBUTES = ("resolution", "objective", "active_set")  # of archives, summaries and analyses
 Kept = Literal["measures", "poses", "all"]
 KEPT = get_args(Kept)

@@ -13,6 +13,7 @@ from tolcontact.discretization import discretize
 from tolcontact.errors import ArchiveError, ModelError, OptionError, TolcontactError
 from tolcontact.method import Method, Solver
 from tolcontact.plausibility import warn_of_nominal
+from tolcontact.replacing import check_identities
 
 DEFAULT_SOLVER: Solver = "qpoases"
 COUNTS = {  # smallest and largest
@@ -56,8 +57,12 @@ def write_model(model: Model, path: str | Path) -> None:
 
     Shapes are stated as file names, relative to the folder of `path` if they are in it. Faces that a function selects become
     triangles, and functions of poses become the steps of their expressions.
-    Raises ModelError for a model with faults, and ScriptError for a mesh that is not a file.
+    A JSON model of that name is replaced; other files, and the model itself, are not.
+    Raises ModelError for a model with faults, ScriptError for a mesh that is not a file, and OptionError for another `path`.
     """
+    check_identities([model], {"JSON model": Path(path)})
+    if Path(path).suffix.lower() != ".json":
+        raise OptionError(f'"{path}" is not the name of a JSON model; expected one that ends in .json')
     assembly = assembly_of(model)
     program = build(assembly)
     write_json(assembly, Path(path), program.nominal.triangles, program.tapes)

@@ -15,6 +15,7 @@ from tolcontact.archive import ArchiveWriter, Run, locked_archive, open_archive,
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError, check_choice
 from tolcontact.method import Solver
+from tolcontact.replacing import check_identities
 from tolcontact.simulation import block_rows, other_objectives
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses, warn_of
@@ -191,6 +192,7 @@ def write_run(
     check_counts(samples=settings.samples, seed=settings.seed, surfaces=settings.surfaces)
     _check_choices(settings)
     check_program(model, solver, method)
+    check_identities([] if resume else [model], {"archive": out})
     target = None if until is None else Target.of(until)
     with locked_archive(out, overwrite=overwrite, resume=resume) as path:
         program = program_of(model, solver, method)

@@ -1,15 +1,18 @@
 """Take away from this Python, on Linux, what Windows does not have. It is imported at the start of every process.
 
 Libraries keep what their parts for Linux need: `fcntl`, `os.uname`, `os.getuid`, `os.O_NONBLOCK`. An open file can neither be
-replaced nor removed under its name, as on Windows; only files of this process count.
+replaced nor removed under its name, as on Windows; only files of this process count. No path has more than 259 letters, and the
+netCDF library opens ASCII paths only. Short names are links in the folder `SHORT_NAMES`; without it, drives have none.
 """
 
 import asyncio  # noqa: F401  (its parts for Linux, and those of psutil, need what is taken away below)
 import builtins
+import ctypes
 import os
 import signal
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import psutil  # noqa: F401
 
@@ -28,13 +31,39 @@ for name in ("resource", "grp", "pwd", "termios", "pty", "tty"):
 os.supports_fd.discard(os.utime)
 os.process_cpu_count = os.cpu_count  # from Python 3.13 on, where no process can be kept to some processors
 
-import_, replace, unlink = builtins.__import__, os.replace, os.unlink
+import_, replace, unlink, stat = builtins.__import__, os.replace, os.unlink, os.stat
 
 
 def imported(name, variables=None, *arguments, **options):
     if name == "fcntl" and (variables or {}).get("__name__", "").startswith("tolcontact"):
         raise ImportError(name)
-    return import_(name, variables, *arguments, **options)
+    module = import_(name, variables, *arguments, **options)
+    if name == "netCDF4" and module.Dataset.__module__ != __name__:
+        module.Dataset = type("Dataset", (module.Dataset,), {"__module__": __name__, "__new__": new_dataset})
+    return module
+
+
+def new_dataset(kind, path, *arguments, **options):
+    if not str(path).isascii():
+        raise PermissionError(13, "Permission denied", str(path))
+    return kind.__base__.__new__(kind)
+
+
+def short_path(path, buffer, size):
+    """Give the short name of a path."""
+    folder = os.environ.get("SHORT_NAMES")
+    link = Path(folder or "", f"{abs(hash(path))}~1")
+    if folder and not link.is_symlink():
+        link.symlink_to(path.removeprefix("\\\\?\\"))
+    buffer.value = str(link) if folder else path
+
+
+def status(path, **options):
+    if isinstance(path, str | os.PathLike) and len(os.fspath(path)) > 259:
+        error = FileNotFoundError(2, "The system cannot find the path specified", str(path))
+        error.winerror = 3
+        raise error
+    return stat(path, **options)
 
 
 def refuse_open(*paths):
@@ -57,4 +86,5 @@ def unlinked(path, **options):
     unlink(path, **options)
 
 
-builtins.__import__, os.replace, os.unlink, os.remove = imported, replaced, unlinked, unlinked
+ctypes.windll = SimpleNamespace(kernel32=SimpleNamespace(GetShortPathNameW=short_path))
+builtins.__import__, os.replace, os.unlink, os.remove, os.stat = imported, replaced, unlinked, unlinked, status

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from tolcontact.errors import GeometryFault, clipped, nearest_name
+from tolcontact.errors import GeometryFault, nearest_name
 from tolcontact.geometry.files.step_shapes import StepShape, rounded, step_shape
 from tolcontact.geometry.files.step_text import StepText
+from tolcontact.texts import clipped
 
 STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # largest distance [mm] and angle [rad] between triangles and true faces of a STEP file
 STEP_SHARE = 5e-6  # the chord of files larger than 0.4 m, as a share of their extent

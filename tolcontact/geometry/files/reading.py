@@ -12,7 +12,7 @@ import trimesh
 
 from tolcontact.declaration import Geometry, Mesh
 from tolcontact.declaration.geometry import UNITS
-from tolcontact.errors import GeometryFault, clipped
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.files import screening
 from tolcontact.geometry.files.product import (
     BREP,
@@ -27,6 +27,7 @@ from tolcontact.geometry.files.product import (
 from tolcontact.geometry.files.step_text import SOLIDS, USAGES, StepText
 from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING, rim
 from tolcontact.shape_worker import Job, UnfinishedRead, Worker, taken
+from tolcontact.texts import clipped
 
 MAX_ANGLE = 0.5  # [rad] between triangles of round faces
 COARSENINGS = (1, 30)  # times the usual chord, tried one after the other
@@ -142,6 +143,7 @@ def _job(path: Path, chord: float | None, text: StepText | None, coarsening: flo
         seconds=limits.seconds + limits.seconds_per_mb * path.stat().st_size / 1e6,
         memory=limits.memory,
         triangles=limits.triangles,
+        encoding="utf-8" if text is None else text.encoding,
         has_face_names=text is not None and text.has_face_names,
         has_solids=text is not None and text.has_any(SOLIDS),
         has_pmi=text is not None and text.has_any(USAGES),

@@ -4,8 +4,9 @@ import re
 from pathlib import Path
 
 from tolcontact.declaration.geometry import STEP
-from tolcontact.errors import GeometryFault, clipped
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.files.step_text import StepText
+from tolcontact.texts import clipped
 
 MESH_SUFFIXES = (".stl", ".obj", ".ply", ".glb", ".gltf")
 HEAD_SIZE = 10_000  # [byte] at the beginning of a file, which show its kind

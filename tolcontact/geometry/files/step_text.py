@@ -22,6 +22,14 @@ _STRING = re.compile(rb"'((?:[^']|'')*+)'")
 _ENTITY = re.compile(rb"([A-Za-z_]\w*+)\s*+\(")
 _REFERENCE = re.compile(rb"#(\d+)")
 _WIDE = re.compile(r"\\X2\\((?:[0-9A-F]{4})*)\\X0\\|\\X\\([0-9A-F]{2})")
+# What strings consist of in the encodings that systems write in place of UTF-8; of Chinese and Japanese the common characters.
+_ENCODINGS = {
+    "utf-8": re.compile(
+        rb"(?:[\0-\x7f]|[\xc2-\xdf][\x80-\xbf]|[\xe0-\xef][\x80-\xbf]{2}|[\xf0-\xf4][\x80-\xbf]{3})*+", re.DOTALL
+    ),
+    "gb18030": re.compile(rb"(?:[\0-\x7f]|[\xb0-\xd7][\xa1-\xfe]|[\xa1\xa3][\xa1-\xfe])*+"),
+    "shift_jis": re.compile(rb"(?:[\0-\x7f]|[\x81-\x97][\x40-\xfc])*+"),
+}
 _POINT = re.compile(
     rb"CARTESIAN_POINT\s*\(\s*'(?:[^']|'')*+'\s*,\s*\(\s*([-+.\dEe]+)\s*,\s*([-+.\dEe]+)\s*,\s*([-+.\dEe]+)\s*\)"
 )
@@ -124,6 +132,13 @@ class StepText:
         return float(np.ptp(np.quantile(finite, [0.01, 0.99], axis=0), axis=0).max()) if len(finite) else 0.0
 
     @property
+    def encoding(self) -> str:
+        """The encoding that its strings seem to have."""
+        if self.content.isascii():
+            return "utf-8"
+        return encoding_of(string for string in _STRING.findall(self.content) if not string.isascii())
+
+    @property
     def endless_number(self) -> str:
         """The first number that is NaN or too large; "" if all numbers are finite."""
         if _ENDLESS.search(self.content) is None:  # the usual case: strings need not be left out
@@ -174,8 +189,17 @@ def entity_name(text: bytes) -> str:
 
 def decoded(string: bytes) -> str:
     """Return a string of a STEP file, without its quotes, as a text."""
-    text = string.decode("utf-8", errors="replace").replace("''", "'")
-    return _WIDE.sub(_wide, text)
+    try:
+        text = string.decode()
+    except UnicodeDecodeError:
+        text = string.decode(encoding_of([string]), errors="replace")
+    return _WIDE.sub(_wide, text.replace("''", "'"))
+
+
+def encoding_of(strings: Iterable[bytes]) -> str:
+    """Return the encoding in which strings consist of common characters: UTF-8, or one of older systems; Latin if in none."""
+    joined = b"\n".join(strings)
+    return next((encoding for encoding, common in _ENCODINGS.items() if common.fullmatch(joined)), "latin-1")
 
 
 def _wide(match: re.Match[str]) -> str:

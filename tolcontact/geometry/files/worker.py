@@ -88,7 +88,10 @@ def read_mesh(path: Path, kind: str) -> Arrays:
         transform, name = scene.graph[node]
         geometry = scene.geometry[name]
         if isinstance(geometry, trimesh.Trimesh):
-            pieces.append((trimesh.transform_points(geometry.vertices, transform), np.asarray(geometry.faces)))
+            faces = np.asarray(geometry.faces)
+            if np.linalg.det(transform[:3, :3]) < 0:  # of a mirrored node (glTF 2.0, 3.7.4)
+                faces = faces[:, ::-1]
+            pieces.append((trimesh.transform_points(geometry.vertices, transform), faces))
             stored = np.maximum(single_spacing(np.asarray(geometry.vertices)) if single else 0.0, np.full(3, printed))
             spacing = np.maximum(spacing, np.abs(transform[:3, :3]) @ stored)
     return {**join(pieces), "units": np.array(scene.units or ""), "spacing": spacing}
@@ -145,7 +148,7 @@ def result(job: Job) -> Arrays | dict[str, Any] | int | str:
     path = Path(job.path)
     try:
         if job.kind == "step":
-            flags = {name: getattr(job, name) for name in ("has_face_names", "has_solids", "has_pmi")}
+            flags = {name: getattr(job, name) for name in ("encoding", "has_face_names", "has_solids", "has_pmi")}
             content = step_document().read(path, job.chord, job.angle, **flags)
             count = sum(len(shape["triangles"]) for shape in content["shapes"])
         else:

@@ -1,0 +1,176 @@
+"""Costs of tolerance ranges: functions of the factor of a range, or tables of ranges or of ISO 286-1 grades to choose from."""
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from tolcontact.compilation import Program
+from tolcontact.declaration.tolerance_class import GRADES, ToleranceClass, UndefinedClass
+from tolcontact.errors import OptionError
+
+MIN_FACTOR, MAX_FACTOR = 0.1, 3.0  # times the present range, where a cost is no table
+GRID = 40  # factors that stand for a range that may have any width, next to tables
+Cost = float | Callable[[float], float] | Mapping[float | str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class CostTable:
+    """The ranges to choose from; between them, where only a search comes, the cost is linear in the logarithm.
+
+    names   as declared: the full width, or the grade
+    logs    (choice,): logarithms of the ranges over the present one, ascending
+    costs   (choice,): a wider choice costs less
+    """
+
+    names: tuple[str, ...]
+    logs: np.ndarray
+    costs: np.ndarray
+
+    def __call__(self, factor: float) -> float:
+        """Return the cost at a factor of the range."""
+        return float(np.interp(math.log(factor), self.logs, self.costs))
+
+    def nearest(self, log: float) -> int:
+        """Return the index of the widest choice that is not wider, or of the narrowest."""
+        return max(int(np.searchsorted(self.logs, log + 1e-9, side="right")) - 1, 0)
+
+
+Curve = float | Callable[[float], float]
+
+
+def curves_of(
+    costs: Mapping[str, Cost] | None, groups: Mapping[str, np.ndarray], ranges: Sequence[float], program: Program
+) -> dict[str, Curve]:
+    """Return the cost of each group that may change. Raises OptionError for costs that are none, and for unknown groups."""
+    if costs is None:
+        return dict.fromkeys(groups, 1.0)
+    if not costs:
+        raise OptionError("costs is empty; name the groups that may change, or leave it out")
+    curves: dict[str, Curve] = {}
+    widths = dict(zip(groups, ranges, strict=True))
+    for name, cost in costs.items():
+        if name not in groups:
+            raise OptionError(f'costs has "{name}"; expected some of: {", ".join(groups)}')
+        if isinstance(cost, Mapping):
+            curves[name] = _table(name, cost, widths[name], _size(program, groups[name]))
+        elif callable(cost) or _is_cost(cost):
+            curves[name] = cost
+        else:
+            raise OptionError(
+                f'cost of "{name}" is {cost!r}; expected a number above 0, a function of the factor of its range, or a table '
+                'such as {0.1: 4, 0.2: 2.5} or {"IT6": 4, "IT7": 2.5}'
+            )
+    return curves
+
+
+def cost_of(curve: Curve, factor: float) -> float:
+    """Return the cost of a range times a factor."""
+    return float(curve(factor)) if callable(curve) else float(curve / factor)
+
+
+class Curves(tuple[Curve, ...]):
+    """The costs of all groups, and the factors that they may have."""
+
+    __slots__ = ()
+
+    @property
+    def has_table(self) -> np.ndarray:
+        """Whether the range of a group is one of a table, (group,)."""
+        return np.array([isinstance(curve, CostTable) for curve in self])
+
+    @property
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """The least and the largest logarithm of the factor of each group, (group,)."""
+        usual = np.log([MIN_FACTOR, MAX_FACTOR])
+        lower, upper = np.array([curve.logs[[0, -1]] if isinstance(curve, CostTable) else usual for curve in self]).T
+        return lower, upper
+
+    def narrowed(self, logs: np.ndarray) -> np.ndarray:
+        """Return logarithms (group,) with the next narrower choices of tables."""
+        pairs = zip(self, logs, strict=True)
+        return np.array([curve.logs[curve.nearest(log)] if isinstance(curve, CostTable) else log for curve, log in pairs])
+
+    def names(self, logs: np.ndarray, groups: Sequence[str]) -> str:
+        """Return the groups that have a table, with the names of their choices."""
+        rows = zip(groups, self, logs, strict=True)
+        return ", ".join(f"{name}: {x.names[x.nearest(log)]}" for name, x, log in rows if isinstance(x, CostTable))
+
+
+def cheapest(curves: Curves, logs: np.ndarray, free: np.ndarray, margins: np.ndarray, slopes: np.ndarray) -> np.ndarray | None:
+    """Return the logarithms (group,) of the choices of least cost, or None if no choice has sufficient margins.
+
+    Margins (requirement,) at `logs` change by their slopes (requirement, group) times half the relative change of the squared
+    range: a linear program with a binary unknown for each choice. Free ranges without a table have a grid of factors.
+    """
+    options = [
+        _options(curve, log) if is_free else np.array([log]) for curve, log, is_free in zip(curves, logs, free, strict=True)
+    ]
+    group = np.repeat(np.arange(len(logs)), [len(choices) for choices in options])
+    choices = np.concatenate(options)
+    prices = [cost_of(curves[k], math.exp(choice)) for k, choice in zip(group, choices, strict=True)]
+    gains = slopes[:, group] * (np.exp(2 * (choices - logs[group])) - 1) / 2
+    one_each = scipy.sparse.csr_array((np.ones(len(group)), (group, np.arange(len(group)))))
+    solution = scipy.optimize.milp(
+        prices, integrality=np.ones(len(choices)), bounds=scipy.optimize.Bounds(0, 1),
+        constraints=[scipy.optimize.LinearConstraint(one_each, 1, 1), scipy.optimize.LinearConstraint(gains, -margins, np.inf)],
+    )  # fmt: skip
+    return (
+        None
+        if solution.x is None
+        else np.array([choices[group == k][solution.x[group == k].argmax()] for k in range(len(logs))])
+    )
+
+
+def _options(curve: Curve, log: float) -> np.ndarray:
+    return curve.logs if isinstance(curve, CostTable) else np.append(np.log(np.geomspace(MIN_FACTOR, MAX_FACTOR, GRID)), log)
+
+
+def _table(name: str, costs: Mapping[float | str, float], present: float, size: float | None) -> CostTable:
+    if not math.isfinite(present):
+        raise OptionError(f'cost of "{name}" is a table, but its zones have several widths; use by="contributor"')
+    if not costs or not all(map(_is_cost, costs.values())):
+        raise OptionError(f'cost of "{name}" is {dict(costs)!r}; expected costs above 0 by range')
+    rows = sorted((_width(name, key, size), float(cost), str(key)) for key, cost in costs.items())
+    # A choice that is no cheaper than a narrower one is of no use.
+    rows = [row for k, row in enumerate(rows) if all(row[1] < narrower[1] for narrower in rows[:k])]
+    widths, prices, names = zip(*rows, strict=True)
+    return CostTable(names, np.log(np.array(widths) / present), np.array(prices))
+
+
+def _width(name: str, key: float | str, size: float | None) -> float:
+    """Return the full width [mm] that a key of a table states. A grade needs the nominal size."""
+    if not isinstance(key, str):
+        if _is_cost(key):
+            return float(key)
+        raise OptionError(
+            f'cost of "{name}" has the range {key!r}; expected a full width above 0 in mm, or a grade such as "IT7"'
+        )
+    grade = match.group(1) if (match := re.fullmatch(r"IT ?(\d+)", key)) else ""
+    if grade not in GRADES:
+        raise OptionError(f'cost of "{name}" has "{key}"; expected a grade of ISO 286-1, IT01 to IT{GRADES[-1]}')
+    if size is None:
+        raise OptionError(f'cost of "{name}" has "{key}"; grades are for sizes (tc.Size): state full widths in mm')
+    try:
+        lower, upper = ToleranceClass("h", grade).deviations(size)
+    except UndefinedClass as fault:
+        raise OptionError(f'cost of "{name}": {fault}') from None
+    return upper - lower
+
+
+def _size(program: Program, columns: np.ndarray) -> float | None:
+    """Return the nominal size [mm] of the first size among columns of deviations; None if there is none."""
+    sizes = {
+        freedom.label: float(pattern.declared.size.nominal)
+        for pattern in program.nominal.patterns if pattern.declared.size is not None
+        for freedom in pattern.freedoms if freedom.label.endswith(".size")
+    }  # fmt: skip
+    labels = [program.draws.labels[column] for column in columns]
+    return next((sizes[label] for label in labels if label in sizes), None)
+
+
+def _is_cost(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value) and value > 0

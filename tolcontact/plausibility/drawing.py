@@ -1,0 +1,145 @@
+"""The check of drawings: what tolerances leave open, what has no effect, and what the simulation takes as perfect."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from tolcontact.declaration import GeometricTolerance, Pattern
+from tolcontact.discretization import Nominal
+from tolcontact.features import FeatureOfSize, NominalFeature, NominalPattern, PlaneFeature, datum_frame, uncontrolled
+
+LISTED = 6  # freedoms or faces by name
+ADVICE = {
+    "offset": "tc.Position or tc.Profile to datums that lock it", "shift": "tc.Position to datums that lock it",
+    "tilt": "tc.Perpendicularity, tc.Parallelism or tc.Angularity, or a location",
+    "relative": "a tolerance with combined zones",
+}  # fmt: skip
+
+
+def drawing_remarks(nominal: Nominal) -> Iterator[str]:
+    """Yield a sentence for everything that a checker would ask about the drawings of the parts."""
+    makers = open_freedoms, missing_sizes, perfect_datums, unused_datums, ineffective_tolerances, perfect_faces
+    for make in makers:
+        yield from make(nominal)
+
+
+def open_freedoms(nominal: Nominal) -> Iterator[str]:
+    """Yield a sentence for each feature with freedoms that no tolerance limits; of a datum, those that it does not define."""
+    for pattern in nominal.patterns:
+        if isinstance(pattern.declared, Pattern) and pattern.declared.borrowed:
+            continue  # these have tolerances of their own
+        if pattern.members[0].mobility is not None:
+            continue  # a gauge element
+        names = uncontrolled(pattern, _followed(nominal, pattern))
+        if not names:
+            continue
+        declared, datum = pattern.declared, pattern.declared.datum
+        if not declared.geometric and datum is None:
+            yield f"{_place(pattern)}: no geometric tolerance limits its place in the part: taken as perfect"
+            continue
+        earlier = f" to the datums before {datum}" if datum else ""
+        kinds = dict.fromkeys(name.split()[0] for name in names)
+        advice = "; ".join(ADVICE[kind] for kind in kinds if kind in ADVICE) or ADVICE["relative"]
+        yield f"{_place(pattern)}: no tolerance limits {_listed(names)}{earlier}: taken as perfect; add {advice}"
+
+
+def missing_sizes(nominal: Nominal) -> Iterator[str]:
+    """Yield a sentence for each toleranced hole, shaft, slot or tab whose size has no limits."""
+    for pattern in nominal.patterns:
+        geometry = pattern.geometries[0]
+        if isinstance(geometry, FeatureOfSize) and pattern.declared.size is None and pattern.declared.tolerances:
+            yield (
+                f"{_place(pattern)}: it is {geometry.in_words} of exactly {geometry.size:.6g} mm, without limits of size; "
+                f"add tc.Size({geometry.size:.6g}, ...)"
+            )
+
+
+def perfect_datums(nominal: Nominal) -> Iterator[str]:
+    """Yield a sentence for each part whose datum planes have no form: parts that stand on them do not rock."""
+    for part in nominal.last_parts:
+        flat = [
+            str(pattern.declared.datum)
+            for pattern in nominal.patterns
+            if pattern.declared.part is part.part and pattern.declared.datum and pattern.form is None
+            and isinstance(pattern.geometries[0], PlaneFeature)
+        ]  # fmt: skip
+        if flat:
+            yield f'part "{part.name}": datum {_listed(flat)}: no tolerance of form: taken as flat; add tc.Flatness'
+
+
+def unused_datums(nominal: Nominal) -> Iterator[str]:
+    """Yield a sentence for each datum letter that no tolerance refers to."""
+    for part in nominal.last_parts:
+        used = {letter for declared in part.part.toleranced for tolerance in declared.geometric for letter in tolerance.letters}
+        letters = [declared.datum for declared in part.part.toleranced if declared.datum]
+        if idle := [letter for letter in letters if letter not in used]:
+            yield f'part "{part.name}": datum {_listed(idle)}: no tolerance refers to it; refer to it, or leave the letter out'
+
+
+def ineffective_tolerances(nominal: Nominal) -> Iterator[str]:
+    """Yield a sentence for each tolerance or modifier that cannot change a part."""
+    for pattern in nominal.patterns:
+        size = pattern.declared.size
+        for tolerance in pattern.declared.geometric:
+            if tolerance.is_form and size and pattern.declared.is_enveloped and size.upper - size.lower <= tolerance.width:
+                yield (
+                    f"{_place(pattern)}: {tolerance} is no finer than the size ({size.upper:+g} {size.lower:+g}), whose "
+                    "envelope limits the form already; make it finer, or leave it out"
+                )
+            yield from (f"{_place(pattern)}: {text}" for text in _moot_modifiers(nominal, pattern, tolerance))
+
+
+def perfect_faces(nominal: Nominal) -> Iterator[str]:
+    """Yield one sentence on the faces in contact pairs that no tolerance of a feature moves or shapes."""
+    perfect: dict[str, list[str]] = {}
+    for pair in nominal.pairs:
+        for index, face in zip((pair.moving, pair.reference), pair.deviating, strict=True):
+            if face is None and index is not None:
+                perfect.setdefault(nominal.parts[index].name, []).append(pair.name)
+    if perfect:
+        faces = [f"{part} ({_listed(list(dict.fromkeys(pairs)))})" for part, pairs in perfect.items()]
+        yield (
+            f"no tolerance touches the faces in contact of {_listed(faces)}: taken as perfect; if this is not meant, declare "
+            "them as features with tolerances"
+        )
+
+
+def _moot_modifiers(nominal: Nominal, pattern: NominalPattern, tolerance: GeometricTolerance) -> Iterator[str]:
+    datums = nominal.datums(pattern.part)
+    for compartment, letters in zip(tolerance.datums.split("|"), tolerance.system, strict=False):
+        if "(" not in compartment:
+            continue
+        of_size = [isinstance(datum.geometry, FeatureOfSize) for letter in letters for datum in datums.get(letter, ())]
+        if not all(of_size):
+            yield f"{tolerance}: datum {letters[0]} has no size, so a material modifier says nothing; leave it out"
+
+
+def _followed(nominal: Nominal, pattern: NominalPattern) -> np.ndarray:
+    """Return the directions (coordinate, n) of a datum that its frame follows: what the datums before it leave free."""
+    datums, letter = nominal.datums(pattern.part), pattern.declared.datum
+    before = [
+        (tolerance.system[:k], tolerance.orientation_only[:k])
+        for declared in pattern.declared.part.toleranced
+        for tolerance in declared.geometric
+        for k, letters in enumerate(tolerance.system)
+        if letter in letters
+    ]
+    if not before:
+        return pattern.values if letter else np.zeros((pattern.count, 0))
+    system, orientation_only = max(before, key=lambda entry: len(entry[0]))
+    frame = datum_frame(_features(system, datums), pattern.centre, pattern.reach, len(nominal.contributors), orientation_only)
+    return pattern.values @ frame.free
+
+
+def _features(
+    system: Sequence[Sequence[str]], datums: Mapping[str | None, Sequence[NominalFeature]]
+) -> list[list[NominalFeature]]:
+    return [[datum for letter in letters for datum in datums[letter]] for letters in system]
+
+
+def _place(pattern: NominalPattern) -> str:
+    return f'part "{pattern.declared.part.name}": {pattern.declared.designation}'
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names[:LISTED]) + (f" and {len(names) - LISTED} more" if len(names) > LISTED else "")
