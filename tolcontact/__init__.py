@@ -49,18 +49,20 @@ Every example in the guide is run by the tests.
 
 | purpose | `tc.` |
 |---|---|
-| declare | `Assembly`, `Part`, `Box`, `Mesh`, `Pin`, `Locator`, `three_two_one`, `Tolerance`, `TitleBlock`, `degrees` |
+| declare | `Assembly`, `Stack`, `Part`, `Box`, `Mesh`, `Pin`, `Locator`, `three_two_one`, `Tolerance`, |
+| | `TitleBlock`, `degrees` |
 | tolerance features | `Size`, `Position`, `Profile`, `LineProfile`, `Parallelism`, `Perpendicularity`, `Angularity`, |
 | | `Symmetry`, `Coaxiality`, `CircularRunout`, `TotalRunout`, `Straightness`, `Flatness`, `Roundness`, `Cylindricity`; |
 | | `Form`, `DatumTargets`, `Variable` |
 | measure faces | `Gap`, `Flush`, `Clearance`, `LargestGap`, `MeanGap`, `AxisDistance`, `Angle`; |
-| | `Minimum`, `Maximum`, `Mean`, `Sum`, `Difference`; `stations` |
+| | `Minimum`, `Maximum`, `Mean`, `Sum`, `Difference`, `Chain`; `stations` |
 | fasten | `fasten` |
 | run | `main`, `run`, `build`, `check`, `compare`, `simulate`, `simulate_blocks`; `Method`, `Program` |
 | read results | `open_archive`, `summarize`, `compare_runs`, `Status`, `plot` |
 | errors and warnings | `TolcontactError` and its kinds `ModelError` and `OptionError`; `NominalWarning` |
 | choose faces, `tc.select` | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
-| analyse, `tc.analyses` | `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate`, `seating` |
+| analyse, `tc.analyses` | `stack_up`, `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate`, |
+| | `seating` |
 | read and write files, `tc.io` | `bodies_in`, `faces_in`, `parts_from`, `read_pmi`, `features_from_pmi`, |
 | | `write_model`, `model_of` |
 | test your models, `tc.testing` | `assert_resolved`, `assert_no_clashes`, `assert_gaps_recompute`, |

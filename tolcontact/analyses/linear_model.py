@@ -94,7 +94,7 @@ def leverages(program: Program) -> np.ndarray:
     nominal, count = program.nominal, len(program.nominal.contributors)
     leverages = np.full(count, np.nan)
     placed = (program.place(deviations=sign * STEP * np.eye(count))["poses"] for sign in (1, -1))
-    ahead, behind = (poses.reshape(count, len(nominal.parts), -1) for poses in placed)
+    ahead, behind = (poses.reshape(count, len(nominal.parts), pose.ENTRIES) for poses in placed)
     for number in range(len(nominal.parts)):
         columns = nominal.columns(number)
         joined = [k for k, other in enumerate(nominal.parts) if other.carried and other.parent == number]

@@ -188,7 +188,7 @@ def _check_text(name: str, text: str) -> None:
 def _check_needed(file: netCDF4.Dataset, groups: dict[str, netCDF4.Dataset]) -> None:
     """Check that everything is there that summaries and models are read from."""
     missing = [name for name, kind in ATTRIBUTES.items() if not isinstance(getattr(file, name, None), kind)]
-    missing += [name for name in (*NEEDED, "field") if name not in groups]
+    missing += [name for name in NEEDED if name not in groups]
     missing += [variable.name for variable in NEEDED[""] if variable.name not in file.variables]
     if missing:
         raise DamagedError(f"is not an archive of tolcontact: it has no valid {', '.join(missing)}")

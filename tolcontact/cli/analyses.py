@@ -101,6 +101,15 @@ def _corner(text: str, option: str) -> tuple[float, ...]:
 
 COMMANDS = (
     AnalysisCommand(
+        "stackup",
+        "Print worst case, RSS, inflated RSS and Monte Carlo range of each measurement, in one table.",
+        "stack_up",
+        terms.STACK_UP,
+        "Number of realizations.",
+        ("stackup stack.py", "stackup run.nc --into run.nc"),
+        lambda dataset: dataset[["drawn", "centred", "half_width"]].to_dataframe(),
+    ),
+    AnalysisCommand(
         "contributions",
         "Print the contributors that cause the variance of each measurement, with and without contact.",
         "contributions",

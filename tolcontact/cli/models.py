@@ -29,17 +29,20 @@ PRESS = (
     "advice: pins or bolts stand in holes, and no force holds the parts together, so contact may lift or tilt them; declare "
     'what does (a weight, a clamp): assembly.force(...), with objective "seating"'
 )
-STARTER = Path(__file__).with_name("starter.py")
+STARTERS = {False: Path(__file__).with_name("starter.py"), True: Path(__file__).with_name("stack_starter.py")}
 
 
-@common.app.command(epilog=common.examples("new bracket"))
-def new(name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the model; its script is NAME.py.")]) -> None:
+@common.app.command(epilog=common.examples("new bracket", "new play --stack"))
+def new(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the model; its script is NAME.py.")],
+    stack: Annotated[bool, common.flag("--stack", "Write a stack in one dimension, without parts.")] = False,
+) -> None:
     """Write a small model with comments as a starting point."""
     path = Path(name if name.endswith(".py") else f"{name}.py")
     if faults := list(key_faults("model", [path.stem])):
         raise OptionError(faults[0])
-    text = STARTER.read_text(encoding="utf-8")
-    text = text.replace('tc.Assembly("starter")', f"tc.Assembly({json.dumps(path.stem)})").replace("NAME.", f"{path.stem}.")
+    text = STARTERS[stack].read_text(encoding="utf-8")
+    text = text.replace('("starter"', f"({json.dumps(path.stem)}").replace("NAME.", f"{path.stem}.")
     text = text.replace(" (NAME is this file without its ending)", "")
     try:
         with path.open("x", encoding="utf-8") as file:

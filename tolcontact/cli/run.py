@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from xarray import Dataset
 
+import tolcontact
 from tolcontact import report as reports
 from tolcontact.archive import Run, open_unchecked
 from tolcontact.cli import app as common, output
@@ -16,11 +18,12 @@ from tolcontact.errors import OptionError
 from tolcontact.simulation.cluster import client_of
 from tolcontact.statistics import Summary
 from tolcontact.temporary import temporary_folder
-from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
+from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS, STACK_UP
 from tolcontact.workflow.accessor import summarize
 from tolcontact.workflow.models import DEFAULT_SOLVER
 from tolcontact.workflow.runs import SURFACES, Target, write_run
 
+MAX_STACK = 100_000  # realizations of the table of a stack
 Until = Annotated[
     str | None,
     typer.Option(
@@ -95,8 +98,8 @@ def run(
             out or folder / "results.nc", solver=solver, method=method, overwrite=overwrite and out is not None,
             resume=resume, until=until, client=client, progress=progress,
         )  # fmt: skip
-        summary, shortfall = _summed_up(path, until, report)
-    _print_results(summary, out, shortfall, quiet=quiet)
+        summary, stack, shortfall = _summed_up(path, until, report)
+    _print_results(summary, stack, out, shortfall, quiet=quiet)
 
 
 def _checked_page(model: Path, out: Path | None, report: Path | None, *, overwrite: bool, resume: bool) -> Path | None:
@@ -107,18 +110,31 @@ def _checked_page(model: Path, out: Path | None, report: Path | None, *, overwri
     return report and report.absolute()
 
 
-def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Summary, str]:
-    """Return the summary of the archive at a path, and what it lacks that `until` states; write its page."""
+def _stack_up(path: Path) -> Dataset | None:
+    """Return the stack-up of the archive of a model without parts, which is added to it; None for an assembly."""
+    with open_unchecked(path) as results:
+        if results.sizes["part"]:
+            return None
+        samples, seed = min(int(results.attrs["realizations"]), MAX_STACK), int(results.attrs["seed"])
+    return tolcontact.analyses.stack_up(path, samples=samples, seed=seed, into=path)
+
+
+def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Summary, Dataset | None, str]:
+    """Return the summary and the stack-up of the archive at a path, and what it lacks that `until` states; write its page."""
+    stack = _stack_up(path)
     with open_unchecked(path) as results:
         summary = summarize(results)
         if report is not None:
             reports.write_page(results, summary, report)
-        return summary, Target.of(until).shortfall(results) if until is not None else ""
+        return summary, stack, Target.of(until).shortfall(results) if until is not None else ""
 
 
-def _print_results(summary: Summary, out: Path | None, shortfall: str, *, quiet: bool) -> None:
+def _print_results(summary: Summary, stack: Dataset | None, out: Path | None, shortfall: str, *, quiet: bool) -> None:
     """Print the summary of results. Raises typer.Exit with code 1 if they lack something."""
     print_summary(summary)
+    if stack is not None:
+        typer.echo()
+        output.console().print(reports.analysis_text(STACK_UP, stack))
     if out is not None:
         common.echo(f"\narchive: {out}")
     if shortfall:

@@ -29,6 +29,7 @@ from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import (
     Angle,
     AxisDistance,
+    Chain,
     Clearance,
     Combination,
     Difference,
@@ -41,23 +42,24 @@ from tolcontact.declaration.measurement import (
     Measurement,
     Minimum,
     Sum,
-    stations,
 )
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
+from tolcontact.declaration.seam import stations
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.sequence import Station
 from tolcontact.declaration.size import Form, Size
+from tolcontact.declaration.stack import Stack
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import degrees
 
 __all__ = [
-    "OUTSIDE", "Angle", "Angularity", "Assembly", "AxisDistance", "Box", "Brep", "CircularRunout", "Clearance", "Coaxiality",
-    "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets", "Difference", "Face", "Facing",
-    "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance", "Geometry", "Inside", "Joint", "Largest",
-    "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean", "MeanGap", "Measure", "Measurement", "Mesh",
-    "Minimum", "Near", "Overlap", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin", "Point", "Population",
-    "Position", "Profile", "Roundness", "Size", "Station", "Straightness", "Sum", "Symmetry", "ThreeTwoOne", "TitleBlock",
-    "Tolerance", "TotalRunout", "Triangles", "Variable", "degrees", "stations",
+    "OUTSIDE", "Angle", "Angularity", "Assembly", "AxisDistance", "Box", "Brep", "Chain", "CircularRunout", "Clearance",
+    "Coaxiality", "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets", "Difference",
+    "Face", "Facing", "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance", "Geometry", "Inside",
+    "Joint", "Largest", "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean", "MeanGap", "Measure",
+    "Measurement", "Mesh", "Minimum", "Near", "Overlap", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked",
+    "Pin", "Point", "Population", "Position", "Profile", "Roundness", "Size", "Stack", "Station", "Straightness", "Sum",
+    "Symmetry", "ThreeTwoOne", "TitleBlock", "Tolerance", "TotalRunout", "Triangles", "Variable", "degrees", "stations",
     "three_two_one",
 ]  # fmt: skip

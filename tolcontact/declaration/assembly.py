@@ -153,19 +153,24 @@ class Assembly(Declarations, Pictured, Checked):
         """Declare the next station, of this `name`, of an assembly that is built in steps: `weld = line.station("weld")`."""
         return self._add("stations", Station(name, script_line()).belonging_to(self))
 
-    def variable(self, name: str, tolerance: Any, *, drives: Mapping[str, float], units: str = "mm") -> Variable:
-        """Declare a cause that drives several contributors (see Variable).
+    def variable(
+        self, name: str, tolerance: Any, *, drives: Mapping[str, float] | None = None, units: str = "mm",
+        nominal: float | None = None,
+    ) -> Variable:  # fmt: skip
+        """Declare a cause that drives several contributors, or a dimension that chains measure (see Variable).
 
         name        of the cause
         tolerance   full width of its range in its `units`, or a tc.Tolerance
         drives      factor [mm per unit] of each contributor, by its label
         units       of the cause, by default mm
+        nominal     value of a dimension in its `units`, which may drive nothing
 
         `model.variable("warmth", 20, drives={"cover.width.size": 0.0007}, units="K")`
         """
         variable = Variable(
-            name=name, tolerance=_tolerance(tolerance), drives=dict(drives), units=units, declared_at=script_line()
-        )
+            name=name, tolerance=_tolerance(tolerance), drives=dict(drives or {}), units=units, nominal=nominal,
+            declared_at=script_line(),
+        )  # fmt: skip
         return self._add("variables", variable)
 
     def correlate(self, labels: Sequence[str], matrix: Any) -> Correlation:
@@ -259,7 +264,7 @@ class Assembly(Declarations, Pictured, Checked):
 
     def faults(self) -> Iterator[str]:
         """Yield the faults of the declarations, among them omissions: sentences that name a declaration and its script line."""
-        if not self.parts:
+        if not (self.parts or self.variables):
             yield "it has no parts; declare at least one with assembly.part(name, geometry)"
         yield from self.omissions()
         yield from (*text_faults("assembly", [self.name]), *Checked.faults(self))

@@ -5,7 +5,7 @@ Contributors are named by labels: "part.locator", "part.feature.freedom" ("cover
 
 import importlib  # pandas takes longer to import than all the rest: only if it is needed
 from collections.abc import Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -14,6 +14,7 @@ import numpy as np
 from tolcontact.declaration.checks import Declaration
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import is_length, is_line
+from tolcontact.declaration.written_tolerance import DIGITS, Deviations
 from tolcontact.input_files import check_inputs
 from tolcontact.texts import shown
 
@@ -25,19 +26,23 @@ MIN_EIGENVALUE = 1e-12  # of a correlation matrix; of a smaller absolute value i
 class Variable(Declaration):
     """A cause that drives several contributors: `drives[label]` times its deviation is added to the draw of each.
 
-    The variable is in `units`; a factor converts them to the units of its contributor.
+    The variable is in `units`; a factor converts them to the units of its contributor. A variable with a `nominal` value is a
+    dimension, the link of a chain, and may drive nothing.
     """
 
     tolerance: Tolerance
-    drives: Mapping[str, float]
+    drives: Mapping[str, float] = field(default_factory=dict)
     name: str
     units: str = "mm"
     declared_at: str = ""
+    nominal: float | None = None
     noun: ClassVar[str] = "variable"
 
     def faults(self) -> Iterator[str]:
         yield from self.tolerance.faults()
-        if not self.drives:
+        if self.nominal is not None and not is_length(self.nominal):
+            yield f"nominal is {self.nominal!r}; expected a number in {self.units}"
+        if not self.drives and self.nominal is None:
             yield 'it drives nothing; give drives={"part.locator": factor, ...}'
         for label, factor in self.drives.items():
             if not (isinstance(label, str) and is_length(factor)):
@@ -47,7 +52,32 @@ class Variable(Declaration):
 
     def __str__(self) -> str:
         drives = ", ".join(f"{label} by {factor:g}" for label, factor in self.drives.items())
-        return f"variable {self.name} [{self.units}]: {self.tolerance}; drives {drives}"
+        driven = f"; drives {drives}" if drives else ""
+        if self.limits is None:
+            return f"variable {self.name} [{self.units}]: {self.tolerance}{driven}"
+        centred = f", centred {self.centred}" if self.limits.middle else ""
+        return f"dimension {self.name} [{self.units}]: {self.drawn}{centred}{driven}"
+
+    @property
+    def limits(self) -> Deviations | None:
+        """The limit deviations from the nominal value, as drawn; None without a nominal value or a range."""
+        if self.nominal is None or not is_length(self.tolerance.range):
+            return None
+        half, middle = float(self.tolerance.range or 0) / 2, self.tolerance.shift
+        return Deviations(round(middle - half, DIGITS), round(middle + half, DIGITS))
+
+    @property
+    def drawn(self) -> str:
+        """The dimension with its limits as drawn: "0.375 0 -0.031", "40 ±0.05"."""
+        is_equal = self.limits is not None and not self.limits.middle
+        return self.centred if is_equal else f"{self.nominal or 0:.12g} {self.limits or self.tolerance}"
+
+    @property
+    def centred(self) -> str:
+        """The dimension with equal limits: "0.3595 ±0.0155"; empty without limits."""
+        if self.limits is None or self.nominal is None:
+            return ""
+        return f"{self.nominal + self.limits.middle:.12g} ±{self.limits.width / 2:.12g}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -11,6 +11,7 @@ from msgspec import UNSET, UnsetType
 from tolcontact.declaration.assembly import MAX_COUNTS, Assembly
 from tolcontact.declaration.checks import NOT_NEGATIVE, text_type
 from tolcontact.declaration.codec import Document, Items, definitions
+from tolcontact.declaration.dependence import Variable
 from tolcontact.declaration.entries import CONTROL, METHOD, RECORDS, TARGETS, TITLE_BLOCK, TOLERANCED
 from tolcontact.declaration.face_entries import Writing
 from tolcontact.declaration.feature_tolerance import GeometricTolerance
@@ -67,6 +68,14 @@ def tolerance_of_entry(entry: Any) -> Size | GeometricTolerance:
     """Return a tolerance of a feature from its entry in a document. Raises ArchiveError for an entry that states none."""
     try:
         return CONTROL.decode(entry, Place(Sources({})))  # type: ignore[no-any-return]
+    except EntryError as error:
+        raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
+
+
+def variable_of_entry(entry: Any) -> Variable:
+    """Return a variable from its entry in a document. Raises ArchiveError for an entry that states none."""
+    try:
+        return RECORDS["variables"].decode(entry, Place(Sources({})))  # type: ignore[no-any-return]
     except EntryError as error:
         raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
 

@@ -229,7 +229,7 @@ RECORDS = {
         tolerance=Plain(POSITIVE | tuple[float, float] | str),
     ),
     "forces": Record(Force, omitted="station"),
-    "variables": Record(Variable, floats="drives"),
+    "variables": Record(Variable, floats="drives nominal", omitted="nominal"),
     "correlations": Record(Correlation),
     "populations": Record(Population, fields="values columns source declared_at"),
     "stations": Record(Station),

@@ -12,7 +12,7 @@ from msgspec import Meta
 from tolcontact.declaration.checks import POSITIVE, text_type
 from tolcontact.declaration.codec import CODECS, Choice, Document, Items, Plain
 from tolcontact.declaration.measure import Tape
-from tolcontact.declaration.measurement import MEASUREMENTS, Combination, Measurement
+from tolcontact.declaration.measurement import MEASUREMENTS, Chain, Combination, Measurement
 from tolcontact.declaration.part import Face, Feature, Part, Point
 from tolcontact.declaration.place import Place
 from tolcontact.declaration.record import Field, Record
@@ -171,6 +171,8 @@ def _record(cls: Any) -> Record:
     """Return the record of a kind of measurement: its faces and points, and its directions if it has any."""
     if issubclass(cls, Combination):
         return Record(cls, kind=cls.kind, fields="measurements", build=lambda measurements: cls(*measurements))
+    if cls is Chain:
+        return Record(cls, kind=cls.kind, omitted="nominal units", floats="sensitivities nominal")
     return Record(cls, kind=cls.kind, omitted="across along about", across=UNIT_VECTOR, along=UNIT_VECTOR, about=UNIT_VECTOR)
 
 

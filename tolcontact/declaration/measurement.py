@@ -3,18 +3,17 @@
 Each kind is a class, which `MEASUREMENTS` lists by the kind's name. Measurements can be nested: `tc.Minimum(tc.Gap(...), "m")`.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from tolcontact.declaration.checks import direction_faults
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
-from tolcontact.declaration.values import Vector, direction
+from tolcontact.declaration.values import Vector, direction, is_length
 from tolcontact.readable import Readable
 
 MAX_DEPTH = 8  # of nested measurements
 MAX_LISTED = 3  # measurements in a text
-MAX_STATIONS = 1000  # of a seam
 
 
 class Measurement(Readable):
@@ -26,7 +25,7 @@ class Measurement(Readable):
     """
 
     kind: ClassVar[str]
-    units: ClassVar[str] = "mm"
+    units: str = "mm"
     depth = 0
 
     @property
@@ -231,6 +230,37 @@ class Angle(_OfTwoFaces):
     about: Vector | None = None
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Chain(Measurement):
+    """A dimension chain: the sum of deviations times their sensitivities, wherever contact places the parts.
+
+    `tc.Chain({"spacer.end.offset": -1, "wall.end.offset": 1}, nominal=0.4)`
+
+    sensitivities   factor of each link, by the name of a variable or the label of another contributor
+    nominal         value without deviations, to which variables with a nominal value add theirs times their factors
+    units           of the value
+    """
+
+    kind = "chain"
+
+    sensitivities: Mapping[str, float]
+    nominal: float = 0.0
+    units: str = "mm"
+
+    def faults(self) -> Iterator[str]:
+        if not self.sensitivities:
+            yield 'the chain has no links; give sensitivities={"part.locator": 1, ...}'
+        for label, factor in self.sensitivities.items():
+            if not (isinstance(label, str) and is_length(factor)):
+                yield f"sensitivities has {label!r}: {factor!r}; expected the label of a contributor, and a number"
+        if not is_length(self.nominal):
+            yield f"nominal is {self.nominal!r}; expected a number"
+
+    def __str__(self) -> str:
+        links = [f"{factor:+g} {label}" for label, factor in self.sensitivities.items()]
+        return f"chain of {len(links)} links" if len(links) > MAX_LISTED else f"chain {' '.join(links)}"
+
+
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class Combination(Measurement):
     """A value of several measurements, or of measures that were declared before, which may be given by name."""
@@ -304,27 +334,6 @@ class Difference(Combination):
 
 
 _KINDS: tuple[type[Measurement], ...] = (
-    Gap, Flush, Clearance, LargestGap, MeanGap, AxisDistance, Angle, Minimum, Maximum, Mean, Sum, Difference,
+    Gap, Flush, Clearance, LargestGap, MeanGap, AxisDistance, Angle, Minimum, Maximum, Mean, Sum, Difference, Chain,
 )  # fmt: skip
 MEASUREMENTS = {measurement.kind: measurement for measurement in _KINDS}
-
-
-def stations(start: Point, end: Point, count: int) -> tuple[Point, ...]:
-    """Return `count` points of a part, evenly from `start` to `end`: the stations of a seam.
-
-    `tc.stations(door.point(0, 40, 0), door.point(0, 40, 700), 5)`
-    Points on a feature move with its deviation. Raises TypeError or ValueError for points of two parts or features.
-    """
-    if not (isinstance(start, Point) and isinstance(end, Point) and start.position and end.position):
-        raise TypeError(
-            f"stations: start is {start!r}, end is {end!r}; expected two points part.point(x, y, z), or two of a feature"
-        )
-    if start.part is not end.part or start.on is not end.on:
-        raise ValueError(f"stations: {start} and {end} are not points of one part, or of one feature")
-    if type(count) is not int or not 2 <= count <= MAX_STATIONS:
-        raise ValueError(f"stations: count is {count!r}; expected a whole number from 2 to {MAX_STATIONS}")
-    point: Callable[..., Point] = start.on.point if start.on else start.part.point
-    shares = [k / (count - 1) for k in range(count)]
-    return tuple(
-        point(*((1 - share) * a + share * b for a, b in zip(start.position, end.position, strict=True))) for share in shares
-    )

@@ -24,7 +24,7 @@ _FIT = re.compile(r"([A-Z]{1,2}\d{1,2}) ?/ ?([a-z]{1,2}\d{1,2})")
 _UNIT = re.compile(r"[\d.,] ?([^\W\d_]+|[°%\"'])$")
 _DEGREES = re.compile(r" ?(?:°|deg)(?![^\W\d])")
 _SIGNS = str.maketrans({"\N{MINUS SIGN}": "-", "\N{EN DASH}": "-", "\N{FULLWIDTH PLUS SIGN}": "+"})
-_DIGITS = 12  # of widths and middles after the point: more than a double has of a deviation
+DIGITS = 12  # of widths and middles after the point: more than a double has of a deviation
 
 
 class TextFault(ValueError):
@@ -40,12 +40,12 @@ class Deviations(NamedTuple):
     @property
     def width(self) -> float:
         """The width of the zone between them."""
-        return round(self.upper - self.lower, _DIGITS)
+        return round(self.upper - self.lower, DIGITS)
 
     @property
     def middle(self) -> float:
         """The midpoint of the zone."""
-        return round((self.upper + self.lower) / 2, _DIGITS)
+        return round((self.upper + self.lower) / 2, DIGITS)
 
     def __str__(self) -> str:
         return " ".join(f"{limit:+g}" if limit else "0" for limit in (self.upper, self.lower))

@@ -59,12 +59,12 @@ class Locators:
         parts = tuple(parts)
         return cls(
             labels=tuple(label for part in parts for label in part.labels),
-            points=np.vstack([part.points for part in parts]),
-            directions=np.vstack([part.directions for part in parts]),
+            points=np.vstack([np.zeros((0, 3)), *(part.points for part in parts)]),
+            directions=np.vstack([np.zeros((0, 3)), *(part.directions for part in parts)]),
             tolerances=tuple(tolerance for part in parts for tolerance in part.tolerances),
-            stiffness=np.concatenate([part.stiffness for part in parts]),
-            one_sided=np.concatenate([part.one_sided for part in parts]),
-            springy=np.concatenate([part.springy for part in parts]),
+            stiffness=np.array([value for part in parts for value in part.stiffness], dtype=float),
+            one_sided=np.array([value for part in parts for value in part.one_sided], dtype=bool),
+            springy=np.array([value for part in parts for value in part.springy], dtype=bool),
             faces=tuple(face for part in parts for face in part.faces),
             grounds=tuple(ground for part in parts for ground in part.grounds),
         )

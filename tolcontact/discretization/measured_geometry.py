@@ -124,6 +124,15 @@ class NominalMeasurement:
 
 
 @dataclass(frozen=True, eq=False)
+class LinearForm(NominalMeasurement):
+    """A constant, and deviations times factors (link,), by their columns (link,)."""
+
+    constant: float
+    columns: np.ndarray
+    factors: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class FaceMeasurement(NominalMeasurement):
     """A measurement between a moving and a reference face."""
 

@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 from tolcontact.declaration import (
     Angle,
     AxisDistance,
+    Chain,
     Clearance,
     Combination,
     Face,
@@ -29,6 +30,7 @@ from tolcontact.discretization.measured_geometry import (
     DirectionPair,
     FaceGap,
     Heights,
+    LinearForm,
     MeasuredFace,
     MeasuredPoint,
     MeshClearance,
@@ -42,7 +44,7 @@ from tolcontact.discretization.nominal import Nominal
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
-from tolcontact.errors import Faults, GeometryFault, designation
+from tolcontact.errors import Faults, GeometryFault, designation, nearest_name
 from tolcontact.geometry.analytic_surfaces import Cylinder, axes_across
 from tolcontact.geometry.faces import patch
 from tolcontact.geometry.nearest_elements import nearest_elements
@@ -330,9 +332,19 @@ def _nearest_places(moving: np.ndarray, reference: np.ndarray) -> np.ndarray:
     return np.array([moving[0] + nearest.x[0] * p, reference[0] + nearest.x[1] * q])
 
 
+def _chain(chain: Chain, faces: MeasuredFaces) -> LinearForm:
+    """Return a chain with numbers. Raises GeometryFault for a link that is no contributor."""
+    labels, nominals = faces.nominal.contributors, {cause.name: cause.nominal for cause in faces.nominal.assembly.variables}
+    if unknown := [label for label in chain.sensitivities if label not in labels]:
+        raise GeometryFault(f'its link "{unknown[0]}" is no contributor{nearest_name(unknown[0], labels)}')
+    constant = chain.nominal + sum(factor * (nominals.get(label) or 0.0) for label, factor in chain.sensitivities.items())
+    columns = np.array([labels.index(label) for label in chain.sensitivities])
+    return LinearForm(NO_LINES, float(constant), columns, np.array(list(chain.sensitivities.values()), dtype=float))
+
+
 Builder = Callable[[Any, MeasuredFaces], NominalMeasurement]
 BUILDERS: Mapping[type[Measurement], Builder] = {
-    Gap: _gap, Flush: _gap, Clearance: _clearance, AxisDistance: _axis_distance, Angle: _angle,
+    Gap: _gap, Flush: _gap, Clearance: _clearance, AxisDistance: _axis_distance, Angle: _angle, Chain: _chain,
     LargestGap: lambda gap, faces: face_gap(*faces.pair(gap), is_largest=True),
     MeanGap: lambda gap, faces: face_gap(*faces.pair(gap), is_largest=False),
 }  # fmt: skip

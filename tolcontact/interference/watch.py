@@ -90,7 +90,8 @@ class Watch:
             [
                 bool(part.movers) or len(part.locators) > 0 or part.carried is not None or part.parent is not None
                 for part in parts
-            ]
+            ],
+            dtype=bool,
         )
         together = (stations[i] == stations[j]) & (moves[i] | moves[j])
         i, j = i[together], j[together]

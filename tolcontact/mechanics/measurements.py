@@ -13,6 +13,7 @@ from tolcontact.discretization.measured_geometry import (
     DirectionPair,
     FaceGap,
     Heights,
+    LinearForm,
     MeasuredFace,
     MeasuredPoint,
     MeshClearance,
@@ -156,6 +157,10 @@ def _angle(pair: DirectionPair, observed: Observed) -> ca.SX:
     return ca.atan2(ca.dot(n, ca.cross(u, v)), ca.dot(u, v) - ca.dot(u, n) * ca.dot(v, n))
 
 
+def _linear_form(form: LinearForm, observed: Observed) -> ca.SX:
+    return form.constant + ca.dot(ca.DM(form.factors), observed.deviations[form.columns.tolist()])
+
+
 def _combined(combined: Combined, observed: Observed) -> ca.SX:
     values = [
         value_of(operand, observed) if isinstance(operand, NominalMeasurement) else observed.measures[operand]
@@ -167,6 +172,7 @@ def _combined(combined: Combined, observed: Observed) -> ca.SX:
 EXPRESSIONS: Mapping[type[NominalMeasurement], Callable[[Any, Observed], ca.SX]] = {
     Heights: _least_height, FaceGap: _face_gap, PlaneClearance: _plane_clearance, RoundClearance: _round_clearance,
     MeshClearance: _mesh_clearance, AxisPair: _axis_distance, DirectionPair: _angle, Combined: _combined,
+    LinearForm: _linear_form,
 }  # fmt: skip
 COMBINATIONS: Mapping[str, Callable[[ca.SX], ca.SX]] = {
     "minimum": ca.mmin, "maximum": ca.mmax, "mean": lambda values: ca.sum1(values) / values.numel(), "sum": ca.sum1,

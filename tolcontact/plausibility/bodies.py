@@ -158,7 +158,7 @@ def body_overlaps(draws: TrialDraws) -> Iterator[str]:
     known = {frozenset((parts[pair.moving], parts[pair.reference])) for pair in nominal.pairs if pair.reference is not None}
     meant = [frozenset(overlap.parts) for overlap in nominal.assembly.overlaps]
     bodies = [SolidBody(part.body) for part in nominal.parts]
-    bounds = np.array([body.bounds for body in bodies])
+    bounds = np.array([body.bounds for body in bodies]).reshape(-1, 2, 3)
     thickness = (bounds[:, 1] - bounds[:, 0]).min(axis=1)
     common = np.minimum(bounds[:, None, 1], bounds[None, :, 1]) - np.maximum(bounds[:, None, 0], bounds[None, :, 0])
     min_overlap = MIN_THICKNESS_SHARE * np.minimum(thickness[:, None], thickness[None])

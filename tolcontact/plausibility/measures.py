@@ -90,7 +90,7 @@ def population_units(draws: TrialDraws) -> Iterator[str]:
     A contributor without a zone has MIN_ZONE of the size of the largest part.
     """
     program = draws.program
-    largest = max(float(part.mesh.scale) for part in program.nominal.parts)
+    largest = max((float(part.mesh.scale) for part in program.nominal.parts), default=0.0)
     freedoms = {freedom.label: freedom for freedom in program.draws.contributors}
     for population in program.nominal.assembly.populations:
         for label, values in zip(population.columns, population.values.T, strict=True):

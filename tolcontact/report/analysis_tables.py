@@ -13,6 +13,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.errors import ArchiveError
 from tolcontact.limits import GAP_ACCURACY
 from tolcontact.report.figures import grouped, number, percent, share
+from tolcontact.report.stack_tables import stack_up_report
 from tolcontact.report.table import Table
 
 SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are only counted
@@ -337,6 +338,7 @@ def _seat(dataset: xr.Dataset) -> list[str]:
 
 
 _REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {
+    terms.STACK_UP.name: lambda dataset: AnalysisReport(*stack_up_report(dataset, _lost(_unresolved(dataset)))),
     terms.CONTRIBUTIONS.name: _contributions,
     terms.SENSITIVITIES.name: _sensitivities,
     terms.WORST_CASE.name: _worst_case,

@@ -9,7 +9,8 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.declaration.document import tolerance_of_entry
+from tolcontact.declaration import Chain, Tolerance, Variable
+from tolcontact.declaration.document import tolerance_of_entry, variable_of_entry
 from tolcontact.errors import ArchiveError
 from tolcontact.report.figures import plain
 from tolcontact.report.table import Cell, Table
@@ -23,13 +24,51 @@ SETTINGS = (
 
 def model_tables(results: xr.DataTree) -> list[Table]:
     """Return the tables of the model that have rows. Raises ArchiveError for a damaged declaration."""
-    document = json.loads(str(results["model"][terms.DECLARATION.name].values))
-    makers: tuple[Callable[[Entry, xr.DataTree], Table], ...] = (_parts, _features, _locators, _pairs, _measurements)
+    document = declaration_of(results)
+    makers: tuple[Callable[[Entry, xr.DataTree], Table], ...] = (
+        _dimensions, _parts, _features, _locators, _pairs, _measurements,
+    )  # fmt: skip
     try:
         tables = [make(document, results) for make in makers]
     except (LookupError, TypeError, ValueError) as error:
         raise ArchiveError(f"the declared model in the archive is damaged: {type(error).__name__}: {error}") from error
     return [table.without_empty_columns() for table in tables if table.rows]
+
+
+def declaration_of(results: xr.DataTree) -> Entry:
+    """Return the declared model of an archive, as its document."""
+    return dict(json.loads(str(results["model"][terms.DECLARATION.name].values)))
+
+
+def dimensions_of(document: Entry) -> list[Variable]:
+    """Return the dimensions that chains are made of."""
+    return [variable_of_entry(entry) for entry in document["variables"] if entry.get("nominal") is not None]
+
+
+def chains_of(document: Entry) -> dict[str, Entry]:
+    """Return the chains that are measured, by the names of their measures."""
+    measurements = {measure["name"]: measure["of"] for measure in document["measures"] if isinstance(measure.get("of"), dict)}
+    return {name: of for name, of in measurements.items() if of.get("kind") == Chain.kind}
+
+
+def _dimensions(document: Entry, results: xr.DataTree) -> Table:
+    chains = chains_of(document)
+    rows = [
+        [
+            dimension.name, dimension.drawn, dimension.centred, dimension.units, _capability(dimension.tolerance),
+            *(chain["sensitivities"].get(dimension.name) for chain in chains.values()),
+        ]
+        for dimension in dimensions_of(document)
+    ]  # fmt: skip
+    columns = ["dimension", "as drawn", "centred", "units", "distribution", *(f"sensitivity of {name}" for name in chains)]
+    return Table("Dimensions", columns, rows)
+
+
+def _capability(tolerance: Tolerance) -> str:
+    """Return the distribution of a dimension with its capability."""
+    name = tolerance.distribution if isinstance(tolerance.distribution, str) else str(tolerance.frozen.dist.name)
+    numbers = [f"{key} {value:g}" for key, value in (("cp", tolerance.cp), ("cpk", tolerance.cpk)) if value is not None]
+    return ", ".join([name, *numbers])
 
 
 def _parts(document: Entry, results: xr.DataTree) -> Table:
@@ -130,6 +169,8 @@ def _measurements(document: Entry, results: xr.DataTree) -> Table:
 def _quantity(measure: Entry) -> str:
     if "of" not in measure:
         return "expression of the poses"
+    if measure["of"].get("kind") == Chain.kind:
+        return f"chain of {len(measure['of']['sensitivities'])} links"
     return f"{measure['of']['kind']} of {', '.join(_named(measure['of']))}" if "kind" in measure["of"] else _end(measure["of"])
 
 

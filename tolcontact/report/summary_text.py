@@ -50,6 +50,8 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
     yield overview_table(summary)
     yield from map(Text, verdict_lines(summary))
     yield from (measure_table(summary.sel(measure=measure), summary.sizes["measure"]) for measure in summary["measure"].values)
+    if not summary.sizes["part"]:
+        return
     magnitudes = int(summary["magnitude_realizations"])
     yield Text("\n6 sigma of the displacement magnitude over the surface of each part (mm)", style="bold")
     if magnitudes < count:

@@ -188,11 +188,14 @@ def _field_values(results: xr.DataTree) -> dict[ArchiveVariable, Any]:
     parts = [str(part) for part in results.to_dataset()[terms.PART].values]
     fields = [results["field"].children[terms.group_of(part)].to_dataset() for part in parts]
     summed = [int(field[terms.FIELD_REALIZATIONS.name]) for field in fields]
+    extremes = [_field_extremes(field, count) for field, count in zip(fields, summed, strict=True)]
     magnitudes = [int(field[terms.MAGNITUDE_REALIZATIONS.name]) for field in fields]
     return {
-        terms.FIELD_EXTREME: np.array([_field_extremes(field, count) for field, count in zip(fields, summed, strict=True)]),
-        terms.REALIZATIONS_IN_FIELDS: min(summed),
-        terms.REALIZATIONS_IN_MAGNITUDES: min(*magnitudes, *summed),
+        terms.FIELD_EXTREME: np.array(extremes).reshape(
+            len(parts), len(terms.STATES), len(terms.EXTREMES), len(terms.ESTIMATE)
+        ),
+        terms.REALIZATIONS_IN_FIELDS: min(summed, default=0),
+        terms.REALIZATIONS_IN_MAGNITUDES: min([*magnitudes, *summed], default=0),
     }
 
 

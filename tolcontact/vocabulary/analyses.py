@@ -27,10 +27,12 @@ CASE = "case"  # a corrected worst case as a realization, with the variables tha
 EVENT, REQUIREMENT, TRIAL = "event", "requirement", "trial"
 SEAT, HOLDER = "seat", "holder"  # contacts: one that a part may not reach, and those that may hold it short of that
 STAGE, STAGES = "stage", ("before", "after")
+APPROACH, APPROACHES = "approach", ("worst case", "RSS", "MRSS", "1.5 RSS")  # to a stack, by linear sensitivities
 OF_EFFECT, EFFECTS = "of_effect", ("6 sigma", OUTSIDE)
 FIXED_LABELS = {
     STATE: STATES, INTERVAL: ESTIMATE, STATUS_MEANING: STATUS_MEANINGS, AXIS: AXES, BODY_AXIS: AXES,
     CONTACT: CONTACT_STATES, END: ENDS, STAGE: STAGES, OF_EFFECT: EFFECTS,
+    APPROACH: APPROACHES,
 }  # fmt: skip
 
 
@@ -172,7 +174,20 @@ SEATING = AnalysisRecord(
         variable("f8 share(seat, holder)", "share of the normal forces that then hold the part", "1"),
     ),
 )
-_RECORDS = CONTRIBUTIONS, SENSITIVITIES, WORST_CASE, TAILS, ALLOCATION, RELOCATION, SEATING
+STACK_UP = AnalysisRecord(
+    "stack_up",
+    "stack-up of the measurements of {assembly}",
+    (
+        variable("f8 drawn(measure)", "value without deviations"),
+        variable("f8 centred(measure)", "linear value at the centres of all zones"),
+        variable("f8 half_width(measure, approach)", "half of the range about the centred value, by linear sensitivities"),
+        variable("f8 simulated(measure, state, end, interval)", "0.135 % and 99.865 % percentiles of the realizations"),
+        variable("i8 links(measure)", "number of contributors that have an effect", "1"),
+        variable("i8 forms(measure)", "number of forms of faces among them", "1"),
+        _by_status(),
+    ),
+)
+_RECORDS = STACK_UP, CONTRIBUTIONS, SENSITIVITIES, WORST_CASE, TAILS, ALLOCATION, RELOCATION, SEATING
 ANALYSES = {record.name: record for record in _RECORDS}
 
 

@@ -171,7 +171,7 @@ class NamedFunction:
         self.native: NativeFunction | None = None
         compiled, executed = _instructions(function)
         self._may_be_compiled = compiled <= MAX_INSTRUCTIONS
-        self._min_calls = MIN_COMPILED_CALLS * compiled // executed
+        self._min_calls = MIN_COMPILED_CALLS * compiled // max(executed, 1)
         self._evaluations: Evaluations | None = None
         self._lock = threading.Lock()
 

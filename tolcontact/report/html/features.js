@@ -160,7 +160,7 @@ class FeatureList {
 }
 
 /** Show a text about the selection; without one, a hint at what can be selected. */
-const HINT = byId("message").textContent;
+const HINT = byId("message")?.textContent;
 function show(lines) {
   byId("message").textContent = lines ? lines.join("\n") : HINT;
 }

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.declaration import Assembly, TitleBlock
+from tolcontact.declaration import Assembly, Chain, TitleBlock
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.discretization import Nominal, discretize
 from tolcontact.errors import ArchiveError, ModelError
@@ -24,8 +24,9 @@ from tolcontact.report.contributor_shares import ContributorShares, contributor_
 from tolcontact.report.convention_text import offset_table
 from tolcontact.report.figures import grouped, limits_text
 from tolcontact.report.html.charts import bars_of, charts_of, compared_charts, relations_of
+from tolcontact.report.html.loop import loops_of
 from tolcontact.report.html.scene import gap_rows, scene_of, view_of
-from tolcontact.report.model_tables import archived_settings, model_tables
+from tolcontact.report.model_tables import archived_settings, chains_of, declaration_of, dimensions_of, model_tables
 from tolcontact.report.results_table import COLUMNS, SIDES, result_rows, share_heading
 from tolcontact.report.summary_text import contact_lines, measure_table, pair_table
 from tolcontact.statistics.capability import VERDICT_RULE
@@ -82,7 +83,7 @@ def is_page(path: Path) -> bool:
 def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock | None = None) -> str:
     """Return the report of a run with this summary; the default `title_block` comes from the archive."""
     scene, titles = scene_of(results, summary), title_block or title_block_of(results.attrs)
-    shares = contributor_shares(results, summary.attrs["realizations"])
+    shares, document = contributor_shares(results, summary.attrs["realizations"]), declaration_of(results)
     values = {
         "title": summary.attrs["title"],
         "titles": titles,
@@ -92,6 +93,8 @@ def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock |
         "results": _results(summary),
         "details": _details(summary, shares),
         "model": model_tables(results),
+        "loops": loops_of(chains_of(document), dimensions_of(document)),
+        "has_parts": summary.sizes["part"] > 0,
         "contact": list(contact_lines(summary, summary.attrs["realizations"])),
         "pairs": pair_table(summary) if summary.sizes["pair"] else None,
         "offsets": offset_table(summary),
@@ -100,7 +103,7 @@ def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock |
         "contributions": (indices := contributions_of(results)),
         "max_rows": MAX_ROWS,
         "run": {name: str(value) for name, value in archived_settings(results).items()},
-        "missing": _missing(scene),
+        "missing": _missing(scene) if scene["parts"] else [],
         "stations": scene["stations"],
     }
     data = {
@@ -123,6 +126,8 @@ def view_page(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]
         "title": assembly.name,
         "faults": remaining_faults,
         "omissions": omissions,
+        "loops": loops_of({m.name: vars(m.of) for m in assembly.measures if isinstance(m.of, Chain)}, assembly.variables),
+        "has_parts": bool(assembly.parts),
         "has_features": any(part.toleranced for part in assembly.parts),
         "pairs": gap_rows(nominal),
         "file": _file(assembly, nominal, faults),

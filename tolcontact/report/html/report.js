@@ -204,7 +204,7 @@ function relations() {
 }
 
 // Pictures come first: charts use the remaining room.
-try {
+if (byId("scene")) try {
   window.viewer = new Viewer(data.scene);
   data.charts.slice(0, MOST_PORTRAITS).forEach((measure, number) => portrait(window.viewer, measure, placeOf(number, "portrait")));
   control(window.viewer);

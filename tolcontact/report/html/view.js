@@ -59,10 +59,12 @@ function gaps(viewer) {
   });
 }
 
-const viewer = new Viewer(data.scene);
-control(viewer);
-window.stations = new Stations(viewer, () => {});
-gaps(viewer);
-viewer.paint("", 3, CORRECTED);
-pick(viewer, new FeatureList(viewer));
-window.viewer = viewer;
+if (byId("scene")) { // a stack has no parts
+  const viewer = new Viewer(data.scene);
+  control(viewer);
+  window.stations = new Stations(viewer, () => {});
+  gaps(viewer);
+  viewer.paint("", 3, CORRECTED);
+  pick(viewer, new FeatureList(viewer));
+  window.viewer = viewer;
+}

@@ -1,0 +1,192 @@
+"""Stacks in one dimension: links with limits, and the gaps that they close, by a script or from a table."""
+
+import csv
+import importlib  # pandas takes longer to import than all the rest: only if it is needed
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from tolcontact.declaration.assembly import Assembly
+from tolcontact.declaration.dependence import Variable
+from tolcontact.declaration.measure import Measure
+from tolcontact.declaration.measurement import Chain
+from tolcontact.declaration.title_block import TitleBlock
+from tolcontact.declaration.tolerance import Tolerance
+from tolcontact.declaration.values import is_length
+from tolcontact.declaration.written_tolerance import TextFault, written
+from tolcontact.errors import Faults, nearest_name
+from tolcontact.input_files import check_inputs
+from tolcontact.texts import shown
+
+GAP = "gap "  # heading of a column with the sensitivities of a gap
+COLUMNS = "name", "nominal", "tolerance", "upper", "lower", "sensitivity", "distribution", "cp", "cpk", "description"
+SEPARATORS = ";\t,"  # of columns, in the order in which they are looked for
+MAX_BYTES = 1 << 24  # of a table
+
+
+class Stack(Assembly):
+    """A stack in one dimension: an assembly without parts, of links and of the gaps that these close.
+
+        play = tc.Stack("play")
+        play.link("housing", 100.4, "±0.15")
+        play.link("spacer", 40, "+0/-0.1", sensitivity=-1)
+        play.gap("gap", limits=(0, None))
+
+    All numbers are in its `units`, which are labels: nothing is converted.
+    """
+
+    def __init__(self, name: str, *, units: str = "mm", title_block: TitleBlock | None = None) -> None:
+        super().__init__(name, title_block=title_block)
+        self.units = units
+        self._sensitivities: dict[str, float] = {}
+
+    def link(self, name: str, nominal: float, tolerance: Any, *, sensitivity: float = 1.0) -> Variable:
+        """Declare a link, a dimension of a drawing.
+
+        name         of the link
+        nominal      its nominal value, as drawn; 0 for a float
+        tolerance    full width of its zone, limit deviations ("±0.1", "+0.1/-0.05", a class such as "H7"), or a tc.Tolerance
+        sensitivity  change of a gap for a unit of the link: -1 if the gap shrinks as the link grows
+        """
+        if isinstance(tolerance, str) and is_length(nominal):
+            try:
+                tolerance = written(tolerance, units=self.units, nominal=nominal)
+            except TextFault as fault:
+                raise ValueError(f'link "{name}": tolerance is {tolerance!r}; {fault}') from fault
+        variable = self.variable(name, tolerance, units=self.units, nominal=nominal)
+        self._sensitivities[name] = sensitivity
+        return variable
+
+    def gap(
+        self, name: str, sensitivities: Mapping[str, float] | None = None, *, tolerance: Any = None,
+        limits: Sequence[float | None] | None = None,
+    ) -> Measure:  # fmt: skip
+        """Declare a gap: the sum of its links times their sensitivities.
+
+        name           of the gap
+        sensitivities  of its links by their names; by default all links declared before, with their own
+        tolerance      width of its limits about the nominal value, or "+0.2/-0.1"
+        limits         (lower, upper) values in place of a tolerance; None for an open side
+
+        `stack.gap("left", {"housing": 1, "shaft": -0.5}, limits=(0.1, None))`
+        """
+        chosen = self._sensitivities if sensitivities is None else sensitivities
+        return self.measure(name, Chain(dict(chosen), units=self.units), tolerance=tolerance, limits=limits)
+
+    def read(self, path: str | Path) -> tuple[Variable, ...]:
+        """Declare the links of a table, a CSV file or an .xlsx workbook, and return them.
+
+        Its columns are name, nominal, and tolerance, or upper and lower; others may be left out: sensitivity, distribution, cp,
+        cpk, description. A column "gap NAME" has the sensitivities of a gap, which is declared without limits. Raises
+        ModelError with all faults of the table.
+        """
+        heading, *rows = _rows(Path(path), self.name)
+        faults, title = Faults(), shown(Path(path).name)
+        faults.extend(f'table "{title}": {fault}' for fault in _heading_faults(heading))
+        faults.refuse(self.name)
+        gaps: dict[str, dict[str, float]] = {name.removeprefix(GAP): {} for name in heading if name.startswith(GAP)}
+        links = []
+        for number, cells in enumerate(rows, start=2):
+            if not any(cells):
+                continue
+            row = dict.fromkeys(heading, "") | dict(zip(heading, cells, strict=False))
+            try:
+                if len(cells) > len(heading):
+                    raise ValueError(f"it has {len(cells)} cells for {len(heading)} columns; write decimals with a point")
+                numbers = {name: _number(text, name) for name, text in row.items() if text and _is_number(name)}
+                links.append(self.link(row["name"], *_zone(row, numbers), sensitivity=numbers.get("sensitivity", 1.0)))
+                for name, factors in gaps.items():
+                    if (factor := numbers.get(GAP + name)) is not None:
+                        factors[row["name"]] = factor
+            except ValueError as fault:
+                faults.append(f'table "{title}", row {number}: {fault}')
+        if not (links or faults):
+            faults.append(f'table "{title}": it has no rows below its heading; expected a row for each link')
+        faults.refuse(self.name)
+        for name, factors in gaps.items():
+            self.gap(name, factors)
+        return tuple(links)
+
+
+def _rows(path: Path, stack: str) -> list[list[str]]:
+    """Return the rows of texts of a table, its heading in lower case. Raises ModelError if it cannot be read."""
+    faults, title = Faults(), shown(path.name)
+    rows: list[list[str]] = []
+    try:
+        check_inputs([path], MAX_BYTES)
+        if path.suffix.lower() == ".xlsx":
+            pandas = importlib.import_module("pandas")
+            table = pandas.read_excel(path, header=None, dtype=object)
+            rows = [["" if pandas.isna(cell) else str(cell).strip() for cell in row] for row in table.itertuples(index=False)]
+        else:
+            rows = _csv_rows(path.read_text(encoding="utf-8-sig"))
+    except UnicodeDecodeError:
+        faults.append(f'table "{title}": it is not UTF-8; save it as "CSV UTF-8"')
+    except (OSError, ValueError, ImportError) as error:
+        remedy = '; install it: pip install "tolcontact[xlsx]"' if isinstance(error, ImportError) else ""
+        faults.append(f'table "{title}" cannot be read: {str(error).splitlines()[0]}{remedy}')
+    if not (rows or faults):
+        faults.append(f'table "{title}": it is empty; expected a heading with some of: {", ".join(COLUMNS)}')
+    faults.refuse(stack)
+    return [[cell.casefold() if k == 0 and not cell.casefold().startswith(GAP) else cell for cell in row]
+            for k, row in enumerate(rows)]  # fmt: skip
+
+
+def _csv_rows(text: str) -> list[list[str]]:
+    """Return the rows of a CSV text; Excel may name its separator in a first line, "sep=;"."""
+    first, _, rest = text.partition("\n")
+    text = rest if first.strip().startswith("sep=") else text
+    heading = text.partition("\n")[0]
+    separator = next((mark for mark in SEPARATORS if mark in heading), ",")
+    return [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(text), delimiter=separator)]
+
+
+def _heading_faults(heading: Sequence[str]) -> Iterator[str]:
+    unknown = [name for name in heading if name not in COLUMNS and not name.startswith(GAP)]
+    for name in unknown:
+        known = f'{", ".join(COLUMNS)}, or "gap NAME"'
+        yield f'it has a column "{shown(name)}"{nearest_name(name, COLUMNS)}; expected some of: {known}'
+    if unknown:  # other columns may only seem to be missing
+        return
+    for name in dict.fromkeys(name for name in heading if heading.count(name) > 1):
+        yield f'it has {heading.count(name)} columns "{shown(name)}"; expected one'
+    for name in ("name", "nominal"):
+        if name not in heading:
+            yield f'it has no column "{name}"; its columns are: {", ".join(map(shown, heading))}'
+    if ("tolerance" in heading) == ("upper" in heading) or ("upper" in heading) != ("lower" in heading):
+        yield 'expected either a column "tolerance", or two, "upper" and "lower"'
+
+
+def _is_number(column: str) -> bool:
+    return column in ("nominal", "upper", "lower", "sensitivity", "cp", "cpk") or column.startswith(GAP)
+
+
+def _number(text: str, column: str) -> float:
+    """Return the number of a cell. Raises ValueError, which names the column."""
+    try:
+        return float(text.replace(",", ".").replace("\N{MINUS SIGN}", "-"))
+    except ValueError:
+        raise ValueError(f'{column} is "{shown(text)}"; expected a number') from None
+
+
+def _limits(text: str, nominal: float) -> Any:
+    """Return what a cell states as a tolerance. Raises ValueError for a text that states none."""
+    try:
+        return written(text, nominal=nominal)
+    except TextFault as fault:
+        raise ValueError(f'tolerance is "{shown(text)}"; {fault}') from fault
+
+
+def _zone(row: Mapping[str, str], numbers: Mapping[str, float]) -> tuple[float, Any]:
+    """Return the nominal value and the tolerance of a row. Raises ValueError for a cell that is empty or states neither."""
+    needed = ("name", "nominal", *(("tolerance",) if "tolerance" in row else ("upper", "lower")))
+    if empty := [name for name in needed if not row.get(name)]:
+        raise ValueError(f"{' and '.join(empty)} {'is' if len(empty) == 1 else 'are'} empty")
+    nominal = numbers["nominal"]
+    zone = _limits(row["tolerance"], nominal) if "tolerance" in row else written((numbers["lower"], numbers["upper"]))
+    options = {name: numbers[name] for name in ("cp", "cpk") if name in numbers}
+    tolerance = Tolerance(zone, row.get("distribution") or "normal", **options)
+    if reason := next(tolerance.faults(), ""):
+        raise ValueError(reason)
+    return nominal, tolerance
