@@ -12,11 +12,11 @@ from tolcontact.declaration.dependence import (
     Population,
     Variable,
     correlation as _correlation,
-    population as _population,
 )
-from tolcontact.declaration.geometry import Geometry
+from tolcontact.declaration.geometry import Geometry, Unit
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
+from tolcontact.declaration.measured_table import population as _population
 from tolcontact.declaration.part import Feature, Part
 from tolcontact.declaration.sequence import Station, in_order, joined_before, present_parts, sequence_faults, settings_of
 from tolcontact.declaration.size import Size
@@ -149,15 +149,22 @@ class Assembly(Declarations, Pictured, Checked):
         """
         return self._add("correlations", _correlation(labels, matrix, script_line()))
 
-    def population(self, source: Any, columns: Mapping[str, str] | None = None) -> Population:
+    def population(
+        self, source: Any, columns: Mapping[str, str] | None = None, *, absolute: bool = False, units: Unit = "mm"
+    ) -> Population:
         """Declare that contributors are drawn from measured rows (see Population).
 
-        source    a CSV file, a DataFrame, a Dataset or a mapping of columns, with deviations [mm]
+        source    a CSV file, a DataFrame, a Dataset or a mapping of columns, with deviations from nominal values
         columns   label of the contributor of each column; by default the names of the columns are labels
+        absolute  True: columns of sizes, of features declared before, hold sizes in place of deviations
+        units     of the numbers, by default mm: "um", "in", ...
 
-        `model.population("batch.csv", columns={"height": "block.top.offset"})`
+        `model.population("batch.csv", columns={"block.top.offset": "height"}, units="um")`
         """
-        return self._add("populations", _population(source, columns, script_line()))
+        expect("population: absolute", absolute, bool, "True or False")
+        sizes = {f"{feature.part.name}.{feature.name}.size": feature.size.nominal for feature in self.features if feature.size}
+        table = _population(source, columns, script_line(), units=units, sizes=sizes if absolute else None)
+        return self._add("populations", table)
 
     def may_overlap(self, *parts: Part) -> Overlap:
         """Declare that parts, any two of them, are meant to overlap, as in `model.may_overlap(shaft, hub)` (see Overlap)."""

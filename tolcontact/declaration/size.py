@@ -6,6 +6,7 @@ from dataclasses import KW_ONLY, dataclass
 from typing import ClassVar, Literal, get_args
 
 from tolcontact.declaration.checks import LENGTH, Checked, one_of, whole_number
+from tolcontact.declaration.scale import MAX_SIZE_SHARE
 from tolcontact.declaration.tolerance import Distribution, Tolerance
 from tolcontact.declaration.tolerance_class import tolerance_class
 from tolcontact.declaration.values import is_length
@@ -85,15 +86,39 @@ class Size(Checked):
     def _limit_faults(self) -> Iterator[str]:
         if not self.nominal > 0:
             yield f"nominal is {self.nominal!r}; expected a size in mm above 0"
-        if not self.lower < self.upper:
+        if self.lower == self.upper:
+            yield f"both limits are {self.upper:g}, so the size does not vary; leave the size out"
+        elif not self.lower < self.upper:
             yield f"the lower limit {self.lower:+g} is not below the upper one {self.upper:+g}; swap them"
         else:
+            yield from self._scale_faults() if self.nominal > 0 else ()
             yield from self.tolerance.faults()
         if self.tolerance_class and (fault := text_fault(self.tolerance_class, nominal=self.nominal)):
             yield f"tolerance_class is {fault}"
         elif self.tolerance_class and written(self.tolerance_class, nominal=self.nominal) != (self.lower, self.upper):
             limits = f"{self.upper:+g} {self.lower:+g}"
             yield f"tolerance_class is {self.tolerance_class!r}, which has other limits than {limits}; leave it out"
+
+    def _scale_faults(self) -> Iterator[str]:
+        """Yield the fault of limits, or of a distribution, that can be no deviations from the nominal size."""
+        largest = MAX_SIZE_SHARE * self.nominal
+        if min(abs(self.lower), abs(self.upper)) >= largest and self.lower * self.upper > 0:
+            upper, lower = (f"{limit - self.nominal:+.6g}" for limit in (self.upper, self.lower))
+            meant = f", as in tc.Size({self.nominal:g}, {upper}, {lower})" if self.lower > 0 else ""
+            yield (
+                f"its limits are {self.upper:g} and {self.lower:g} for a size of {self.nominal:g} mm; limits are deviations "
+                f"from the nominal size{meant}"
+            )
+        elif self.lower <= -self.nominal:
+            yield (
+                f"its lower limit {self.lower:+g} leaves nothing of a size of {self.nominal:g} mm; limits are deviations from "
+                "the nominal size, in mm: divide micrometres by 1000"
+            )
+        elif hasattr(self.tolerance.frozen, "ppf") and abs(median := float(self.tolerance.frozen.ppf(0.5))) >= largest:
+            yield (
+                f"the median of its distribution is {median:g} mm for a size of {self.nominal:g} mm; it is one of deviations "
+                "from the nominal size: subtract that from its mean"
+            )
 
     def __str__(self) -> str:
         if not (is_length(self.nominal) and is_length(self.upper) and is_length(self.lower)):

@@ -115,14 +115,18 @@ class Tolerance(Readable):
         return float(6 * self.frozen.std()) if hasattr(self.frozen, "std") else 0.0
 
     def __str__(self) -> str:
+        return self.in_units("mm")
+
+    def in_units(self, units: str) -> str:
+        """Return the tolerance in words, of a variable with these units."""
         if hasattr(self.frozen, "dist"):
             spread = f"scipy.stats.{self.frozen.dist.name}"
         else:
-            width = f"{self.range:g} mm" if is_length(self.range) else repr(self.range)
+            width = f"{self.range:g} {units}" if is_length(self.range) else repr(self.range)
             spread = f"{self.distribution}, full width {width}"
         numbers = [(name, value) for name, value in (("cp", self.cp), ("cpk", self.cpk)) if is_length(value)]
         capability = "".join(f", {name} {value:g}" for name, value in numbers)
-        return spread + capability + (f", shifted by {self.shift:g} mm" if is_length(self.shift) and self.shift else "")
+        return spread + capability + (f", shifted by {self.shift:g} {units}" if is_length(self.shift) and self.shift else "")
 
 
 def tolerance(value: Any) -> Tolerance:

@@ -65,6 +65,47 @@ def unfollowed_by_locators(draws: TrialDraws) -> Iterator[str]:
                 break
 
 
+def unvaried(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence if nothing varies, or for each measure, correlation and variable that does not."""
+    nominal = draws.program.nominal
+    varies = dict(zip(nominal.contributors, np.ptp(draws.deviations, axis=0) > 0, strict=True)) if len(draws.deviations) else {}
+    if varies and not any(varies.values()):
+        yield (
+            "nothing varies, since all tolerances are 0: each realization is the nominal assembly; give locators, features or "
+            "variables a tolerance"
+        )
+        return
+    yield from _unvaried_measures(draws)
+    assembly = nominal.assembly
+    causes = [
+        *((correlation, correlation.labels) for correlation in assembly.correlations),
+        *((variable, (variable.name,)) for variable in assembly.variables),
+    ]
+    for cause, labels in causes:
+        still = [label for label in labels if not varies.get(label, True)]
+        if still:
+            yield f'{cause.designation}: "{still[0]}" does not vary, so it has no effect; give it a tolerance, or leave it out'
+
+
+def _unvaried_measures(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each measure that no tolerance changes, on parts that contact does not move."""
+    program, nominal = draws.program, draws.program.nominal
+    still = [
+        k
+        for k, values in enumerate(draws.measured.T)
+        if len(values) and np.isfinite(values).all() and np.ptp(values) <= MIN_MOTION
+    ]
+    on_pose = _dependence(program, "observe", "poses", "measured") if still else np.zeros(0)
+    for k in still:
+        parts = np.flatnonzero(on_pose[k].reshape(len(nominal.parts), -1).any(axis=1))
+        if not any(nominal.may_differ(int(part)) for part in parts):
+            names = " and ".join(f'"{nominal.parts[part].name}"' for part in parts[:LISTED])
+            yield (
+                f"{nominal.measures[k].designation}: it does not vary: no tolerance changes it, and contact does not move "
+                f"{names or 'its parts'}; measure what varies, or give these parts tolerances"
+            )
+
+
 def unused_features(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence on the features whose tolerances displace nothing that is measured, located or in contact."""
     nominal = draws.program.nominal
