@@ -151,19 +151,54 @@ def test_tables_that_cannot_be_read_are_named(tmp_path):
     with pytest.raises(ValueError, match=r'population "none.csv" cannot be read as CSV'):
         a.population(tmp_path / "none.csv")
     texts = {
-        "one;two\n0.1;0.2\n": r"expected commas between columns, got semicolons; .*\(pandas.read_csv\(\"p.csv\", sep=';'\)\)",
-        "one;two\n0,1;0,2\n": r"""got semicolons; read it with pandas: .* sep=';', decimal=","\)\)""",
-        "one\ttwo\n0.1\t0.2\n": r"got tabs; .* sep='\\t'\)\)",
-        "one\n0,1\n0,2\n": "its rows have more entries than its heading has columns; expected one for each",
+        "one\n0,1\n0,2\n": "line 2 has 2 entries, and the heading 1; .*line 3 has 2 entries",
+        "one,two\n1,2\n1\n": "line 3 has 1 entries, and the heading 2",
+        "one\n0.1\n#DIV/0!\n": r'line 3, column "one" is "#DIV/0!", and no number; mend the table, or leave out the rows',
+        "one\n0.1\n \n0.2\n": 'line 3, column "one" is empty',
+        "one,two\nmm,mm\n1,2\n": 'line 2, column "one" is "mm"',
+        "one\n0.1 mm\n": 'line 2, column "one" is "0.1 mm"',
+        "one\ttwo\n1,250\t1\n": 'line 2, column "one" is "1,250", and no number: write a decimal point',
+        "one\n1_000\n0x10\nnan\ninf\n1\n": 'line 2, .*"1_000".* line 3, .*"0x10".*line 4, .*"nan".*; and 1 more;',
+        "one,one\n1,2\n": 'columns 1 and 2 are both named "one"; rename one of them',
+        "one [um]\n1\n": r'column "one \[um\]" is in um; give units="um"',
+        "one (\N{MICRO SIGN}m)\n1\n": 'is in um; give units="um"',
+        "two\n1\n": "has no column 'one'; its columns are: two",
+        "": "it has no rows; expected a heading",
+        "PK\3\4": r'it is a workbook; read it with pandas: population\(pandas.read_excel\("p.csv"\)\)',
     }
     for text, message in texts.items():
-        (tmp_path / "p.csv").write_text(text)
-        with pytest.raises(ValueError, match=f'^population "p.csv": .*{message}'):
+        (tmp_path / "p.csv").write_text(text, encoding="utf-8")
+        with pytest.raises(ValueError, match=f'^population "p.csv".*{message}'):
             a.population(tmp_path / "p.csv", {"top.A1": "one"})
     with pytest.raises(ValueError, match="a population is a int that is no table"):
         a.population(3)
     with pytest.raises(ValueError, match=r"has no column 'width'; its columns are: one, two"):
         a.population({"one": [1, 2], "two": [1, 2]}, {"top.A1": "width"})
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "one,two\n0.1,2\n-0.25,3\n",
+        "sep=;\r\none;two\r\n0,1;2\r\n-0,25;3\r\n",
+        "sep=,\none,two\n0.1,2\n-0.25,3\n",
+        "one\ttwo\n0,1\t2\n-.25e0\t3\n",
+        "# gauge 7\none [mm],two\n0.1,2\n# lunch\n\n\N{MINUS SIGN}0.25,3\n# mean -0.075\n\n",
+        ' one , "two, too"\n 0.1 , 2\n-0.25,3\n',
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
+def test_tables_of_spreadsheets_are_read(text, encoding, tmp_path):
+    a = cases.ra1()
+    text = text.replace("\N{MINUS SIGN}", "-") if encoding == "cp1252" else text
+    (tmp_path / "p.csv").write_bytes(text.replace("two", "Maß").encode(encoding))
+    assert a.population(tmp_path / "p.csv", {"top.A1": "one"}).values.tolist() == [[0.1], [-0.25]]
+
+
+def test_numbers_of_a_table_are_read_to_the_last_bit(tmp_path):
+    numbers = np.random.default_rng(5).normal(size=2000) * 10.0 ** np.random.default_rng(6).integers(-12, 3, 2000)
+    pd.DataFrame({"one": numbers}).to_csv(tmp_path / "p.csv", index=False)
+    assert np.array_equal(cases.ra1().population(tmp_path / "p.csv", {"top.A1": "one"}).values[:, 0], numbers)
 
 
 def test_measured_places_have_used_their_bonus():

@@ -136,8 +136,8 @@ def _rows(text: str, columns: Mapping[str, str] | None) -> Iterator[tuple[int, l
         line = lines[number].translate(_SIGNS) if number > first else heading
         if _COMMENT.match(line) and number not in used:
             continue
-        cells = [cell.strip() for cell in next(csv.reader(io.StringIO(line), delimiter=separator), [])]
-        if number not in used and len(next(csv.reader([heading], delimiter=separator))) > 1:
+        cells = [cell.strip() for cell in next(csv.reader(io.StringIO(line), delimiter=separator, skipinitialspace=True), [])]
+        if number not in used and len(next(csv.reader([heading], delimiter=separator, skipinitialspace=True))) > 1:
             continue
         is_decimal = separator != "," and number > first
         yield number + 1, [_decimal(cell) for cell in cells] if is_decimal else cells

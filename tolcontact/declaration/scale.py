@@ -81,7 +81,7 @@ class Scale:
         """The smallest and the largest plausible width of deviations: by the zone, or by the standard tolerance grades."""
         if self.width > CONSTANT_SHARE * self.part:
             return MIN_ZONES * self.width, MAX_ZONES * self.width
-        return grade_width(FINEST, self.extent) / 2, grade_width(COARSEST, self.extent)
+        return grade_width(FINEST, self.extent), grade_width(COARSEST, self.extent)
 
     def fits(self, centre: float, width: float) -> bool:
         """Return whether deviations with this centre and width (six standard deviations) are plausible."""

@@ -68,8 +68,10 @@ def unfollowed_by_locators(draws: TrialDraws) -> Iterator[str]:
 def unvaried(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence if nothing varies, or for each measure, correlation and variable that does not."""
     nominal = draws.program.nominal
-    varies = dict(zip(nominal.contributors, np.ptp(draws.deviations, axis=0) > 0, strict=True)) if len(draws.deviations) else {}
-    if varies and not any(varies.values()):
+    if not len(draws.deviations):
+        return
+    varies = dict(zip(nominal.contributors, np.ptp(draws.deviations, axis=0) > 0, strict=True))
+    if not any(varies.values()):
         yield (
             "nothing varies, since all tolerances are 0: each realization is the nominal assembly; give locators, features or "
             "variables a tolerance"
@@ -82,7 +84,7 @@ def unvaried(draws: TrialDraws) -> Iterator[str]:
         *((variable, (variable.name,)) for variable in assembly.variables),
     ]
     for cause, labels in causes:
-        still = [label for label in labels if not varies.get(label, True)]
+        still = [label for label in labels if not varies[label]]
         if still:
             yield f'{cause.designation}: "{still[0]}" does not vary, so it has no effect; give it a tolerance, or leave it out'
 

@@ -73,7 +73,7 @@ class Zone(NamedTuple):
     @property
     def smallest(self) -> float:
         """The smallest plausible width [mm]."""
-        return grade_width(FINEST, self.extent) / 2
+        return grade_width(FINEST, self.extent)
 
 
 def _zones(nominal: NominalPart, place: str) -> Iterator[Zone]:

@@ -67,7 +67,7 @@ def _doubts_of_variable(variable: Variable, freedoms: dict[str, Freedom], by_lab
             continue
         has_zone = scale.width > CONSTANT_SHARE * scale.part
         largest = MAX_EFFECT * scale.width if has_zone else grade_width(COARSEST, scale.extent)
-        smallest = MIN_EFFECT * scale.width if has_zone else grade_width(FINEST, scale.extent) / 2
+        smallest = MIN_EFFECT * scale.width if has_zone else grade_width(FINEST, scale.extent)
         effect, offset = abs(factor) * width, factor * centre
         if effect < smallest or max(effect, abs(offset)) > largest:
             zone = f"its own zone of {scale.width:.3g} mm" if has_zone else f"a length of {scale.extent:.4g} mm"
