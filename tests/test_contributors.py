@@ -55,6 +55,52 @@ def test_marginals_of_other_shapes_stay():
     assert rank == pytest.approx(6 / np.pi * np.arcsin(-0.7 / 2), abs=0.02)
 
 
+def two_supports(distribution, coefficient, kind):
+    a = tc.Assembly("two")
+    top = a.part("top", tc.Box(50, 25, 10))
+    faces = [top.face(side) for side in ("-z", "-y", "-x")]
+    a.locate(top, tc.three_two_one(*faces), tolerance=tc.Tolerance(distribution=distribution))
+    a.measure("x", top.point(0, 0, 0), along="x")
+    a.correlate(["top.A1", "top.A2"], coefficient, kind=kind)
+    return a
+
+
+SIGMA = 0.8  # of the logarithm
+LOGNORMAL = stats.lognorm(SIGMA, loc=-0.1, scale=0.1)
+PEARSON = (np.exp(0.7 * SIGMA**2) - 1) / (np.exp(SIGMA**2) - 1)  # of lognormal deviations with normal scores of 0.7
+
+
+@pytest.mark.parametrize(
+    ("distribution", "kind", "stated"),
+    [
+        (LOGNORMAL, "copula", 0.7),
+        (LOGNORMAL, "pearson", PEARSON),
+        (LOGNORMAL, "rank", 6 / np.pi * np.arcsin(0.35)),
+        (stats.uniform(-0.1, 0.2), "pearson", 6 / np.pi * np.arcsin(0.35)),
+        (stats.norm(0, 0.1), "pearson", 0.7),
+    ],
+)
+def test_coefficients_of_each_kind_have_the_copula_of_their_closed_form(distribution, kind, stated):
+    found, expected = (draws_of(two_supports(distribution, *choice)) for choice in ((stated, kind), (0.7, "copula")))
+    assert found["top.A2"] == pytest.approx(expected["top.A2"], abs=1e-6)
+    if distribution is LOGNORMAL and kind == "copula":
+        assert PEARSON == pytest.approx(0.630, abs=5e-4)
+        (line,) = tc.build(two_supports(distribution, stated, kind)).draws.correlations_in_words
+        assert line == 'correlation of "top.A1" and "top.A2": copula 0.700, Pearson 0.630, rank 0.683'
+
+
+def test_coefficients_that_cannot_exist_are_refused():
+    least = (np.exp(-(SIGMA**2)) - 1) / (np.exp(SIGMA**2) - 1)
+    (fault,) = tc.check(two_supports(LOGNORMAL, -0.6, "pearson"))
+    assert f"have Pearson coefficients from {least:.3f} to 1.000 alone, by their distributions, and not -0.6" in fault
+    (fault,) = tc.check(two_supports(LOGNORMAL, 0.6, "kendall"))
+    assert "kind is 'kendall'; expected one of: copula, pearson, rank" in fault
+    a = two_supports(LOGNORMAL, 0.1, "copula").replaced(correlations=[])
+    a.correlate(["top.A1", "top.A2", "top.A3"], [[1, -0.49, -0.49], [-0.49, 1, -0.49], [-0.49, -0.49, 1]], kind="rank")
+    (fault,) = tc.check(a)
+    assert "no Gaussian copula has these rank coefficients together" in fault
+
+
 def with_everything():
     a = toleranced.block_with("top", tc.Profile(0.3, "A"))
     block = a.parts[0]

@@ -123,7 +123,8 @@ def worst_case(
     gains no more. `unseen` is the estimate w (w + 1) / (n (n - 1)) for w distinct ends of n searches from random combinations
     (Boender, Rinnooy Kan, 1987). Faces with form keep their shape, as with form=None: no worst case is searched in the
     zones of forms, and the attribute `without_form` names these features. The linear estimate is exact to first order in the
-    deviations: large tilts may exceed it. Only certified realizations count. `progress` is called with the number of realizations simulated, and the approximate total.
+    deviations: large tilts may exceed it. Only certified realizations count. `progress` is called with the number of
+    realizations simulated, and the approximate total.
     `model`, `samples`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see tolcontact.analyses).
 
     `tc.analyses.worst_case("model.py", solver="daqp")`

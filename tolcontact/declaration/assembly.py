@@ -9,6 +9,7 @@ from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overl
 from tolcontact.declaration.declarations import Declarations, expect
 from tolcontact.declaration.dependence import (
     Correlation,
+    CorrelationKind,
     Population,
     Variable,
     correlation as _correlation,
@@ -142,12 +143,13 @@ class Assembly(Declarations, Pictured, Checked):
         )
         return self._add("variables", variable)
 
-    def correlate(self, labels: Sequence[str], matrix: Any) -> Correlation:
+    def correlate(self, labels: Sequence[str], matrix: Any, *, kind: CorrelationKind = "copula") -> Correlation:
         """Declare that contributors with these `labels` are correlated: a `matrix`, or one coefficient for two of them.
 
+        `kind` is what the coefficients are of: "copula" (default), "pearson" or "rank" (see Correlation).
         `model.correlate(["top.A1", "top.A2"], 0.5)`
         """
-        return self._add("correlations", _correlation(labels, matrix, script_line()))
+        return self._add("correlations", _correlation(labels, matrix, script_line(), kind))
 
     def population(
         self, source: Any, columns: Mapping[str, str] | None = None, *, absolute: bool = False, units: Unit = "mm"

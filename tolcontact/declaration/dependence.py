@@ -5,15 +5,16 @@ Contributors are named by labels: "part.locator", "part.feature.freedom" ("cover
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 
-from tolcontact.declaration.checks import Declaration
+from tolcontact.declaration.checks import Declaration, one_of
 from tolcontact.declaration.geometry import UNITS
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import is_length, is_line
 
+CorrelationKind = Literal["copula", "pearson", "rank"]
 MAX_LISTED = 6  # coefficients in a row of the model
 MIN_EIGENVALUE = 1e-12  # of a correlation matrix; of a smaller absolute value it is zero
 
@@ -54,11 +55,17 @@ class Variable(Declaration):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Correlation(Declaration):
-    """A correlation of contributors: a Gaussian copula with this matrix, which leaves their distributions unchanged."""
+    """A correlation of contributors: a Gaussian copula, which leaves their distributions unchanged.
+
+    kind   what the coefficients of the matrix are of: "copula", the normal scores; "pearson", the deviations; or "rank", the
+           ranks of the deviations (Spearman). They are equal, or nearly so, for normal distributions
+    """
 
     labels: tuple[str, ...]
     matrix: tuple[tuple[float, ...], ...]
     declared_at: str = ""
+    kind: CorrelationKind = "copula"
+    checks: ClassVar = {"kind": one_of(get_args(CorrelationKind))}
     noun: ClassVar[str] = "correlation"
 
     @property
@@ -66,6 +73,7 @@ class Correlation(Declaration):
         return ", ".join(map(str, self.labels))
 
     def faults(self) -> Iterator[str]:
+        yield from super().faults()
         if len(set(self.labels)) < len(self.labels) or len(self.labels) < 2:
             yield "expected two or more different labels of contributors"
         try:
@@ -92,7 +100,7 @@ class Correlation(Declaration):
     def __str__(self) -> str:
         numbers = [f"{self.matrix[row][column]:g}" for row in range(len(self.matrix)) for column in range(row)]
         listed = ", ".join(numbers) if len(numbers) <= MAX_LISTED else f"{len(numbers)} coefficients"
-        return f"correlation of {self.name}: {listed} (Gaussian copula)"
+        return f"correlation of {self.name}: {listed} ({self.kind})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -130,7 +138,7 @@ class Population(Declaration):
         return f"population {self.source}: {len(self.values)} rows of {', '.join(self.columns)}"
 
 
-def correlation(labels: Sequence[str], matrix: Any, declared_at: str) -> Correlation:
+def correlation(labels: Sequence[str], matrix: Any, declared_at: str, kind: Any = "copula") -> Correlation:
     """Return the Correlation of contributors; `matrix` may be an array, or one coefficient for two of them."""
     if is_length(matrix):
         matrix = [[1.0, matrix], [matrix, 1.0]]
@@ -138,4 +146,4 @@ def correlation(labels: Sequence[str], matrix: Any, declared_at: str) -> Correla
         rows = tuple(tuple(float(number) for number in row) for row in matrix)
     except (TypeError, ValueError):
         rows = ()
-    return Correlation(tuple(labels), rows, declared_at)
+    return Correlation(tuple(labels), rows, declared_at, kind)

@@ -226,7 +226,7 @@ RECORDS = {
     ),
     "forces": Record(Force, omitted="station"),
     "variables": Record(Variable, floats="drives"),
-    "correlations": Record(Correlation),
+    "correlations": Record(Correlation, omitted="kind"),
     "populations": Record(Population, fields="values columns source declared_at"),
     "stations": Record(Station),
     "joints": Record(Joint),
