@@ -7,7 +7,7 @@ from typing import ClassVar, Literal, get_args
 
 from tolcontact.declaration.checks import LENGTH, Checked, one_of, whole_number
 from tolcontact.declaration.scale import MAX_SIZE_SHARE
-from tolcontact.declaration.tolerance import Distribution, Tolerance
+from tolcontact.declaration.tolerance import Distribution, Side, Tolerance
 from tolcontact.declaration.tolerance_class import tolerance_class
 from tolcontact.declaration.values import is_length
 from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
@@ -28,7 +28,7 @@ class Size(Checked):
     "H7")` with a `tolerance_class` of ISO 286-1. Sizes vary about the midpoint of the limits by `distribution` (see
     tc.Tolerance). `moves` states which of two planes moves with the size: "both" by half each (default), or the "first" or
     "second" alone. `cp` and `cpk` are the capability of its process: by default six standard deviations equal `upper` less
-    `lower`, with the mean in their middle.
+    `lower`, with the mean in their middle; `side` is the side that the mean is on, "up" or "down".
     """
 
     kind: ClassVar[str] = "size"
@@ -41,6 +41,7 @@ class Size(Checked):
     _: KW_ONLY
     cp: float | None = None
     cpk: float | None = None
+    side: Side | None = None
     moves: Moves = "both"
     distribution: Distribution = "normal"
     tolerance_class: str = ""
@@ -67,7 +68,7 @@ class Size(Checked):
         if not isinstance(self.distribution, str):
             return Tolerance(distribution=self.distribution)
         width, middle = self.upper - self.lower, (self.upper + self.lower) / 2
-        return Tolerance(width, self.distribution, shift=middle, cp=self.cp, cpk=self.cpk)
+        return Tolerance(width, self.distribution, shift=middle, cp=self.cp, cpk=self.cpk, side=self.side)
 
     def faults(self) -> Iterator[str]:
         if not is_length(self.nominal):

@@ -13,6 +13,7 @@ from tolcontact.declaration.scale import COARSEST, CONSTANT_SHARE, FINEST, grade
 from tolcontact.declaration.values import is_length
 from tolcontact.discretization import NominalPart
 from tolcontact.discretization.measured_geometry import Combined, MeshClearance, NominalMeasurement
+from tolcontact.features import Freedom
 from tolcontact.plausibility.declared_points import location_designation, parts_in_other_units
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws, spread
 
@@ -20,6 +21,7 @@ WIDE_SHARE = 0.5  # of a part's largest extent, or of a size: the width of a zon
 MAX_LEVERAGE = 20.0  # displacement of a corner of a part for a unit deviation of a locator
 MAX_TILT = math.radians(45)  # by the locators, at three sigma
 FAR_SIGMAS = 100.0  # limits this far from the nominal value do not matter
+MIN_SHIFTS, CANCELLED = 2, 0.5  # mean shifts that may cancel; what they lose in doing so, as a share of their sum
 NEAR_SIGMAS = 0.1  # limits this close together are in other units than what varies
 MIN_SHARE = 1e-6  # of that distance: smaller variation is rounding
 
@@ -186,6 +188,36 @@ def _number(value: float) -> str:
 
 def _side(limit: float) -> str:
     return f"{limit:g}" if math.isfinite(limit) else "open"
+
+
+def assumed_sides(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each measure on which mean shifts without a side cancel that are all assumed to go up."""
+    program = draws.program
+    shifts = np.array([_assumed_shift(freedom) for freedom in program.draws.contributors])
+    columns = np.flatnonzero(shifts)
+    if len(columns) < MIN_SHIFTS:
+        return
+    deviations = np.zeros((len(columns) + 1, len(shifts)))
+    deviations[np.arange(len(columns)), columns] = shifts[columns]
+    measured = program.observe(poses=program.place(deviations=deviations)["poses"], deviations=deviations)["measured"]
+    effects = measured[:-1] - measured[-1]
+    for measure, effect in zip(program.nominal.measures, effects.T, strict=True):
+        largest, assumed = float(np.abs(effect).sum()), round(float(effect.sum()), 9) + 0.0
+        if np.isfinite(largest) and largest > (1 + CANCELLED) * abs(assumed):
+            count = int((np.abs(effect) > MIN_SHARE * largest).sum())
+            yield (
+                f"{measure.designation}: the means of {count} contributors are assumed to be above the centre by their cpk, which "
+                f"moves it by {assumed:.3g} {measure.units}; if their sides are unknown, by up to ±{largest:.3g}; state them, "
+                'side="up" or "down"'
+            )
+
+
+def _assumed_shift(freedom: Freedom) -> float:
+    """Return the shift of a mean by cpk whose side is not stated; 0 without one."""
+    if freedom.tolerance is not None:
+        return freedom.tolerance.capability_shift if freedom.tolerance.side is None else 0.0
+    control = freedom.geometric
+    return freedom.mean - freedom.middle if control is not None and control.cpk is not None and control.side is None else 0.0
 
 
 def measured_reach(draws: TrialDraws) -> Iterator[str]:

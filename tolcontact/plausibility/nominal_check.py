@@ -9,7 +9,7 @@ from tolcontact.plausibility.bodies import body_overlaps, clashes, clashes_beyon
 from tolcontact.plausibility.declared_points import doubtful_units, far_points, stored_coordinates, unfit_directions
 from tolcontact.plausibility.effects import unfollowed_by_locators, unfollowed_by_measures, unused_features, unvaried
 from tolcontact.plausibility.faces import measured_forms, partial_surfaces
-from tolcontact.plausibility.measures import measure_limits, measured_reach, rotations, wide_tolerances
+from tolcontact.plausibility.measures import assumed_sides, measure_limits, measured_reach, rotations, wide_tolerances
 from tolcontact.plausibility.pairs import (
     coarse_pairs,
     pair_clearances,
@@ -36,6 +36,7 @@ KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
     "twice": (repeated_pairs,),
     "rotation": (unconstrained_rotations,),
     "limits": (measure_limits,),
+    "side": (assumed_sides,),
     "reach": (measured_reach,),
     "force": (unused_forces,),
     "friction": (unsure_seats,),

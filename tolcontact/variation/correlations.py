@@ -57,9 +57,10 @@ def copula_matrix(correlation: Correlation, freedoms: Sequence[Freedom], model: 
         else:
             low, high = pearson(-1.0, *pair), pearson(1.0, *pair)
             if not low < stated < high:
+                first, second = correlation.labels[row], correlation.labels[column]
                 faults.append(
-                    f'"{correlation.labels[row]}" and "{correlation.labels[column]}" have Pearson coefficients from {low:.3f} to '
-                    f"{high:.3f} alone, by their distributions, and not {stated:g}"
+                    f'"{first}" and "{second}" have Pearson coefficients from {low:.3f} to {high:.3f} alone, by their '
+                    f"distributions, and not {stated:g}"
                 )
                 continue
             coefficient = scipy.optimize.brentq(lambda r, pair=pair, stated=stated: pearson(r, *pair) - stated, -1, 1)
