@@ -125,15 +125,16 @@ def test_a_tangent_plane_and_form_per_length_are_stated_and_draw_as_the_plane_do
 
 
 def two_blocks(**options):
-    """Two equal blocks side by side; the measure is the difference of the places of their feet."""
+    """Two equal blocks side by side, each with a foot off its centre; the measure is the difference of their heights."""
     a = tc.Assembly("two")
     blocks = [a.part(name, tc.Box(50, 25, 10), at=(x, 0, 0)) for name, x in (("left", 0), ("right", 60))]
-    for block in blocks:
-        tolerance = (
-            tc.Tolerance(0.2, cp=1.33, cpk=1.0, **options) if block is blocks[0] else tc.Tolerance(0.2, cp=1.33, cpk=1.0)
-        )
-        a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=tolerance)
-    a.measure("step", blocks[1].point(25, 22, 0), to=blocks[0].point(25, 22, 0), along="z", absolute=False)
+    places = {"Z1": (20, 12, 0), "Z2": (30, 12, 0), "Z3": (25, 22, 0), "Y1": (0, 0, 5), "Y2": (50, 0, 5), "X": (0, 12, 5)}
+    for block, side in zip(blocks, (options, {}), strict=True):
+        foot = tc.Tolerance(0.2, cp=1.33, cpk=1.0, **side)
+        zones = {name: foot if name == "Z3" else 0 for name in places}
+        a.locate(block, [tc.Locator(name, point, name[0].lower(), zones[name]) for name, point in places.items()])
+    left, right = (block.point(25, 22, 0) for block in blocks)
+    a.measure("step", right, to=left, along="z", absolute=False)
     return a
 
 

@@ -66,7 +66,7 @@ def unfollowed_by_locators(draws: TrialDraws) -> Iterator[str]:
 
 
 def unvaried(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence if nothing varies, or for each measure, correlation and variable that does not."""
+    """Yield a sentence if nothing varies, on measures that do not, and for each such correlation and variable."""
     nominal = draws.program.nominal
     if not len(draws.deviations):
         return
@@ -90,7 +90,7 @@ def unvaried(draws: TrialDraws) -> Iterator[str]:
 
 
 def _unvaried_measures(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence for each measure that no tolerance changes, on parts that contact does not move."""
+    """Yield a sentence on the measures that no tolerance changes, on parts that contact does not move."""
     program, nominal = draws.program, draws.program.nominal
     still = [
         k
@@ -98,14 +98,15 @@ def _unvaried_measures(draws: TrialDraws) -> Iterator[str]:
         if len(values) and np.isfinite(values).all() and np.ptp(values) <= MIN_MOTION
     ]
     on_pose = _dependence(program, "observe", "poses", "measured") if still else np.zeros(0)
-    for k in still:
-        parts = np.flatnonzero(on_pose[k].reshape(len(nominal.parts), -1).any(axis=1))
-        if not any(nominal.may_differ(int(part)) for part in parts):
-            names = " and ".join(f'"{nominal.parts[part].name}"' for part in parts[:LISTED])
-            yield (
-                f"{nominal.measures[k].designation}: it does not vary: no tolerance changes it, and contact does not move "
-                f"{names or 'its parts'}; measure what varies, or give these parts tolerances"
-            )
+    owners = {k: np.flatnonzero(on_pose[k].reshape(len(nominal.parts), -1).any(axis=1)) for k in still}
+    unmoved = [k for k, parts in owners.items() if not any(nominal.may_differ(int(part)) for part in parts)]
+    if unmoved:
+        parts = " and ".join(f'"{nominal.parts[part].name}"' for part in owners[unmoved[0]][:LISTED]) or "its parts"
+        others = f", nor do {len(unmoved) - 1} more measurements" if len(unmoved) > 1 else ""
+        yield (
+            f"{nominal.measures[unmoved[0]].designation}: it does not vary{others}: no tolerance changes it, and contact does not "
+            f"move {parts}; measure what varies, or give these parts tolerances"
+        )
 
 
 def unused_features(draws: TrialDraws) -> Iterator[str]:
