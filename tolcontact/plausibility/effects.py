@@ -104,8 +104,8 @@ def _unvaried_measures(draws: TrialDraws) -> Iterator[str]:
         parts = " and ".join(f'"{nominal.parts[part].name}"' for part in owners[unmoved[0]][:LISTED]) or "its parts"
         others = f", nor do {len(unmoved) - 1} more measurements" if len(unmoved) > 1 else ""
         yield (
-            f"{nominal.measures[unmoved[0]].designation}: it does not vary{others}: no tolerance changes it, and contact does not "
-            f"move {parts}; measure what varies, or give these parts tolerances"
+            f"{nominal.measures[unmoved[0]].designation}: it does not vary{others}: no tolerance changes it, and contact does "
+            f"not move {parts}; measure what varies, or give these parts tolerances"
         )
 
 

@@ -206,8 +206,8 @@ def assumed_sides(draws: TrialDraws) -> Iterator[str]:
         if np.isfinite(largest) and largest > (1 + CANCELLED) * abs(assumed):
             count = int((np.abs(effect) > MIN_SHARE * largest).sum())
             yield (
-                f"{measure.designation}: the means of {count} contributors are assumed to be above the centre by cpk, which moves "
-                f"it by {assumed:.3g} {measure.units}; if their sides are unknown, by up to ±{largest:.3g}; state them, "
+                f"{measure.designation}: the means of {count} contributors are assumed to be above the centre by cpk, which "
+                f"moves it by {assumed:.3g} {measure.units}; if their sides are unknown, by up to ±{largest:.3g}; state them, "
                 'side="up" or "down"'
             )
 
