@@ -18,7 +18,7 @@ from tolcontact.plausibility.declared_points import location_designation, parts_
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws, spread
 
 WIDE_SHARE = 0.5  # of a part's largest extent, or of a size: the width of a zone
-MAX_LEVERAGE = 20.0  # displacement of a corner of a part for a unit deviation of a locator
+MAX_LEVERAGE = 25.0  # displacement of a corner of a part for a unit deviation of a locator
 MAX_TILT = math.radians(45)  # by the locators, at three sigma
 FAR_SIGMAS = 100.0  # limits this far from the nominal value do not matter
 MIN_SHIFTS, CANCELLED = 2, 0.5  # mean shifts that may cancel; what they lose in doing so, as a share of their sum
