@@ -55,6 +55,52 @@ def test_marginals_of_other_shapes_stay():
     assert rank == pytest.approx(6 / np.pi * np.arcsin(-0.7 / 2), abs=0.02)
 
 
+def two_supports(distribution, coefficient, kind):
+    a = tc.Assembly("two")
+    top = a.part("top", tc.Box(50, 25, 10))
+    faces = [top.face(side) for side in ("-z", "-y", "-x")]
+    a.locate(top, tc.three_two_one(*faces), tolerance=tc.Tolerance(distribution=distribution))
+    a.measure("x", top.point(0, 0, 0), along="x")
+    a.correlate(["top.A1", "top.A2"], coefficient, kind=kind)
+    return a
+
+
+SIGMA = 0.8  # of the logarithm
+LOGNORMAL = stats.lognorm(SIGMA, loc=-0.1, scale=0.1)
+PEARSON = (np.exp(0.7 * SIGMA**2) - 1) / (np.exp(SIGMA**2) - 1)  # of lognormal deviations with normal scores of 0.7
+
+
+@pytest.mark.parametrize(
+    ("distribution", "kind", "stated"),
+    [
+        (LOGNORMAL, "copula", 0.7),
+        (LOGNORMAL, "pearson", PEARSON),
+        (LOGNORMAL, "rank", 6 / np.pi * np.arcsin(0.35)),
+        (stats.uniform(-0.1, 0.2), "pearson", 6 / np.pi * np.arcsin(0.35)),
+        (stats.norm(0, 0.1), "pearson", 0.7),
+    ],
+)
+def test_coefficients_of_each_kind_have_the_copula_of_their_closed_form(distribution, kind, stated):
+    found, expected = (draws_of(two_supports(distribution, *choice)) for choice in ((stated, kind), (0.7, "copula")))
+    assert found["top.A2"] == pytest.approx(expected["top.A2"], abs=1e-6)
+    if distribution is LOGNORMAL and kind == "copula":
+        assert PEARSON == pytest.approx(0.630, abs=5e-4)
+        (line,) = tc.build(two_supports(distribution, stated, kind)).draws.correlations_in_words
+        assert line == 'correlation of "top.A1" and "top.A2": copula 0.700, Pearson 0.630, rank 0.683'
+
+
+def test_coefficients_that_cannot_exist_are_refused():
+    least = (np.exp(-(SIGMA**2)) - 1) / (np.exp(SIGMA**2) - 1)
+    (fault,) = tc.check(two_supports(LOGNORMAL, -0.6, "pearson"))
+    assert f"have Pearson coefficients from {least:.3f} to 1.000 alone, by their distributions, and not -0.6" in fault
+    (fault,) = tc.check(two_supports(LOGNORMAL, 0.6, "kendall"))
+    assert "kind is 'kendall'; expected one of: copula, pearson, rank" in fault
+    a = two_supports(LOGNORMAL, 0.1, "copula").replaced(correlations=[])
+    a.correlate(["top.A1", "top.A2", "top.A3"], [[1, -0.49, -0.49], [-0.49, 1, -0.49], [-0.49, -0.49, 1]], kind="rank")
+    (fault,) = tc.check(a)
+    assert "no Gaussian copula has these rank coefficients together" in fault
+
+
 def with_everything():
     a = toleranced.block_with("top", tc.Profile(0.3, "A"))
     block = a.parts[0]
@@ -151,19 +197,54 @@ def test_tables_that_cannot_be_read_are_named(tmp_path):
     with pytest.raises(ValueError, match=r'population "none.csv" cannot be read as CSV'):
         a.population(tmp_path / "none.csv")
     texts = {
-        "one;two\n0.1;0.2\n": r"expected commas between columns, got semicolons; .*\(pandas.read_csv\(\"p.csv\", sep=';'\)\)",
-        "one;two\n0,1;0,2\n": r"""got semicolons; read it with pandas: .* sep=';', decimal=","\)\)""",
-        "one\ttwo\n0.1\t0.2\n": r"got tabs; .* sep='\\t'\)\)",
-        "one\n0,1\n0,2\n": "its rows have more entries than its heading has columns; expected one for each",
+        "one\n0,1\n0,2\n": "line 2 has 2 entries, and the heading 1; .*line 3 has 2 entries",
+        "one,two\n1,2\n1\n": "line 3 has 1 entries, and the heading 2",
+        "one\n0.1\n#DIV/0!\n": r'line 3, column "one" is "#DIV/0!", and no number; mend the table, or leave out the rows',
+        "one\n0.1\n \n0.2\n": 'line 3, column "one" is empty',
+        "one,two\nmm,mm\n1,2\n": 'line 2, column "one" is "mm"',
+        "one\n0.1 mm\n": 'line 2, column "one" is "0.1 mm"',
+        "one\ttwo\n1,250\t1\n": 'line 2, column "one" is "1,250", and no number: write a decimal point',
+        "one\n1_000\n0x10\nnan\ninf\n1\n": 'line 2, .*"1_000".* line 3, .*"0x10".*line 4, .*"nan".*; and 1 more;',
+        "one,one\n1,2\n": 'columns 1 and 2 are both named "one"; rename one of them',
+        "one [um]\n1\n": r'column "one \[um\]" is in um; give units="um"',
+        "one (\N{MICRO SIGN}m)\n1\n": 'is in um; give units="um"',
+        "two\n1\n": "has no column 'one'; its columns are: two",
+        "": "it has no rows; expected a heading",
+        "PK\3\4": r'it is a workbook; read it with pandas: population\(pandas.read_excel\("p.csv"\)\)',
     }
     for text, message in texts.items():
-        (tmp_path / "p.csv").write_text(text)
-        with pytest.raises(ValueError, match=f'^population "p.csv": .*{message}'):
+        (tmp_path / "p.csv").write_text(text, encoding="utf-8")
+        with pytest.raises(ValueError, match=f'^population "p.csv".*{message}'):
             a.population(tmp_path / "p.csv", {"top.A1": "one"})
     with pytest.raises(ValueError, match="a population is a int that is no table"):
         a.population(3)
     with pytest.raises(ValueError, match=r"has no column 'width'; its columns are: one, two"):
         a.population({"one": [1, 2], "two": [1, 2]}, {"top.A1": "width"})
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "one,two\n0.1,2\n-0.25,3\n",
+        "sep=;\r\none;two\r\n0,1;2\r\n-0,25;3\r\n",
+        "sep=,\none,two\n0.1,2\n-0.25,3\n",
+        "one\ttwo\n0,1\t2\n-.25e0\t3\n",
+        "# gauge 7\none [mm],two\n0.1,2\n# lunch\n\n\N{MINUS SIGN}0.25,3\n# mean -0.075\n\n",
+        ' one , "two, too"\n 0.1 , 2\n-0.25,3\n',
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
+def test_tables_of_spreadsheets_are_read(text, encoding, tmp_path):
+    a = cases.ra1()
+    text = text.replace("\N{MINUS SIGN}", "-") if encoding == "cp1252" else text
+    (tmp_path / "p.csv").write_bytes(text.replace("two", "Maß").encode(encoding))
+    assert a.population(tmp_path / "p.csv", {"top.A1": "one"}).values.tolist() == [[0.1], [-0.25]]
+
+
+def test_numbers_of_a_table_are_read_to_the_last_bit(tmp_path):
+    numbers = np.random.default_rng(5).normal(size=2000) * 10.0 ** np.random.default_rng(6).integers(-12, 3, 2000)
+    pd.DataFrame({"one": numbers}).to_csv(tmp_path / "p.csv", index=False)
+    assert np.array_equal(cases.ra1().population(tmp_path / "p.csv", {"top.A1": "one"}).values[:, 0], numbers)
 
 
 def test_measured_places_have_used_their_bonus():

@@ -2,9 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from io import StringIO
 
 import numpy as np
 import pytest
+from rich.console import Console
 from scipy.optimize import linprog
 from scipy.stats import chi2
 
@@ -16,9 +18,10 @@ from tolcontact.compilation import compile_program
 from tolcontact.discretization import Offsets, discretize
 from tolcontact.errors import ModelError
 from tolcontact.features import FormField
+from tolcontact.report import analysis_text
 from tolcontact.simulation import simulate_blocks
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
-from tolcontact.vocabulary import CORRECTED, Status
+from tolcontact.vocabulary import CORRECTED, WORST_CASE, Status
 
 
 def modes_at(program, feature, places):
@@ -218,9 +221,27 @@ def test_contact_points_too_far_apart_for_a_form_are_refused():
     assert "correlation length of 33.3 mm; expected at most half of that" in refused(sparse)
 
 
-def test_no_worst_case_of_faces_with_form_is_searched():
-    with pytest.raises(tc.OptionError, match="has faces with form, in whose zone no worst case is searched"):
-        tc.analyses.worst_case(seat(), samples=256, method=SEATED, solver="daqp")
+def test_a_worst_case_leaves_form_out_and_names_its_features():
+    """The block touches the table with its form, and a profile contains the form of its top: values are as with form=None."""
+    found = []
+    for form in (tc.Form(), None):
+        a = tc.Assembly("block")
+        table = a.part("table", tc.Box(60, 60, 10), at=(0, 0, -10), fixed=True)
+        block = a.part("block", tc.Box(40, 40, 10), at=(10, 10, 0))
+        under = block.feature("under", block.face("-z"), tc.Flatness(0.05, form=form), datum="A")
+        top = block.feature("top", block.face("+z"), tc.Profile(0.2, "A"), tc.Flatness(0.1, form=form))
+        a.locate(block, tc.three_two_one(under, block.face("-y"), block.face("-x"), inset=5), tolerance=0.4)
+        a.contact("seat", moving=under, reference=table.face("+z"))
+        a.measure("top", top.point(20, 20, 10), along="z")
+        found.append(tc.analyses.worst_case(a, samples=256, solver="daqp"))
+    assert found[0].attrs["without_form"] == "block.under, block.top"
+    assert "without_form" not in found[1].attrs
+    assert found[0]["worst"].values == pytest.approx(found[1]["worst"].values, abs=1e-4)
+    raw = [dataset["bound"].sel(state="raw").values for dataset in found]
+    assert raw[0] == pytest.approx(raw[1], abs=1e-6)
+    with Console(width=200, file=StringIO()) as console, console.capture() as printed:
+        console.print(analysis_text(WORST_CASE, found[0]))
+    assert "Without the form deviations of block.under, block.top: these faces keep their shape." in printed.get()
 
 
 def test_the_gap_of_a_station_over_a_face_with_form_counts_its_height_there():

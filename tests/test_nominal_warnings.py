@@ -233,8 +233,8 @@ def test_measured_parts_that_are_probably_in_micrometres(tolerance, values, is_d
     a = model(tolerance=tolerance)
     (tmp_path / "feet.csv").write_text("\n".join(["block.B1", *map(str, values)]))
     a.population(tmp_path / "feet.csv")
-    expected = r'\[units\] population "feet.csv" \(test_nom.*\): the values of block.B1 are around 50 mm .* micrometres by 1000'
-    assert [bool(re.search(expected, text)) for text in warned(a) if text.startswith("[units]")] == [True] * is_doubtful
+    expected = r'population "feet.csv" \(test_nom.*\): row 1 is a deviation of 50 mm; block.B1 .* micrometres: .*units="um"'
+    assert [bool(re.search(expected, fault)) for fault in tc.check(a)] == [True] * is_doubtful
 
 
 def test_bodies_that_are_no_pair():
@@ -254,11 +254,87 @@ def test_a_pin_in_a_hole_of_its_size_is_no_overlap():
     pin = trimesh.creation.cylinder(5, 20, sections=36)
     a.part("pin", tc.Mesh(pin), fixed=True)
     a.measure("nothing", a.parts[0].point(20, 0, 0), along="z")
-    assert not warned(a)
+    assert kinds(a) == ["effect"]
     sunk = a.replaced(parts=[a.parts[0]], measures=[])
     sunk.part("pin", tc.Mesh(pin), at=(4, 0, 0), fixed=True)
     sunk.measure("nothing", sunk.parts[0].point(20, 0, 0), along="z")
-    assert kinds(sunk) == ["overlap"]
+    assert kinds(sunk) == ["overlap", "effect"]
+
+
+def test_many_bodies_in_one_place_are_one_warning():
+    a = tc.Assembly("stack")
+    for number in range(11):
+        box = a.part(f"box {number}", tc.Box(10, 10, 10 + number))
+        a.locate(box, tc.three_two_one(box.face("-z"), box.face("-y"), box.face("-x"), inset=2), tolerance=0.2)
+    a.measure("height", box.point(0, 0, 0), along="z")
+    (text,) = warned(a)
+    assert re.match(r"\[overlap\] 11 parts .* overlap in 55 places .*; 11 of them lie at the origin: .*at=\(x, y, z\)", text)
+
+
+def test_a_pair_of_the_same_faces_is_declared_twice():
+    a = model()
+    table, block = a.parts
+    for name, faces in {"again": (block, table), "exchanged": (table, block)}.items():
+        moving, reference = (part.face("-z" if part is block else "+z") for part in faces)
+        a.contact(name, moving=moving, reference=reference)
+    again, exchanged = (text for text in warned(a) if text.startswith("[twice]"))
+    assert re.match(r'\[twice\] contact pair "again" .* declared twice: "interface" has its faces; leave', again)
+    assert re.match(r'\[twice\] contact pair "exchanged" .*"interface" has its faces, with the sides exchanged', exchanged)
+
+
+def test_what_does_not_vary_is_named():
+    a = model()
+    a.measure("table", a.parts[0].point(0, 0, 10), along="z")
+    (text,) = warned(a)
+    assert re.match(r'\[effect\] measurement "table" .* does not vary: .* contact does not move "table"', text)
+    still = model(tolerance=0)
+    still.measure("table", still.parts[0].point(0, 0, 10), along="z")
+    (text,) = warned(still)
+    assert re.match(r"\[effect\] nothing varies, since all tolerances are 0", text)
+    a = model(changes=off("B1", (2, 0, 5), "y", tolerance=0.0))
+    a.correlate(["block.B1", "block.B2"], 0.5)
+    (text,) = warned(a)
+    assert re.match(r'\[effect\] correlation "block.B1, block.B2" .*: "block.B1" does not vary, so it has no effect', text)
+
+
+def test_a_measure_that_contact_alone_changes_varies():
+    """The table varies, and lifts the block, whose own locators do not vary."""
+    a = tc.Assembly("lift")
+    table = a.part("table", tc.Box(100, 50, 10))
+    block = a.part("block", tc.Box(50, 25, 10), at=(20, 12.5, 10))
+    for part, tolerance in ((table, 0.2), (block, 0.0)):
+        scheme = tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x"), inset=2)
+        a.locate(part, scheme, tolerance=tolerance)
+    a.contact("interface", moving=block.face("-z"), reference=table.face("+z"))
+    a.measure("height", block.point(50, 0, 10), along="z", limits=(-0.5, 0.5))
+    assert not warned(a)
+
+
+def test_feet_close_together_displace_the_corners():
+    feet = {"A1": (24, 12, 0), "A2": (25, 12, 0), "A3": (24.5, 13, 0)}
+    changes = {name: tc.Locator(name, point, "z", 0.01) for name, point in feet.items()}
+    (text,) = [text for text in warned(model(changes=changes)) if text.startswith("[tolerance]")]
+    # A corner 26 mm right and 0.5 x 12 mm off: A1 and A2 tilt by 1/1 about y, and A3 by 1/1 about x.
+    assert re.search(r'1 mm at locator "A2" is 32\.\d mm at a corner of the part; .* \(the closest ones are 1 mm apart\)', text)
+
+
+def test_limits_narrower_than_what_varies_are_in_other_units():
+    (text,) = warned(model(limits=(-0.0005, 0.0005)))
+    assert re.search(r"\[limits\] .* are 0\.0\d+ sigma wide; check their units", text)
+
+
+def test_coordinates_far_from_the_origin_are_coarse(tmp_path):
+    """A binary STL has single precision: 1 km from the origin the next number is 1/16 mm away."""
+    for shift, expected in ((0.0, []), (1e6, ["0.062"])):
+        block = trimesh.creation.box((50, 25, 10))
+        block.apply_translation((25 + shift, 12.5, 5))
+        block.export(tmp_path / "block.stl")
+        a = tc.Assembly("far")
+        part = a.part("block", tc.Mesh(tmp_path / "block.stl"), at=(-shift, 0, 0))
+        a.locate(part, tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x"), inset=2), tolerance=0.01)
+        a.measure("height", part.point(25 + shift, 12, 10), along="z")
+        said = [re.search(r"\[coarse\] .* stores coordinates (\S+) mm apart", text) for text in warned(a)]
+        assert [match[1] for match in said if match] == expected
 
 
 def test_a_warning_is_silenced_by_its_name():

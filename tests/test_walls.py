@@ -45,7 +45,7 @@ LAZY = {
     "dask": ("simulation/cluster.py", "simulation/lazy.py"),
     "dask.array": ("simulation/lazy.py",),
     "distributed": ("simulation/cluster.py",),
-    "pandas": ("declaration/dependence.py", "declaration/stack.py"),
+    "pandas": ("declaration/measured_table.py", "declaration/stack.py"),
     "trimesh": ("geometry/files/worker.py",),  # in a process that mostly reads STEP files
     "openpyxl": ("report/spreadsheet.py",),
     "psutil": ("system/",),  # where the system limits no process

@@ -1,5 +1,7 @@
 """From zones to spreads: the table of known factors, other rules, and populations that are measured back."""
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.stats import binom, norm
@@ -120,3 +122,42 @@ def test_a_tangent_plane_and_form_per_length_are_stated_and_draw_as_the_plane_do
     assert list(map(str, top.tolerances))[1:] == [
         "parallelism 0.1 Ⓣ A", "flatness 0.02/25×25", "straightness 0.01/10",
     ]  # fmt: skip
+
+
+def two_blocks(**options):
+    """Two equal blocks side by side, each with a foot off its centre; the measure is the difference of their heights."""
+    a = tc.Assembly("two")
+    blocks = [a.part(name, tc.Box(50, 25, 10), at=(x, 0, 0)) for name, x in (("left", 0), ("right", 60))]
+    places = {"Z1": (20, 12, 0), "Z2": (30, 12, 0), "Z3": (25, 22, 0), "Y1": (0, 0, 5), "Y2": (50, 0, 5), "X": (0, 12, 5)}
+    for block, side in zip(blocks, (options, {}), strict=True):
+        foot = tc.Tolerance(0.2, cp=1.33, cpk=1.0, **side)
+        zones = {name: foot if name == "Z3" else 0 for name in places}
+        a.locate(block, [tc.Locator(name, point, name[0].lower(), zones[name]) for name, point in places.items()])
+    left, right = (block.point(25, 22, 0) for block in blocks)
+    a.measure("step", right, to=left, along="z", absolute=False)
+    return a
+
+
+def test_a_mean_shift_has_a_side():
+    up, down = (tc.Tolerance(0.2, cp=1.33, cpk=1.0, side=side) for side in ("up", "down"))
+    shift = 0.1 * (1 - 1 / 1.33)
+    assert (up.mean_shift, down.mean_shift) == (shift, -shift) == (tc.Tolerance(0.2, cp=1.33, cpk=1.0).mean_shift, -shift)
+    assert str(down) == "normal, full width 0.2 mm, cp 1.33, cpk 1 (mean down by 0.02481 mm)"
+    assert tc.Size(10, 0.1, side="down", cp=1.33, cpk=1.0).tolerance.mean_shift == pytest.approx(-shift)
+    for side, sign in (("up", 1), ("down", -1)):
+        block = toleranced.block_with("top", tc.Profile(0.3, "A", cp=1.5, cpk=1.2, side=side))
+        means = [freedom.mean for freedom in tc.build(block).draws.contributors if freedom.mean]
+        assert len(means) == 1 and means[0] * sign > 0
+    assert "side is 'left'; expected up or down" in list(tc.Tolerance(0.2, cp=1, cpk=0.9, side="left").faults())
+    assert any("side is given without cpk" in fault for fault in tc.Tolerance(0.2, side="up").faults())
+
+
+def test_sides_that_are_assumed_are_told_where_shifts_cancel():
+    with pytest.warns(
+        tc.NominalWarning,
+        match=r'\[side\] measurement "step" .* of 2 contributors .* moves it by 0 mm; if their .* up to ±0.0496;',
+    ):
+        tc.build(two_blocks())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", tc.NominalWarning)
+        tc.build(two_blocks(side="down"))

@@ -14,16 +14,16 @@ from tolcontact.system import files
 def check_identities(inputs: Iterable[object], outputs: Mapping[str, Path]) -> None:
     """Raise OptionError for an output, by its kind, that is an input or another output, by whatever name."""
     named = [("input", Path(path)) for path in inputs if isinstance(path, str | Path)]
-    for (name, path), (other, taken) in itertools.combinations([*named, *outputs.items()], 2):
-        if other in outputs and _is_same(path, taken):
-            raise OptionError(f'"{taken}" would be the {name} and the {other}; choose another name for the {other}')
+    for (name, path), (output, target) in itertools.combinations([*named, *outputs.items()], 2):
+        if output in outputs and _is_same(path, target):
+            raise OptionError(f'"{target}" would be the {name} and the {output}; choose another name for the {output}')
 
 
-def _is_same(path: Path, other: Path) -> bool:
+def _is_same(path: Path, target: Path) -> bool:
     """Return whether two paths lead to one file; names that differ only in case do on some systems."""
-    if path.exists() and other.exists():
-        return path.samefile(other)
-    return str(path.resolve()).casefold() == str(other.resolve()).casefold()
+    if path.exists() and target.exists():
+        return path.samefile(target)
+    return str(path.resolve()).casefold() == str(target.resolve()).casefold()
 
 
 @contextlib.contextmanager

@@ -95,7 +95,7 @@ def allocate(
     }
     labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
     limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR, "choices": prices.names(fresh.logs, list(groups))}
-    counts = {"samples": samples, "fresh": VERIFICATION_FACTOR * samples, "idle_tried": search.tested_rows}
+    counts: dict[str, Any] = {"samples": samples, "fresh": VERIFICATION_FACTOR * samples, "idle_tried": search.tested_rows}
     return analysis.dataset(values, labels, by=by, **counts, **limits)
 
 

@@ -121,8 +121,10 @@ def worst_case(
     population, the far ends along nominal sensitivities, and the far ends along the slopes of a regression; `samples` / 128
     start at any of them (see tolcontact.analyses.extreme_search). The best one continues in other random directions until it
     gains no more. `unseen` is the estimate w (w + 1) / (n (n - 1)) for w distinct ends of n searches from random combinations
-    (Boender, Rinnooy Kan, 1987). The linear estimate is exact to first order in the deviations: large tilts may exceed it. Only
-    certified realizations count. `progress` is called with the number of realizations simulated, and the approximate total.
+    (Boender, Rinnooy Kan, 1987). Faces with form keep their shape, as with form=None: no worst case is searched in the
+    zones of forms, and the attribute `without_form` names these features. The linear estimate is exact to first order in the
+    deviations: large tilts may exceed it. Only certified realizations count. `progress` is called with the number of
+    realizations simulated, and the approximate total.
     `model`, `samples`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see tolcontact.analyses).
 
     `tc.analyses.worst_case("model.py", solver="daqp")`
@@ -137,11 +139,6 @@ def worst_case(
 def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
     """Return the dataset of `worst_case`, by searches with a given effort."""
     program, engine = analysis.program, analysis.engine(analysis.samples)
-    if any(contributor.source == FORM for contributor in program.draws.contributors):
-        raise OptionError(
-            f'"{analysis.assembly}" has faces with form, in whose zone no worst case is searched; give their tolerances '
-            "of form form=None"
-        )
     region = AllowedRegion(program.draws, seed=analysis.seed)
     analysis.check_varies(region.varies.size)
     linear, evaluation, rng = linear_model(program), Evaluation(engine, region), np.random.default_rng(analysis.seed)
@@ -178,7 +175,12 @@ def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
         **_as_realizations(program, region.deviations(corrected.point)),
     }
     cases = [f"{end} {measure.name}" for measure in program.nominal.measures for end in terms.ENDS]
-    return analysis.dataset(arrays, {terms.CASE: cases}, random_combinations=analysis.samples, searches=effort.searches)
+    labels = [contributor.label for contributor in program.draws.contributors if contributor.source == FORM]
+    formed = dict.fromkeys(label.rpartition(".")[0] for label in labels)
+    return analysis.dataset(
+        arrays, {terms.CASE: cases}, random_combinations=analysis.samples, searches=effort.searches,
+        **({terms.WITHOUT_FORM: ", ".join(formed)} if formed else {}),
+    )  # fmt: skip
 
 
 def _check_defined(program: Program, is_undefined: np.ndarray) -> None:

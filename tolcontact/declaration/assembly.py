@@ -1,18 +1,17 @@
 """The assembly: it collects declarations in the order of a script."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from typing import Any, ClassVar, Generic, TypeVar, get_args
 
+from tolcontact.declaration.causes import Causes
 from tolcontact.declaration.checks import FRICTION, Checked, one_of
 from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overlap
-from tolcontact.declaration.declarations import Declarations, expect
+from tolcontact.declaration.declarations import expect
 from tolcontact.declaration.dependence import (
     Correlation,
     Population,
     Variable,
-    correlation as _correlation,
-    population as _population,
 )
 from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.locator import Location
@@ -21,7 +20,6 @@ from tolcontact.declaration.part import Feature, Part, Standard
 from tolcontact.declaration.sequence import Station, in_order, joined_before, present_parts, sequence_faults, settings_of
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.title_block import TitleBlock
-from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import (
     group_faults,
     key_faults,
@@ -52,7 +50,7 @@ class Declared(Generic[T]):
         return self if assembly is None else tuple(assembly._declared[self._name])  # type: ignore[return-value]
 
 
-class Assembly(Declarations, Pictured, Checked):
+class Assembly(Causes, Pictured, Checked):
     """Parts, how they are located, which faces may touch, and what is measured. Lengths in mm, angles in rad.
 
     The methods only record declarations; `faults()` lists everything that is wrong with them. `method` states how contact in
@@ -152,43 +150,6 @@ class Assembly(Declarations, Pictured, Checked):
     def station(self, name: str) -> Station:
         """Declare the next station, of this `name`, of an assembly that is built in steps: `weld = line.station("weld")`."""
         return self._add("stations", Station(name, script_line()).belonging_to(self))
-
-    def variable(
-        self, name: str, tolerance: Any, *, drives: Mapping[str, float] | None = None, units: str = "mm",
-        nominal: float | None = None,
-    ) -> Variable:  # fmt: skip
-        """Declare a cause that drives several contributors, or a dimension that chains measure (see Variable).
-
-        name        of the cause
-        tolerance   full width of its range in its `units`, or a tc.Tolerance
-        drives      factor [mm per unit] of each contributor, by its label
-        units       of the cause, by default mm
-        nominal     value of a dimension in its `units`, which may drive nothing
-
-        `model.variable("warmth", 20, drives={"cover.width.size": 0.0007}, units="K")`
-        """
-        variable = Variable(
-            name=name, tolerance=_tolerance(tolerance), drives=dict(drives or {}), units=units, nominal=nominal,
-            declared_at=script_line(),
-        )  # fmt: skip
-        return self._add("variables", variable)
-
-    def correlate(self, labels: Sequence[str], matrix: Any) -> Correlation:
-        """Declare that contributors with these `labels` are correlated: a `matrix`, or one coefficient for two of them.
-
-        `model.correlate(["top.A1", "top.A2"], 0.5)`
-        """
-        return self._add("correlations", _correlation(labels, matrix, script_line()))
-
-    def population(self, source: Any, columns: Mapping[str, str] | None = None) -> Population:
-        """Declare that contributors are drawn from measured rows (see Population).
-
-        source    a CSV file, a DataFrame, a Dataset or a mapping of columns, with deviations [mm]
-        columns   label of the contributor of each column; by default the names of the columns are labels
-
-        `model.population("batch.csv", columns={"height": "block.top.offset"})`
-        """
-        return self._add("populations", _population(source, columns, script_line()))
 
     def may_overlap(self, *parts: Part) -> Overlap:
         """Declare that parts, any two of them, are meant to overlap, as in `model.may_overlap(shaft, hub)` (see Overlap)."""

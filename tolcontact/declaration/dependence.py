@@ -3,22 +3,20 @@
 Contributors are named by labels: "part.locator", "part.feature.freedom" ("cover.H1.size"), or the name of a variable.
 """
 
-import importlib  # pandas takes longer to import than all the rest: only if it is needed
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 
-from tolcontact.declaration.checks import Declaration
+from tolcontact.declaration.checks import Declaration, one_of
+from tolcontact.declaration.geometry import UNITS
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import is_length, is_line
 from tolcontact.declaration.written_tolerance import DIGITS, Deviations
-from tolcontact.input_files import check_inputs
-from tolcontact.texts import shown
 
-SEPARATORS = {";": "semicolons", "\t": "tabs"}
+CorrelationKind = Literal["copula", "pearson", "rank"]
+MAX_LISTED = 6  # coefficients in a row of the model
 MIN_EIGENVALUE = 1e-12  # of a correlation matrix; of a smaller absolute value it is zero
 
 
@@ -49,12 +47,17 @@ class Variable(Declaration):
                 yield f"drives has {label!r}: {factor!r}; expected the label of a contributor, and a number"
         if not (self.units and is_line(self.units)):
             yield f'units is {self.units!r}; expected a text such as "mm" or "K"'
+        elif self.drives and self.units in UNITS and self.units != "mm":
+            yield (
+                f'units is "{self.units}", and nothing is converted; state the cause in mm: its tolerance times '
+                f"{UNITS[self.units]:g}, and factors in mm per mm"
+            )
 
     def __str__(self) -> str:
         drives = ", ".join(f"{label} by {factor:g}" for label, factor in self.drives.items())
         driven = f"; drives {drives}" if drives else ""
         if self.limits is None:
-            return f"variable {self.name} [{self.units}]: {self.tolerance}{driven}"
+            return f"variable {self.name} [{self.units}]: {self.tolerance.in_units(self.units)}{driven}"
         centred = f", centred {self.centred}" if self.limits.middle else ""
         return f"dimension {self.name} [{self.units}]: {self.drawn}{centred}{driven}"
 
@@ -82,11 +85,17 @@ class Variable(Declaration):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Correlation(Declaration):
-    """A correlation of contributors: a Gaussian copula with this matrix, which leaves their distributions unchanged."""
+    """A correlation of contributors: a Gaussian copula, which leaves their distributions unchanged.
+
+    kind   what the coefficients of the matrix are of: "copula", the normal scores; "pearson", the deviations; or "rank", the
+           ranks of the deviations (Spearman). They are equal, or nearly so, for normal distributions
+    """
 
     labels: tuple[str, ...]
     matrix: tuple[tuple[float, ...], ...]
     declared_at: str = ""
+    kind: CorrelationKind = "copula"
+    checks: ClassVar = {"kind": one_of(get_args(CorrelationKind))}
     noun: ClassVar[str] = "correlation"
 
     @property
@@ -94,6 +103,7 @@ class Correlation(Declaration):
         return ", ".join(map(str, self.labels))
 
     def faults(self) -> Iterator[str]:
+        yield from super().faults()
         if len(set(self.labels)) < len(self.labels) or len(self.labels) < 2:
             yield f"its labels are {', '.join(map(str, self.labels)) or 'none'}; expected two or more different contributors"
         try:
@@ -118,7 +128,9 @@ class Correlation(Declaration):
             )
 
     def __str__(self) -> str:
-        return f"correlation of {self.name}"
+        numbers = [f"{self.matrix[row][column]:g}" for row in range(len(self.matrix)) for column in range(row)]
+        listed = ", ".join(numbers) if len(numbers) <= MAX_LISTED else f"{len(numbers)} coefficients"
+        return f"correlation of {self.name}: {listed} ({self.kind})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -156,67 +168,7 @@ class Population(Declaration):
         return f"population {self.source}: {len(self.values)} rows of {', '.join(self.columns)}"
 
 
-def population(source: Any, columns: Mapping[str, str] | None, declared_at: str) -> Population:
-    """Return the Population of a CSV file, a DataFrame, an xarray Dataset of one dimension, or a mapping of columns.
-
-    `columns` maps the label of each contributor to the name of its column; by default the two are equal. Entries that are not
-    numbers, among them True and False, become NaN, and a fault of the population. Raises ValueError for an unreadable table or
-    a missing column.
-    """
-    pd = importlib.import_module("pandas")
-    if isinstance(source, str | Path):
-        title = shown(Path(source).name)
-        table = _table_of(source, title, set(columns.values()) if columns is not None else set())
-    else:
-        try:
-            table = source.to_dataframe() if hasattr(source, "to_dataframe") else pd.DataFrame(source)
-        except (TypeError, ValueError) as error:
-            raise ValueError(
-                f"a population is a {type(source).__name__} that is no table ({error}); expected a CSV file, a DataFrame, a "
-                "Dataset, or columns of equal length by name"
-            ) from error
-        title = f"of {len(table)} rows"
-    names = dict(columns) if columns is not None else {str(name): name for name in table.columns}
-    missing = [name for name in names.values() if name not in table.columns]
-    if missing:
-        raise ValueError(
-            f'population "{title}" has no column {missing[0]!r}; its columns are: {", ".join(map(str, table.columns))}'
-        )
-    entries = [table[name].astype(object).mask(table[name].map(type).isin([bool, np.bool_])) for name in names.values()]
-    numbers = [pd.to_numeric(column, errors="coerce").to_numpy(dtype=float) for column in entries]
-    values = np.column_stack(numbers) if numbers else np.empty((len(table), 0))
-    return Population(tuple(names), values, title, declared_at)
-
-
-def _table_of(source: str | Path, title: str, names: Set[str]) -> Any:
-    """Return the DataFrame of a CSV file. Raises ValueError if it cannot be read, or if its entries do not match its heading.
-
-    names   the stated columns; their names may have any characters
-    """
-    pd = importlib.import_module("pandas")
-    try:
-        check_inputs([Path(source)])
-        table = pd.read_csv(source)
-    except (OSError, ValueError) as error:
-        raise ValueError(f'population "{title}" cannot be read as CSV: {str(error).splitlines()[0]}') from error
-    has_more_entries = not isinstance(table.index, pd.RangeIndex)  # pandas takes the first ones for names of rows
-    heading = "".join(map(str, table.columns[:1])) if len(table.columns) == 1 else ""
-    separator = next((mark for mark in ";\t" if mark in heading and heading not in names), None)
-    if separator is not None:
-        options = f"sep={separator!r}" + (', decimal=","' if has_more_entries else "")
-        raise ValueError(
-            f'population "{title}": expected commas between columns, got {SEPARATORS[separator]}; '
-            f'read it with pandas: population(pandas.read_csv("{title}", {options}))'
-        )
-    if has_more_entries:
-        raise ValueError(
-            f'population "{title}": its rows have more entries than its heading has columns; expected one for each, '
-            "separated by commas, and points in decimals"
-        )
-    return table
-
-
-def correlation(labels: Sequence[str], matrix: Any, declared_at: str) -> Correlation:
+def correlation(labels: Sequence[str], matrix: Any, declared_at: str, kind: Any = "copula") -> Correlation:
     """Return the Correlation of contributors; `matrix` may be an array, or one coefficient for two of them."""
     if is_length(matrix):
         matrix = [[1.0, matrix], [matrix, 1.0]]
@@ -224,4 +176,4 @@ def correlation(labels: Sequence[str], matrix: Any, declared_at: str) -> Correla
         rows = tuple(tuple(float(number) for number in row) for row in matrix)
     except (TypeError, ValueError):
         rows = ()
-    return Correlation(tuple(labels), rows, declared_at)
+    return Correlation(tuple(labels), rows, declared_at, kind)

@@ -63,7 +63,7 @@ CODECS[Tolerance] = Choice(
     "Tolerance",
     "a width in mm, a text such as '±0.1', or named values",
     Record(
-        Tolerance, name="Zone", omitted="range shift cp cpk", floats="shift cpk", range=Plain(NOT_NEGATIVE | str),
+        Tolerance, name="Zone", omitted="range shift cp cpk side", floats="shift cpk", range=Plain(NOT_NEGATIVE | str),
         distribution=DISTRIBUTION, cp=Plain(POSITIVE, floats),
     ),
     WIDTH,
@@ -74,7 +74,7 @@ CONTROL = CODECS[Size | GeometricTolerance] = Choice(
     "FeatureTolerance",
     f"kind: one of {', '.join(['size', *KINDS])}",
     Record(
-        Size, kind="size", omitted="tolerance_class envelope",
+        Size, kind="size", omitted="tolerance_class envelope side",
         nominal=Plain(POSITIVE), upper=Plain(float | str), distribution=DISTRIBUTION,
     ),
     *(
@@ -230,7 +230,7 @@ RECORDS = {
     ),
     "forces": Record(Force, omitted="station"),
     "variables": Record(Variable, floats="drives nominal", omitted="nominal"),
-    "correlations": Record(Correlation),
+    "correlations": Record(Correlation, omitted="kind"),
     "populations": Record(Population, fields="values columns source declared_at"),
     "stations": Record(Station),
     "joints": Record(Joint),

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal, TypedDict, Unpack, get_args
 
 from tolcontact.declaration.checks import LENGTH, LENGTH_OR_0, TRUTH, Check, Checked, direction_faults, one_of
 from tolcontact.declaration.size import Form
+from tolcontact.declaration.tolerance import Side, side_faults
 from tolcontact.declaration.values import MAX_NUMBER, Direction, Vector, direction as _direction, is_length
 from tolcontact.readable import Readable
 
@@ -55,6 +56,7 @@ class ToleranceOptions(TypedDict, total=False):
     rule: Rule
     cp: float
     cpk: float | None
+    side: Side | None
 
 
 @dataclass(frozen=True, repr=False)
@@ -112,6 +114,7 @@ class GeometricTolerance(Checked):
                 inside, where components are equal, independent and normal. "6 sigma at the extremes": six standard deviations
                 at the worst extreme of the feature equal the width. "translation": the default without tilts
     cp, cpk     process capability: the spread is divided by `cp`, and the mean is shifted until `cpk` results
+    side        "up" or "down": the sense of this shift in the first freedom that the tolerance adds, such as "offset"
     """
 
     of: ToleranceKind
@@ -130,6 +133,7 @@ class GeometricTolerance(Checked):
     rule: Rule = "99.73 % inside"
     cp: float = 1.0
     cpk: float | None = None
+    side: Side | None = None
 
     checks: ClassVar = {**OPTION_CHECKS, "rule": one_of(RULES)}
 
@@ -240,6 +244,7 @@ class GeometricTolerance(Checked):
             yield f"cp is {self.cp!r}; expected a number above 0"
         elif self.cpk is not None and not (is_length(self.cpk) and self.cpk <= self.cp):
             yield f"cpk is {self.cpk!r}; expected a number, at most cp"
+        yield from side_faults(self.side, self.cpk)
 
     def __str__(self) -> str:
         """Return the tolerance with the symbols of a drawing."""

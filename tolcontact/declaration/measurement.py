@@ -83,7 +83,11 @@ class _OfStation(Measurement):
 
     def __post_init__(self) -> None:
         if not isinstance(self.station, Point):
-            raise TypeError(f"{self.kind}: station is a {type(self.station).__name__}; expected part.point(x, y, z)")
+            raise TypeError(
+                f"{self.kind}: station is a {type(self.station).__name__}; it takes a point and a face, as in "
+                f'tc.{type(self).__name__}(part.point(x, y, z), other.face("+z")); of two faces there are tc.Clearance, '
+                "tc.LargestGap and tc.MeanGap"
+            )
         self._take_faces(face=self.face)
 
     @property

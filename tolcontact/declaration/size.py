@@ -6,7 +6,8 @@ from dataclasses import KW_ONLY, dataclass
 from typing import ClassVar, Literal, get_args
 
 from tolcontact.declaration.checks import LENGTH, TRUTH, Checked, one_of, whole_number
-from tolcontact.declaration.tolerance import Distribution, Tolerance
+from tolcontact.declaration.scale import MAX_SIZE_SHARE
+from tolcontact.declaration.tolerance import Distribution, Side, Tolerance
 from tolcontact.declaration.tolerance_class import tolerance_class
 from tolcontact.declaration.values import is_length
 from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
@@ -27,8 +28,9 @@ class Size(Checked):
     "H7")` with a `tolerance_class` of ISO 286-1. Sizes vary about the midpoint of the limits by `distribution` (see
     tc.Tolerance). `moves` states which of two planes moves with the size: "both" by half each (default), or the "first" or
     "second" alone. `cp` and `cpk` are the capability of its process: by default six standard deviations equal `upper` less
-    `lower`, with the mean in their middle. With `envelope` the form of the feature stays inside the envelope of perfect form at
-    maximum material (ISO 8015, ASME Y14.5 Rule #1); by default as the `standard` of its part has it.
+    `lower`, with the mean in their middle; `side` is the side that the mean is on, "up" or "down". With `envelope` the form of
+    the feature stays inside the envelope of perfect form at maximum material (ISO 8015, ASME Y14.5 Rule #1); by default as the
+    `standard` of its part has it.
     """
 
     kind: ClassVar[str] = "size"
@@ -41,6 +43,7 @@ class Size(Checked):
     _: KW_ONLY
     cp: float | None = None
     cpk: float | None = None
+    side: Side | None = None
     moves: Moves = "both"
     distribution: Distribution = "normal"
     tolerance_class: str = ""
@@ -68,7 +71,7 @@ class Size(Checked):
         if not isinstance(self.distribution, str):
             return Tolerance(distribution=self.distribution)
         width, middle = self.upper - self.lower, (self.upper + self.lower) / 2
-        return Tolerance(width, self.distribution, shift=middle, cp=self.cp, cpk=self.cpk)
+        return Tolerance(width, self.distribution, shift=middle, cp=self.cp, cpk=self.cpk, side=self.side)
 
     def faults(self) -> Iterator[str]:
         if not is_length(self.nominal):
@@ -87,15 +90,39 @@ class Size(Checked):
     def _limit_faults(self) -> Iterator[str]:
         if not self.nominal > 0:
             yield f"nominal is {self.nominal!r}; expected a size in mm above 0"
-        if not self.lower < self.upper:
+        if self.lower == self.upper:
+            yield f"both limits are {self.upper:g}, so the size does not vary; leave the size out"
+        elif not self.lower < self.upper:
             yield f"the lower limit {self.lower:+g} is not below the upper one {self.upper:+g}; swap them"
         else:
+            yield from self._scale_faults() if self.nominal > 0 else ()
             yield from self.tolerance.faults()
         if self.tolerance_class and (fault := text_fault(self.tolerance_class, nominal=self.nominal)):
             yield f"tolerance_class is {fault}"
         elif self.tolerance_class and written(self.tolerance_class, nominal=self.nominal) != (self.lower, self.upper):
             limits = f"{self.upper:+g} {self.lower:+g}"
             yield f"tolerance_class is {self.tolerance_class!r}, which has other limits than {limits}; leave it out"
+
+    def _scale_faults(self) -> Iterator[str]:
+        """Yield the fault of limits, or of a distribution, that can be no deviations from the nominal size."""
+        largest = MAX_SIZE_SHARE * self.nominal
+        if min(abs(self.lower), abs(self.upper)) >= largest and self.lower * self.upper > 0:
+            upper, lower = (f"{limit - self.nominal:+.6g}" for limit in (self.upper, self.lower))
+            meant = f", as in tc.Size({self.nominal:g}, {upper}, {lower})" if self.lower > 0 else ""
+            yield (
+                f"its limits are {self.upper:g} and {self.lower:g} for a size of {self.nominal:g} mm; limits are deviations "
+                f"from the nominal size{meant}"
+            )
+        elif self.lower <= -self.nominal:
+            yield (
+                f"its lower limit {self.lower:+g} leaves nothing of a size of {self.nominal:g} mm; limits are deviations from "
+                "the nominal size, in mm: divide micrometres by 1000"
+            )
+        elif hasattr(self.tolerance.frozen, "ppf") and abs(median := float(self.tolerance.frozen.ppf(0.5))) >= largest:
+            yield (
+                f"the median of its distribution is {median:g} mm for a size of {self.nominal:g} mm; it is one of deviations "
+                "from the nominal size: subtract that from its mean"
+            )
 
     def __str__(self) -> str:
         if not (is_length(self.nominal) and is_length(self.upper) and is_length(self.lower)):

@@ -185,7 +185,7 @@ def _zone(row: Mapping[str, str], numbers: Mapping[str, float]) -> tuple[float, 
         raise ValueError(f"{' and '.join(empty)} {'is' if len(empty) == 1 else 'are'} empty")
     nominal = numbers["nominal"]
     zone = _limits(row["tolerance"], nominal) if "tolerance" in row else written((numbers["lower"], numbers["upper"]))
-    options = {name: numbers[name] for name in ("cp", "cpk") if name in numbers}
+    options: dict[str, Any] = {name: numbers[name] for name in ("cp", "cpk") if name in numbers}
     tolerance = Tolerance(zone, row.get("distribution") or "normal", **options)
     if reason := next(tolerance.faults(), ""):
         raise ValueError(reason)

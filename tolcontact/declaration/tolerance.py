@@ -18,6 +18,8 @@ DRAWN = (0.1, 0.4, 0.9)
 Shape = Literal["normal", "uniform", "triangular", "truncated normal"]
 Distribution = Shape | Any  # or a frozen distribution of scipy.stats
 SHAPES = get_args(Shape)
+Side = Literal["up", "down"]  # to which a process is off its centre
+SIDES: dict[Any, float] = {None: 1.0, "up": 1.0, "down": -1.0}
 
 
 @dataclass(frozen=True, repr=False)
@@ -31,7 +33,8 @@ class Tolerance(Readable):
 
     The range may be written as on drawings: "±0.1" has the range 0.2, and "+0.1/-0.05" or (-0.05, 0.1) the range 0.15 with a
     shift of 0.025. `shift` [mm] moves the whole distribution. `cp` and `cpk` are the capability of a process with a normal
-    distribution: 6 sigma = range / cp, and the mean moves up by a further range / 2 * (1 - cpk / cp).
+    distribution: 6 sigma = range / cp, and the mean moves by a further range / 2 * (1 - cpk / cp), to the `side` "up" or
+    "down"; by default up, which a check tells where shifts would cancel.
     `tc.Tolerance(0.6, "uniform")` and `tc.Tolerance(0.6, cp=1.33, cpk=1.0)` are examples.
     `distribution` may also be a frozen continuous distribution of `scipy.stats`. It defines the spread alone; leave
     `range` out.
@@ -42,6 +45,7 @@ class Tolerance(Readable):
     shift: float = 0.0
     cp: float | None = None
     cpk: float | None = None
+    side: Side | None = None
 
     def __post_init__(self) -> None:
         with contextlib.suppress(TextFault):  # faults() reports it
@@ -74,6 +78,8 @@ class Tolerance(Readable):
         if self.cpk is not None and (self.cp is None or (is_length(self.cpk) and is_length(self.cp) and self.cpk > self.cp)):
             yield f"cpk is {self.cpk!r} with cp {self.cp!r}; expected cp, and cpk not above it"
 
+        yield from side_faults(self.side, self.cpk)
+
     def _scipy_faults(self) -> Iterator[str]:
         frozen = self.frozen
         if not (hasattr(getattr(frozen, "dist", None), "pdf") and hasattr(getattr(frozen, "dist", None), "name")):
@@ -101,8 +107,14 @@ class Tolerance(Readable):
     @property
     def mean_shift(self) -> float:
         """The shift [mm] of the distribution by `shift` and `cpk`."""
-        capability_shift = 0.0 if self.cp is None or self.cpk is None else float(self.range or 0) / 2 * (1 - self.cpk / self.cp)
-        return float(self.shift) + capability_shift
+        return float(self.shift) + self.capability_shift
+
+    @property
+    def capability_shift(self) -> float:
+        """The shift [mm] of the mean that `cpk` states, with the sign of its side."""
+        if self.cp is None or self.cpk is None:
+            return 0.0
+        return SIDES.get(self.side, 1.0) * (float(self.range or 0) / 2 * (1 - self.cpk / self.cp))
 
     @property
     def width(self) -> float:
@@ -115,14 +127,30 @@ class Tolerance(Readable):
         return float(6 * self.frozen.std()) if hasattr(self.frozen, "std") else 0.0
 
     def __str__(self) -> str:
+        return self.in_units("mm")
+
+    def in_units(self, units: str) -> str:
+        """Return the tolerance in words, of a variable with these units."""
         if hasattr(self.frozen, "dist"):
             spread = f"scipy.stats.{self.frozen.dist.name}"
         else:
-            width = f"{self.range:g} mm" if is_length(self.range) else repr(self.range)
+            width = f"{self.range:g} {units}" if is_length(self.range) else repr(self.range)
             spread = f"{self.distribution}, full width {width}"
         numbers = [(name, value) for name, value in (("cp", self.cp), ("cpk", self.cpk)) if is_length(value)]
         capability = "".join(f", {name} {value:g}" for name, value in numbers)
-        return spread + capability + (f", shifted by {self.shift:g} mm" if is_length(self.shift) and self.shift else "")
+        if len(numbers) > 1 and is_length(self.range):
+            capability += (
+                f" (mean {'up' if self.capability_shift >= 0 else 'down'} by {abs(self.capability_shift):.4g} {units})"
+            )
+        return spread + capability + (f", shifted by {self.shift:g} {units}" if is_length(self.shift) and self.shift else "")
+
+
+def side_faults(side: Any, cpk: Any) -> Iterator[str]:
+    """Yield the fault of the side of a process's mean."""
+    if side not in SIDES:
+        yield f"side is {side!r}; expected up or down"
+    elif side is not None and cpk is None:
+        yield "side is given without cpk, which states how far the mean is off; leave it out"
 
 
 def tolerance(value: Any) -> Tolerance:

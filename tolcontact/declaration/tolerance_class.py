@@ -15,7 +15,7 @@ SUBRANGES = (
     "3 6 10 14 18 24 30 40 50 65 80 100 120 140 160 180 200 225 250 280 315 355 400 450 500 "
     "560 630 710 800 900 1000 1120 1250 1400 1600 1800 2000 2240 2500 2800 3150"
 )
-_WIDTHS = {
+WIDTHS = {
     "01": "0.3 0.4 0.4 0.5 0.6 0.6 0.8 1 1.2 2 2.5 3 4",
     "0": "0.5 0.6 0.6 0.8 1 1 1.2 1.5 2 3 4 5 6",
     "1": "0.8 1 1 1.2 1.5 1.5 2 2.5 3.5 4.5 6 7 8 9 10 11 13 15 18 22 26",
@@ -92,7 +92,7 @@ _UPPER_LIMITS_OF_J = {
     "7": "4 6 8 10 12 14 18 22 26 30 36 39 43",
     "8": "6 10 12 15 20 24 28 34 41 47 55 60 66",
 }
-GRADES = tuple(_WIDTHS)
+GRADES = tuple(WIDTHS)
 LETTERS = tuple(re.findall(r"\w+", "a b c cd d e ef f fg g h js j k m n p r s t u v x y z za zb zc"))
 _BELOW = LETTERS[: LETTERS.index("h") + 1]  # the zone of a shaft lies below the nominal size
 _CLASS = re.compile(r"([A-Za-z]{1,2}) ?(01|0|[1-9]\d?)")
@@ -141,7 +141,7 @@ class ToleranceClass:
             raise self._undefined(nominal, f"it is for sizes above 0, up to {_LARGEST:g} mm")
         if nominal <= _TINY and self._number >= 14:
             raise self._undefined(nominal, f"its grades 14 to 18 are for sizes above {_TINY:g} mm")
-        return self._value(_WIDTHS[self.grade], RANGES, nominal)
+        return self._value(WIDTHS[self.grade], RANGES, nominal)
 
     def _distance(self, letter: str, nominal: float) -> float:
         if letter in ("a", "b") and nominal <= _TINY:

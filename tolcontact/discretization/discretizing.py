@@ -13,6 +13,7 @@ from tolcontact.discretization.contact_points import contact_points, support_pai
 from tolcontact.discretization.locators import FACES_OF_SCHEME, Locators, NominalPart, scheme_locators
 from tolcontact.discretization.measurements import nominal_measurements
 from tolcontact.discretization.nominal import ContactPoints, Nominal
+from tolcontact.discretization.scales import scale_faults
 from tolcontact.discretization.scenes import Scene, joint_indices, scenes_of
 from tolcontact.errors import Faults, designation
 from tolcontact.features import Features, Placement, datum_order
@@ -76,7 +77,9 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
             faults.extend(_contributor_faults(assembly, labels, shifts))
     faults.extend(fault for scene in scenes for fault in _reserved_names(scene))
     Faults(dict.fromkeys(faults)).refuse(assembly.name)
-    return _nominal(assembly, scenes, nominal_parts, (*pairs, *support_pairs(nominal_parts, scenes)), features)
+    nominal = _nominal(assembly, scenes, nominal_parts, (*pairs, *support_pairs(nominal_parts, scenes)), features)
+    Faults(scale_faults(nominal)).refuse(assembly.name)
+    return nominal
 
 
 def _nominal(
@@ -274,6 +277,8 @@ def _immovable_pairs(scene: Scene) -> list[str]:
 def _way_to_open(scene: Scene, moving: Part, reference: Part) -> str:
     """Return the end of a message: how contact may move two parts relative to each other."""
     joint = next((joint for joint in scene.assembly.joints if {moving, reference} <= set(joint.members)), None)
+    if joint is None and moving.fixed and not reference.fixed:
+        return f'exchange the sides, since part "{moving.name}" is fixed and part "{reference.name}" may move'
     if joint is None:
         return f'declare part "{moving.name}" free (fixed=False)'
     return (

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import trimesh
 
-from tolcontact.declaration import Locator, Part, ThreeTwoOne, Tolerance
+from tolcontact.declaration import Locator, Mesh, Part, ThreeTwoOne, Tolerance
 from tolcontact.declaration.locator import BEST_FIT, FIRST_ORDER
 from tolcontact.discretization.locating_faces import LocatingFace
 from tolcontact.errors import GeometryFault
@@ -180,9 +180,12 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
     edges /= np.linalg.norm(edges, axis=1, keepdims=True)
     a, b, c = edges
     primary, secondary, tertiary = (face.vertices for face in faces)
-    near_c, far_c = _support_coordinates(primary, c, scheme.inset)
-    near_b, far_b = _support_coordinates(primary, b, scheme.inset)
-    side_near, side_far = _support_coordinates(secondary, c, scheme.inset)
+    inset, geometry = scheme.inset, scheme.primary.part.geometry
+    has_own_units = not isinstance(geometry, Mesh) or geometry.units or geometry.is_step
+    advice = "make it smaller" + ("" if has_own_units else ', or state the units of the mesh: tc.Mesh(..., units="m") or "in"')
+    near_c, far_c = _support_coordinates(primary, c, inset, advice)
+    near_b, far_b = _support_coordinates(primary, b, inset, advice)
+    side_near, side_far = _support_coordinates(secondary, c, inset, advice)
     rectangular = [
         _place(edges, outward, primary, 0, {1: near_b, 2: near_c}),
         _place(edges, outward, primary, 0, {1: near_b, 2: far_c}),
@@ -202,13 +205,13 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
     )
 
 
-def _support_coordinates(points: np.ndarray, along: np.ndarray, inset: float) -> tuple[float, float]:
+def _support_coordinates(points: np.ndarray, along: np.ndarray, inset: float, advice: str) -> tuple[float, float]:
     """Return the coordinates [mm] along a direction at an inset from both ends of a face."""
     places = points @ along
     lower, upper = places.min() + inset, places.max() - inset
     if not lower < upper:
         length = places.max() - places.min()
-        raise GeometryFault(f"an inset of {inset:g} mm leaves no room on a face that is {length:g} mm long; make it smaller")
+        raise GeometryFault(f"an inset of {inset:g} mm leaves no room on a face that is {length:g} mm long; {advice}")
     return lower, upper
 
 

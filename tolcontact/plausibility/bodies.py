@@ -23,6 +23,7 @@ MIN_SHARE = 0.005  # of the draws
 MIN_MEASURED = 8  # draws whose depth of a clash is measured
 MAX_TRIANGLES = 20_000  # of both bodies, in all of these draws, if there are more of them
 MAX_RESOLVED = 8  # draws that are resolved to see whether two bodies still interfere beyond the chosen faces
+MAX_OVERLAPS = 5  # of bodies that have a sentence each
 MAX_CLASHES = 20  # pairs of parts that are named
 
 
@@ -163,6 +164,7 @@ def body_overlaps(draws: TrialDraws) -> Iterator[str]:
     common = np.minimum(bounds[:, None, 1], bounds[None, :, 1]) - np.maximum(bounds[:, None, 0], bounds[None, :, 0])
     min_overlap = MIN_THICKNESS_SHARE * np.minimum(thickness[:, None], thickness[None])
     candidates = np.argwhere(np.triu((common > min_overlap[..., None]).all(axis=2), 1))
+    overlaps = list[tuple[int, int, str]]()
     for i, j in itertools.islice(candidates, MAX_COMPARED):
         is_known = nominal.parts[i].station != nominal.parts[j].station or {parts[i], parts[j]} in known
         is_known = is_known or any({parts[i], parts[j]} <= overlap for overlap in meant)
@@ -173,11 +175,23 @@ def body_overlaps(draws: TrialDraws) -> Iterator[str]:
         ball = common_ball(bodies[i], bodies[j], max(float(min_overlap[i, j]), facets))
         if ball is not None and not _is_press_fit(nominal, nominal.parts[i], nominal.parts[j], *ball):
             diameter, place = ball
-            yield (
+            sentence = (
                 f'{nominal.parts[i].part.designation}: it overlaps part "{nominal.parts[j].name}" by about '
                 f"{diameter:.2g} mm near ({', '.join(f'{c:.4g}' for c in place)}) in the nominal assembly, and they are no "
                 "contact pair; check their places, declare their contact, or say that it is meant: assembly.may_overlap(...)"
             )
+            overlaps.append((i, j, sentence))
+    if len(overlaps) <= MAX_OVERLAPS:
+        yield from (sentence for *_, sentence in overlaps)
+    else:
+        bodies_in = sorted({index for *pair, _ in overlaps for index in pair})
+        unplaced = sum(nominal.parts[index].part.at == (0.0, 0.0, 0.0) for index in bodies_in)
+        advice = f"{unplaced} of them lie at the origin: give them their places" if unplaced > 1 else "check their places"
+        yield (
+            f"{len(bodies_in)} parts without contact pairs overlap in {len(overlaps)} places of the nominal assembly, "
+            f'for example "{nominal.parts[overlaps[0][0]].name}" and "{nominal.parts[overlaps[0][1]].name}"; {advice}, '
+            "part(..., at=(x, y, z)), or say that it is meant: assembly.may_overlap(...)"
+        )
 
 
 def _is_press_fit(nominal: Nominal, left: NominalPart, right: NominalPart, diameter: float, place: np.ndarray) -> bool:

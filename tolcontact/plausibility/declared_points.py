@@ -12,9 +12,12 @@ from tolcontact.declaration import Assembly, Mesh, Part
 from tolcontact.declaration.geometry import STEP, UNITS
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.geometry.tolerances import ON_FACE
+from tolcontact.geometry.triangle_mesh import coordinate_spacing
 from tolcontact.plausibility.trial_draws import TrialDraws
 
 FAR_SHARE = 0.25  # of a part's size: how far off its box a point may lie
+SPACING_SHARE = 0.1  # of the smallest tolerance: the spacing of stored coordinates
+USUAL_SIZE = 100.0  # of a part [mm]
 PLAUSIBLE_SIZES = (1.0, 10_000.0)  # of a part [mm]
 MAX_SIZE_RATIO = 10.0  # of parts that touch
 MESH_MARGIN = 0.1  # of a mesh's size: largest distance of a point on the mesh
@@ -96,17 +99,35 @@ def _advice(geometry: Mesh, size: float, unit: str) -> str:
     return f'if the file is in other units, state them: with tc.Mesh(..., units="{unit}") it would be {length:.4g} mm'
 
 
+def _unit_for(geometry: Mesh, size: float, expected: float) -> str:
+    """Return the unit in which a mesh of a size [mm] is nearest to the expected size [mm]."""
+    return min(UNITS, key=lambda unit: abs(np.log(size * UNITS[unit] / _assumed_unit(geometry) / expected)))
+
+
+def stored_coordinates(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each part whose file stores coordinates more coarsely than the smallest tolerance allows."""
+    finest = draws.program.nominal.assembly.smallest_zone()
+    for part in draws.program.nominal.last_parts:
+        spacing = float(coordinate_spacing(part.mesh).max())
+        if spacing > SPACING_SHARE * finest:
+            yield (
+                f"{part.part.designation}: {part.part.geometry} stores coordinates {spacing:.2g} mm apart, compared with a "
+                f"smallest tolerance of {finest:.4g} mm; export it near the origin of its frame, or as STEP"
+            )
+
+
 def _implausible_size(nominal: Nominal, part: NominalPart, geometry: Mesh) -> Iterator[str]:
     """Yield why the size of a mesh file without stated units is implausible: alone, or compared with a part that it touches."""
     if geometry.units or not isinstance(geometry.source, str | Path) or _states_units(geometry):
         return
-    size, advice = float(part.mesh.scale), _advice(geometry, float(part.mesh.scale), "in")
+    size = float(part.mesh.scale)
     if not PLAUSIBLE_SIZES[0] <= size <= PLAUSIBLE_SIZES[1]:
-        yield f"which is unusual for a part; {advice}"
+        yield f"which is unusual for a part; {_advice(geometry, size, _unit_for(geometry, size, USUAL_SIZE))}"
     sides = [(pair.moving.part, pair.reference.part) for pair in nominal.assembly.pairs]
     for neighbour in [b if a is part.part else a for a, b in sides if part.part in (a, b)]:
         neighbour_size = float(nominal.meshes[neighbour].scale)
         if max(size, neighbour_size) > MAX_SIZE_RATIO * min(size, neighbour_size):
+            advice = _advice(geometry, size, _unit_for(geometry, size, neighbour_size))
             yield f'but "{neighbour.name}", which it touches, is {neighbour_size:.4g} mm across; {advice}'
 
 

@@ -66,6 +66,50 @@ def unfollowed_by_locators(draws: TrialDraws) -> Iterator[str]:
                 break
 
 
+def unvaried(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence if nothing varies, on measures that do not, and for each such correlation and variable."""
+    nominal = draws.program.nominal
+    if not len(draws.deviations):
+        return
+    varies = dict(zip(nominal.contributors, np.ptp(draws.deviations, axis=0) > 0, strict=True))
+    if not any(varies.values()):
+        yield (
+            "nothing varies, since all tolerances are 0: each realization is the nominal assembly; give locators, features or "
+            "variables a tolerance"
+        )
+        return
+    yield from _unvaried_measures(draws)
+    assembly = nominal.assembly
+    causes = [
+        *((correlation, correlation.labels) for correlation in assembly.correlations),
+        *((variable, (variable.name,)) for variable in assembly.variables),
+    ]
+    for cause, labels in causes:
+        still = [label for label in labels if not varies[label]]
+        if still:
+            yield f'{cause.designation}: "{still[0]}" does not vary, so it has no effect; give it a tolerance, or leave it out'
+
+
+def _unvaried_measures(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence on the measures that no tolerance changes, on parts that contact does not move."""
+    program, nominal = draws.program, draws.program.nominal
+    still = [
+        k
+        for k, values in enumerate(draws.measured.T)
+        if len(values) and np.isfinite(values).all() and np.ptp(values) <= MIN_MOTION
+    ]
+    on_pose = _dependence(program, "observe", "poses", "measured") if still else np.zeros(0)
+    owners = {k: np.flatnonzero(on_pose[k].reshape(len(nominal.parts), -1).any(axis=1)) for k in still}
+    unmoved = [k for k, parts in owners.items() if not any(nominal.may_differ(int(part)) for part in parts)]
+    if unmoved:
+        parts = " and ".join(f'"{nominal.parts[part].name}"' for part in owners[unmoved[0]][:LISTED]) or "its parts"
+        others = f", nor do {len(unmoved) - 1} more measurements" if len(unmoved) > 1 else ""
+        yield (
+            f"{nominal.measures[unmoved[0]].designation}: it does not vary{others}: no tolerance changes it, and contact does "
+            f"not move {parts}; measure what varies, or give these parts tolerances"
+        )
+
+
 def unused_features(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence on the features whose tolerances displace nothing that is measured, located or in contact."""
     nominal = draws.program.nominal

@@ -2,22 +2,27 @@
 
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
 from tolcontact import poses as pose
 from tolcontact.compilation import Program
 from tolcontact.declaration import Measure, Point, Size
+from tolcontact.declaration.scale import COARSEST, CONSTANT_SHARE, FINEST, grade_width
 from tolcontact.declaration.values import is_length
 from tolcontact.discretization import NominalPart
 from tolcontact.discretization.measured_geometry import Combined, MeshClearance, NominalMeasurement
+from tolcontact.features import Freedom
 from tolcontact.plausibility.declared_points import location_designation, parts_in_other_units
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws, spread
 
-WIDE_SHARE = 0.5  # of a part's largest extent: the width of a zone
+WIDE_SHARE = 0.5  # of a part's largest extent, or of a size: the width of a zone
+MAX_LEVERAGE = 25.0  # displacement of a corner of a part for a unit deviation of a locator
 MAX_TILT = math.radians(45)  # by the locators, at three sigma
 FAR_SIGMAS = 100.0  # limits this far from the nominal value do not matter
-SIX_SIGMA, MIN_ZONE, MAX_ZONES = 6.0, 0.01, 10.0  # of a zone; of a part's size, without a zone; largest values, in zones
+MIN_SHIFTS, CANCELLED = 2, 0.5  # mean shifts that may cancel; what they lose in doing so, as a share of their sum
+NEAR_SIGMAS = 0.1  # limits this close together are in other units than what varies
 MIN_SHARE = 1e-6  # of that distance: smaller variation is rounding
 
 
@@ -35,35 +40,62 @@ def rotations(draws: TrialDraws) -> Iterator[str]:
 
 
 def wide_tolerances(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence for each part with a zone that is wide compared with it, or with locators too close together."""
+    """Yield a sentence for each part with a zone too wide or too narrow for it, or with locators too close together."""
     in_other_units = parts_in_other_units(draws)
     for nominal in draws.program.nominal.parts:
         if nominal.part in in_other_units:
             continue
         place = location_designation(draws.program.nominal.assembly, nominal.part, nominal.station)
-        size = float(np.ptp(nominal.mesh.bounds, axis=0).max())
-        widths = _widths(nominal, place)
-        owner, width = max(widths, key=lambda entry: entry[1], default=("", 0.0))
-        if width > WIDE_SHARE * size:
+        zones = list(_zones(nominal, place))
+        widest = max(zones, key=lambda zone: zone.width / zone.largest, default=None)
+        narrowest = min(zones, key=lambda zone: zone.width / zone.smallest, default=None)
+        if widest is not None and widest.width > widest.largest:
             yield (
-                f'{owner}: its tolerance of {width:.4g} mm is wide compared with part "{nominal.name}", which is {size:.4g} mm '
-                "long; a tolerance is the full width of its zone, in mm"
+                f"{widest.owner}: its tolerance of {widest.width:.4g} mm is wide compared with {widest.extent_in_words}; a "
+                "tolerance is the full width of its zone, in mm"
             )
-        elif fault := _tilt(nominal, place):
+        elif narrowest is not None and narrowest.width < narrowest.smallest:
+            yield (
+                f"{narrowest.owner}: its tolerance of {narrowest.width:.4g} mm is narrower than the finest standard grade for "
+                f"{narrowest.extent_in_words}; tolerances are in mm, not in metres"
+            )
+        elif fault := _tilt(nominal, place) or _leverage(nominal, place):
             yield fault
 
 
-def _widths(nominal: NominalPart, place: str) -> list[tuple[str, float]]:
-    """Return the declarations of a part that have zones, and the widths [mm] of these."""
-    locators = zip(nominal.locators.labels, nominal.locators.tolerances, strict=True)
-    widths = [(f'{place}: locator "{label.rpartition(".")[2]}"', tolerance.width) for label, tolerance in locators]
+class Zone(NamedTuple):
+    """A declared zone: its owner in a message, its width [mm], and the length [mm] that it is compared with, also in words."""
+
+    owner: str
+    width: float
+    extent: float
+    extent_in_words: str
+    largest: float
+
+    @property
+    def smallest(self) -> float:
+        """The smallest plausible width [mm]."""
+        return grade_width(FINEST, self.extent)
+
+
+def _zones(nominal: NominalPart, place: str) -> Iterator[Zone]:
+    """Yield the zones of a part that vary. Locators place parts as wide as people do, features are machined."""
+    extent = float(np.ptp(nominal.mesh.bounds, axis=0).max())
+    part = f'part "{nominal.name}", which is {extent:.4g} mm long'
+    for label, tolerance in zip(nominal.locators.labels, nominal.locators.tolerances, strict=True):
+        if tolerance.range and tolerance.width > CONSTANT_SHARE * extent:
+            owner = f'{place}: locator "{label.rpartition(".")[2]}"'
+            yield Zone(owner, tolerance.width, extent, part, WIDE_SHARE * extent)
     for declared in nominal.part.toleranced:
         where = f'part "{nominal.name}": {declared.designation}'
-        for tolerance in declared.tolerances:
-            width = tolerance.tolerance.width if isinstance(tolerance, Size) else tolerance.width
-            if is_length(width):
-                widths.append((f"{where}: {tolerance.kind}", float(width)))
-    return widths
+        for control in declared.tolerances:
+            if isinstance(control, Size):
+                width, length, phrase = control.upper - control.lower, control.nominal, f"a size of {control.nominal:.4g} mm"
+            else:
+                width, length, phrase = control.width, extent, part
+            if is_length(width) and width > CONSTANT_SHARE * extent:
+                largest = min(grade_width(COARSEST, length), WIDE_SHARE * length)
+                yield Zone(f"{where}: {control.kind}", float(width), length, phrase, largest)
 
 
 def _tilt(nominal: NominalPart, place: str) -> str:
@@ -84,25 +116,22 @@ def _tilt(nominal: NominalPart, place: str) -> str:
     )
 
 
-def population_units(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence for each population with a column whose values are far beyond the zone that they should come from.
-
-    A contributor without a zone has MIN_ZONE of the size of the largest part.
-    """
-    program = draws.program
-    largest = max((float(part.mesh.scale) for part in program.nominal.parts), default=0.0)
-    freedoms = {freedom.label: freedom for freedom in program.draws.contributors}
-    for population in program.nominal.assembly.populations:
-        for label, values in zip(population.columns, population.values.T, strict=True):
-            usual, freedom = float(np.median(np.abs(values))), freedoms[label]
-            zone = SIX_SIGMA * math.sqrt(freedom.variance) or (MIN_ZONE * largest if freedom.units == "mm" else math.inf)
-            if usual > MAX_ZONES * zone:
-                yield (
-                    f"{population.designation}: the values of {label} are around {usual:.4g} {freedom.units} (median of the "
-                    f"magnitudes), {usual / zone:.2g} times the zone of {zone:.3g} {freedom.units} of its tolerance; they are "
-                    "deviations from the nominal value, in mm: subtract the nominal value, or divide micrometres by 1000"
-                )
-                break
+def _leverage(nominal: NominalPart, place: str) -> str:
+    """Return a sentence on locators that displace a corner by many times their own deviation; empty if they do not."""
+    locators = nominal.locators
+    if not len(locators):
+        return ""
+    matrix, centre = locators.placing_matrix
+    arms = nominal.vertices - centre
+    motions = np.linalg.norm(matrix[:3].T[:, None] + np.cross(matrix[3:].T[:, None], arms[None]), axis=2)
+    row, corner = np.unravel_index(int(motions.argmax()), motions.shape)
+    if not motions[row, corner] > MAX_LEVERAGE:
+        return ""
+    apart = np.linalg.norm(locators.points[:, None] - locators.points[None], axis=2)
+    return (
+        f'{place}: 1 mm at locator "{locators.labels[row].rpartition(".")[2]}" is {motions[row, corner]:.3g} mm at a corner of '
+        f"the part; move its locators apart (the closest ones are {apart[apart > 0].min():.3g} mm apart)"
+    )
 
 
 def measure_limits(draws: TrialDraws) -> Iterator[str]:
@@ -121,6 +150,12 @@ def measure_limits(draws: TrialDraws) -> Iterator[str]:
             continue
         values = draws.measured[np.isfinite(draws.measured[:, k]), k]
         sigma = float(spread(values)) if len(values) else 0.0
+        if sigma > 0 and limits.upper - limits.lower < NEAR_SIGMAS * sigma:
+            yield (
+                f"{place}: its {stated} are {(limits.upper - limits.lower) / sigma:.2g} sigma wide; check their units, and the "
+                "units of the tolerances"
+            )
+            continue
         distance = min(side for side in (nominal - limits.lower, limits.upper - nominal) if math.isfinite(side))
         if MIN_SHARE * distance < sigma and distance > FAR_SIGMAS * sigma + pushed:
             yield (
@@ -153,6 +188,36 @@ def _number(value: float) -> str:
 
 def _side(limit: float) -> str:
     return f"{limit:g}" if math.isfinite(limit) else "open"
+
+
+def assumed_sides(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each measure on which mean shifts without a side cancel that are all assumed to go up."""
+    program = draws.program
+    shifts = np.array([_assumed_shift(freedom) for freedom in program.draws.contributors])
+    columns = np.flatnonzero(shifts)
+    if len(columns) < MIN_SHIFTS:
+        return
+    deviations = np.zeros((len(columns) + 1, len(shifts)))
+    deviations[np.arange(len(columns)), columns] = shifts[columns]
+    measured = program.observe(poses=program.place(deviations=deviations)["poses"], deviations=deviations)["measured"]
+    effects = measured[:-1] - measured[-1]
+    for measure, effect in zip(program.nominal.measures, effects.T, strict=True):
+        largest, assumed = float(np.abs(effect).sum()), round(float(effect.sum()), 9) + 0.0
+        if np.isfinite(largest) and largest > (1 + CANCELLED) * abs(assumed):
+            count = int((np.abs(effect) > MIN_SHARE * largest).sum())
+            yield (
+                f"{measure.designation}: the means of {count} contributors are assumed to be above the centre by cpk, which "
+                f"moves it by {assumed:.3g} {measure.units}; if their sides are unknown, by up to ±{largest:.3g}; state them, "
+                'side="up" or "down"'
+            )
+
+
+def _assumed_shift(freedom: Freedom) -> float:
+    """Return the shift of a mean by cpk whose side is not stated; 0 without one."""
+    if freedom.tolerance is not None:
+        return freedom.tolerance.capability_shift if freedom.tolerance.side is None else 0.0
+    control = freedom.geometric
+    return freedom.mean - freedom.middle if control is not None and control.cpk is not None and control.side is None else 0.0
 
 
 def measured_reach(draws: TrialDraws) -> Iterator[str]:

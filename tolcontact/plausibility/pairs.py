@@ -1,10 +1,12 @@
 """Contact pairs: gaps and overlaps that do not vary enough, coarse contact points, seats that friction may keep parts off."""
 
+from collections import defaultdict
 from collections.abc import Iterator
 
 import numpy as np
 
-from tolcontact.discretization import ContactPoints
+from tolcontact.declaration import ContactPair, Face, Inside, Part
+from tolcontact.discretization import ContactPoints, Nominal
 from tolcontact.geometry.curvature import CHORD_SHARE
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws, spread
 from tolcontact.statics import balances, drawn_contacts
@@ -29,6 +31,26 @@ def pair_overlaps(draws: TrialDraws) -> Iterator[str]:
                     f"what varies there (3 sigma {SIGMAS * sigma:.2g} mm); check the places and sizes of "
                     f'"{_name(draws, pair.moving)}" and "{_name(draws, pair.reference)}"'
                 )
+
+
+def repeated_pairs(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each contact pair with the faces of an earlier one, in the same order or in the other."""
+    nominal, by_parts = draws.program.nominal, defaultdict[tuple[str, frozenset[Part]], list[ContactPair]](list)
+    for pair in nominal.assembly.pairs:
+        by_parts[pair.station, frozenset((pair.moving.part, pair.reference.part))].append(pair)
+    for pairs in by_parts.values():
+        earlier = dict[frozenset[tuple[Part, tuple[int, ...], str]], ContactPair]()
+        for pair in pairs if len(pairs) > 1 else ():
+            first = earlier.setdefault(frozenset(_extent(nominal, face) for face in (pair.moving, pair.reference)), pair)
+            if first is not pair:
+                order = "" if first.moving.part is pair.moving.part else ", with the sides exchanged"
+                yield f'{pair.designation}: it is declared twice: "{first.name}" has its faces{order}; leave one of them out'
+
+
+def _extent(nominal: Nominal, face: Face) -> tuple[Part, tuple[int, ...], str]:
+    """Return what two equal faces have in common: the part, its triangles, and the boxes that cut these."""
+    boxes = " ".join(str(selection) for selection in face.selections if isinstance(selection, Inside))
+    return face.part, tuple(nominal.triangles(face)), boxes
 
 
 def pair_clearances(draws: TrialDraws) -> Iterator[str]:

@@ -20,6 +20,7 @@ SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are onl
 SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are only counted
 AT_END = 1.001  # times the smallest factor of a tolerance: below this, it is as small as permitted
 MAX_HOLDERS = 3  # of a part, in a table
+FEW_NAMES = 3  # of features in a note
 FEW_SEARCHES = 0.25  # of all: if no more than this share end at a value, a remark states that there may be worse ones
 
 
@@ -180,6 +181,9 @@ def _worst_case(dataset: xr.Dataset) -> AnalysisReport:
         "linear: tolerances times sensitivities at the nominal assembly, as in a stack-up; with contact,",
         "the farthest that parts can be without penetration, if contact or locators hold them.",
     ]
+    if names := [name for name in dataset.attrs.get(terms.WITHOUT_FORM, "").split(", ") if name]:
+        others = f" and {len(names) - FEW_NAMES} more" if len(names) > FEW_NAMES else ""
+        notes.append(f"Without the form deviations of {', '.join(names[:FEW_NAMES])}{others}: these faces keep their shape.")
     counts = dataset["by_status"].values
     for status in terms.UNRESOLVED:
         if counts[status]:

@@ -10,9 +10,11 @@ from collections.abc import Callable
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+from tolcontact.declaration import Correlation
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
 from tolcontact.features.datum_frames import Shifts
+from tolcontact.variation.correlations import copula_matrix, in_words
 from tolcontact.variation.plans import STREAM, Numbers, Plan
 from tolcontact.variation.spreads import envelopes, fill_zones
 from tolcontact.vocabulary import MONTE_CARLO
@@ -45,12 +47,23 @@ class Draws:
             contributor.tolerance.shift if contributor.tolerance else contributor.middle for contributor in self.contributors
         ])  # fmt: skip
         self.correlated = [
-            (list(correlation.labels), np.linalg.cholesky(np.array(correlation.matrix)))
-            for correlation in assembly.correlations
+            (list(correlation.labels), np.linalg.cholesky(self._copula(correlation))) for correlation in assembly.correlations
         ]
         self.populations = [
             (np.array([self._column[label] for label in population.columns]), population.values)
             for population in assembly.populations
+        ]
+
+    def _copula(self, correlation: Correlation) -> np.ndarray:
+        freedoms = [self.contributors[self._column[label]] for label in correlation.labels]
+        return copula_matrix(correlation, freedoms, self._assembly.name)
+
+    @property
+    def correlations_in_words(self) -> list[str]:
+        """A line for each correlation: its coefficient of the copula, of deviations and of ranks."""
+        return [
+            in_words(correlation, self._copula(correlation), [self.contributors[self._column[k]] for k in correlation.labels])
+            for correlation in self._assembly.correlations
         ]
 
     def planned(self, name: str) -> "Draws":

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from tolcontact.declaration import GeometricTolerance
 from tolcontact.declaration.feature_tolerance import EXTREMES, INSIDE
+from tolcontact.declaration.tolerance import SIDES
 from tolcontact.discretization import Nominal
 from tolcontact.errors import GeometryFault, ModelError, designation
 from tolcontact.features import FeatureOfSize, FormField, Freedom, Layer, NominalPattern
@@ -207,7 +208,7 @@ def _fill_layers(
             )
             yield zone if not tolerance.material else _with_bonus(zone, pattern, members, group, tolerance.material)
             if tolerance.cpk is not None:
-                means[added[:1] - inner_count] += 3 * spread * (1 - tolerance.cpk / tolerance.cp)
+                means[added[:1] - inner_count] += SIDES[tolerance.side] * (3 * spread * (1 - tolerance.cpk / tolerance.cp))
         for column, mean, middle in zip(layer.columns, means, middles[inner_count:], strict=True):
             freedoms[column] = replace(freedoms[column], spread=spread / tolerance.cp, mean=float(mean), middle=float(middle))
 

@@ -126,6 +126,7 @@ WORST_CASE = AnalysisRecord(
     ),
     of_stations=tuple(replace(variable, dims=(CASE, *variable.dims[1:])) for variable in STATION_POSES),
 )
+WITHOUT_FORM = "without_form"  # attribute of worst cases: features with form, which is left out
 TAILS = AnalysisRecord(
     "tails",
     "rare events of {assembly}",

@@ -25,13 +25,14 @@ from tolcontact.geometry.files.product import (
     usual_chord,
 )
 from tolcontact.geometry.files.step_text import SOLIDS, USAGES, StepText
-from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING, rim
+from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING, edges, rim
 from tolcontact.shape_worker import Job, UnfinishedRead, Worker, taken
 from tolcontact.texts import clipped
 
 MAX_ANGLE = 0.5  # [rad] between triangles of round faces
 COARSENINGS = (1, 30)  # times the usual chord, tried one after the other
 CACHE_SIZE = 4  # STEP files
+MIN_RIM = 3  # edges around a missing triangle
 
 log = logging.getLogger(__name__)
 
@@ -165,6 +166,7 @@ def read(geometry: Mesh, contents: Contents) -> Shape:
             return content.part(geometry.body)
         mesh = trimesh.Trimesh(content["vertices"], content["faces"], process=False)
         piece, unit, spacing = content["piece"], str(content["units"]) or None, content["spacing"]
+        _check_triangles(mesh, str(geometry))
     else:
         mesh = trimesh.Trimesh(source.vertices, source.faces, process=False)
         if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
@@ -183,6 +185,35 @@ def read(geometry: Mesh, contents: Contents) -> Shape:
         mesh.face_attributes[BREP] = source.face_attributes[BREP]
         mesh.metadata[STATED_FACES] = source.metadata[STATED_FACES]
     return mesh
+
+
+def _check_triangles(mesh: trimesh.Trimesh, name: str) -> None:
+    """Raise GeometryFault for a mesh of a file that is open at a triangle that occurs twice, or that is missing.
+
+    Bodies that touch, and sheets with two sides, may share triangles: an even number of triangles meets at each edge.
+    """
+    whole = mesh.copy()
+    whole.merge_vertices(merge_tex=True, merge_norm=True)
+    ends, edge, counts = edges(whole.faces)
+    is_open = counts[edge] % 2 == 1
+    if not is_open.any():
+        return
+    corners = np.sort(whole.faces, axis=1)
+    doubtful = corners[is_open.reshape(-1, 3).any(axis=1) & (np.diff(corners, axis=1) > 0).all(axis=1)]
+    distinct, repeats = np.unique(doubtful, axis=0, return_counts=True)
+    once = ends[counts[edge] == 1]
+    pieces = trimesh.graph.connected_components(once, min_len=MIN_RIM) if len(once) else []
+    holes = [np.sort(piece) for piece in pieces if len(piece) == np.isin(once, piece).all(axis=1).sum() == MIN_RIM]
+    for fault, triangles in (
+        ("occurs more than once", distinct[repeats > 1]),
+        ("is missing", [hole for hole in holes if not (corners == hole).all(axis=1).any()]),
+    ):
+        if len(triangles):
+            place = ", ".join(f"{coordinate:.5g}" for coordinate in whole.vertices[triangles[0]].mean(axis=0))
+            raise GeometryFault(
+                f"{name}: a triangle {fault}, near ({place}) in the units of the file; mend the mesh in CAD, or with trimesh: "
+                "mesh.update_faces(mesh.unique_faces()), mesh.fill_holes()"
+            )
 
 
 def _scale(geometry: Mesh, source_unit: str | None) -> float:

@@ -1,0 +1,70 @@
+"""The declarations of an assembly about what varies together: shared causes, correlations, measured parts."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tolcontact.declaration.declarations import Declarations, expect
+from tolcontact.declaration.dependence import (
+    Correlation,
+    CorrelationKind,
+    Population,
+    Variable,
+    correlation as _correlation,
+)
+from tolcontact.declaration.geometry import Unit
+from tolcontact.declaration.measured_table import population as _population
+from tolcontact.declaration.tolerance import tolerance as _tolerance
+from tolcontact.declaration.values import script_line
+
+
+class Causes(Declarations):
+    """The methods that declare what several contributors depend on."""
+
+    def variable(
+        self, name: str, tolerance: Any, *, drives: Mapping[str, float] | None = None, units: str = "mm",
+        nominal: float | None = None,
+    ) -> Variable:  # fmt: skip
+        """Declare a cause that drives several contributors, or a dimension that chains measure (see Variable).
+
+        name        of the cause
+        tolerance   full width of its range in its `units`, or a tc.Tolerance
+        drives      factor [mm per unit] of each contributor, by its label
+        units       of the cause, by default mm
+        nominal     value of a dimension in its `units`, which may drive nothing
+
+        `model.variable("warmth", 20, drives={"cover.width.size": 0.0007}, units="K")`
+        """
+        variable = Variable(
+            name=name, tolerance=_tolerance(tolerance), drives=dict(drives or {}), units=units, nominal=nominal,
+            declared_at=script_line(),
+        )  # fmt: skip
+        return self._add("variables", variable)
+
+    def correlate(self, labels: Sequence[str], matrix: Any, *, kind: CorrelationKind = "copula") -> Correlation:
+        """Declare that contributors with these `labels` are correlated: a `matrix`, or one coefficient for two of them.
+
+        `kind` is what the coefficients are of: "copula" (default), "pearson" or "rank" (see Correlation).
+        `model.correlate(["top.A1", "top.A2"], 0.5)`
+        """
+        return self._add("correlations", _correlation(labels, matrix, script_line(), kind))
+
+    def population(
+        self, source: Any, columns: Mapping[str, str] | None = None, *, absolute: bool = False, units: Unit = "mm"
+    ) -> Population:
+        """Declare that contributors are drawn from measured rows (see Population).
+
+        source    a CSV file, a DataFrame, a Dataset or a mapping of columns, with deviations from nominal values
+        columns   label of the contributor of each column; by default the names of the columns are labels
+        absolute  True: columns of sizes, of features declared before, hold sizes in place of deviations
+        units     of the numbers, by default mm: "um", "in", ...
+
+        `model.population("batch.csv", columns={"block.top.offset": "height"}, units="um")`
+        """
+        expect("population: absolute", absolute, bool, "True or False")
+        sizes = {
+            f"{feature.part.name}.{feature.name}.size": feature.size.nominal
+            for feature in self.assembly.features
+            if feature.size
+        }
+        table = _population(source, columns, script_line(), units=units, sizes=sizes if absolute else None)
+        return self._add("populations", table)
