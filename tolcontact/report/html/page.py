@@ -18,7 +18,8 @@ from tolcontact.declaration.title_block import title_block_of
 from tolcontact.discretization import Nominal, discretize
 from tolcontact.errors import ArchiveError, ModelError
 from tolcontact.replacing import replacing
-from tolcontact.report.analysis_tables import analysis_report, archived_analysis
+from tolcontact.report.analysis_tables import analysis_report
+from tolcontact.report.archived_analysis import archived_analysis
 from tolcontact.report.comparison_text import change_table, runs_lines, value_table
 from tolcontact.report.contributor_shares import ContributorShares, contributor_shares
 from tolcontact.report.convention_text import offset_table
