@@ -172,7 +172,7 @@ def test_a_population_is_in_the_archive():
         (lambda a: a.correlate(["top.A1", "top.A2"], -1.0), "common cause by variable(name, tolerance, drives="),
         (lambda a: a.correlate(["top.A1", "top.A2"], [[1, 0.5], [0.4, 1]]), "not symmetric"),
         (lambda a: a.correlate(["top.A1", "top.A2"], [[4, 0.5], [0.5, 4]]), "correlation coefficients, not covariances"),
-        (lambda a: a.correlate(["top.A1"], [[1]]), "two or more different labels"),
+        (lambda a: a.correlate(["top.A1"], [[1]]), "two or more different contributors"),
         (lambda a: a.correlate(["top.A1", "top.X9"], 0.5), 'unknown contributor "top.X9"; contributors are, for example: top.'),
         (lambda a: [a.correlate(["top.A1", f"top.A{k}"], 0.5) for k in (2, 3)], "is drawn by correlation"),
         (lambda a: a.variable("heat", 1, drives={"top.Q": 1}), 'unknown contributor "top.Q"'),

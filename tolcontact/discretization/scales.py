@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tolcontact.declaration.scale import Scale, doubt_of_distribution, doubt_of_rows
+from tolcontact.declaration.scale import CONSTANT_SHARE, Scale, doubt_of_distribution, doubt_of_rows
 from tolcontact.discretization.nominal import Nominal
 from tolcontact.errors import designation
 from tolcontact.features.freedoms import LOCATOR, Freedom
@@ -52,6 +52,7 @@ def scale_faults(nominal: Nominal) -> Iterator[str]:
         part = freedom.label.rpartition(".")[0]
         if freedom.source == LOCATOR and part not in reported:  # the locators of a part mostly have one tolerance
             centre, width = centre_and_width(freedom)
-            if abs(centre) >= by_label[freedom.label].limit:
+            scale = by_label[freedom.label]
+            if abs(centre) >= scale.limit and width > CONSTANT_SHARE * scale.part:  # a constant parks a locator
                 reported.add(part)
-                yield f'locator "{freedom.label}": {doubt_of_distribution(by_label[freedom.label], centre, width)}'
+                yield f'locator "{freedom.label}": {doubt_of_distribution(scale, centre, width)}'

@@ -17,7 +17,13 @@ def test_an_index_differs_from_its_counterpart_with_95_of_100_confidence_for_all
         figures.append([[by_percentiles(x, limits)[1]] * 2, [as_normal(x, limits)[1]] * 2])
     estimates, names = np.array(figures).transpose(0, 2, 1, 3), [f"x{k}" for k in range(len(figures))]
     dims = {"statistic": ["Ppk", "Ppk as normal"], "interval": ["estimate", "lower", "upper"]}
-    nothing = {"measure_units": "mm", "measure_quantity": "", "measure_lower": np.nan, "measure_upper": 4.5}
+    nothing = {
+        "measure_units": "mm",
+        "measure_quantity": "",
+        "measure_lower": np.nan,
+        "measure_upper": 4.5,
+        "measure_required": 0,
+    }
     marked = [
         any("*" in cell for row in measure_table(xr.Dataset(
             {

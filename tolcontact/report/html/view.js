@@ -41,7 +41,7 @@ function pointAt(known, part, hit) {
   const place = part.mesh.geometry.getAttribute("position");
   const corners = [0, 1, 2].map((corner) => new THREE.Vector3().fromBufferAttribute(place, 3 * hit.faceIndex + corner));
   const nearest = corners.reduce((one, other) => (other.distanceTo(hit.point) < one.distanceTo(hit.point) ? other : one));
-  const isNear = nearest.distanceTo(hit.point) < SNAP_DISTANCE * viewer.size;
+  const isNear = nearest.distanceTo(hit.point) < SNAP_DISTANCE * window.viewer.size;
   const [a, b] = [(isNear ? nearest : hit.point).toArray(), known.placement];
   const off = a.map((x, k) => x - b[9 + k]);
   const own = [0, 1, 2].map((k) => off[0] * b[k] + off[1] * b[3 + k] + off[2] * b[6 + k]); // R transposed
