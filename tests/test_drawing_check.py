@@ -59,6 +59,17 @@ def box_on_table() -> tc.Assembly:
     return a
 
 
+def at_its_boundary() -> tc.Assembly:
+    """A pin whose shank is datum A(M) of its head: the gauge element is no feature of the drawing."""
+    a = tc.Assembly("pin", standard="ASME")
+    part = a.part("pin", tc.Mesh(trimesh.creation.cylinder(5, 30, sections=96)), fixed=True)
+    shank = part.feature("shank", part.face(tc.select.Cylinder(5)), tc.Size(10, 0, -0.02), tc.Cylindricity(0.03), datum="A")
+    part.feature("head", part.face("+z"), tc.Perpendicularity(0.1, "A(M)"), FLAT, datum="B")
+    part.feature("foot", part.face("-z"), tc.Profile(0.2, "A|B"))
+    a.measure("x", shank.point(5, 0, 0), along="x")
+    return a
+
+
 SIZED = tc.Size(8, 0.1), tc.Position(0.2, "A|B")
 DRAWINGS = {
     "complete": (block(PLACED), None),
@@ -72,6 +83,10 @@ DRAWINGS = {
     "open, separate": (drilled(*SIZED, standard="ISO"), "H.*no tolerance limits shift x, shift x"),
     "exact holes": (drilled(tc.Position(0.2, "A|B")), "H.*it is a cylinder of exactly 8 mm, without limits of size.*tc.Size.8"),
     "moot form": (pin("ASME", 0.03), r'"shank".*no finer than the size .\+0 -0.02., whose envelope limits'),
+    "moot form of a datum with play": (
+        at_its_boundary(),
+        r'"shank".*no finer than the size .\+0 -0.02., whose envelope limits',
+    ),
     "independent form": (pin("ISO", 0.03), None),
     "finer form": (pin("ASME", 0.01), None),
     "modifier of a plane": (

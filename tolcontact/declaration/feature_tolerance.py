@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, ClassVar, Literal, TypedDict, Unpack, get_args
+from typing import Any, ClassVar, Literal, TypedDict, Unpack, cast, get_args
 
 from tolcontact.declaration.checks import LENGTH, LENGTH_OR_0, TRUTH, Check, Checked, direction_faults, one_of
 from tolcontact.declaration.size import Form
@@ -164,9 +164,9 @@ class GeometricTolerance(Checked):
         return tuple(compartment.endswith("><") for compartment in self._compartments)
 
     @property
-    def modifiers(self) -> tuple[str, ...]:
+    def modifiers(self) -> tuple[Material, ...]:
         """The material modifier of each compartment: "M", "L" or none."""
-        return tuple((match[2] or "") for match in map(COMPARTMENT.fullmatch, self._compartments) if match)
+        return tuple(cast(Material, match[2] or "") for match in map(COMPARTMENT.fullmatch, self._compartments) if match)
 
     @property
     def _compartments(self) -> list[str]:

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from tolcontact.declaration import Feature, GeometricTolerance
-from tolcontact.declaration.feature_tolerance import INSIDE, Position
+from tolcontact.declaration.feature_tolerance import INSIDE, Material, Position
 from tolcontact.features.datum_frames import DatumFrame
 from tolcontact.features.feature_geometry import FeatureOfSize
 from tolcontact.features.freedoms import FEATURE, Freedom
@@ -21,7 +21,7 @@ from tolcontact.features.tolerance_layers import named_span
 MOBILITY = "mobility"
 
 
-def mobile(pattern: NominalPattern, free: np.ndarray, material: str, start: int) -> NominalPattern | None:
+def mobile(pattern: NominalPattern, free: np.ndarray, material: Material, start: int) -> NominalPattern | None:
     """Return a datum feature with the freedoms of its gauge element, from column `start` on; None if it has no play.
 
     free      (6, n): displacements about its centre that the datums before it leave free
@@ -31,7 +31,7 @@ def mobile(pattern: NominalPattern, free: np.ndarray, material: str, start: int)
     if not isinstance(declared, Feature) or not isinstance(member.geometry, FeatureOfSize) or member.size_column is None:
         return None
     own = min((tolerance.width for tolerance in declared.geometric if not tolerance.is_form and tolerance.datums), default=0.0)
-    zone = GeometricTolerance(Position, own, material=material, rule=INSIDE)  # type: ignore[arg-type]
+    zone = GeometricTolerance(Position, own, material=material, rule=INSIDE)
     rows, added = zone_rows(zone, member.geometry, None), named_span(pattern.values @ free, pattern)
     layer = Layer(zone, (rows,), added, added, range(start, start + added.shape[1]), DatumFrame(np.zeros((6, start)), free, ()))
     labels = [f"{member.label}.{MOBILITY} {pattern.freedom_name(direction)}" for direction in added.T]

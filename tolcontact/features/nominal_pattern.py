@@ -61,6 +61,11 @@ class NominalPattern:
         return self.members[0].part
 
     @property
+    def is_gauge(self) -> bool:
+        """Whether its freedoms are those of the gauge element of a datum (see datum_mobility)."""
+        return self.members[0].mobility is not None
+
+    @property
     def label(self) -> str:
         return f"{self.declared.part.name}.{self.declared.name}"
 

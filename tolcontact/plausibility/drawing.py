@@ -25,11 +25,9 @@ def drawing_remarks(nominal: Nominal) -> Iterator[str]:
 
 def open_freedoms(nominal: Nominal) -> Iterator[str]:
     """Yield a sentence for each feature with freedoms that no tolerance limits; of a datum, those that it does not define."""
-    for pattern in nominal.patterns:
+    for pattern in _stated(nominal):
         if isinstance(pattern.declared, Pattern) and pattern.declared.borrowed:
             continue  # these have tolerances of their own
-        if pattern.members[0].mobility is not None:
-            continue  # a gauge element
         names = uncontrolled(pattern, _followed(nominal, pattern))
         if not names:
             continue
@@ -45,7 +43,7 @@ def open_freedoms(nominal: Nominal) -> Iterator[str]:
 
 def missing_sizes(nominal: Nominal) -> Iterator[str]:
     """Yield a sentence for each toleranced hole, shaft, slot or tab whose size has no limits."""
-    for pattern in nominal.patterns:
+    for pattern in _stated(nominal):
         geometry = pattern.geometries[0]
         if isinstance(geometry, FeatureOfSize) and pattern.declared.size is None and pattern.declared.tolerances:
             yield (
@@ -59,9 +57,9 @@ def perfect_datums(nominal: Nominal) -> Iterator[str]:
     for part in nominal.last_parts:
         flat = [
             str(pattern.declared.datum)
-            for pattern in nominal.patterns
+            for pattern in _stated(nominal)
             if pattern.declared.part is part.part and pattern.declared.datum and pattern.form is None
-            and isinstance(pattern.geometries[0], PlaneFeature)
+            and isinstance(pattern.geometries[0], PlaneFeature) and not isinstance(pattern.geometries[0], FeatureOfSize)
         ]  # fmt: skip
         if flat:
             yield f'part "{part.name}": datum {_listed(flat)}: no tolerance of form: taken as flat; add tc.Flatness'
@@ -78,7 +76,7 @@ def unused_datums(nominal: Nominal) -> Iterator[str]:
 
 def ineffective_tolerances(nominal: Nominal) -> Iterator[str]:
     """Yield a sentence for each tolerance or modifier that cannot change a part."""
-    for pattern in nominal.patterns:
+    for pattern in _stated(nominal):
         size = pattern.declared.size
         for tolerance in pattern.declared.geometric:
             if tolerance.is_form and size and pattern.declared.is_enveloped and size.upper - size.lower <= tolerance.width:
@@ -106,12 +104,15 @@ def perfect_faces(nominal: Nominal) -> Iterator[str]:
 
 def _moot_modifiers(nominal: Nominal, pattern: NominalPattern, tolerance: GeometricTolerance) -> Iterator[str]:
     datums = nominal.datums(pattern.part)
-    for compartment, letters in zip(tolerance.datums.split("|"), tolerance.system, strict=False):
-        if "(" not in compartment:
-            continue
-        of_size = [isinstance(datum.geometry, FeatureOfSize) for letter in letters for datum in datums.get(letter, ())]
-        if not all(of_size):
+    for letters, modifier in zip(tolerance.system, tolerance.modifiers, strict=True):
+        features = [datum for letter in letters for datum in datums.get(letter, ())]
+        if modifier and not all(isinstance(datum.geometry, FeatureOfSize) for datum in features):
             yield f"{tolerance}: datum {letters[0]} has no size, so a material modifier says nothing; leave it out"
+
+
+def _stated(nominal: Nominal) -> list[NominalPattern]:
+    """Return the features and patterns of the drawings, without the gauge elements of datums."""
+    return [pattern for pattern in nominal.patterns if not pattern.is_gauge]
 
 
 def _followed(nominal: Nominal, pattern: NominalPattern) -> np.ndarray:

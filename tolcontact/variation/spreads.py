@@ -138,7 +138,7 @@ class Envelope:
 def envelopes(nominal: Nominal) -> list[Envelope]:
     """Return the envelopes of features whose form is drawn and has to stay inside."""
     found = []
-    for pattern in (pattern for pattern in nominal.patterns if pattern.declared.is_enveloped):
+    for pattern in (pattern for pattern in nominal.patterns if pattern.declared.is_enveloped and not pattern.is_gauge):
         size = pattern.declared.size
         for member in pattern.members:
             if member.form is None or size is None or member.size_column is None:

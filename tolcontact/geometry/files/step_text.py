@@ -3,6 +3,7 @@
 Time and memory are linear in the size of any text: the patterns are possessive and never backtrack.
 """
 
+import contextlib
 import re
 import sys
 from collections import defaultdict
@@ -24,9 +25,6 @@ _REFERENCE = re.compile(rb"#(\d+)")
 _WIDE = re.compile(r"\\X2\\((?:[0-9A-F]{4})*)\\X0\\|\\X\\([0-9A-F]{2})")
 # What strings consist of in the encodings that systems write in place of UTF-8; of Chinese and Japanese the common characters.
 _ENCODINGS = {
-    "utf-8": re.compile(
-        rb"(?:[\0-\x7f]|[\xc2-\xdf][\x80-\xbf]|[\xe0-\xef][\x80-\xbf]{2}|[\xf0-\xf4][\x80-\xbf]{3})*+", re.DOTALL
-    ),
     "gb18030": re.compile(rb"(?:[\0-\x7f]|[\xb0-\xd7][\xa1-\xfe]|[\xa1\xa3][\xa1-\xfe])*+"),
     "shift_jis": re.compile(rb"(?:[\0-\x7f]|[\x81-\x97][\x40-\xfc])*+"),
 }
@@ -189,16 +187,16 @@ def entity_name(text: bytes) -> str:
 
 def decoded(string: bytes) -> str:
     """Return a string of a STEP file, without its quotes, as a text."""
-    try:
-        text = string.decode()
-    except UnicodeDecodeError:
-        text = string.decode(encoding_of([string]), errors="replace")
+    text = string.decode(encoding_of([string]), errors="replace")
     return _WIDE.sub(_wide, text.replace("''", "'"))
 
 
 def encoding_of(strings: Iterable[bytes]) -> str:
     """Return the encoding in which strings consist of common characters: UTF-8, or one of older systems; Latin if in none."""
     joined = b"\n".join(strings)
+    with contextlib.suppress(UnicodeDecodeError):
+        joined.decode()
+        return "utf-8"
     return next((encoding for encoding, common in _ENCODINGS.items() if common.fullmatch(joined)), "latin-1")
 
 
