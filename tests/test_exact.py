@@ -5,9 +5,9 @@ import pytest
 
 import tolcontact as tc
 from tests import cases, referee
-from tests.helpers import EXACT, FIXED, PAPER, SEATED, R_t, compiled, moved_at_locators, nightly, simulate
+from tests.helpers import EXACT, FIXED, PAPER, SEATED, R_t, compiled, joined, moved_at_locators, nightly, simulate
 from tests.nonlinear import TrueProblem
-from tolcontact.simulation import simulate_block
+from tolcontact.simulation import simulate_block, simulate_blocks
 from tolcontact.variation import draw
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
@@ -110,6 +110,16 @@ def test_conflicts_do_not_loosen_two_sided_locators(start, stop):
     plate = program.nominal.parts[0]
     moved = moved_at_locators(plate, block.poses[:, CORRECTED, 0])[:, ~plate.locators.one_sided]
     assert np.abs(moved[stuck | (block.status == Status.RESOLVED)]).max() < 1e-8
+
+
+def test_conflicts_depend_on_no_other_realization():
+    """Also where the solver fails and another one answers."""
+    program = compiled(cases.square_pins(), solver="daqp", method=SEATED)
+    whole, single = (
+        joined(simulate_blocks(program, samples=2220, seed=8, start=2212, block=size, threads=1)) for size in (8, 1)
+    )
+    assert (whole["status"] == Status.NOT_ASSEMBLABLE).any() and whole["second_answers"].any()
+    assert np.array_equal(whole["poses"], single["poses"])
 
 
 @pytest.mark.slow

@@ -64,11 +64,13 @@ class ContactSolver:
             lost = _is_lost(answer)
             if not lost.any():
                 break
+            if SOLVERS[name].remembers:  # then each problem gets a solver of its own, so that it does not depend on others
+                for row in np.flatnonzero(lost):
+                    self._retry(SOLVERS[name].solver(self._qp), answer, inputs, np.arange(len(lost)) == row, second=1.0)
+                continue
             if name not in self._fallbacks:
                 self._fallbacks[name] = SOLVERS[name].solver(self._qp)
             self._retry(self._fallbacks[name], answer, inputs, lost, second=1.0)
-            if SOLVERS[name].remembers:
-                del self._fallbacks[name]
         return answer
 
     def _retry(

@@ -1,0 +1,133 @@
+"""What must change nothing, for many assemblies: blocks, threads, a stop, the archive, names, order, and the place in space.
+
+Each scene is built and run once; every property is a test of that run. A model is changed through its archive: the declaration
+in it is a text, and its meshes are arrays.
+"""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.spatial.transform import Rotation
+
+import tolcontact as tc
+from tests import cases
+from tests.cases import ends, fastened, fits, floating, laps, measured, round_contact, seats, stations, toleranced
+from tests.helpers import EXACT, PAPER, SEATED, assert_same_archive, joined, nightly
+from tolcontact.testing import assert_datums_recompute, assert_gaps_recompute, assert_same_run
+
+SAMPLES, SEED = 24, 5
+FLANGE = [(-60.0, -35.0), (60.0, -35.0), (0.0, 35.0)]
+SCENES = {
+    "ra1, linearized": (cases.ra1, PAPER),
+    "stack": (cases.stack, EXACT),
+    "springs": (cases.table, SEATED),
+    "everything": (cases.everything_of_boxes, EXACT),
+    "faces that end": (lambda: ends.case("chamfer")[0], None),
+    "a fit with form": (lambda: fits.shaft_in_a_bore(tc.Cylindricity(0.02)), SEATED),
+    "a floating shaft": (floating.floating_shaft_in_a_v, None),
+    "bolts": (lambda: fastened.bolted(FLANGE, size=0.2, method=SEATED), None),
+    "stations": (stations.rail, None),
+    "a pattern": (lambda: toleranced.pattern_with(tc.Position(0.2, "A"), tc.Size(10, 0.1)), EXACT),
+}
+AT_NIGHT = {
+    "jaws": (cases.jaws, EXACT),
+    "square pins": (cases.square_pins, SEATED),
+    "conflicts": (cases.everything_of_boxes, SEATED),
+    "a lap": (lambda: laps.case("three walls")[0], None),
+    "a jammed peg": (round_contact.jammed_peg, EXACT),
+    "a ball on pins": (round_contact.ball_on_three_pins, EXACT),
+    "a seat with form": (lambda: seats.seat(points=40), SEATED),
+    "a lid on studs": (floating.lid_on_studs, None),
+    "three stations": (lambda: stations.three_stations(0.3), EXACT),
+    "measurements": (measured.seated, None),
+}
+TURN, SHIFT = Rotation.from_rotvec((0.4, -1.1, 0.7)), np.array((310.0, -170.0, 90.0))  # mm
+
+
+class Scene:
+    """An assembly, its program, and the archive of a run."""
+
+    def __init__(self, name, folder):
+        self.name, (self.model, self.method) = name, (SCENES | AT_NIGHT)[name]
+        model = self.model()
+        self.program, self.path = tc.build(model, solver="daqp", method=self.method), folder / "run.nc"
+        self.run(out=self.path).close()
+        self.results = xr.load_datatree(self.path)
+        # What a user's function computes turns with nothing.
+        self.fixed_in_space = [measure.name for measure in model.measures if callable(measure.of)]
+
+    def run(self, model=None, **options):
+        options = {"samples": SAMPLES, "seed": SEED, "surfaces": 4} | options
+        if model is not None:
+            options |= {"solver": "daqp", "method": self.method}
+        return tc.run(self.program if model is None else model, **options)
+
+    def changed(self, change):
+        """A run of the model that is in the archive, after a change of its declaration (a dict)."""
+        tree = self.results.copy()
+        document = json.loads(str(tree["model"]["declaration"].values))
+        change(document)
+        tree["model"]["declaration"] = xr.DataArray(json.dumps(document))
+        return self.run(tc.io.model_of(tree))
+
+
+@pytest.fixture(scope="module", params=[*SCENES, *nightly(*AT_NIGHT)])
+def scene(request, tmp_path_factory):
+    return Scene(request.param, tmp_path_factory.mktemp("scene"))
+
+
+def test_neither_blocks_nor_threads_nor_the_problem_before_change_a_bit(scene):
+    block = joined(tc.simulate_blocks(scene.program, samples=SAMPLES, seed=SEED, block=7, threads=2))
+    assert np.array_equal(block["measured"], scene.results["measured"], equal_nan=True)
+    assert np.array_equal(block["status"], scene.results["status"])
+    (late,) = tc.simulate_blocks(scene.program, samples=SAMPLES, seed=SEED, start=SAMPLES - 3)
+    assert np.array_equal(late.poses, block["poses"][-3:], equal_nan=True)
+
+
+def test_a_run_that_stopped_goes_on_to_the_same_archive(scene, tmp_path):
+    for samples in (10, SAMPLES):
+        scene.run(samples=samples, out=tmp_path / "grown.nc", resume=samples == SAMPLES).close()
+    assert_same_archive(tmp_path / "grown.nc", scene.path)
+
+
+def test_the_model_in_an_archive_gives_the_run_again_and_names_of_pairs_are_free(scene):
+    """Labels of contributors choose their draws; the names of the assembly and its pairs choose nothing."""
+
+    def renamed(document):
+        document["name"] = 'Ärger, \'n "Haus" #1'
+        for pair in document["pairs"]:
+            pair["name"] += " \u4e2d\u6587 =1+1"
+
+    again = scene.changed(renamed)
+    if "pair" in scene.results.coords:
+        again = again.assign_coords(pair=scene.results["pair"].values)
+    assert_same_run(again, scene.results)
+
+
+def test_neither_the_place_in_space_nor_the_order_of_declarations_changes_anything(scene):
+    """All parts, the directions of measures and the forces are turned and shifted; lists are declared from the end."""
+
+    def turned(document):
+        for part in document["parts"]:
+            part["at"] = (TURN.apply(part["at"]) + SHIFT).tolist()
+            part["rotation"] = (TURN * Rotation.from_rotvec(part["rotation"])).as_rotvec().tolist()
+        for vectors, name in ((document["measures"], "along"), (document["forces"], "vector")):
+            for one in vectors:
+                if one.get(name) is not None:
+                    one[name] = TURN.apply(one[name]).tolist()
+        for name in ("parts", "pairs", "measures", "locations", "forces"):
+            document[name].reverse()
+
+    again, there = scene.changed(turned), ~np.isin(scene.results["measure"].values, scene.fixed_in_space)
+    found = again["measured"].sel(measure=scene.results["measure"].values).values
+    np.testing.assert_allclose(found[..., there], scene.results["measured"].values[..., there], rtol=0, atol=1e-6)
+    assert np.array_equal(again["status"].values, scene.results["status"].values)
+
+
+def test_gaps_and_datums_recompute_from_the_archive(scene):
+    if "contact" in scene.results.children:
+        assert_gaps_recompute(scene.path)
+    if "datum" in scene.results.children:
+        assert_datums_recompute(scene.path)
