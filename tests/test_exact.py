@@ -53,7 +53,7 @@ def certified(program, run):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("objective", ["all points", *nightly("active points", "locator stiffness")])
-@pytest.mark.parametrize("make", [lambda: cases.model("tower"), cases.ring, cases.jaws], ids=["tower", "ring", "jaws"])
+@pytest.mark.parametrize("make", [cases.jaws, *nightly(lambda: cases.model("tower"), cases.ring)])
 def test_many_bodies_are_resolved(make, objective):
     program, run = simulate(make(), samples=500, solver="daqp", method=tc.Method(search="fixed", objective=objective))
     assert (run["gap_min"][:, RAW].min(axis=1) < -0.01).all()
@@ -100,7 +100,7 @@ def test_a_tab_wider_than_its_slot_is_not_assemblable(solver):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("start", "stop"), [(2150, 2350), *nightly((0, 4000))])
+@pytest.mark.parametrize(("start", "stop"), [(2205, 2225), *nightly((0, 4000))])
 def test_conflicts_do_not_loosen_two_sided_locators(start, stop):
     """Also with a solver that finds no rest there: poses of least penetration are poses that the locators allow."""
     program = compiled(cases.square_pins(), solver="daqp", method=SEATED)

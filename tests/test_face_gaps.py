@@ -47,10 +47,10 @@ def test_with_form_they_are_those_of_a_dense_grid_in_a_run_and_in_its_archive(tm
     faces = model.parts[1].face("-z"), model.parts[0].face("+z")
     model.measure("largest", tc.LargestGap(*faces))
     model.measure("mean", tc.MeanGap(*faces))
-    results = tc.run(model, samples=20, solver="daqp", method=SEATED, out=tmp_path / "run.nc", surfaces=0, fields="none")
+    results = tc.run(model, samples=6, solver="daqp", method=SEATED, out=tmp_path / "run.nc", surfaces=0, fields="none")
     measured = results["measured"].values
     results.close()
-    program, again = simulate(tmp_path / "run.nc", samples=20, build=tc.build, solver="daqp")
+    program, again = simulate(tmp_path / "run.nc", samples=6, build=tc.build, solver="daqp")
     np.testing.assert_array_equal(again["measured"], measured)
     grid = np.stack(np.meshgrid(np.linspace(0, 100, 101), np.linspace(0, 50, 51)), axis=-1).reshape(-1, 2)
     places = np.column_stack([grid, np.zeros(len(grid))])

@@ -118,7 +118,7 @@ def test_a_bolt_lets_a_cover_shift_by_both_clearances():
     a = a.replaced(locations=locations)
     a.locate(cover, [*lying(), turning], floating=True)
     a.force("pull", at=cover.point(0, 0, 0), vector=(3, 4, 0))
-    results = run(a, samples=300)
+    results = run(a, samples=60)
     assert_resolved(results)
     drawn = results["sample"].deviation
     room = 1.0 + (grown(results, "base", 1) + grown(results, "cover", 1))[:, 0] / 2

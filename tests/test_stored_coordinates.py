@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
-from tests.cases.stored import FAR, SCENES, ascii_stl, stored, stored_case
+from tests.cases.stored import FAR, ascii_stl, stored, stored_case
 from tests.helpers import FIXED, call, nightly
 from tolcontact.stored_coordinates import printed_spacing
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
@@ -21,8 +21,7 @@ SINGLE = trimesh.Trimesh(ABROAD.vertices.astype(np.float32).astype(float), ABROA
 
 
 @pytest.mark.parametrize("seed", [1, *nightly(2, 3, 8, 9)])
-@pytest.mark.parametrize("faces", [False, True])
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(("name", "faces"), [("key", True), ("dovetail", False), *nightly(("key", False), ("dovetail", True))])
 def test_bodies_without_clearance_fit_in_files_of_single_precision(name, faces, seed, tmp_path):
     run = tc.run(stored_case(name, tmp_path, faces=faces, seed=seed), keep="all", **QUICK)
     assert_resolved(run)
@@ -34,7 +33,10 @@ def test_bodies_without_clearance_fit_in_files_of_single_precision(name, faces, 
 
 @pytest.mark.parametrize(
     "suffix, options, largest",
-    [("ply", {}, 4.3e-4), ("stl", {"units": "m"}, 4.3e-4), ("obj", {"units": "in"}, 1e-6), ("stl", {"number": "%.2f"}, 0.02)],
+    [
+        ("obj", {"units": "in"}, 1e-6),
+        *nightly(("ply", {}, 4.3e-4), ("stl", {"units": "m"}, 4.3e-4), ("stl", {"number": "%.2f"}, 0.02)),
+    ],
 )
 def test_bodies_without_clearance_fit_in_other_files(suffix, options, largest, tmp_path):
     run = tc.run(stored_case("key", tmp_path, suffix, **options), keep="all", **QUICK)

@@ -80,14 +80,14 @@ def test_an_interrupted_run_says_how_far_it_is_has_its_fields_and_goes_on(tmp_pa
     paths = [tmp_path / "stopped.nc", tmp_path / "whole.nc", tmp_path / "short.nc"]
     options = {"seed": 3, "solver": "daqp", "method": PAPER}
     with pytest.raises(KeyboardInterrupt):
-        tc.run(cases.stack(), samples=60_000, out=paths[0], progress=interrupt, **options)
+        tc.run(cases.stack(), samples=20_000, out=paths[0], progress=interrupt, **options)
     tc.run(cases.stack(), samples=8192, out=paths[2], **options).close()
     found = tc.summarize(paths[0])
-    assert found.attrs["realizations"] == 8192 and found.attrs["samples"] == 60_000
+    assert found.attrs["realizations"] == 8192 and found.attrs["samples"] == 20_000
     assert found["field_realizations"] == 8192
     assert found["field_extreme"].identical(tc.summarize(paths[2])["field_extreme"])
     tc.run(cases.stack(), samples=1000, out=paths[0], resume=True, **options).close()
-    tc.run(cases.stack(), samples=60_000, out=paths[1], **options).close()
+    tc.run(cases.stack(), samples=20_000, out=paths[1], **options).close()
     for group in (None, "sample", "field/middle"):
         one, other = (contents(path, group) for path in paths[:2])
         assert one.identical(other), group

@@ -243,6 +243,7 @@ def test_measured_parts_are_one_of_their_rows():
     assert found.worst.sel(state="raw").values.ravel() == pytest.approx([-1, 2], abs=1e-9)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_what_cannot_be_assembled_does_not_count():
     a = cases.square_pins("rotations")

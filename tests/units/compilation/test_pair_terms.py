@@ -124,9 +124,9 @@ def both_ways(model, samples, method):
 @pytest.mark.parametrize(
     ("name", "method"),
     [
-        (TOWER, None), (TOWER, PAPER), (CHANNEL, None), ("chain", EXACT), ("toleranced", EXACT), ("ra1", PAPER),
-        *nightly((TOWER, CLOSED), (CELLS, None), (CELLS, PAPER), (CHANNEL, PAPER), (COVER, None)),
-        *nightly(("chain", PAPER), ("ra1", EXACT)),
+        (CHANNEL, None), ("chain", EXACT), ("toleranced", EXACT), ("ra1", PAPER),
+        *nightly((TOWER, None), (TOWER, PAPER), (TOWER, CLOSED), (CELLS, None), (CELLS, PAPER), (CHANNEL, PAPER)),
+        *nightly((COVER, None), ("chain", PAPER), ("ra1", EXACT)),
     ],
 )  # fmt: skip
 def test_sums_over_pairs_give_what_the_whole_function_gives(name, method):
@@ -142,8 +142,8 @@ def test_sums_over_pairs_give_what_the_whole_function_gives(name, method):
 @pytest.mark.parametrize(
     ("name", "objective"),
     [
-        *product(("rigid faces", "springy locators", "springy faces", "clutch"), ("seating",)),
-        ("rigid faces", "locator stiffness"), *nightly(*product(("hinge", "spindle", "bracket"), ("seating",))),
+        *product(("rigid faces", "springy faces", "clutch"), ("seating",)), *nightly(("rigid faces", "locator stiffness")),
+        *nightly(*product(("springy locators", "hinge", "spindle", "bracket"), ("seating",))),
     ],
 )  # fmt: skip
 def test_summed_functions_equal_the_functions_of_the_whole(name, objective):
