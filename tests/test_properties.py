@@ -14,22 +14,21 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests import cases
 from tests.cases import ends, fastened, fits, floating, laps, measured, round_contact, seats, stations, toleranced
-from tests.helpers import EXACT, PAPER, SEATED, assert_same_archive, joined, nightly
+from tests.helpers import ALL_POINTS, EXACT, PAPER, SEATED, assert_same_archive, joined, nightly
 from tolcontact.testing import assert_datums_recompute, assert_gaps_recompute, assert_same_run
 
 SAMPLES, SEED = 24, 5
-FLANGE = [(-60.0, -35.0), (60.0, -35.0), (0.0, 35.0)]
 SCENES = {
     "ra1, linearized": (cases.ra1, PAPER),
     "stack": (cases.stack, EXACT),
     "springs": (cases.table, SEATED),
-    "everything": (cases.everything_of_boxes, EXACT),
+    "everything": (cases.everything_of_boxes, tc.Method(objective="locator stiffness")),
     "faces that end": (lambda: ends.case("chamfer")[0], None),
     "a fit with form": (lambda: fits.shaft_in_a_bore(tc.Cylindricity(0.02)), SEATED),
     "a floating shaft": (floating.floating_shaft_in_a_v, None),
-    "bolts": (lambda: fastened.bolted(FLANGE, size=0.2, method=SEATED), None),
+    "bolts": (lambda: fastened.bolted(fastened.FOUR[::3], position=(1.3, 1.3), size=0.1, is_cover_fixed=True), ALL_POINTS),
     "stations": (stations.rail, None),
-    "a pattern": (lambda: toleranced.pattern_with(tc.Position(0.2, "A"), tc.Size(10, 0.1)), EXACT),
+    "a pattern": (lambda: toleranced.EVERY["composite pattern"](cases.STILL), EXACT),
 }
 AT_NIGHT = {
     "jaws": (cases.jaws, EXACT),
@@ -43,6 +42,8 @@ AT_NIGHT = {
     "three stations": (lambda: stations.three_stations(0.3), EXACT),
     "measurements": (measured.seated, None),
 }
+# mm: where faces have form, places of contact are looked for on lines that depend on the frame.
+OF_FRAME = {"a fit with form": 5e-3}
 TURN, SHIFT = Rotation.from_rotvec((0.4, -1.1, 0.7)), np.array((310.0, -170.0, 90.0))  # mm
 
 
@@ -102,7 +103,7 @@ def test_the_model_in_an_archive_gives_the_run_again_and_names_of_pairs_are_free
 
     again = scene.changed(renamed)
     if "pair" in scene.results.coords:
-        again = again.assign_coords(pair=scene.results["pair"].values)
+        again.coords["pair"] = scene.results["pair"]
     assert_same_run(again, scene.results)
 
 
@@ -122,7 +123,9 @@ def test_neither_the_place_in_space_nor_the_order_of_declarations_changes_anythi
 
     again, there = scene.changed(turned), ~np.isin(scene.results["measure"].values, scene.fixed_in_space)
     found = again["measured"].sel(measure=scene.results["measure"].values).values
-    np.testing.assert_allclose(found[..., there], scene.results["measured"].values[..., there], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(
+        found[..., there], scene.results["measured"].values[..., there], rtol=0, atol=OF_FRAME.get(scene.name, 1e-6)
+    )
     assert np.array_equal(again["status"].values, scene.results["status"].values)
 
 
