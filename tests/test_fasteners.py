@@ -172,14 +172,6 @@ def stack(frame: Frame = STILL, **options) -> tc.Assembly:
 
 
 @pytest.mark.slow
-def test_where_a_bolted_assembly_stands_changes_nothing():
-    here, there = (run(stack(frame), samples=40) for frame in (STILL, MOVED))
-    assert (here.status == there.status).all()
-    assert np.abs(here.measured - there.measured).max() < 1e-5
-    assert here.measured.sel(state="corrected").std() > 0.001
-
-
-@pytest.mark.slow
 def test_a_bolted_assembly_is_rebuilt_from_its_archive_and_from_json(tmp_path):
     a = stack(shank=tc.Size(10, 0.0, -0.1))
     results = tc.run(a, samples=30, solver="daqp", keep="all")

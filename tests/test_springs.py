@@ -78,13 +78,6 @@ def test_mean_variance_and_share_agree_with_a_quadrature():
     assert (run["carrying"][:, 0] == 4).mean() == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / count))
 
 
-def test_a_turned_frame_changes_nothing():
-    _, run = simulate(springy_table(1000.0), samples=100)
-    _, turned = simulate(springy_table(1000.0, rotation=(0.3, -0.5, 0.2)), samples=100)
-    sunk = [each["measured"][:, CORRECTED, 0] for each in (run, turned)]
-    assert sunk[1] == pytest.approx(sunk[0], abs=1e-8)
-
-
 def test_forces_follow_from_the_archive_alone(tmp_path):
     """Compressions of the legs, from archived poses and deviations, times their stiffness are the archived reaction."""
     path = tmp_path / "springs.nc"
