@@ -1,9 +1,9 @@
-"""Look for a better pose than a resolved one: whether contact was resolved with the least motion.
+"""Look for a better pose than a resolved one: is contact resolved with the least motion?
 
-For each resolved realization, an interior-point solver (ipopt) looks for a pose with less displacement of the contact points. Bodies
-are unions of convex pieces; two pieces are apart if a plane is between them, and each plane is four unknowns of the problem. One
-search starts at the resolved pose, others at random ones. Nothing is shared with the simulation but the points and weights that
-define the objective "all points".
+For each resolved realization, an interior-point solver (ipopt) looks for a pose with less displacement of the contact points.
+Bodies are unions of convex pieces; two pieces are apart if a plane lies between them, and each plane is four unknowns of the
+problem. One search starts at the resolved pose, others at random ones. Nothing is shared with the simulation but the points and
+weights that define the objective "all points".
 """
 
 import argparse
@@ -61,16 +61,16 @@ class Search:
         return turn @ ca.reshape(start[:9], 3, 3).T, start[9:] + z[:3]
 
     def energy(self, raw, R, t) -> float:
-        """Half the mean squared displacement [mm^2] of the contact points from the raw pose (R, t)."""
+        """Return half the mean squared displacement [mm^2] of the contact points from the raw pose (R, t)."""
         moved = self.points @ (R - raw[0]).T + t - raw[1]
         return float(self.weights @ (moved**2).sum(axis=1) / 2)
 
     def distance(self, R, t) -> float:
-        """The signed distance [mm] from the fixed body."""
+        """Return the signed distance [mm] from the fixed body."""
         return min(separation(a, b, R, t) for a, b in self.pairs)
 
     def least(self, raw, start) -> tuple[float, np.ndarray, np.ndarray] | None:
-        """Energy and pose that a search from `start` comes to, if it keeps outside of the fixed body."""
+        """Return energy and pose that a search from `start` comes to, if it keeps outside of the fixed body."""
         z = np.concatenate([np.zeros(6), *(plane(a.corners @ start[0].T + start[1], b.corners) for a, b in self.pairs)])
         p = np.concatenate([raw[0].ravel(), raw[1], start[0].ravel(), start[1]])
         answer = np.asarray(self.solver(x0=z, p=p, lbg=self.lower, ubg=self.upper)["x"]).ravel()
@@ -80,20 +80,15 @@ class Search:
 
 
 def plane(above, below) -> np.ndarray:
-    """Normal and offset (4,) of the plane that leaves most room, or least overlap, between two sets of corners (v, 3)."""
+    """Return normal and offset (4,) of a plane between two sets of corners (v, 3), with most room or least overlap."""
     centre, best = below.mean(axis=0), None
     guess = above.mean(axis=0) - centre
     for _ in range(20):  # a linear program at a time: the normal has the length 1 along the last one
         guess = guess / np.linalg.norm(guess)
-        A = np.block(
-            [
-                [-(above - centre), np.ones((len(above), 2))],
-                [below - centre, -np.ones((len(below), 1)), np.ones((len(below), 1))],
-            ]
-        )
-        found = linprog(
-            [0, 0, 0, 0, -1], A_ub=A, b_ub=np.zeros(len(A)), A_eq=[[*guess, 0, 0]], b_eq=[1], bounds=[(None, None)] * 5
-        )
+        sides = (-(above - centre), 1.0), (below - centre, -1.0)
+        A = np.vstack([np.column_stack([side, np.full(len(side), sense), np.ones(len(side))]) for side, sense in sides])
+        along = {"A_eq": [[*guess, 0, 0]], "b_eq": [1]}
+        found = linprog([0, 0, 0, 0, -1], A_ub=A, b_ub=np.zeros(len(A)), bounds=[(None, None)] * 5, **along)
         if found.status != 0 or (best is not None and np.allclose(found.x[:3] / np.linalg.norm(found.x[:3]), guess)):
             break
         guess = best = found.x[:3]
@@ -129,7 +124,7 @@ def at_random(rng, pose):
 
 
 def compared(own, ours, near, best, search) -> dict:
-    """The least objectives found from the resolved pose and from anywhere, and the way [mm] there."""
+    """Return the least objectives found from the resolved pose and from anywhere, and the way [mm] there."""
     found = {}
     for name, other in (("near", near), ("best", best)):
         is_better = other is not None and other[0] < own * (1 - BETTER) - LEAST
