@@ -1,4 +1,4 @@
-"""Look for a better pose than a resolved one: is contact resolved with the least motion?
+"""Look for better poses than resolved ones, which would show that contact was not resolved with the least motion.
 
 For each resolved realization, an interior-point solver (ipopt) looks for a pose with less displacement of the contact points.
 Bodies are unions of convex pieces; two pieces are apart if a plane lies between them, and each plane is four unknowns of the
