@@ -128,7 +128,7 @@ def paired_figures(x, other, truth):
     hits.append(np.where(rng.random(len(x)) < CHANGED, rng.random(len(x)) < 0.05, hits[0]))
     shift = two_samples.share_shift(*map(Sample.of, hits), paired=True)
     table = {"shift of a share": (shift, 0.0)}
-    if len(x) >= required_realizations(2):
+    if len(x) >= required_realizations(2) and np.ptp(x) * np.ptp(other) > 0:
         z = (np.column_stack([x, other]) - truth.mean) / np.sqrt(truth.variance)
         (shares,) = linear_shares(z, (z @ SLOPES + PRODUCT * z.prod(axis=1))[:, None], [np.array([0]), np.array([1])])
         assert shares is not None
@@ -142,8 +142,6 @@ def counted(draw, repeats, figures_of, truth):
     covered: dict[str, list[bool]] = {}
     for repeat in range(repeats):
         draws = draw(repeat)
-        if np.ptp(draws[0]) == 0:
-            continue
         for statistic, (estimate, true) in figures_of(draws, truth).items():
             rows = covered.setdefault(statistic, [])
             if not (np.isnan(true) or np.isnan(estimate.lower)):

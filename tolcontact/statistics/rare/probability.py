@@ -267,9 +267,7 @@ def _unseen(strands: Sequence[np.ndarray], hits: np.ndarray, rng: np.random.Gene
 
 def _has_spread_weights(weights: np.ndarray) -> bool:
     """Return whether the weights are spread over many realizations, with no dominant one."""
-    total = weights.sum()
-    is_carried = total > 0 and total**2 / (weights**2).sum() >= MIN_EFFECTIVE
-    return bool(is_carried and weights.max() <= MAX_WEIGHT * total)
+    return intervals.effective_count(weights) >= MIN_EFFECTIVE and bool(weights.max() <= MAX_WEIGHT * weights.sum())
 
 
 def _combined(answers: Sequence[Estimate]) -> Tail:
