@@ -15,7 +15,7 @@ from scipy import special
 from tolcontact.statistics.sample import Sample
 
 CONFIDENCE = 0.95
-MIN_VARIANCE = 10  # realizations: variances of fewer have no interval
+MIN_VARIANCE = 20  # realizations: variances of fewer have no interval
 MIN_RATIO = 50  # realizations: ratios of variances of fewer have no interval
 MIN_SHAPE, MAX_KURTOSIS = 1000, 3.5  # realizations, and their kurtosis: otherwise skewness and kurtosis have no interval
 MIN_SKEW = 1e-6
@@ -127,14 +127,15 @@ def kurtosis(x: np.ndarray | Sample) -> Estimate:
 
 
 def variance(x: np.ndarray | Sample) -> Estimate:
-    """Return the variance with the interval of its influences on the log scale.
+    """Return the variance with the interval of its influences on the log scale, with Bonett's (2006) correction of its upper end.
 
     The smallest samples have none, and so have samples with too few values apart from a stop.
     """
     x = Sample.of(x)
     estimate = x.moments[0] * x.count / (x.count - 1)
     if estimate > 0:
-        return Estimate(*(estimate * math.exp(change) for change in from_standardized_influence(x, 0.0, [-1, 0, 1])))
+        _, below, above = from_standardized_influence(x, 0.0, [-1, 0, 1])
+        return Estimate(estimate, estimate * math.exp(below), estimate * math.exp(above * x.count / (x.count - _Z)))
     is_certain = x.count >= MIN_VARIANCE and x.determines_moments
     return Estimate(estimate, *(2 * [estimate if is_certain else math.nan]))
 
