@@ -31,7 +31,7 @@ ITERATIONS = 10
 FEW_DIMENSIONS, NOISE = 10, 5.0  # with more dimensions, this many standard errors of a centre are noise
 PILOT, MIN_COUNTED = 0.05, 50  # share of all realizations; number of hits among them above which the event is counted
 FIRST_SHARE = 0.25  # of all realizations
-SUFFICIENT, MIN_SUFFICIENT = 1.5, 4000  # upper over lower bound that suffices, with this many realizations
+SUFFICIENT, MIN_SUFFICIENT = 1.5, 30_000  # upper over lower bound that suffices, with this many realizations
 SEARCHABLE, MIN_PILOT, MIN_FEW = 10_000, 500, 3  # with fewer realizations, counting beats searches even with few hits
 SEARCHES = (0.25, 0.3)  # of all realizations: by levels, by inflation
 SCOUTING = 0.04  # of a search, for each trial inflation
@@ -253,15 +253,14 @@ def _unseen(strands: Sequence[np.ndarray], hits: np.ndarray, rng: np.random.Gene
     """Return an upper bound of the share of an event that no strand reached.
 
     The regions of the event are clusters of realizations drawn in it, `hits` (n, d). Regions that only one strand reached are
-    about as probable as regions that none reached (Good, 1953; the standard error also counts regions that two reached).
+    about as probable as regions that none reached (Good, 1953). The standard error also counts regions that two reached, and
+    is not 0 if no region was reached by one alone.
     """
     ways = fitted([hits[::2], hits[1::2]], rng)
     strands = [points for points in strands if len(points)]
     shares = np.array([np.bincount(ways.nearest(points), minlength=len(ways.shares)) / len(points) for points in strands])
     visits = (shares > 0).sum(axis=0)
     singles, doubles = (float(shares[:, visits == number].sum()) for number in (1, 2))
-    if not singles:
-        return 0.0
     return min((singles + intervals.student(np.inf) * math.sqrt(singles + doubles)) / len(strands), MAX_UNSEEN)
 
 
