@@ -43,9 +43,10 @@ def tails(
     assembled. The score of the former is the measure, and each limit has its own search; the latter only has a search by
     inflation of all deviations. Each search has about `samples` realizations, by default and at least 30 000, since fewer miss
     regions of an event. A quarter of 120 000 or more suffices where the upper bound of the interval is at most 1.5 times the
-    lower one; otherwise the result comes from the other three quarters. A probability of 0 with an upper bound means that the search ended below 1e-9. Where two
-    searches disagree, the interval covers both results, and more realizations are needed. A measure that is not a number in any
-    realization has the probability NaN, as in `run`. Probabilities include unresolved realizations, with their last poses.
+    lower one; otherwise the result comes from the other three quarters. A probability of 0 with an upper bound means that the
+    search ended below 1e-9. Where two searches disagree, the interval covers both results, and more realizations are needed. A
+    measure that is not a number in any realization has the probability NaN, as in `run`. Probabilities include unresolved
+    realizations, with their last poses.
     `progress` is called with the number of realizations simulated, and the approximate total.
     `model`, `samples`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see tolcontact.analyses).
     Raises OptionError for a model that has no rare event.

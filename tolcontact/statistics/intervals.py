@@ -127,9 +127,10 @@ def kurtosis(x: np.ndarray | Sample) -> Estimate:
 
 
 def variance(x: np.ndarray | Sample) -> Estimate:
-    """Return the variance with the interval of its influences on the log scale, with Bonett's (2006) correction of its upper end.
+    """Return the variance with the interval of its influences on the log scale.
 
-    The smallest samples have none, and so have samples with too few values apart from a stop.
+    The upper bound has Bonett's correction for small samples (2006). There is no interval of the smallest samples, and of those
+    with too few values apart from a stop.
     """
     x = Sample.of(x)
     estimate = x.moments[0] * x.count / (x.count - 1)
