@@ -57,6 +57,14 @@ def test_shares_of_skewed_contributors_are_covered_and_r2_is_or_has_no_interval(
     assert of_r2[has_r2].mean() > 0.895 if tails.dist.name == "norm" else has_r2.mean() < 0.1
 
 
+def test_a_contributor_that_seldom_deviates_has_no_interval_of_its_share():
+    """In 1 % of 300 realizations; the other contributor is normal."""
+    x = np.random.default_rng(4).normal(size=(300, 2))
+    x[:, 0] = np.maximum(x[:, 0] - stats.norm.ppf(0.99), 0)
+    (shares,) = linear_shares(x, (x @ np.array([10.0, 1.0]))[:, None], ALONE[:2])
+    assert np.isnan(shares.shares[0, 1:]).all() and np.isfinite(shares.shares[1]).all() and np.isfinite(shares.shares[0, 0])
+
+
 def test_what_is_explained_by_chance_is_not_counted():
     """Many contributors without an effect, few realizations: without the correction R2 would be 0.3."""
     generator, estimates = np.random.default_rng(3), []

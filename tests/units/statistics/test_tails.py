@@ -7,6 +7,7 @@ from scipy import stats
 from tests.helpers import nightly
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.rare import Tail, either, sufficient_tail, tail_probability
+from tolcontact.statistics.rare.probability import _unseen
 
 TWELVE = np.ones(12) / np.sqrt(12)
 SLOPES = np.geomspace(0.1, 1.0, 20)
@@ -72,6 +73,21 @@ def test_what_is_not_rare_is_counted():
     rng = np.random.default_rng(1)
     (_, lower, upper), _ = tail_probability(lambda u: u[:, 0] + 0.5, 3, samples=20_000, rng=rng)
     assert lower < stats.norm.cdf(0.5) < upper and upper - lower < 0.02
+
+
+@pytest.mark.parametrize(
+    ("ways_of_strands", "is_open"), [([[0]] * 8, False), ([[0], [0], [0], [0], [1], [1], [0, 2], [2]], True)]
+)
+def test_ways_that_few_strands_reached_leave_others_open(ways_of_strands, is_open):
+    """Ways 8 apart; each strand has twelve points, near the ways that it reached. Way 0 alone, by all, leaves none open."""
+    rng, ways = np.random.default_rng(5), 8.0 * np.eye(3)
+
+    def near(numbers, count):
+        return ways[np.resize(numbers, count)] + 0.1 * rng.standard_normal((count, 3))
+
+    reached = sorted({way for numbers in ways_of_strands for way in numbers})
+    share = _unseen([near(numbers, 12) for numbers in ways_of_strands], near(reached, 300), rng)
+    assert share > 0.1 if is_open else share == 0.0
 
 
 SPARSE = np.r_[np.ones(8), np.full(8, 0.3), np.zeros(52)] / np.sqrt(8.72)
