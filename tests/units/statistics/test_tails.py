@@ -7,7 +7,7 @@ from scipy import stats
 from tests.helpers import nightly
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.rare import Tail, either, sufficient_tail, tail_probability
-from tolcontact.statistics.rare.probability import _unseen
+from tolcontact.statistics.rare.probability import unseen_share
 
 TWELVE = np.ones(12) / np.sqrt(12)
 SLOPES = np.geomspace(0.1, 1.0, 20)
@@ -86,7 +86,7 @@ def test_ways_that_few_strands_reached_leave_others_open(ways_of_strands, is_ope
         return ways[np.resize(numbers, count)] + 0.1 * rng.standard_normal((count, 3))
 
     reached = sorted({way for numbers in ways_of_strands for way in numbers})
-    share = _unseen([near(numbers, 12) for numbers in ways_of_strands], near(reached, 300), rng)
+    share = unseen_share([near(numbers, 12) for numbers in ways_of_strands], near(reached, 300), rng)
     assert share > 0.1 if is_open else share == 0.0
 
 

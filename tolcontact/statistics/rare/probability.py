@@ -165,7 +165,7 @@ def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.ran
     reach = math.exp(intervals.student(np.inf) * float(weights.std()) / mean / math.sqrt(len(weights)))
     hits = np.flatnonzero(weights)
     hits = rng.choice(hits, min(2 * REFIT, len(hits)), p=weights[hits] / weights.sum())
-    unseen = _unseen([strand for search in searches for strand in search.points], u[hits], rng)
+    unseen = unseen_share([strand for search in searches for strand in search.points], u[hits], rng)
     estimate = Estimate(mean, mean / reach, min(mean * reach / (1 - unseen), 1.0))
     for alternative in answers:
         if alternative.value > 0 and math.log(alternative.value / mean) > SIGNIFICANT * math.hypot(
@@ -249,7 +249,7 @@ def _completed(mixture: Mixture, u: np.ndarray, w: np.ndarray, rng: np.random.Ge
     return joined([mixture, fitted(groups, rng).flattened()], [0.5, 0.5])
 
 
-def _unseen(strands: Sequence[np.ndarray], hits: np.ndarray, rng: np.random.Generator) -> float:
+def unseen_share(strands: Sequence[np.ndarray], hits: np.ndarray, rng: np.random.Generator) -> float:
     """Return an upper bound of the share of an event that no strand reached.
 
     The regions of the event are clusters of realizations drawn in it, `hits` (n, d). Regions that only one strand reached are
