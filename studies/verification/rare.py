@@ -160,7 +160,7 @@ MODELS = {
 
 def found_by_score(name, samples, seed):
     score, dimensions, _, leads = SCORES[name]
-    rng = np.random.default_rng([seed, len(name)])
+    rng = np.random.default_rng([seed, len(name), samples])
     used = 0
 
     def counted(u):
