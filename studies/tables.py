@@ -6,7 +6,7 @@ A table stands between `<!-- written by SCRIPT: NAME -->` and `<!-- end -->`.
 import math
 import re
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 MARKED = re.compile(r"(<!-- written by ([^>]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
@@ -31,12 +31,17 @@ def write(script: str, results: dict[str, Table], to: Path | None = None) -> Non
     if not page.exists():
         shutil.copy(readme, page)
     texts = {f"{Path(script).name}: {name}": markdown(table) for name, table in results.items()}
+    replace(page, texts)
+    for name, table in texts.items():
+        print(f"\n{name}\n{table}")
+
+
+def replace(page: Path, texts: Mapping[str, str]) -> None:
+    """Replace the texts between the marks of a page. Raises ValueError for a mark that is not there."""
     if unknown := set(texts) - set(tables(page)):
         raise ValueError(f"{page} has no marks of {', '.join(sorted(unknown))}")
     text = MARKED.sub(lambda match: match[1] + texts.get(match[2], match[3]) + match[4], page.read_text(encoding="utf-8"))
     page.write_text(text, encoding="utf-8")
-    for name, table in texts.items():
-        print(f"\n{name}\n{table}")
 
 
 def with_interval(value: float, lower: float, upper: float) -> str:

@@ -37,7 +37,7 @@ def test_an_archive_keeps_what_was_asked_of_its_model(archive):
         "contributions": tc.analyses.contributions(cases.ra1(), samples=1024, into=archive, **FAST),
         "sensitivities": tc.analyses.sensitivities(cases.ra1(), samples=16, into=archive, **FAST),
         "worst_case": tc.analyses.worst_case(cases.ra1(), samples=16, into=archive, **FAST),
-        "tails": tc.analyses.tails(cases.ra1(), samples=4000, into=archive, **FAST),
+        "tails": tc.analyses.tails(cases.ra1(), samples=30_000, into=archive, **FAST),
         "allocation": tc.analyses.allocate(
             cases.ra1(), "corner height: ppm 700000", samples=256, by="part", into=archive, **FAST
         ),
@@ -80,7 +80,7 @@ def test_a_model_without_contact_can_be_asked_as_well():
     assert float(tc.analyses.contributions(a, samples=256, **FAST).missed.max()) < 1e-3
     nominal = tc.analyses.sensitivities(a, samples=4, **FAST).nominal.values[0]
     assert worst.bound.values[0, 0, 1] == pytest.approx(0.05 * np.abs(nominal).sum(), abs=1e-9)
-    assert tc.analyses.tails(a, samples=4000, **FAST).sizes["event"] == 1
+    assert tc.analyses.tails(a, samples=30_000, **FAST).sizes["event"] == 1
 
 
 @pytest.mark.slow

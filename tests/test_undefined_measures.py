@@ -68,7 +68,7 @@ def test_a_measure_that_is_a_number_but_for_negligible_deviations_has_its_probab
 def test_the_table_of_tails_says_what_is_not_defined(tmp_path):
     script = tmp_path / "block.py"
     script.write_text(SCRIPT)
-    done = call(tmp_path, "tails", script, "--samples", "4000")
+    done = call(tmp_path, "tails", script)
     assert done.returncode == 0 and "lg outside limits    -" in done.stdout, done.stderr
     assert "lg outside limits: the measurement is not a number in some realizations" in done.stdout
     assert "Traceback" not in (failed := call(tmp_path, "worst", script)).stderr and failed.returncode == 2

@@ -1,7 +1,8 @@
 """How often 95 % intervals cover the truth: every statistic of a measure, 13 distributions, samples of 20 to 5000.
 
 Distributions have closed quantiles, and moments by quadrature. Limits lie at 1.2 times the distance of the outer percentiles.
-With `--write` the tables of the README are replaced, and the picture is drawn.
+With `--write` the tables of the README and the sentences of the guide are replaced, and the picture is drawn. A coverage is
+below the target beyond its scatter if its own exact 95 % interval is.
 """
 
 import argparse
@@ -13,6 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy import special, stats
 
+from studies.tables import markdown, replace, tables
 from tolcontact.limits import Limits
 from tolcontact.statistics import capability, intervals, two_samples
 from tolcontact.statistics.linear_shares import linear_shares, required_realizations
@@ -21,7 +23,8 @@ from tolcontact.statistics.sobol_indices import sobol_indices
 from tolcontact.variation.plans import Plan
 from tolcontact.vocabulary import LATIN_HYPERCUBE, REPLICATE, SOBOL
 
-README, BEGIN, END = Path(__file__).with_name("README.md"), "<!-- coverage -->\n", "<!-- end of coverage -->"
+README = Path(__file__).with_name("README.md")
+CHAPTER = Path(__file__).parents[2] / "tolcontact" / "guide" / "statistics.md"
 PICTURE = "coverage.png"
 SIZES = (20, 100, 300, 5000)
 REPLICATES = 20  # of a run with a sampling plan
@@ -128,7 +131,7 @@ def paired_figures(x, other, truth):
     hits.append(np.where(rng.random(len(x)) < CHANGED, rng.random(len(x)) < 0.05, hits[0]))
     shift = two_samples.share_shift(*map(Sample.of, hits), paired=True)
     table = {"shift of a share": (shift, 0.0)}
-    if len(x) >= required_realizations(2):
+    if len(x) >= required_realizations(2) and np.ptp(x) * np.ptp(other) > 0:
         z = (np.column_stack([x, other]) - truth.mean) / np.sqrt(truth.variance)
         (shares,) = linear_shares(z, (z @ SLOPES + PRODUCT * z.prod(axis=1))[:, None], [np.array([0]), np.array([1])])
         assert shares is not None
@@ -138,17 +141,20 @@ def paired_figures(x, other, truth):
 
 
 def counted(draw, repeats, figures_of, truth):
-    """Return by statistic: coverage in percent of the intervals that there are; NaN if few samples have one."""
+    """Return by statistic the coverage [%] of intervals, with its own interval; NaN if few samples have an interval."""
     covered: dict[str, list[bool]] = {}
     for repeat in range(repeats):
         draws = draw(repeat)
-        if np.ptp(draws[0]) == 0:
-            continue
         for statistic, (estimate, true) in figures_of(draws, truth).items():
             rows = covered.setdefault(statistic, [])
             if not (np.isnan(true) or np.isnan(estimate.lower)):
                 rows.append(bool(estimate.lower <= true <= estimate.upper))
-    return {s: 100 * float(np.mean(rows)) if len(rows) >= STATED * repeats else np.nan for s, rows in covered.items()}
+    return {
+        statistic: 100 * np.array(intervals.proportion_of(sum(rows), len(rows)))
+        if len(rows) >= STATED * repeats
+        else np.full(3, np.nan)
+        for statistic, rows in covered.items()
+    }
 
 
 def coverage(name, size, repeats):
@@ -184,22 +190,45 @@ def coverage_of_plan(plan, name, repeats):
 PLANNED = ("normal", "lognormal", "half at a stop", "uniform")
 
 
+def below(rows):
+    """Return the cells whose coverage is below the target: row, statistic, coverage, and whether its interval is below, too."""
+    return [
+        (f"{name}, {size}", statistic, float(percent), bool(upper < TARGET))
+        for (name, size), column in rows.items()
+        for statistic, (percent, _, upper) in column.items()
+        if percent < TARGET
+    ]
+
+
 def table_of(rows):
-    """Yield a table: for each row, the number of figures with an interval, and the least coverage."""
-    yield "| | realizations | figures with an interval | least coverage % | of | below " + f"{TARGET:g} % |"
-    yield "|---" * 6 + "|"
+    """Return a table: for each row, the number of figures with an interval, the least coverage, and those below the target."""
+    table = [["", "realizations", "figures with an interval", "least coverage %", "of", f"below {TARGET:g} %"]]
     for (name, size), column in rows.items():
-        stated = {statistic: percent for statistic, percent in column.items() if not np.isnan(percent)}
+        stated = {statistic: float(cell[0]) for statistic, cell in column.items() if not np.isnan(cell[0])}
         worst = min(stated, key=lambda statistic: stated[statistic])
-        below = [f"{statistic} {percent:.1f}" for statistic, percent in stated.items() if percent < TARGET]
-        cells = [name, str(size), str(len(stated)), f"{stated[worst]:.1f}", worst, ", ".join(below) or "none"]
-        yield "| " + " | ".join(cells) + " |"
+        weak = [f"{statistic} {percent:.1f}" for _, statistic, percent, _ in below({(name, size): column})]
+        table.append([name, size, len(stated), f"{stated[worst]:.1f}", worst, ", ".join(weak) or "none"])
+    return markdown(table)
+
+
+def sentences_of(rows, repeats):
+    """Return what the table of all rows shows: how many intervals cover less often than the target, and which."""
+    count, weak = sum(not np.isnan(cell[0]) for column in rows.values() for cell in column.values()), below(rows)
+    sure = [cell for cell in weak if cell[3]]
+    clean, fair = (len(rows) - len({cell[0] for cell in cells}) for cells in (weak, sure))
+    text = (
+        f"Of {count} intervals in {len(rows)} rows, each of {repeats} samples, {len(weak)} cover the truth in less than "
+        f"{TARGET:g} %,\n{len(sure)} of them beyond the scatter of their coverage; {clean} rows have none below, "
+        f"and {fair} none beyond the scatter.\n"
+    )
+    listed = [f"- {row}: {name} {percent:.1f} %{', beyond the scatter' * is_sure}" for row, name, percent, is_sure in weak]
+    return text + "".join(f"{line}\n" for line in ["", *listed] if listed)
 
 
 def draw_picture(rows, path):
     """Draw the coverage of each figure (column) by distribution and number of realizations (row)."""
     figures_of_all = list(dict.fromkeys(figure for column in rows.values() for figure in column))
-    values = np.array([[column.get(figure, np.nan) for figure in figures_of_all] for column in rows.values()])
+    values = np.array([[column.get(figure, [np.nan])[0] for figure in figures_of_all] for column in rows.values()])
     figure, axes = plt.subplots(figsize=(9, 12), layout="constrained")
     colours = plt.get_cmap("RdYlBu").copy()
     colours.set_bad("0.9")
@@ -222,17 +251,17 @@ def main():
         for plan in (LATIN_HYPERCUBE, SOBOL)
         for name in PLANNED
     }
-    cells = [percent for column in [*rows.values(), *planned.values()] for percent in column.values() if not np.isnan(percent)]
-    below = sum(percent < TARGET for percent in cells)
-    lines = [
-        f"{options.repeats} samples for each row; {len(cells)} intervals, of which {below} cover in less than {TARGET:g} %.",
-        "",
-    ]
-    lines += [*table_of(rows), "", "With a sampling plan:", "", *table_of(planned)]
-    print("\n".join(lines))
+    texts = {
+        "rows": sentences_of(rows, options.repeats),
+        "coverage": table_of(rows),
+        "plan rows": sentences_of(planned, options.repeats),
+        "plans": table_of(planned),
+    }
+    print("\n".join(texts.values()))
     if options.write:
-        before, _, rest = README.read_text(encoding="utf-8").partition(BEGIN)
-        README.write_text(before + BEGIN + "\n".join(lines) + "\n" + END + rest.partition(END)[2], encoding="utf-8")
+        marked = {f"{Path(__file__).name}: {name}": text for name, text in texts.items()}
+        replace(README, marked)
+        replace(CHAPTER, {name: text for name, text in marked.items() if name in tables(CHAPTER)})
         draw_picture(rows, README.with_name(PICTURE))
 
 

@@ -21,7 +21,7 @@ from tolcontact.analyses.linear_model import total_derivatives
 from tolcontact.compilation import Program
 from tolcontact.method import Solver
 from tolcontact.simulation import Block
-from tolcontact.statistics.intervals import UNDEFINED, Estimate
+from tolcontact.statistics.intervals import UNDEFINED, Estimate, effective_count
 from tolcontact.statistics.sobol_indices import missed, shapley_effects, sobol_indices
 from tolcontact.workflow.models import Choice, Model
 
@@ -92,19 +92,14 @@ def screened(engine: Engine, groups: Mapping[str, np.ndarray], seed: int) -> Scr
     totals, accuracies = [], engine.program.accuracies
     for states, accuracy in zip(measured.transpose(3, 2, 0, 1), accuracies, strict=True):
         totals.append([[index.value for index in sobol_indices(f, accuracy)[1]] for f in states])
-        if any(0 < _effective_count(f) < MIN_EFFECTIVE for f in states):
+        squares = [((f[:, :2] - f[:, :2].mean()) ** 2).mean(axis=1) for f in states]
+        if any(0 < effective_count(square) < MIN_EFFECTIVE for square in squares):
             return Screening.none(groups)
     shares = np.nan_to_num(np.array(totals)).reshape(-1, len(groups))
     order = np.argsort(shares.max(axis=0, initial=0.0), kind="stable")
     is_minor = np.zeros(len(groups), dtype=bool)
     is_minor[order] = (shares[:, order].cumsum(axis=1) <= MINOR_SHARE).all(axis=0)
     return Screening(groups, is_minor, np.array(totals)) if is_minor.sum() > 1 else Screening.none(groups)
-
-
-def _effective_count(f: np.ndarray) -> float:
-    """Return the effective number of base realizations behind the variance of f (n, 2 + group); 0 without variance."""
-    squares = ((f[:, :2] - f[:, :2].mean()) ** 2).mean(axis=1)
-    return float(squares.sum() ** 2 / (squares**2).sum()) if squares.any() else 0.0
 
 
 def contributions(

@@ -20,8 +20,7 @@ from tolcontact.statistics.rare import NEGLIGIBLE, Tail, either, sufficient_tail
 from tolcontact.variation.draws import MIN_UNIFORM
 from tolcontact.workflow.models import Choice, Model
 
-MIN_SAMPLES = 4000  # for an event
-BUDGET, DEFAULT_RANGE = 60_000, (10_000, 40_000)  # realizations for all events, and for one
+MIN_SAMPLES = 30_000  # for a search: fewer see too few of an event's regions (studies/verification)
 MIN_AT_STOP = 50  # values at a limit that is never exceeded
 UNDEFINED_TAIL = Tail(UNDEFINED, 1.0)
 
@@ -37,41 +36,40 @@ def tails(
         disagreement (event)                    ratio of the results of two searches for the event; 1 if they agree
         stop         (event)                    1: many values were at one of the limits, and none beyond; if the other limit
                                                 can be exceeded, this one is left out
-        simulated    (event)                    number of realizations, out of about `samples`
+        simulated    (event)                    number of realizations, about `samples` for each limit
         by_status    (event, status_meaning)    number of realizations, most of them unlikely ones
 
     In an event a corrected measure is beyond its limits by more than its accuracy, or, in an exact resolution, parts cannot be
     assembled. The score of the former is the measure, and each limit has its own search; the latter only has a search by
-    inflation of all deviations. By default all events share 60 000 realizations, with 10 000 to 40 000 for each. A quarter of
-    the samples suffices where the upper bound of the interval is at most 1.5 times the lower one; otherwise the result comes
-    from the other three quarters. A probability of 0 with an upper bound means that the search ended below 1e-9. Where two
-    searches disagree, the interval covers both results, and more realizations are needed. A measure that is not a number in any
-    realization has the probability NaN, as in `run`. Probabilities include unresolved realizations, with their last poses.
+    inflation of all deviations. Each search has about `samples` realizations, by default and at least 30 000, since fewer miss
+    regions of an event. A quarter of 120 000 or more suffices where the upper bound of the interval is at most 1.5 times the
+    lower one; otherwise the result comes from the other three quarters. A probability of 0 with an upper bound means that the
+    search ended below 1e-9. Where two searches disagree, the interval covers both results, and more realizations are needed. A
+    measure that is not a number in any realization has the probability NaN, as in `run`. Probabilities include unresolved
+    realizations, with their last poses.
     `progress` is called with the number of realizations simulated, and the approximate total.
     `model`, `samples`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see tolcontact.analyses).
     Raises OptionError for a model that has no rare event.
 
     `tc.analyses.tails("model.nc")`
     """
+    samples = MIN_SAMPLES if samples is None else samples
     if isinstance(samples, int) and samples < MIN_SAMPLES:
-        raise OptionError(f"samples is {samples!r}; expected at least {MIN_SAMPLES} realizations for an event")
+        raise OptionError(f"samples is {samples!r}; expected at least {MIN_SAMPLES} realizations for each limit")
     analysis = Analysis(
-        terms.TAILS, model, samples=MIN_SAMPLES if samples is None else samples, seed=seed, solver=solver, method=method,
-        into=into, client=client, progress=progress,
+        terms.TAILS, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
+        progress=progress,
     )  # fmt: skip
     program = analysis.program
     analysis.check_varies(program.draws.varying)
     events = _events(program)
-    if samples is None:
-        samples = int(np.clip(BUDGET // len(events), *DEFAULT_RANGE))
-    engine, dimensions = analysis.engine(len(events) * samples), len(program.draws.varying)
+    engine, dimensions = analysis.engine(sum(map(len, events.values())) * samples), len(program.draws.varying)
     event_tails, statuses, stops = [], [], []
     for number, sides in enumerate(events.values()):
         before, scores, side_tails = engine.statuses.copy(), [make_score(engine) for make_score in sides], []
         for side, score in enumerate(scores):  # each has its own region, and could hide the region of the other
             rng = np.random.default_rng([analysis.seed, number, side])
-            side_samples = samples // len(sides)
-            side_tails.append(sufficient_tail(score, dimensions, samples=side_samples, rng=rng, leads=score.leads))
+            side_tails.append(sufficient_tail(score, dimensions, samples=samples, rng=rng, leads=score.leads))
         # If the other limit can be exceeded, a limit that acts as a stop would only add its detection bound, so it is left out.
         exceedable = [tail for score, tail in zip(scores, side_tails, strict=True) if not score.is_stop] or side_tails
         event_tails.append(UNDEFINED_TAIL if any(score.is_undefined for score in scores) else either(exceedable))

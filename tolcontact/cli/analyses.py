@@ -134,8 +134,8 @@ COMMANDS = (
         "Print rare-event (ppm) estimates: how often measurements are outside their limits, or parts cannot be assembled.",
         "tails",
         terms.TAILS,
-        "Approximate largest number of realizations for each event; by default all events share 60 000. "
-        "The analysis stops at a quarter of them if these suffice.",
+        "Approximate number of realizations for each limit: by default and at least 30 000. "
+        "Of 120 000 or more, a quarter is enough if it suffices.",
         ("tails model.py", "tails model.py --samples 400000 --json > rare.json"),
         _intervals("probability"),
     ),

@@ -10,6 +10,7 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.report.figures import NO_INTERVAL, grouped, percent
 from tolcontact.statistics.linear_shares import (
+    MIN_EFFECTIVE,
     MIN_R2,
     MIN_RESIDUALS,
     LinearShares,
@@ -72,6 +73,8 @@ def _shown(names: list[str], shares: LinearShares | None, count: int) -> Contrib
         f"Shares of the variance with contact, by linear regression on {grouped(count)} realizations, which explains {r2}; "
         "the rest is due to contact and other nonlinearities."
     )
+    if np.isnan(shares.shares[:, 1]).any():
+        note += f" A share needs {MIN_EFFECTIVE} realizations behind the variance of its contributors."
     if np.isnan(shares.r2[1]) and not shares.r2[0] > 1 - ROUNDED:
         note += f" An interval of it needs {MIN_RESIDUALS} realizations, and residuals without heavy tails."
     return ContributorShares([names[k] for k in order], shares.shares[order], note)

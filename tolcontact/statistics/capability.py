@@ -19,22 +19,27 @@ import numpy as np
 import scipy
 
 from tolcontact.limits import Limits
+from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import (
     CONFIDENCE,
+    MIN_SHAPE,
+    MIN_SKEW,
     UNDEFINED,
     Estimate,
     binomial_quantile,
-    from_standardized_influence,
+    hypotenuse,
     is_constant,
     percentiles,
     proportion,
     proportion_of,
+    standard_deviation,
 )
 from tolcontact.statistics.sample import Sample
 
 PERCENTS = 0.135, 50.0, 99.865
 MIN_AT_STOP = 2  # values at a limit that is a stop
 MIN_TAIL, MIN_TAILS = 2730, 3240  # realizations that bound a tail of 0.135 %; that bound both
+MAX_KURTOSIS = 10.0  # of a sample in which the errors of mean and standard deviation may cancel
 TRIALS = 1 << 11  # simulated triples of percentiles; an interval covers 95 % of them
 ALLOWED_SHARE = 0.0027  # share of a normal distribution beyond three standard deviations: Ppk 1 on both sides
 MEETS, FAILS, UNDECIDED, CONSTANT = "meets", "does not meet", "undecided", "does not vary"
@@ -105,8 +110,9 @@ def by_percentiles(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
 
     The numbers of values below the three percentiles are multinomial for any distribution. Each percentile lies between the
     two order statistics next to its simulated number. The interval uses the conservative one, and leaves out 2.5 % of the
-    simulated indices on either side. A sample that is too small to bound a tail has the lower bound 0, if values lie outside
-    of the limits, and no interval otherwise: any index of such a sample is possible.
+    simulated indices on either side. A sample that is too small to bound a tail has no interval, unless surely more than
+    0.135 % lie outside of the limits: then the lower bound is 0. If only samples with a value outside had an interval, it would
+    rest on the extreme ones.
     """
     if is_constant(x, limits.accuracy) or not np.isfinite(x.mean):
         return UNDEFINED, UNDEFINED
@@ -123,7 +129,7 @@ def by_percentiles(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
         best = np.stack([_sides(highs[0], middle, lows[2], limits) for middle in (lows[1], highs[1])])
         best_sides = list(np.fmax.reduce(best, axis=0))
         ppk = _with_interval(np.min(_sides(low, median, high, limits)), np.fmin.reduce(worst, axis=(0, 1)), best_sides)
-    if limits.outside(x.values).any():
+    if proportion(x.map(limits.outside)).lower > PERCENTS[0] / 100:
         return pp, ppk
     return _bounded(pp), _bounded(ppk)
 
@@ -138,22 +144,32 @@ def as_normal(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
     if is_constant(x, limits.accuracy) or not np.isfinite(x.mean):
         return UNDEFINED, UNDEFINED
     lower, upper, _ = without_stops(x, limits)
-    deviation = float(np.sqrt(x.moments[0] * x.count / (x.count - 1)))
-    kurt = float(x.standardized_moments[4])
-    pp, sides = UNDEFINED, []
-    if np.isfinite(lower) and np.isfinite(upper) and kurt > 0:
-        width = (upper - lower) / (6 * deviation)
-        pp = from_standardized_influence(x, width, [width / 2, 0, -width / 2])
-    if np.isfinite(upper):
-        sides.append(_side(x, (upper - x.mean) / (3 * deviation), 1.0))
-    if np.isfinite(lower):
-        sides.append(_side(x, (x.mean - lower) / (3 * deviation), -1.0))
+    spread, pp = standard_deviation(x, times=6), UNDEFINED
+    if np.isfinite(lower) and np.isfinite(upper):
+        pp = Estimate(*((upper - lower) / width for width in (spread.value, spread.upper, spread.lower)))
+    sides = [_side(x, spread, limit, sign) for limit, sign in ((upper, 1.0), (lower, -1.0)) if np.isfinite(limit)]
     return pp, min(sides, key=lambda side: side.value) if sides else UNDEFINED
 
 
-def _side(x: Sample, index: float, sign: float) -> Estimate:
-    """Return the index of one side for a normal distribution; `sign` is 1 for the upper limit, -1 for the lower."""
-    return from_standardized_influence(x, index, [index / 2, -sign / 3, -index / 2])
+def _side(x: Sample, spread: Estimate, limit: float, sign: float) -> Estimate:
+    """Return the index of one side for a normal distribution; `sign` is 1 for the upper limit, -1 for the lower.
+
+    The distances of its bounds are those of the mean and of the `spread` 6 sigma, which add up like errors. Their correlation
+    follows from skewness and kurtosis. Small samples and heavy tails use it only where it widens the interval, since few skewed
+    values do not prove that two errors cancel.
+    """
+    reach = sign * (limit - x.mean)
+    index, (skew, kurt) = 2 * reach / spread.value, x.standardized_moments[3:5].tolist()
+    by_mean = sorted(2 * sign * (limit - bound) / spread.value for bound in intervals.mean(x)[1:])
+    by_spread = sorted(2 * reach / width for width in spread[1:])
+    correlation = sign * float(np.sign(reach)) * skew / math.sqrt(max(kurt - 1, MIN_SKEW))
+    if x.count < MIN_SHAPE or kurt > MAX_KURTOSIS:
+        correlation = max(correlation, 0.0)
+    below, above = (
+        hypotenuse(of_mean - index, of_spread - index, correlation)
+        for of_mean, of_spread in zip(by_mean, by_spread, strict=True)
+    )
+    return Estimate(index, index - below, index + above)
 
 
 def _pp(low: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> np.ndarray:

@@ -15,7 +15,7 @@ from scipy import special
 from tolcontact.statistics.sample import Sample
 
 CONFIDENCE = 0.95
-MIN_VARIANCE, MAX_SMALL = 10, 1000  # realizations: variances of fewer have no interval; below the second, one by influences
+MIN_VARIANCE = 20  # realizations: variances of fewer have no interval
 MIN_RATIO = 50  # realizations: ratios of variances of fewer have no interval
 MIN_SHAPE, MAX_KURTOSIS = 1000, 3.5  # realizations, and their kurtosis: otherwise skewness and kurtosis have no interval
 MIN_SKEW = 1e-6
@@ -127,25 +127,18 @@ def kurtosis(x: np.ndarray | Sample) -> Estimate:
 
 
 def variance(x: np.ndarray | Sample) -> Estimate:
-    """Return the variance with the interval of Hall's transformation (1992), which accounts for the skewness of squares.
+    """Return the variance with the interval of its influences on the log scale.
 
-    Small samples use the influences on the logarithm of the variance; the smallest have no interval, and so have samples with
-    too few values apart from a stop.
+    The upper bound has Bonett's correction for small samples (2006). There is no interval of the smallest samples, and of those
+    with too few values apart from a stop.
     """
     x = Sample.of(x)
     estimate = x.moments[0] * x.count / (x.count - 1)
-    if x.count < MIN_VARIANCE or not x.determines_moments:
-        return Estimate(estimate, math.nan, math.nan)
-    if not estimate > 0:
-        return Estimate(estimate, estimate, estimate)
-    if x.count < MAX_SMALL:
-        return Estimate(*(estimate * math.exp(change) for change in from_standardized_influence(x, 0.0, [-1, 0, 1])))
-    kurt, sixth = x.standardized_moments[[4, 6]].tolist()
-    deviation = math.sqrt(max(kurt - 1, 0.0))  # of squares, relative to their mean
-    skew = (sixth - 3 * kurt + 2) / deviation**3 if deviation > 0 else 0.0
-    widening = x.map(lambda values: (values - x.mean) ** 2).widening
-    lower, upper = (1 - deviation * _back(sign * _Z * widening, skew, x.count) for sign in (1, -1))
-    return Estimate(estimate, estimate * min(max(lower, 0.0), 1.0), estimate * max(upper, 1.0))
+    if estimate > 0:
+        _, below, above = from_standardized_influence(x, 0.0, [-1, 0, 1])
+        return Estimate(estimate, estimate * math.exp(below), estimate * math.exp(above * x.count / (x.count - _Z)))
+    is_certain = x.count >= MIN_VARIANCE and x.determines_moments
+    return Estimate(estimate, *(2 * [estimate if is_certain else math.nan]))
 
 
 def _back(z: float, skew: float, count: int) -> float:
@@ -242,6 +235,19 @@ def variance_from_moments(count: int, moment2: ArrayLike, moment4: ArrayLike) ->
     if count < MIN_VARIANCE:
         return estimate, np.full(estimate.shape, np.nan), np.full(estimate.shape, np.nan)
     return estimate, np.minimum(middle * np.exp(-_Z * error), estimate), middle * np.exp(_Z * error)
+
+
+def hypotenuse(one: float, other: float, correlation: float) -> float:
+    """Return the distance of a bound from an estimate that depends on two others (Zou and Donner, 2008).
+
+    The distances of their bounds, `one` and `other`, add up like errors.
+    """
+    return math.sqrt(max(one**2 + other**2 + 2 * correlation * abs(one * other), 0.0))
+
+
+def effective_count(squares: np.ndarray) -> float:
+    """Return how many equal terms determine a sum as well as `squares` (realization,) do; 0 if all are 0."""
+    return float(squares.sum() ** 2 / (squares**2).sum()) if squares.any() else 0.0
 
 
 def is_constant(x: Sample, accuracy: float = 0.0) -> bool:

@@ -11,7 +11,9 @@ Nonlinear effects of contact are in 1 - R^2, and in no share. With C the covaria
     (b_g.x_g y + cov(x_g, y).(C^-1 x)_g e - S_g y^2) / var(y),     e without the share that a realization has in its own fit.
 
 The interval of a share is that of the mean of these influences or, if wider, the same on the logit scale: a share lies
-between 0 and 1. The residuals of few realizations, or those with heavy tails, do not tell how much no line explains.
+between 0 and 1. Its bounds are apart by the largest influences more, since one more realization of that kind could have been
+drawn. A share has no interval if the variance of a contributor of its group comes from few realizations. The residuals of few
+realizations, or those with heavy tails, do not tell how much no line explains.
 """
 
 import math
@@ -26,6 +28,7 @@ from tolcontact.statistics.intervals import Estimate
 
 MIN_ROWS, ROWS_PER_CONTRIBUTOR = 200, 5  # fewer realizations give no shares
 MIN_RESIDUALS, MAX_KURTOSIS = 1000, 10.0  # realizations, and the kurtosis of their residuals: otherwise R^2 has no interval
+MIN_EFFECTIVE = 20  # effective realizations behind the variance of a contributor: with fewer, a share has no interval
 MAX_LEVERAGE = 0.9  # of a realization in its own fit
 MIN_SHARE, MAX_LOGIT = 1e-6, 50.0  # of the logit scale
 MIN_R2 = 0.5  # below this, linear shares do not describe a measurement
@@ -80,6 +83,7 @@ def linear_shares(x: np.ndarray, y: np.ndarray, groups: Sequence[np.ndarray]) ->
     columns, rows = np.concatenate(members), np.repeat(np.arange(len(members)), [len(group) for group in members])
     membership = scipy.sparse.csr_array((np.ones(len(columns)), (rows, columns)), shape=(len(members), count))
     sizes = membership.sum(axis=1)
+    is_rare = membership @ np.array([intervals.effective_count(column**2) < MIN_EFFECTIVE for column in x.T]) > 0
     shares: list[LinearShares | None] = []
     for values in y.T:
         centred = values - values.mean()
@@ -94,16 +98,19 @@ def linear_shares(x: np.ndarray, y: np.ndarray, groups: Sequence[np.ndarray]) ->
         estimates = explained - sizes * (1 - explained[-1]) / (n - 1 - count)
         fitted, through_slopes = (membership @ (matrix * row).T for matrix, row in ((x, slopes), (normalized, with_y)))
         influences = (fitted * centred + through_slopes * residuals / independent - estimates[:, None] * centred**2) / variance
-        found = [_with_interval(*pair) for pair in zip(estimates, influences, strict=True)]
+        found = np.array([_with_interval(*pair) for pair in zip(estimates, influences, strict=True)])
+        found[is_rare, 1:] = math.nan
         if n < MIN_RESIDUALS or not n * (residuals**4).sum() < MAX_KURTOSIS * (residuals**2).sum() ** 2:
-            found[-1] = Estimate(found[-1].value, math.nan, math.nan)
-        shares.append(LinearShares(np.array(found[:-1]).reshape(-1, 3), np.array(found[-1])))
+            found[-1, 1:] = math.nan
+        shares.append(LinearShares(found[:-1], found[-1]))
     return shares
 
 
 def _with_interval(share: float, influences: np.ndarray) -> Estimate:
     """Return a share, with the interval that the influences of realizations (n,) give it."""
-    _, lower, upper = intervals.from_influences(0.0, influences - influences.mean())
+    influences = influences - influences.mean()
+    _, lower, upper = intervals.from_influences(0.0, influences)
+    lower, upper = lower + influences.min() / len(influences), upper + influences.max() / len(influences)
     inner = min(max(share, MIN_SHARE), 1 - MIN_SHARE)
     steps = np.clip(np.array([lower, upper]) / (inner * (1 - inner)), -MAX_LOGIT, MAX_LOGIT)
     least, most = scipy.special.expit(scipy.special.logit(inner) + steps)

@@ -25,7 +25,7 @@ import math
 
 import numpy as np
 
-from tolcontact.statistics.intervals import UNDEFINED, Estimate, from_influences
+from tolcontact.statistics.intervals import UNDEFINED, Estimate, effective_count, from_influences
 
 MIN_EFFECTIVE = 100  # effective number of realizations behind the variance: with fewer, an index has no interval
 CONSTANT = 1e-24  # of the square of the mean: a smaller variance is rounding
@@ -67,6 +67,6 @@ def ratio(u: np.ndarray, v: np.ndarray) -> Estimate:
     """Return the mean of u over the mean of v, of the same realizations, with the interval of its influence function."""
     mean_v = v.mean()
     estimate = float(u.mean() / mean_v)
-    if not v.sum() ** 2 >= MIN_EFFECTIVE * (v**2).sum():
+    if effective_count(v) < MIN_EFFECTIVE:
         return Estimate(estimate, math.nan, math.nan)
     return from_influences(estimate, (u - estimate * v) / mean_v)

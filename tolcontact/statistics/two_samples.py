@@ -61,8 +61,9 @@ def share_shift(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:
         n = weight * change.count
         counts = [weight * int((change.values == sign).sum()) for sign in (1, -1)]
         gained, lost = (intervals.proportion_of(count, n) for count in counts)
-        least = _hypotenuse(gained.value - gained.lower, lost.upper - lost.value, gained.value, lost.value)
-        most = _hypotenuse(gained.upper - gained.value, lost.value - lost.lower, gained.value, lost.value)
+        odds = math.prod(share.value / (1 - share.value) for share in (gained, lost) if share.value < 1)
+        least = intervals.hypotenuse(gained.value - gained.lower, lost.upper - lost.value, math.sqrt(odds))
+        most = intervals.hypotenuse(gained.upper - gained.value, lost.value - lost.lower, math.sqrt(odds))
         difference = gained.value - lost.value
         return Estimate(difference, max(difference - least, -1.0), min(difference + most, 1.0))
     hits = [x.map(lambda values: values.astype(float)) for x in (sample, baseline)]
@@ -71,12 +72,6 @@ def share_shift(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:
     shares = [(n * x.mean + 1) / (n + 2) for n, x in zip(counts, hits, strict=True)]
     error = math.sqrt(sum(p * (1 - p) / (n + 2) for p, n in zip(shares, counts, strict=True)))
     return _bounded(hits[0].mean - hits[1].mean, shares[0] - shares[1], error)
-
-
-def _hypotenuse(one: float, other: float, gained: float, lost: float) -> float:
-    """Return the error of the difference of two shares of the same sample, from the error of each."""
-    correlation = math.sqrt(gained * lost / ((1 - gained) * (1 - lost))) if gained * lost > 0 else 0.0
-    return math.sqrt(one**2 + other**2 + 2 * correlation * one * other)
 
 
 def _weight(x: Sample) -> float:

@@ -40,9 +40,9 @@ def charts_of(results: xr.DataTree, summary: xr.Dataset) -> list[dict[str, Any]]
 
 
 def bars_of(shares: ContributorShares) -> list[dict[str, Any]]:
-    """Return the largest linear shares [%] of a measurement, with their intervals."""
+    """Return the largest linear shares [%] of a measurement, with their intervals where there are any."""
     return [
-        {"name": name, "share": [100 * float(value) for value in values]}
+        {"name": name, "share": (100 * np.where(np.isnan(values), values[0], values)).tolist()}
         for name, values in zip(shares.groups[:MAX_BARS], shares.shares, strict=False)
     ]
 

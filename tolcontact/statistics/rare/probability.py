@@ -31,7 +31,7 @@ ITERATIONS = 10
 FEW_DIMENSIONS, NOISE = 10, 5.0  # with more dimensions, this many standard errors of a centre are noise
 PILOT, MIN_COUNTED = 0.05, 50  # share of all realizations; number of hits among them above which the event is counted
 FIRST_SHARE = 0.25  # of all realizations
-SUFFICIENT, MIN_SUFFICIENT = 1.5, 4000  # upper over lower bound that suffices, with this many realizations
+SUFFICIENT, MIN_SUFFICIENT = 1.5, 30_000  # upper over lower bound that suffices, with this many realizations
 SEARCHABLE, MIN_PILOT, MIN_FEW = 10_000, 500, 3  # with fewer realizations, counting beats searches even with few hits
 SEARCHES = (0.25, 0.3)  # of all realizations: by levels, by inflation
 SCOUTING = 0.04  # of a search, for each trial inflation
@@ -165,7 +165,7 @@ def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.ran
     reach = math.exp(intervals.student(np.inf) * float(weights.std()) / mean / math.sqrt(len(weights)))
     hits = np.flatnonzero(weights)
     hits = rng.choice(hits, min(2 * REFIT, len(hits)), p=weights[hits] / weights.sum())
-    unseen = _unseen([strand for search in searches for strand in search.points], u[hits], rng)
+    unseen = unseen_share([strand for search in searches for strand in search.points], u[hits], rng)
     estimate = Estimate(mean, mean / reach, min(mean * reach / (1 - unseen), 1.0))
     for alternative in answers:
         if alternative.value > 0 and math.log(alternative.value / mean) > SIGNIFICANT * math.hypot(
@@ -249,27 +249,24 @@ def _completed(mixture: Mixture, u: np.ndarray, w: np.ndarray, rng: np.random.Ge
     return joined([mixture, fitted(groups, rng).flattened()], [0.5, 0.5])
 
 
-def _unseen(strands: Sequence[np.ndarray], hits: np.ndarray, rng: np.random.Generator) -> float:
+def unseen_share(strands: Sequence[np.ndarray], hits: np.ndarray, rng: np.random.Generator) -> float:
     """Return an upper bound of the share of an event that no strand reached.
 
     The regions of the event are clusters of realizations drawn in it, `hits` (n, d). Regions that only one strand reached are
-    about as probable as regions that none reached (Good, 1953; the standard error also counts regions that two reached).
+    about as probable as regions that none reached (Good, 1953). The standard error also counts regions that two reached, and
+    is not 0 if no region was reached by one alone.
     """
     ways = fitted([hits[::2], hits[1::2]], rng)
     strands = [points for points in strands if len(points)]
     shares = np.array([np.bincount(ways.nearest(points), minlength=len(ways.shares)) / len(points) for points in strands])
     visits = (shares > 0).sum(axis=0)
     singles, doubles = (float(shares[:, visits == number].sum()) for number in (1, 2))
-    if not singles:
-        return 0.0
     return min((singles + intervals.student(np.inf) * math.sqrt(singles + doubles)) / len(strands), MAX_UNSEEN)
 
 
 def _has_spread_weights(weights: np.ndarray) -> bool:
     """Return whether the weights are spread over many realizations, with no dominant one."""
-    total = weights.sum()
-    is_carried = total > 0 and total**2 / (weights**2).sum() >= MIN_EFFECTIVE
-    return bool(is_carried and weights.max() <= MAX_WEIGHT * total)
+    return intervals.effective_count(weights) >= MIN_EFFECTIVE and bool(weights.max() <= MAX_WEIGHT * weights.sum())
 
 
 def _combined(answers: Sequence[Estimate]) -> Tail:
