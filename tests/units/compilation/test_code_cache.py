@@ -119,16 +119,16 @@ def test_code_of_another_processor_or_translation_is_another_one():
 LIMITED = """import resource
 from pathlib import Path
 import casadi as ca
-from tolcontact.compilation.functions import native
+from tolcontact.compilation.functions.native import NativeFunction
 x = ca.SX.sym("x", 8)
 y = x[0]
 for k in range(10_000):
     y = y * x[k % 8] + x[7 * k % 8]
-module = str(native.module_of(ca.Function("f", [x], [y])))
+function = ca.Function("f", [x], [y])
 pages = int(Path("/proc/self/statm").read_text().split()[0])
 resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + {room},) * 2)
 try:
-    native._engine(module)
+    NativeFunction(function)
     print("compiled")
 except MemoryError as error:
     print(error)
@@ -136,7 +136,7 @@ except MemoryError as error:
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="other systems do not limit the address space")
-@pytest.mark.parametrize(("room", "words"), [(1 << 28, "compiled"), (1 << 23, "address space is limited")])
+@pytest.mark.parametrize(("room", "words"), [(1 << 28, "compiled"), (1 << 26, "address space is limited")])
 def test_code_is_not_compiled_where_the_compiler_would_end_the_process(room, words):
     done = run([sys.executable, "-c", LIMITED.format(room=room)])
     assert done.returncode == 0 and done.stdout.startswith(words), done.stderr
