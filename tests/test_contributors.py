@@ -179,10 +179,10 @@ def test_a_population_is_in_the_archive():
         (lambda a: a.variable("heat", 1, drives={}), "it drives nothing"),
         (lambda a: a.variable("top.A1", 1, drives={"top.A2": 1}), 'contributor "top.A1" is declared 2 times'),
         (lambda a: a.population({"top.A1": [0.1]}), "it has 1 row(s); a population needs two or more"),
-        (lambda a: a.population({"top.A1": [0.1, "wide", 0.2]}), "row 2 of the column for top.A1 is no finite number"),
-        (lambda a: a.population({"top.A1": [0.1, True]}), "row 2 of the column for top.A1 is no finite number"),
-        (lambda a: a.population({"top.A1": [False, True]}), "row 1 of the column for top.A1 is no finite number"),
-        (lambda a: a.population({"top.A1": [0.1, np.nan]}), "row 2 of the column for top.A1 is no finite number"),
+        (lambda a: a.population({"top.A1": [0.1, "wide", 0.2]}), "row 2 of the column for top.A1 is no number up to 1e+15"),
+        (lambda a: a.population({"top.A1": [0.1, True]}), "row 2 of the column for top.A1 is no number up to 1e+15"),
+        (lambda a: a.population({"top.A1": [False, True]}), "row 1 of the column for top.A1 is no number up to 1e+15"),
+        (lambda a: a.population({"top.A1": [0.1, np.nan]}), "row 2 of the column for top.A1 is no number up to 1e+15"),
     ],
 )
 def test_wrong_causes_have_one_message(declare, said):
@@ -199,18 +199,21 @@ def test_tables_that_cannot_be_read_are_named(tmp_path):
     texts = {
         "one\n0,1\n0,2\n": "line 2 has 2 entries, and the heading 1; .*line 3 has 2 entries",
         "one,two\n1,2\n1\n": "line 3 has 1 entries, and the heading 2",
-        "one\n0.1\n#DIV/0!\n": r'line 3, column "one" is "#DIV/0!", and no number; mend the table, or leave out the rows',
+        "one\n0.1\n#DIV/0!\n": r'line 3, column "one" is "#DIV/0!"; expected a number; mend the table, or leave out the rows',
         "one\n0.1\n \n0.2\n": 'line 3, column "one" is empty',
         "one,two\nmm,mm\n1,2\n": 'line 2, column "one" is "mm"',
         "one\n0.1 mm\n": 'line 2, column "one" is "0.1 mm"',
-        "one\ttwo\n1,250\t1\n": 'line 2, column "one" is "1,250", and no number: write a decimal point',
+        "one\ttwo\n1,250\t1\n": 'line 2, column "one" is "1,250"; expected a number; write a decimal point',
         "one\n1_000\n0x10\nnan\ninf\n1\n": 'line 2, .*"1_000".* line 3, .*"0x10".*line 4, .*"nan".*; and 1 more;',
         "one,one\n1,2\n": 'columns 1 and 2 are both named "one"; rename one of them',
         "one [um]\n1\n": r'column "one \[um\]" is in um; give units="um"',
         "one (\N{MICRO SIGN}m)\n1\n": 'is in um; give units="um"',
         "two\n1\n": "has no column 'one'; its columns are: two",
-        "": "it has no rows; expected a heading",
-        "PK\3\4": r'it is a workbook; read it with pandas: population\(pandas.read_excel\("p.csv"\)\)',
+        "one\n1e16\n": 'line 2, column "one" is "1e16"; expected a number up to 1e\\+15',
+        "one\n\u0661\n": 'line 2, column "one" is "\u0661"; expected a number',
+        'one\n"1\n2\n': "line 2 has a quotation mark that is not closed",
+        "": "it is empty; expected a heading",
+        "PK\3\4": "it is a workbook; save it as CSV, or read it with pandas.read_excel",
     }
     for text, message in texts.items():
         (tmp_path / "p.csv").write_text(text, encoding="utf-8")
@@ -231,6 +234,7 @@ def test_tables_that_cannot_be_read_are_named(tmp_path):
         "one\ttwo\n0,1\t2\n-.25e0\t3\n",
         "# gauge 7\none [mm],two\n0.1,2\n# lunch\n\n\N{MINUS SIGN}0.25,3\n# mean -0.075\n\n",
         ' one , "two, too"\n 0.1 , 2\n-0.25,3\n',
+        '"one\n[mm]";"two; or\ntoo"\n"0,1";2\n-0.25;"3\n# of them"\n',
     ],
 )
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])

@@ -112,15 +112,21 @@ def test_files_that_are_no_points_of_the_face_are_refused(batch, tmp_path):
         few = "\n".join(path.read_text().splitlines()[:6])  # a heading and five places
         (tmp_path / "few" / path.name).write_text("\n".join([few, *few.splitlines()[1:] * 10]))
     assert "has 5 points; expected at least 24" in fault(tc.Form(measured=str(tmp_path / "few" / "*")))
-    lines = "expected lines of three numbers x, y, z [mm], in the frame of the part"
+    lines = "expected lines of three numbers x, y, z [mm] up to 1e+15, in the frame of the part"
     texts = {
-        "x,y\n1,2\n": f"0.csv\" cannot be read as measured points: line 2 is '1,2'; {lines}",
-        "1 2 3\n4 5 6 7": f"0.csv\" cannot be read as measured points: line 2 is '4 5 6 7'; {lines}",
-        "x;y;z\n1,5;2;3": f"line 2 is '1,5;2;3'; {lines}; write decimals with points",
+        "x,y\n1,2\n": f'0.csv" cannot be read as measured points: line 2 is "1,2"; {lines}',
+        "1 2 3\n4 5 6 7": f'0.csv" cannot be read as measured points: line 2 is "4 5 6 7"; {lines}',
+        "x;y;z\n1,5;2;3": f'line 2 is "1,5;2;3"; {lines}; write decimals with points',
         "": f'0.csv" has no points; {lines}',
-        "1,2,3\n4,nan,6\n": '0.csv": point 2 is (4, nan, 6); expected finite numbers, so leave it out',
+        "1,2,3\n4,nan,6\n": f'line 2 is "4,nan,6"; {lines}',
+        "1,2,3\n4,5,1e308\n": f'line 2 is "4,5,1e308"; {lines}',
+        "1,2,3\n4\n": f'line 2 is "4"; {lines}',
     }
     for text, message in texts.items():
         (tmp_path / "0.csv").write_text(text)
         assert message in fault(tc.Form(measured=str(tmp_path / "*.csv")))
+    for number in range(3):
+        cloud = "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty double y\nproperty double z\nend_header\n"
+        (tmp_path / f"{number}.ply").write_text(f"{cloud}1 2 1e300\n")
+    assert "point 1 is (1, 2, 1e+300); expected numbers up to 1e+15" in fault(tc.Form(measured=str(tmp_path / "*.ply")))
     assert "has a covariance, a length or lobes beside" in fault(tc.Form(measured=str(batch[0] / "*"), length=3.0))

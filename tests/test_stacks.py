@@ -190,6 +190,7 @@ def test_a_stack_has_all_analyses():
 TABLES = {
     "commas": "name,nominal,tolerance,sensitivity\nA,0.375,+0/-.031,-1\nB,0.032,±.002,\n",
     "semicolons": "sep=;\r\nName;Nominal;Upper;Lower;Sensitivity\r\nA;0,375;0;-0,031;-1\r\nB;0,032;0,002;-0,002;1\r\n;;;;\r\n",
+    "line breaks": 'name,nominal,tolerance,sensitivity,description\nA,0.375,+0/-.031,-1,"base,\nof steel"\nB,0.032,±.002,1,\n',
     "tabs": "\ufeffname\tnominal\ttolerance\tgap play\tdescription\nA\t0.375\t+0/-.031\t-1\tbase\nB\t0.032\t±.002\t1\twasher\n",
 }
 
@@ -222,7 +223,7 @@ def test_links_from_a_table_are_those_of_a_script(kind, tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", 'table "links.csv": it is empty; expected a heading with some of: name'),
+        ("", 'table "links.csv" cannot be read: it is empty; expected a heading with the names of columns'),
         ("name,nominal,tolerance\n", "it has no rows below its heading"),
         ("name,nominl,tolerance\nA,1,0.1\n", 'it has a column "nominl"; the nearest name is "nominal"'),
         ("name,nominal\nA,1\n", 'expected either a column "tolerance", or two, "upper" and "lower"'),

@@ -67,7 +67,7 @@ APART = {
 }
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
-    "version", "texts", "errors", "user_functions", "input_files", "system", "interrupts", "readable", "child",
+    "version", "texts", "errors", "user_functions", "input_files", "tables", "system", "interrupts", "readable", "child",
     "stored_coordinates", "shape_worker", "kernel", "vocabulary", "realizations", "arrays", "method", "poses", "limits",
     "code_cache", "replacing", "temporary", "compiled", "declaration", "select", "geometry", "features", "fasteners", "pmi",
     "discretization", "interference", "variation", "mechanics", "compilation", "statics", "contact", "simulation",

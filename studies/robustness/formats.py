@@ -6,6 +6,7 @@ LibreOffice's converter is used where `soffice` is installed; every text of a ce
 """
 
 import argparse
+import codecs
 import csv
 import decimal
 import importlib
@@ -157,13 +158,22 @@ def _damaged(content: bytes, rng: random.Random) -> tuple[str, bytes]:
 
 def _second_reading(content: bytes) -> Iterator[list[decimal.Decimal]]:
     """Yield the points of a table, without the heading, as decimal numbers."""
-    rows = [line.split("#")[0] for line in re.split("\r\n|\r|\n", content.decode("utf-8-sig"))]
+    rows = [line.split("#")[0] for line in re.split("\r\n|\r|\n", _decoded(content))]
     for number, row in enumerate(filter(str.strip, rows)):
         if number or re.search("[0-9]", row):
             words = re.split(r"[\s,;]+", row.strip())
             if len(words) != 3 or not all(NUMBER.fullmatch(word.encode()) for word in words):
                 raise ValueError(f"{row!r}")
             yield [decimal.Decimal(word) for word in words]
+
+
+def _decoded(content: bytes) -> str:
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return content.decode("utf-16")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("cp1252", errors="replace")
 
 
 def main() -> None:

@@ -197,7 +197,7 @@ def functions(count: int, rng: random.Random, folder: Path, table: Table) -> Non
     for in_measure, in_face in [("", ""), *rng.sample(measured + picked, min(count, len(measured + picked)))]:
         (folder / "m.py").write_text(SCRIPT.format(measured=in_measure, picked=in_face), encoding="utf-8")
         (folder / "m.nc").unlink(missing_ok=True)
-        ending = attempt(["run", "m.py", "--samples", "40", "--out", "m.nc"], folder, limit=60)
+        ending = attempt(["run", "m.py", "--samples", "40", "--out", "m.nc"], folder, limit=300 if heights is None else 60)
         fault, kept = ending.fault, "refused" if ending.code == 2 else "ran"
         if ending.code == 2 and ending.error.count("error: ") != 1:
             fault = "not one message"

@@ -128,8 +128,11 @@ def command_line(arguments: list[str] | None = None) -> None:
     except TolcontactError as error:
         echo(f"error: {error}", err=True)
         sys.exit(2)
-    except MemoryError as error:
-        echo(f"error: there is not enough memory ({str(error) or 'no details'}); ask for fewer samples", err=True)
+    except (MemoryError, RuntimeError) as error:
+        if isinstance(error, RuntimeError) and "bad_alloc" not in str(error):  # CasADi's lack of memory
+            raise
+        remedy = "raise its limit (ulimit -v), or ask for fewer samples"
+        echo(f"error: there is not enough memory ({str(error) or 'no details'}); {remedy}", err=True)
         sys.exit(2)
     except OSError as error:
         echo(f"error: the operating system reports: {error}", err=True)

@@ -140,8 +140,7 @@ class LinearStep:
         guess = state.multipliers.copy()
         for k, of_pair in zip(self.varying, slots, strict=True):
             guess[:, self.spans[k]] = of_pair.reactions * of_pair.filled
-        guessed_slack = np.where(np.isfinite(state.slack), state.slack, 0.0)  # infinite before the first answer
-        answer = self._solve(**inputs, P_m=P_m, P_r=P_r, n_r=n_r, filled=filled, guess=guess, guessed_slack=guessed_slack)
+        answer = self._solve(**inputs, P_m=P_m, P_r=P_r, n_r=n_r, filled=filled, guess=guess, guessed_slack=state.slack)
         slack, residual = np.maximum(answer["slack"], 0), answer["residual"][:, 0]
         solved = residual <= self._max_residual  # a problem that no solver could solve moves nothing
         deepest = self._deepest(task, answer["linearized"].reshape(state.relative.shape))

@@ -127,7 +127,7 @@ class State(Record):
             **initial_numbers(count),
             poses=poses.copy(),
             relative=relative.copy(),
-            slack=np.full((count, pairs), np.inf),
+            slack=np.zeros((count, pairs)),
             astray=np.zeros(count),
             multipliers=np.zeros((count, rows)),
             gap_min=np.full((count, pairs), np.nan),

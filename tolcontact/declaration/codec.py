@@ -15,7 +15,8 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from tolcontact.declaration.place import MAX_NUMBER, Place
+from tolcontact.declaration.place import Place
+from tolcontact.tables import MAX_NUMBER
 
 Document = dict[str, Any]
 
@@ -102,7 +103,7 @@ def _without_numpy(value: Any) -> Any:
 
 def _check_numbers(value: Any, place: Place) -> None:
     if isinstance(value, int | float) and not abs(value) <= MAX_NUMBER:
-        raise place.mismatch("a finite number", value)
+        raise place.mismatch(f"a number up to {MAX_NUMBER:g}", value)
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list | tuple) else ()
     for key, item in items:
         _check_numbers(item, place[key])

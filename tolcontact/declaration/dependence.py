@@ -14,6 +14,7 @@ from tolcontact.declaration.geometry import UNITS
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import is_length, is_line
 from tolcontact.declaration.written_tolerance import DIGITS, Deviations
+from tolcontact.tables import MAX_NUMBER
 
 CorrelationKind = Literal["copula", "pearson", "rank"]
 MAX_LISTED = 6  # coefficients in a row of the model
@@ -160,9 +161,9 @@ class Population(Declaration):
         elif len(self.values) < 2:
             yield f"it has {len(self.values)} row(s); a population needs two or more"
         for column, label in enumerate(self.columns[: self.values.shape[1]] if self.values.ndim == 2 else ()):
-            gaps = [row for row, value in enumerate(self.values[:, column]) if not np.isfinite(value)]
+            gaps = [row for row, value in enumerate(self.values[:, column]) if not abs(value) <= MAX_NUMBER]
             if gaps:
-                yield f"row {gaps[0] + 1} of the column for {label} is no finite number; mend the table, or leave out the row"
+                yield f"row {gaps[0] + 1} of the column for {label} is no number up to {MAX_NUMBER:g}; mend the table"
 
     def __str__(self) -> str:
         return f"population {self.source}: {len(self.values)} rows of {', '.join(self.columns)}"

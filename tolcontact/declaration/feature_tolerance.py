@@ -8,8 +8,9 @@ from typing import Any, ClassVar, Literal, TypedDict, Unpack, cast, get_args
 from tolcontact.declaration.checks import LENGTH, LENGTH_OR_0, TRUTH, Check, Checked, direction_faults, one_of
 from tolcontact.declaration.size import Form
 from tolcontact.declaration.tolerance import Side, side_faults
-from tolcontact.declaration.values import MAX_NUMBER, Direction, Vector, direction as _direction, is_length
+from tolcontact.declaration.values import Direction, Vector, direction as _direction, is_length
 from tolcontact.readable import Readable
+from tolcontact.tables import MAX_NUMBER
 
 Rule = Literal["99.73 % inside", "6 sigma at the extremes", "translation"]  # the last one is without tilts
 INSIDE, EXTREMES, TRANSLATION = RULES = get_args(Rule)

@@ -8,7 +8,8 @@ from typing import Any
 
 import msgspec
 
-MAX_NUMBER = 1e100  # its square is finite
+from tolcontact.tables import MAX_NUMBER
+
 MAX_MESSAGE = 300
 MAX_DEPTH = 20  # of values in a document
 PLAIN_TYPES = {

@@ -1,8 +1,6 @@
 """Stacks in one dimension: links with limits, and the gaps that they close, by a script or from a table."""
 
-import csv
 import importlib  # pandas takes longer to import than all the rest: only if it is needed
-import io
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,13 +13,14 @@ from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import is_length
 from tolcontact.declaration.written_tolerance import TextFault, written
-from tolcontact.errors import Faults, nearest_name
+from tolcontact.errors import Faults, ModelError, nearest_name
 from tolcontact.input_files import check_inputs
+from tolcontact.tables import Table, number, read_table
 from tolcontact.texts import shown
 
 GAP = "gap "  # heading of a column with the sensitivities of a gap
 COLUMNS = "name", "nominal", "tolerance", "upper", "lower", "sensitivity", "distribution", "cp", "cpk", "description"
-SEPARATORS = ";\t,"  # of columns, in the order in which they are looked for
+NUMBERS = "nominal", "upper", "lower", "sensitivity", "cp", "cpk"  # columns of numbers
 MAX_BYTES = 1 << 24  # of a table
 
 
@@ -81,26 +80,26 @@ class Stack(Assembly):
         cpk, description. A column "gap NAME" has the sensitivities of a gap, which is declared without limits. Raises
         ModelError with all faults of the table.
         """
-        heading, *rows = _rows(Path(path), self.name)
+        heading, rows, has_decimal_commas = _table(Path(path), self.name)
         faults, title = Faults(), shown(Path(path).name)
         faults.extend(f'table "{title}": {fault}' for fault in _heading_faults(heading))
         faults.refuse(self.name)
         gaps: dict[str, dict[str, float]] = {name.removeprefix(GAP): {} for name in heading if name.startswith(GAP)}
         links = []
-        for number, cells in enumerate(rows, start=2):
+        for line, cells in rows:
             if not any(cells):
                 continue
             row = dict.fromkeys(heading, "") | dict(zip(heading, cells, strict=False))
             try:
                 if len(cells) > len(heading):
                     raise ValueError(f"it has {len(cells)} cells for {len(heading)} columns; write decimals with a point")
-                numbers = {name: _number(text, name) for name, text in row.items() if text and _is_number(name)}
+                numbers = _numbers(row, has_decimal_commas)
                 links.append(self.link(row["name"], *_zone(row, numbers), sensitivity=numbers.get("sensitivity", 1.0)))
                 for name, factors in gaps.items():
                     if (factor := numbers.get(GAP + name)) is not None:
                         factors[row["name"]] = factor
             except ValueError as fault:
-                faults.append(f'table "{title}", row {number}: {fault}')
+                faults.append(f'table "{title}", row {line}: {fault}')
         if not (links or faults):
             faults.append(f'table "{title}": it has no rows below its heading; expected a row for each link')
         faults.refuse(self.name)
@@ -109,37 +108,26 @@ class Stack(Assembly):
         return tuple(links)
 
 
-def _rows(path: Path, stack: str) -> list[list[str]]:
-    """Return the rows of texts of a table, its heading in lower case. Raises ModelError if it cannot be read."""
+def _table(path: Path, stack: str) -> Table:
+    """Return a table of links, its heading in lower case. Raises ModelError if it cannot be read."""
     faults, title = Faults(), shown(path.name)
-    rows: list[list[str]] = []
     try:
-        check_inputs([path], MAX_BYTES)
-        if path.suffix.lower() == ".xlsx":
-            pandas = importlib.import_module("pandas")
-            table = pandas.read_excel(path, header=None, dtype=object)
-            rows = [["" if pandas.isna(cell) else str(cell).strip() for cell in row] for row in table.itertuples(index=False)]
-        else:
-            rows = _csv_rows(path.read_text(encoding="utf-8-sig"))
-    except UnicodeDecodeError:
-        faults.append(f'table "{title}": it is not UTF-8; save it as "CSV UTF-8"')
+        table = _workbook(path) if path.suffix.lower() == ".xlsx" else read_table(path, max_bytes=MAX_BYTES)
+        heading = [cell if cell.casefold().startswith(GAP) else cell.casefold() for cell in table.heading]
+        return table._replace(heading=heading)
     except (OSError, ValueError, ImportError) as error:
         remedy = '; install it: pip install "tolcontact[xlsx]"' if isinstance(error, ImportError) else ""
         faults.append(f'table "{title}" cannot be read: {str(error).splitlines()[0]}{remedy}')
-    if not (rows or faults):
-        faults.append(f'table "{title}": it is empty; expected a heading with some of: {", ".join(COLUMNS)}')
-    faults.refuse(stack)
-    return [[cell.casefold() if k == 0 and not cell.casefold().startswith(GAP) else cell for cell in row]
-            for k, row in enumerate(rows)]  # fmt: skip
+    raise ModelError(stack, faults)
 
 
-def _csv_rows(text: str) -> list[list[str]]:
-    """Return the rows of a CSV text; Excel may name its separator in a first line, "sep=;"."""
-    first, _, rest = text.partition("\n")
-    text = rest if first.strip().startswith("sep=") else text
-    heading = text.partition("\n")[0]
-    separator = next((mark for mark in SEPARATORS if mark in heading), ",")
-    return [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(text), delimiter=separator)]
+def _workbook(path: Path) -> Table:
+    """Return the table in the first sheet of a workbook. Raises OSError, ValueError or ImportError."""
+    check_inputs([path], MAX_BYTES)
+    pandas = importlib.import_module("pandas")
+    sheet = pandas.read_excel(path, header=None, dtype=object)
+    rows = [["" if pandas.isna(cell) else str(cell).strip() for cell in row] for row in sheet.itertuples(index=False)]
+    return Table(rows[0] if rows else [], list(enumerate(rows[1:], start=2)), has_decimal_commas=True)
 
 
 def _heading_faults(heading: Sequence[str]) -> Iterator[str]:
@@ -158,16 +146,16 @@ def _heading_faults(heading: Sequence[str]) -> Iterator[str]:
         yield 'expected either a column "tolerance", or two, "upper" and "lower"'
 
 
-def _is_number(column: str) -> bool:
-    return column in ("nominal", "upper", "lower", "sensitivity", "cp", "cpk") or column.startswith(GAP)
-
-
-def _number(text: str, column: str) -> float:
-    """Return the number of a cell. Raises ValueError, which names the column."""
-    try:
-        return float(text.replace(",", ".").replace("\N{MINUS SIGN}", "-"))
-    except ValueError:
-        raise ValueError(f'{column} is "{shown(text)}"; expected a number') from None
+def _numbers(row: Mapping[str, str], has_decimal_commas: bool) -> dict[str, float]:
+    """Return the numbers of a row by their columns. Raises ValueError, which names the column, for a cell that is no number."""
+    numbers = {}
+    for column, text in row.items():
+        if text and (column in NUMBERS or column.startswith(GAP)):
+            try:
+                numbers[column] = number(text, has_decimal_commas=has_decimal_commas)
+            except ValueError as fault:
+                raise ValueError(f"{column} {fault}") from None
+    return numbers
 
 
 def _limits(text: str, nominal: float) -> Any:

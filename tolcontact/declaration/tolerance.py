@@ -9,9 +9,10 @@ from typing import Any, Literal, get_args
 
 import scipy
 
-from tolcontact.declaration.values import MAX_NUMBER, is_length
+from tolcontact.declaration.values import is_length
 from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
 from tolcontact.readable import Readable
+from tolcontact.tables import MAX_NUMBER
 
 MAX_DRAW_SECONDS = 0.01
 DRAWN = (0.1, 0.4, 0.9)

@@ -13,10 +13,10 @@ from typing import Any, Literal, get_args, overload
 
 import numpy as np
 
+from tolcontact.tables import MAX_NUMBER
 from tolcontact.texts import CONTROL_CHARACTERS, shown
 
 MAX_NAME = 500  # characters
-MAX_NUMBER = 1e15  # of a length [mm], a force, a stiffness: nothing overflows
 MAX_GROUP_NAME = 255  # bytes in UTF-8: the netCDF library's NC_MAX_NAME is 256, with which some groups cannot be written
 _TEXT = re.compile(".*")
 _KEY = re.compile(r"\w(?:[^/]*[^/\s])?")
@@ -129,8 +129,8 @@ def degrees(*angles: float) -> float | tuple[float, ...]:
 
 
 def is_finite(value: Vector) -> bool:
-    """Return True if all three components are finite."""
-    return all(math.isfinite(component) for component in value)
+    """Return True if all three components are numbers up to MAX_NUMBER."""
+    return all(map(is_length, value))
 
 
 def is_length(value: Any) -> bool:

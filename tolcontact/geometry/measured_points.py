@@ -8,10 +8,11 @@ import trimesh
 
 from tolcontact.errors import GeometryFault
 from tolcontact.input_files import check_inputs
+from tolcontact.tables import MAX_NUMBER, number, text_of
+from tolcontact.texts import clipped
 
 MIN_FILES = 3  # smallest number of parts with a meaningful spread
-NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?(inf|nan)", re.IGNORECASE)
-EXPECTED = "expected lines of three numbers x, y, z [mm], in the frame of the part"
+EXPECTED = f"expected lines of three numbers x, y, z [mm] up to {MAX_NUMBER:g}, in the frame of the part"
 
 
 def measured_points(pattern: str) -> dict[Path, np.ndarray]:
@@ -46,25 +47,29 @@ def _points(path: Path) -> np.ndarray:
         raise GeometryFault(f'"{path}" cannot be read as measured points: {error}') from error
     if not len(points):
         raise GeometryFault(f'"{path}" has no points; {EXPECTED}')
-    if not np.isfinite(points).all():
-        row = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
+    is_far = ~(np.abs(points) <= MAX_NUMBER).all(axis=1)  # or not a number
+    if is_far.any():
+        row = int(np.flatnonzero(is_far)[0])
         point = ", ".join(f"{coordinate:g}" for coordinate in points[row])
-        raise GeometryFault(f'"{path}": point {row + 1} is ({point}); expected finite numbers, so leave it out')
+        raise GeometryFault(f'"{path}": point {row + 1} is ({point}); expected numbers up to {MAX_NUMBER:g}, so leave it out')
     return points
 
 
 def _of_table(path: Path) -> np.ndarray:
     """Return the points of a table with commas, semicolons or blanks between columns, with or without a heading."""
-    lines = path.read_text(encoding="utf-8-sig").splitlines()
-    rows = [
-        (number, line.replace(",", " ").replace(";", " ").split())
-        for number, line in enumerate(lines, start=1)
+    lines = [
+        (k, line)
+        for k, line in enumerate(text_of(path).split("\n"), start=1)
         if line.strip() and not line.lstrip().startswith("#")
     ]
-    if rows and not re.search("[0-9]", lines[rows[0][0] - 1]):  # a heading
-        rows = rows[1:]
-    for number, row in rows:
-        if len(row) != 3 or not all(map(NUMBER.fullmatch, row)):
-            advice = "; write decimals with points" if ";" in lines[number - 1] and "," in lines[number - 1] else ""
-            raise ValueError(f"line {number} is {lines[number - 1][:60]!r}; {EXPECTED}{advice}")
-    return np.array([row for _, row in rows], dtype=float).reshape(-1, 3)
+    if lines and not re.search("[0-9]", lines[0][1]):  # a heading
+        lines = lines[1:]
+    points = np.empty((len(lines), 3))
+    for row, (k, line) in enumerate(lines):
+        try:
+            x, y, z = map(number, line.replace(",", " ").replace(";", " ").split())
+            points[row] = x, y, z
+        except ValueError:
+            advice = "; write decimals with points" if ";" in line and "," in line else ""
+            raise ValueError(f'line {k} is "{clipped(line, 60)}"; {EXPECTED}{advice}') from None
+    return points

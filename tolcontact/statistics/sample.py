@@ -147,11 +147,18 @@ class Sample:
 
 
 def measured_sample(rows: xr.Dataset, measure: int, state: str) -> Sample:
-    """Return the values of a measure, given by its index, in a state; they are read from the rows when needed."""
+    """Return the values of a measure, given by its index, in a state; they are read from the rows when needed.
+
+    An infinite value is not a number.
+    """
     is_planned, raw = rows.attrs.get("sampler", terms.MONTE_CARLO) != terms.MONTE_CARLO, terms.STATES[terms.RAW]
+
+    def read() -> np.ndarray:
+        values = column(rows, terms.MEASURED, state=terms.STATES.index(state), measure=measure)
+        return np.where(np.isfinite(values), values, np.nan)
+
     sample = Sample(
-        lambda: column(rows, terms.MEASURED, state=terms.STATES.index(state), measure=measure),
-        terms.REPLICATE if is_planned else 1, accuracy=float(rows[terms.MEASURE_ACCURACY.name].values[measure]),
+        read, terms.REPLICATE if is_planned else 1, accuracy=float(rows[terms.MEASURE_ACCURACY.name].values[measure]),
     )  # fmt: skip
     sample.cause = sample if state == raw else measured_sample(rows, measure, raw)
     return sample

@@ -4,6 +4,7 @@ import contextlib
 import math
 import sys
 import time
+from pathlib import Path
 
 import lazy_loader
 
@@ -38,6 +39,14 @@ def address_space() -> int | None:
         return None
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     return None if limit == resource.RLIM_INFINITY else limit
+
+
+def free_address_space() -> float:
+    """Return the address space [byte] that this process may still take; infinite without a limit."""
+    limit, statistics = address_space(), Path("/proc/self/statm")
+    if limit is None or not statistics.exists():
+        return math.inf
+    return limit - int(statistics.read_text().split()[0]) * resource.getpagesize()
 
 
 def peak_memory() -> int | None:

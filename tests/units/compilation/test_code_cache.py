@@ -1,6 +1,7 @@
 """Machine code is kept on disk for later processes, and everything goes on where that cannot be done."""
 
 import os
+import sys
 from importlib.metadata import version
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from llvmlite import binding
 
+from tests.helpers import run
 from tolcontact import code_cache
 from tolcontact.compilation.functions import native
 from tolcontact.compilation.functions.named import MIN_COMPILED_CALLS, NamedFunction
@@ -112,3 +114,29 @@ def test_code_of_another_processor_or_translation_is_another_one():
     parts = (binding.get_host_cpu_name().encode(), Path(native.__file__).read_bytes(), version("llvmlite").encode())
     assert all(part in host for part in parts)
     assert key_of(wave()) == key_of(wave(), host) != key_of(wave(), host + b"another processor")
+
+
+LIMITED = """import resource
+from pathlib import Path
+import casadi as ca
+from tolcontact.compilation.functions.native import NativeFunction
+x = ca.SX.sym("x", 8)
+y = x[0]
+for k in range(10_000):
+    y = y * x[k % 8] + x[7 * k % 8]
+function = ca.Function("f", [x], [y])
+pages = int(Path("/proc/self/statm").read_text().split()[0])
+resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + {room},) * 2)
+try:
+    NativeFunction(function)
+    print("compiled")
+except MemoryError as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="other systems do not limit the address space")
+@pytest.mark.parametrize(("room", "words"), [(1 << 28, "compiled"), (1 << 26, "address space is limited")])
+def test_code_is_not_compiled_where_the_compiler_would_end_the_process(room, words):
+    done = run([sys.executable, "-c", LIMITED.format(room=room)])
+    assert done.returncode == 0 and done.stdout.startswith(words), done.stderr

@@ -29,6 +29,11 @@ def test_a_conflict_is_believed_if_it_exceeds_what_was_left_undone():
     assert state(0.001, [0.0005, 0.0]).solved.tolist() == [False]
 
 
+def test_a_problem_that_no_solver_could_solve_is_no_conflict():
+    begun = State.start(np.zeros((1, 2, 12)), np.zeros((1, 3, 12)), 4, [])
+    assert begun.kkt_residual.tolist() == [np.inf] and begun.outcome.tolist() == [Outcome.UNSOLVED]
+
+
 def test_a_conflict_is_penetration_beyond_the_accuracy_in_any_pair():
     assert state(0.0, [0.0, 2 * ACCURACY]).in_conflict.tolist() == [True]
     assert state(0.0, [ACCURACY, ACCURACY]).in_conflict.tolist() == [False]

@@ -20,6 +20,9 @@ from tolcontact import code_cache
 from tolcontact.compilation.functions import operations, translation
 from tolcontact.compilation.functions.operations import LANES
 from tolcontact.compilation.functions.translation import memory_of, module_of, sizes_of
+from tolcontact.system.resources import free_address_space
+
+MIN_MEMORY, MEMORY_FACTOR = 1 << 26, 16  # bytes, and bytes per character of a module: LLVM takes 9 for 88 000 instructions
 
 
 class NativeFunction:
@@ -88,6 +91,9 @@ def _loaded(code: bytes) -> binding.ExecutionEngine:
 
 
 def _engine(module: str) -> binding.ExecutionEngine:
+    """Return the engine for a module. Raises MemoryError where LLVM, which would end the process, might lack memory."""
+    if free_address_space() < MIN_MEMORY + MEMORY_FACTOR * len(module):
+        raise MemoryError("address space is limited, and code of the model has to be compiled")
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     # More optimization would double the compile time, for code that is no faster.
