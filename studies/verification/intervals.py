@@ -225,7 +225,7 @@ def main():
     cells = [percent for column in [*rows.values(), *planned.values()] for percent in column.values() if not np.isnan(percent)]
     below = sum(percent < TARGET for percent in cells)
     lines = [
-        f"{options.repeats} samples for each row; {len(cells)} intervals, of which {below} cover in less than {TARGET:g} %.",
+        f"{options.repeats} samples for each row; {len(cells)} intervals; {below} of them cover in less than {TARGET:g} %.",
         "",
     ]
     lines += [*table_of(rows), "", "With a sampling plan:", "", *table_of(planned)]
