@@ -137,7 +137,7 @@ class Assembly(Causes, Pictured, Checked):
         name       of the part; it also names groups of archives
         geometry   its shape: tc.Box(x, y, z), tc.Pin(diameter, length) or tc.Mesh(file)
         at         (x, y, z) [mm] of its frame in the nominal assembly; by default the origin
-        rotation   rotation vector [rad]; tc.degrees(0, 0, 90) is a quarter turn about z
+        rotation   rotation vector [rad], by default 0; tc.degrees(0, 0, 90) is a quarter turn about z
         fixed      True: contact does not move it; None (default): it is free if it is the moving side of a pair (see Part)
         standard   of its drawing, "ISO" or "ASME"; by default that of the assembly
 

@@ -246,7 +246,7 @@ class Chain(Measurement):
 
     sensitivities   factor of each link, by the name of a variable or the label of another contributor
     nominal         value without deviations, to which variables with a nominal value add theirs times their factors
-    units           of the value
+    units           of the value, by default mm
     """
 
     kind = "chain"
