@@ -8,18 +8,27 @@ import pytest
 
 import tolcontact as tc
 
-MODULES = {"tc": tc, "tc.analyses": tc.analyses, "tc.io": tc.io, "tc.testing": tc.testing}
+MODULES = {
+    "tc": tc, "tc.analyses": tc.analyses, "tc.io": tc.io, "tc.plot": tc.plot, "tc.select": tc.select, "tc.testing": tc.testing,
+}  # fmt: skip
 DECLARING = {  # the methods of a script
     tc.Assembly: "part locate contact force measure station variable correlate population may_overlap",
     tc.Part: "feature pattern datum_targets point face",
+    tc.declaration.Feature: "point axis",
+    tc.declaration.Station: "join",
+    tc.Stack: "link gap read",
+    tc.Method: "paper",
 }
+MADE = {tc.DatumTargets, tc.Part, tc.Program, tc.Status, tc.Variable}  # by functions and methods, not by scripts
 
 
 def functions():
     for prefix, module in MODULES.items():
         for name in module.__all__:
-            if isinstance(getattr(module, name), types.FunctionType):
-                yield f"{prefix}.{name}", getattr(module, name)
+            value = getattr(module, name)
+            is_made = inspect.isclass(value) and (value in MADE or issubclass(value, Exception))
+            if isinstance(value, types.FunctionType) or (inspect.isclass(value) and not is_made):
+                yield f"{prefix}.{name}", value
     for owner, names in DECLARING.items():
         for name in names.split():
             yield f"tc.{owner.__name__}.{name}", getattr(owner, name)

@@ -125,14 +125,26 @@ def test_vertices_stay_on_planes_that_deviate():
     closed = solid(box(*BOX))
     top = np.flatnonzero(closed.normals[:, 2] > 0.5)
     side = np.flatnonzero(closed.normals[:, 0] > 0.5)
-    heights = [np.full((2, 3, 1), 1.0), np.full((2, 3, 1), 1.0)]
-    faces = [(top, np.array([0]), heights[0]), (side, np.array([2]), heights[1])]
+    motions = [closed.normals[triangles][:, None, :, None].repeat(3, axis=1) for triangles in (top, side)]
+    faces = [(top, np.array([0]), motions[0]), (side, np.array([2]), motions[1])]
     vertices, motions = deviating_solid(closed, faces, np.zeros(12)).motions
     expected = np.zeros((8, 3))
     expected[closed.vertices[:, 2] > 5, 2], expected[closed.vertices[:, 0] > 5, 0] = 0.3, -0.2
     moved = np.zeros((8, 3))
     moved[vertices] = motions @ (0.3, -0.2)
     np.testing.assert_allclose(moved, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("sections", [24, 48, 64, 200])
+def test_a_bore_that_shifts_keeps_its_shape_with_any_number_of_facets(sections):
+    closed = solid(trimesh.creation.annulus(3, 10, 5, sections=sections))
+    radii = np.hypot(*closed.vertices[:, :2].T)
+    bore = np.flatnonzero((radii[closed.faces] < 4).all(axis=1))
+    shift = np.eye(3)[:, :2]
+    faces = [(bore, np.array([0, 1]), np.broadcast_to(shift, (len(bore), 3, 3, 2)))]
+    vertices, motions = deviating_solid(closed, faces, np.zeros(len(closed.faces))).motions
+    assert set(vertices) == set(np.flatnonzero(radii < 4))
+    np.testing.assert_allclose(motions, np.broadcast_to(shift, motions.shape), atol=1e-9)
 
 
 ROOF = [(-12, 0, 0), (5, 0, 0), *[(x, y, -10) for x in (-12, 12) for y in (-10, 10)]]  # its ridge ends below the plate

@@ -108,6 +108,12 @@ def test_the_summary_names_the_convention_and_the_means_by_others(compared):
     assert 'by "all points"' in line and 'by "locator stiffness"; here 0.46' in line
 
 
+def test_a_figure_without_an_interval_is_not_said_to_depend_on_the_convention(compared):
+    summary = tc.summarize(compared)
+    summary.statistic_value.loc[{"interval": ["lower", "upper"]}] = np.nan
+    assert "corner height: mean" not in printed(summary)
+
+
 def test_nothing_is_compared_where_forces_decide_or_a_run_is_short():
     assert "objectives" not in tc.run(weighed(), samples=20, surfaces=0).children
     short = tc.summarize(tc.run(cases.model("ra1"), samples=100, method=PAPER, surfaces=0))

@@ -34,7 +34,7 @@ STUDIES = {
     "exact/tables.py": ["--samples", "300", "--to", "."],
     "form/measure.py": ["--samples", "20", "--to", "."],
     "objectives/measure.py": ["--samples", "20", "--models", "ra1", "lid", "--to", "."],
-    "paper/reproduce.py": ["--large", "2000", "--to", "."],
+    "paper/reproduce.py": ["--large", "20000", "--to", "."],
     "pictures/contact.py": ["contact.svg"],
     "pictures/cover_pmi.py": ["cover_pmi.stp"],
     "pictures/draw.py": ["pictures"],

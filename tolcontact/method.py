@@ -68,7 +68,7 @@ class Method:
                         every pose; "fixed": contact points are projected once, in the nominal state, on planes without end.
                         If it is not given, "bounded" with "exact", and "fixed" with "linearized", which has no other
 
-    Every archive states all of these choices.
+    `tc.Assembly("vise", method=tc.Method(objective="seating"))` is an example. Every archive states all of these choices.
     """
 
     resolution: Resolution | str = "exact"
@@ -95,7 +95,10 @@ class Method:
 
     @classmethod
     def paper(cls) -> "Method":
-        """Return the choices of the paper: one step (12) by the points active in the raw state, regularized by eta I (11)."""
+        """Return the choices of the paper, one step (12) by the points active in the raw state, regularized by eta I (11).
+
+        `tc.run("ra1.py", method=tc.Method.paper())`
+        """
         return cls(resolution="linearized", objective="active points", regularization="identity", active_set="initial")
 
     def with_choices(self, **choices: Any) -> "Method":

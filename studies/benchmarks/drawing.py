@@ -44,12 +44,17 @@ class Shape:
         return list(zip(self.numbers[::2], self.numbers[1::2], strict=True))
 
     @property
+    def is_upright(self) -> bool:
+        """Whether it is a vertical line, whose label stands to its right."""
+        return self.kind in ("line", "arrow", "force") and self.numbers[0] == self.numbers[2]
+
+    @property
     def anchor(self) -> tuple[float, float]:
-        """The place of its label: the middle; in a circle near the y_max, and at the tail of a force."""
+        """The place of its label: the middle; in a circle near the y_max, and at the tail of a force that is not upright."""
         if self.kind == "circle":
             x, y, radius = self.numbers
             return x, y + 0.7 * radius
-        if self.kind == "force":
+        if self.kind == "force" and not self.is_upright:
             return self.points[0]
         xs, ys = zip(*self.points, strict=True)
         return (min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2
@@ -86,7 +91,7 @@ ELEMENTS: dict[str, Callable[[Points], str]] = {
 COUNTS = {"box": 4, "circle": 3, "line": 4, "arrow": 4, "force": 4, "text": 2}  # numbers of a shape; a polygon has any
 STYLE = (
     ".body { fill: #7aa2c833; stroke: #35618f; } .line { stroke: #888; } "
-    "text { font: 12px sans-serif; fill: currentColor; text-anchor: middle; }"
+    "text { font: 12px sans-serif; fill: currentColor; text-anchor: middle; } .right { text-anchor: start; }"
 )
 HEAD = (
     '<marker id="head" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" markerHeight="7" orient="auto-start-reverse">'
@@ -110,7 +115,9 @@ def svg(shapes: tuple[str, ...]) -> str:
     labels = []
     for shape in elements:
         ((x, y),) = placed([shape.anchor])
-        labels.append(f'<text x="{x:.1f}" y="{y - 4:.1f}">{escape(shape.label)}</text>' if shape.label else "")
+        right, below = (6, 4) if shape.is_upright else (0, 4 if shape.kind in ("box", "polygon") else -4)
+        place = f'x="{x + right:.1f}" y="{y + below:.1f}"' + (' class="right"' if shape.is_upright else "")
+        labels.append(f"<text {place}>{escape(shape.label)}</text>" if shape.label else "")
     inside = "".join([f"<defs><style>{STYLE}</style>{HEAD}</defs>", *bodies, *labels])
     size = f'width="{WIDTH:.0f}" height="{height:.0f}" viewBox="0 0 {WIDTH:.0f} {height:.0f}"'
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size} role="img">{inside}</svg>'

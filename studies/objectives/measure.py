@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import tolcontact as tc
-from studies.tables import Table, with_interval, write
+from studies.tables import Table, markdown, with_interval, write
 from tolcontact.discretization import discretize
 from tolcontact.method import OBJECTIVES
 
@@ -126,10 +126,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--samples", type=int, default=1000, help="realizations by each objective (see FACTORS)")
     parser.add_argument("--models", nargs="+", default=MODELS, choices=MODELS)
-    parser.add_argument("--to", type=Path, default=HERE, help="folder of the figure, and of a README with the table")
+    parser.add_argument("--to", type=Path, help="folder of the figure, and of a README with the table: by default the study's")
     options = parser.parse_args()
     rows = [row for name in options.models for row in results(name, max(20, int(options.samples * FACTORS.get(name, 1))))]
-    draw(rows, options.to / "objectives.png")
+    if options.to is None and len(options.models) < len(MODELS):  # the page of the study has all models
+        print(markdown(table(rows)))
+        return
+    draw(rows, (options.to or HERE) / "objectives.png")
     write(__file__, {"objectives": table(rows)}, options.to)
 
 

@@ -76,7 +76,7 @@ PICTURES: dict[str, list[str]] = {
     ],
     "datum": [
         *curve([(x, 8 + 3 * bumps(x)) for x in FACE]), "line 0 8.6 100 8.6", "text 50 -8 below the curve: the material",
-        "line 0 12.3 100 12.3", "text 22 14 datum: outside the material", "text 80 2 least-squares plane", "force 80 4 80 8.4",
+        "line 0 12.3 100 12.3", "text 22 14 datum: outside the material", "text 52 0 least-squares plane", "force 80 4 80 8.4",
     ],
     "bonus": [
         "circle 0 0 20 least hole", "circle 0 0 3", "text 0 -28 zone t", "circle 62 0 24 larger hole", "circle 62 0 7",
@@ -112,8 +112,8 @@ PICTURES: dict[str, list[str]] = {
         "box -16 0 12 80 body", "box 104 0 12 80 body", "box 0 0 100 80 door", "arrow -4 90 0 90 gap",
         "arrow 100 90 104 90 gap",
         "circle 8 8 3", "circle 92 8 3", "circle 8 72 3", "circle 92 72 3", "text 50 12 four bump stops behind",
-        "text 3 60 hinge",
-        "text 3 24 hinge", "text 92 44 striker",
+        "text 8 60 hinge",
+        "text 8 24 hinge", "text 92 44 striker",
     ],
     "rail": [
         "box 0 14 100 12 front", "box 88 26 100 12 rear", "box 191 26 24 12 bracket", "force 8 0 8 14", "force 80 0 80 14",

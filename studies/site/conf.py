@@ -44,13 +44,20 @@ def _as_text(app, what, name, thing, options, lines):
     for paragraph in paragraphs:
         rows = paragraph.splitlines()
         is_aligned = any(row.startswith(" ") for row in rows) or any(re.search(r"\S {2,}\S", row) for row in rows)
-        if is_aligned or paragraph.lstrip().startswith(">>>"):
-            result += ["::", "", *("    " + row for row in rows), ""]
+        is_example = paragraph.lstrip().startswith(">>>")
+        if is_aligned or is_example:
+            result += [f".. code-block:: {'pycon' if is_example else 'text'}", "", *("    " + row for row in rows), ""]
         else:
             result += [*(re.sub(r"`([^`]*)`", r"``\1``", re.sub(r"(?<!`)([*|_])(?=\W|\b)", r"\\\1", row)) for row in rows), ""]
     lines[:] = result
 
 
+def _is_left_out(app, what, name, thing, is_skipped, options):
+    """Leave out the methods that no script calls, whose docstrings have no example."""
+    return is_skipped or (callable(thing) and not re.search(r"`[^`]*\w\(|>>> ", thing.__doc__ or "")) or None
+
+
 def setup(app):
     app.add_html_math_renderer("mathml", inline_renderers=(_equation, None), block_renderers=(_equation, None))
     app.connect("autodoc-process-docstring", _as_text)
+    app.connect("autodoc-skip-member", _is_left_out)

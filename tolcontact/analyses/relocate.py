@@ -52,8 +52,8 @@ def relocate(
     trials use the same draws: first a grid and the present position, then scipy's COBYQA starting at the best of them. The
     statistic may have several minima, or be flat: see `tried_value`. Each trial compiles a model. `progress` is called with the
     number of trials, and their largest number.
-    `model`, `samples`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see tolcontact.analyses).
-    Raises OptionError for a locator, a box or a measure that does not exist.
+    `model`, `samples` (4096 by default), `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see
+    tolcontact.analyses). Raises OptionError for a locator, a box or a measure that does not exist.
 
     `tc.analyses.relocate("model.py", "lid.A3", between=((0, 25, 0), (50, 25, 0)), least="gap: 6 sigma")`
     """

@@ -48,8 +48,9 @@ def stack_up(
         by_status   (status_meaning)                 number of realizations
 
     For normal distributions with 6 sigma equal to the zone, and without contact, RSS is the range that holds 99.73 %. Half
-    widths are NaN for a measure with a kink in the nominal assembly. `model`, `samples`, `seed`, `solver`, `method`, `into`,
-    `client` and `progress` are as in all analyses (see tolcontact.analyses): `tc.analyses.stack_up("stack.py")`.
+    widths are NaN for a measure with a kink in the nominal assembly. `model`, `samples` (10 000 by default), `seed`, `solver`,
+    `method`, `into`, `client` and `progress` are as in all analyses (see tolcontact.analyses):
+    `tc.analyses.stack_up("stack.py")`.
     """
     analysis = Analysis(
         terms.STACK_UP, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,

@@ -53,11 +53,12 @@ class Declared(Generic[T]):
 class Assembly(Causes, Pictured, Checked):
     """Parts, how they are located, which faces may touch, and what is measured. Lengths in mm, angles in rad.
 
-    The methods only record declarations; `faults()` lists everything that is wrong with them. `method` states how contact in
-    this model is resolved; a run may state another one. `title_block` heads its reports. `mu` is the coefficient of friction of
-    all contacts; `tc.analyses.seating` uses it. `standard` is that of the drawings, "ISO" or "ASME": under ISO the zones of a
-    pattern are separate, and sizes do not limit form; under ASME zones are combined, and form is inside the envelope of sizes.
-    Without one, zones are combined, and sizes do not limit form. Raises TypeError for an argument of a wrong type.
+    `tc.Assembly("clamp", mu=0.15)` has the `name` "clamp", which reports and archives show. The methods only record
+    declarations; `faults()` lists everything that is wrong with them. `method` states how contact in this model is resolved; a
+    run may state another one. `title_block` heads its reports. `mu` is the coefficient of friction of all contacts;
+    `tc.analyses.seating` uses it. `standard` is that of the drawings, "ISO" or "ASME": under ISO the zones of a pattern are
+    separate, and sizes do not limit form; under ASME zones are combined, and form is inside the envelope of sizes. Without
+    one, zones are combined, and sizes do not limit form. Raises TypeError for an argument of a wrong type.
     """
 
     checks: ClassVar = {"mu": FRICTION, "standard": one_of(get_args(Standard))}
@@ -136,7 +137,7 @@ class Assembly(Causes, Pictured, Checked):
         name       of the part; it also names groups of archives
         geometry   its shape: tc.Box(x, y, z), tc.Pin(diameter, length) or tc.Mesh(file)
         at         (x, y, z) [mm] of its frame in the nominal assembly; by default the origin
-        rotation   rotation vector [rad]; tc.degrees(0, 0, 90) is a quarter turn about z
+        rotation   rotation vector [rad], by default 0; tc.degrees(0, 0, 90) is a quarter turn about z
         fixed      True: contact does not move it; None (default): it is free if it is the moving side of a pair (see Part)
         standard   of its drawing, "ISO" or "ASME"; by default that of the assembly
 

@@ -50,11 +50,12 @@ UNITS: dict[str, float] = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25
 class Mesh(Checked):
     """A triangle surface: a file (STL, OBJ, PLY, GLB, STEP), or a `trimesh.Trimesh`. Normals point outward.
 
-    `units` ("mm", "in", ...) apply to the source. By default a STEP file states its own, a GLB file is in m, a Trimesh has
-    its `units` if they are set, and all others are in mm. STEP faces are triangulated to within `chord` [mm] (by default
-    2 um, or 5e-6 of the extent of files beyond 0.4 m, and coarser if that gives too many triangles). They keep their boundary
-    representation for `tc.select.Brep`; this needs the extra `tolcontact[step]`. `body` is the name or the number (from 1) of a
-    body in a STEP file with several, which is read in its own frame; the only body of a file is read in its place.
+    `tc.Mesh("bracket.stl", units="in")` has the `source` "bracket.stl". `units` ("mm", "in", ...) apply to the source. By
+    default a STEP file states its own, a GLB file is in m, a Trimesh has its `units` if they are set, and all others are in
+    mm. STEP faces are triangulated to within `chord` [mm] (by default 2 um, or 5e-6 of the extent of files beyond 0.4 m, and
+    coarser if that gives too many triangles). They keep their boundary representation for `tc.select.Brep`; this needs the
+    extra `tolcontact[step]`. `body` is the name or the number (from 1) of a body in a STEP file with several, which is read in
+    its own frame; the only body of a file is read in its place.
     """
 
     source: Any

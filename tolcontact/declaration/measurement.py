@@ -170,7 +170,9 @@ class Clearance(_OfTwoFaces):
 
 
 class LargestGap(_OfTwoFaces):
-    """The largest gap left between two faces of different parts that face each other: the widest leak.
+    """The largest gap [mm] left between two faces of different parts that face each other: the widest leak.
+
+    `tc.LargestGap(lid.face("-z"), box.face("+z"))`
 
     The gap is measured at places of the first face, perpendicular to the second one, with the form of both, and is negative
     inside the material. The places cover the region of the first face over which the second one lies in the nominal assembly,
@@ -183,7 +185,9 @@ class LargestGap(_OfTwoFaces):
 
 
 class MeanGap(_OfTwoFaces):
-    """The area-weighted mean of the gap left between two faces of different parts, at the places of a LargestGap.
+    """The area-weighted mean [mm] of the gap left between two faces of different parts, at the places of a LargestGap.
+
+    `tc.MeanGap(lid.face("-z"), box.face("+z"))`
 
     The weight of each place is the area of the first face that is nearest to it, so that flat faces have the mean of the region
     where they lie over each other. On curved faces the area is summed over triangles, each over the second face or not: where
@@ -242,7 +246,7 @@ class Chain(Measurement):
 
     sensitivities   factor of each link, by the name of a variable or the label of another contributor
     nominal         value without deviations, to which variables with a nominal value add theirs times their factors
-    units           of the value
+    units           of the value, by default mm
     """
 
     kind = "chain"

@@ -214,13 +214,13 @@ class Feature(Toleranced):
         return (self,)
 
     def point(self, x: float, y: float, z: float) -> Point:
-        """Return the point (x, y, z) [mm] of its part, which moves with the feature when it deviates."""
+        """Return the point (x, y, z) [mm] of its part, which moves with the feature when it deviates: `top.point(0, 0, 5)`."""
         return Point(self.part, vector((x, y, z)), self)
 
     def axis(self, end: int) -> Point:
         """Return an end of the axis of a cylinder or cone, or the centre of a sphere.
 
-        The ends 0 and 1 are in the sense of the axis' largest component.
+        `hole.axis(1)` is its upper end if it is vertical: an `end` is 0 or 1, in the sense of the axis' largest component.
         """
         return Point(self.part, None, self, end)
 

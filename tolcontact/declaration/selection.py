@@ -188,6 +188,7 @@ class Cylinder(Checked):
 class Largest(Checked):
     """The largest face of one `kind`; with a `direction` ("+x" to "-z", or a vector), the largest one along it.
 
+    `tc.select.Largest("plane", "-y")`
     The normal of a plane points along the direction; the axis of a cylinder, cone or torus is parallel to it in either sense.
     Faces are the B-rep faces of a STEP file, and the smooth pieces of other meshes.
     """

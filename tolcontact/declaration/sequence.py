@@ -41,9 +41,9 @@ class Station(Declarations, Declaration):
         return self
 
     def join(self, name: str, *bodies: Part | Joint) -> Joint:
-        """Declare that parts, or joints of earlier stations, are joined at the end of this station, and return the joint.
+        """Declare that `bodies`, parts or joints of earlier stations, are joined at the end of this station; return the joint.
 
-        Later stations locate the joint by points of any of its parts.
+        `weld.join("rail", left, right)` has the `name` "rail". Later stations locate the joint by points of any of its parts.
         """
         for body in bodies:
             expect(f'join "{name}": a body', body, Part | Joint, "parts and joints, as in weld.join(name, left, right)")

@@ -136,6 +136,8 @@ class Size(Checked):
 class Form(Checked):
     """A random field of heights of a face, orthogonal to displacements of the face as a whole.
 
+    `tc.Flatness(0.05, form=tc.Form("matern 5/2", length=20))`
+
     covariance   of the heights of two points, by their distance: "squared exponential", "matern 5/2" or "matern 3/2", from
                  smooth to rough
     length       [mm] correlation length; by default a third of the longest extent of the face, of a cylinder or cone a

@@ -32,7 +32,8 @@ class Stack(Assembly):
         play.link("spacer", 40, "+0/-0.1", sensitivity=-1)
         play.gap("gap", limits=(0, None))
 
-    All numbers are in its `units`, which are labels: nothing is converted.
+    `tc.Stack("play", units="in")` has the `name` "play". All numbers are in its `units`, by default mm, which are labels:
+    nothing is converted. The `title_block` heads its reports.
     """
 
     def __init__(self, name: str, *, units: str = "mm", title_block: TitleBlock | None = None) -> None:
@@ -46,7 +47,9 @@ class Stack(Assembly):
         name         of the link
         nominal      its nominal value, as drawn; 0 for a float
         tolerance    full width of its zone, limit deviations ("±0.1", "+0.1/-0.05", a class such as "H7"), or a tc.Tolerance
-        sensitivity  change of a gap for a unit of the link: -1 if the gap shrinks as the link grows
+        sensitivity  change of a gap for a unit of the link, by default 1: -1 if the gap shrinks as the link grows
+
+        `stack.link("spacer", 40, "+0/-0.1", sensitivity=-1)`
         """
         if isinstance(tolerance, str) and is_length(nominal):
             try:
@@ -74,7 +77,7 @@ class Stack(Assembly):
         return self.measure(name, Chain(dict(chosen), units=self.units), tolerance=tolerance, limits=limits)
 
     def read(self, path: str | Path) -> tuple[Variable, ...]:
-        """Declare the links of a table, a CSV file or an .xlsx workbook, and return them.
+        """Declare the links of a table, the CSV file or .xlsx workbook at a `path`, as in `stack.read("links.csv")`.
 
         Its columns are name, nominal, and tolerance, or upper and lower; others may be left out: sensitivity, distribution, cp,
         cpk, description. A column "gap NAME" has the sensitivities of a gap, which is declared without limits. Raises

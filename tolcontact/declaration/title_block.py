@@ -15,7 +15,8 @@ MAX_LENGTH = 200  # characters of an entry
 class TitleBlock:
     """The title block of reports of an assembly; empty entries are left out.
 
-    `date` is a text in any format. Without a `title`, reports have the name of the assembly.
+    `tc.TitleBlock(part_number="4711", author="A. Person", revision="B", company="Works")` is an example; all entries are texts,
+    `date` in any format. Without a `title`, reports have the name of the assembly.
     """
 
     title: str = ""

@@ -68,7 +68,9 @@ def analytic_surface(face: Surface) -> AnalyticSurface | None:
     if len(numbers) > 1 or pieces > 1:
         kinds = [face.surfaces[number].kind if number >= 0 else "general" for number in numbers]
         listing = ", ".join(kinds) if len(numbers) > 1 else f"{pieces} faces with creases between them"
-        raise GeometryFault(f"its face spans more than one surface ({listing}); a feature is one of them, so choose one")
+        raise GeometryFault(
+            f"its face spans more than one surface ({listing}); a feature is one of them: choose it, as with tc.select.Largest"
+        )
     return None
 
 

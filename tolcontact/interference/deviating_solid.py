@@ -20,14 +20,14 @@ class DeviatingSolid:
 
     solid      without deviations
     columns    (k,) of the deviations that move its faces
-    outward    (t, 3, k) [mm]: how far the plane of each triangle moves outwards at each of its corners for unit deviations
+    motions    (m,), (m, 3, k) [mm]: the vertices that deviations move, and how far for unit deviations
     bulges     (t,) [mm]: how far triangles of hollow round faces protrude into the hollow
     cylinders  that are known to contain some of its triangles, in its frame
     """
 
     solid: Solid
     columns: Int[Array, " k"]
-    outward: Float[Array, "t 3 k"]
+    motions: tuple[Int[Array, " m"], Float[Array, "m 3 k"]]
     bulges: Float[Array, " t"]
     cylinders: tuple[Cylinder, ...] = ()
 
@@ -56,15 +56,6 @@ class DeviatingSolid:
         """A triangle of each facet."""
         return np.unique(self.facet_of, return_index=True)[1]
 
-    @cached_property
-    def motions(self) -> tuple[Int[Array, " m"], Float[Array, "m 3 k"]]:
-        """The vertices that deviations move (m,), and how far (m, 3, k) [mm] for unit deviations."""
-        if not self.varies:
-            return np.zeros(0, dtype=int), np.zeros((0, 3, 0))
-        shifts = self.solid.shifts(self.outward)
-        moved = np.flatnonzero(np.abs(shifts).max(axis=(1, 2), initial=0) > 0)
-        return moved, shifts[moved]
-
     def growth(self, deviations: Float[Array, "n contributor"]) -> float:
         """Return how far [mm] deviations (n, contributor) move any vertex at most."""
         if not self.varies:
@@ -83,9 +74,16 @@ def deviating_solid(
     bulges: np.ndarray,
     cylinders: Sequence[Cylinder] = (),
 ) -> DeviatingSolid:
-    """Return a solid whose faces deviate: triangles (m,), columns (k,) and outward (m, 3, k) of each face."""
+    """Return a solid whose faces deviate: triangles (m,), columns (k,) and motions (m, 3, 3, k) of the corners of each face."""
     columns = np.unique(np.concatenate([np.zeros(0, dtype=int), *(face[1] for face in faces)]))
-    outward = np.zeros((len(solid.faces), 3, len(columns)))
+    is_moved = np.zeros(len(solid.vertices), dtype=bool)
+    for triangles, _, _ in faces:
+        is_moved[solid.faces[triangles]] = True
+    around = np.flatnonzero(is_moved[solid.faces].any(axis=1))
+    motions = np.zeros((len(around), 3, 3, len(columns)))
     for triangles, of_face, motion in faces:
-        outward[np.ix_(triangles, np.arange(3), np.searchsorted(columns, of_face))] += motion
-    return DeviatingSolid(solid, columns, outward, bulges, tuple(cylinders))
+        rows = np.searchsorted(around, triangles)
+        motions[np.ix_(rows, np.arange(3), np.arange(3), np.searchsorted(columns, of_face))] += motion
+    shifts = solid.shifts(around, motions)
+    moved = np.flatnonzero(np.abs(shifts).max(axis=(1, 2), initial=0) > 0)
+    return DeviatingSolid(solid, columns, (moved, shifts[moved]), bulges, tuple(cylinders))

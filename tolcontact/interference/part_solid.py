@@ -34,7 +34,7 @@ def part_solid(nominal: Nominal, index: int) -> DeviatingSolid | None:
 def _deviating_faces(
     nominal: Nominal, index: int, body: Solid, surface_of_body: Surface
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield triangles (m,) of each face that deviates, columns (k,), and how far its corners move outwards (m, 3, k)."""
+    """Yield triangles (m,) of each face that deviates, columns (k,), and how its corners move (m, 3, 3, k)."""
     part = nominal.parts[index]
     for feature in nominal.features:
         if nominal.parts[feature.part].part is not part.part or not feature.varies:
@@ -45,16 +45,15 @@ def _deviating_faces(
             placed = surface.placed(*part.placement)
             triangles = _triangles(surface_of_body, placed)
             corners, facets = body.vertices[body.faces[triangles]].reshape(-1, 3), body.normals[triangles].repeat(3, axis=0)
-            normals = facets.copy()
+            normals = facets.copy()  # along which sizes move corners: those of a shaft stay on it, facets of a bore behind it
             for piece in placed.pieces:
                 if not (piece.is_hollow or isinstance(piece.surface, Plane)):
                     rows = np.isin(triangles, _triangles(surface_of_body, piece.face)).repeat(3)
                     _, slope = piece.surface.distance(corners[rows])
                     normals[rows] = slope * np.sign((slope * facets[rows]).sum(axis=1, keepdims=True))
-            motion = np.hstack([normals, np.cross(corners - face.centre, normals)]) @ face.twist + face.height
-            # Corners of a shaft stay on it; the facets of a bore stay behind it, also at their centres.
-            motion *= (normals * facets).sum(axis=1, keepdims=True)
-            yield triangles, face.columns[columns], motion[:, columns].reshape(len(triangles), 3, -1)
+            tau, rho = face.twist[:3, columns], face.twist[3:, columns]
+            motion = tau.T + np.cross(rho.T, (corners - face.centre)[:, None]) + normals[:, None] * face.height[columns, None]
+            yield triangles, face.columns[columns], motion.swapaxes(1, 2).reshape(len(triangles), 3, 3, len(columns))
 
 
 def _bulges(body: Solid, surface_of_body: Surface, round_faces: Sequence[tuple[AnalyticSurface, np.ndarray]]) -> np.ndarray:

@@ -10,10 +10,9 @@ from tolcontact.arrays import Array, Float, Int
 from tolcontact.geometry.inset import smaller
 from tolcontact.geometry.merged_surface import merged_surface
 from tolcontact.geometry.triangle_mesh import coordinate_error, edges
-from tolcontact.geometry.vertex_displacements import capped, displacements
+from tolcontact.geometry.vertex_displacements import SAME_PLANE, capped, displacements
 from tolcontact.interference.opposing_planes import MIN_SINGULAR, divided
 
-SAME_PLANE = 1e-5  # rad: facets whose normals differ by less are one plane
 MAX_SHIFT = 8.0  # insets: the largest motion of a vertex, for needles
 
 
@@ -47,17 +46,19 @@ class Solid:
         order = used[np.argsort(labels[used], kind="stable")]
         return np.split(order, np.flatnonzero(np.diff(labels[order])) + 1)
 
-    def shifts(self, outward: Float[Array, "t 3 k"]) -> Float[Array, "v 3 k"]:
-        """Return how vertices move if the plane of each triangle moves out of the body by `outward` at its corners.
+    def shifts(self, triangles: Int[Array, " m"], motions: Float[Array, "m 3 3 k"]) -> Float[Array, "v 3 k"]:
+        """Return how vertices move as `motions` of the corners of `triangles`, all that meet in them, displace their planes.
 
         A vertex stays on all planes around it (see `displacements`). Each of the k columns is a separate case.
         """
-        N, heights = self.normals.repeat(3, axis=0), outward.reshape(-1, outward.shape[2])
-        return displacements(self.faces.ravel(), N, heights, len(self.vertices), MIN_SINGULAR)
+        N, vectors = self.normals[triangles].repeat(3, axis=0), motions.reshape(3 * len(triangles), 3, motions.shape[3])
+        heights = np.einsum("pj,pjk->pk", N, vectors)
+        return displacements(self.faces[triangles].ravel(), N, heights, len(self.vertices), MIN_SINGULAR, vectors)
 
     def inset(self, depths: Float[Array, " t"]) -> Float[Array, "v 3"]:
         """Return the shifts (v, 3) [mm] of the vertices that put the planes of triangles `depths` (t,) [mm] deeper."""
-        shifts = self.shifts(np.broadcast_to(-depths[:, None, None], (len(self.faces), 3, 1)))[..., 0]
+        motions = (-depths[:, None] * self.normals)[:, None].repeat(3, axis=1)
+        shifts = self.shifts(np.arange(len(self.faces)), motions[..., None])[..., 0]
         return capped(shifts, MAX_SHIFT * float(depths.max(initial=0.0)))
 
 

@@ -45,9 +45,10 @@ def assembly(
 ) -> Any:
     """Draw the bodies of results or of a declared model, with locators, contact points, measures and forces.
 
-    The bodies are drawn in their nominal poses, or in their poses in a `realization` of results and its `state`; marks are
-    always drawn in their nominal positions. Returns a pyvista.Plotter. Raises OptionError for a realization or a state that
-    does not exist, and ModelError for a model with faults.
+    `tc.plot.assembly(results, realization=7, opacity=0.6).show()` draws the `source` with that opacity, 1 by default, into a
+    new `plotter` or a given one. The bodies are drawn in their nominal poses, or in their poses in a `realization` of results
+    and its `state`; marks are always drawn in their nominal positions, unless `marks=False`. Returns a pyvista.Plotter. Raises
+    OptionError for a realization or a state that does not exist, and ModelError for a model with faults.
     """
     is_new = plotter is None
     plotter = _new_plotter() if is_new else plotter
@@ -74,9 +75,10 @@ def field(
 ) -> Any:
     """Draw the displacement field of all parts as colours [mm].
 
-    `statistic` is "mean" or "6 sigma". Colours cover `limits`, or by default the values of both states of all parts, so that
-    pictures of both states can be compared. Returns a pyvista.Plotter.
-    Raises OptionError for an unknown statistic, component or state, and for an archive without fields.
+    `tc.plot.field(results, "mean", component="z").show()` draws the `statistic` "mean" of a `component` of the displacements
+    in a `state`, into a new `plotter` or a given one; by default 6 sigma of the corrected magnitudes. Colours cover `limits`,
+    or by default the values of both states of all parts, so that pictures of both states can be compared. Returns a
+    pyvista.Plotter. Raises OptionError for an unknown statistic, component or state, and for an archive without fields.
     """
     check_choice("statistic", statistic, tuple(STATISTICS))
     check_choice("component", component, terms.COMPONENTS)

@@ -33,9 +33,10 @@ def histogram(
 ) -> Axes:
     """Draw the distribution of a measure with its limits, and normal curves of the same means and variances.
 
-    The name may be left out if there is only one measure. Heights are the shares of realizations in each bin, in %; both states
-    have the same bins. Returns the matplotlib axes.
-    Raises OptionError for an unknown measure or state, and for a measure with NaN values.
+    `tc.plot.histogram(results, "gap", bins=40)` has 40 `bins`, 60 by default, of both `states`, in new `axes` or given ones.
+    The name of the `measure` may be left out if there is only one. Heights are the shares of realizations in each bin, in %;
+    both states have the same bins. Returns the matplotlib axes. Raises OptionError for an unknown measure or state, and for a
+    measure with NaN values.
     """
     rows = results.to_dataset().isel({terms.REALIZATION: slice(finished(results))})
     place = _place(rows, measure)

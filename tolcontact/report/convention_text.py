@@ -49,10 +49,15 @@ def _other_results(measure: xr.Dataset) -> Iterator[str]:
         for name in measure[terms.BY_OBJECTIVE].values:
             change = measure["change_by_objective"].sel(by_objective=name, change_of=change_of).values
             joined, unchanged = (_sum(own, change), 0) if statistic == terms.MEAN else (_product(own, change), 1)
-            if not own[1] <= joined[0] <= own[2] and not change[1] <= unchanged <= change[2]:
+            if _is_beyond(joined[0], own) and _is_beyond(unchanged, change):
                 texts.append(f'{number(joined)} by "{name}"')
         if texts:
             yield f"{measure[terms.MEASURE].values}: {statistic} {', '.join(texts)}; here {number(own).partition(' [')[0]}"
+
+
+def _is_beyond(value: float, estimate: np.ndarray) -> bool:
+    """Return whether a value lies outside of the interval of an estimate (value, lower, upper), if it has one."""
+    return bool(value < estimate[1] or value > estimate[2])
 
 
 def _sum(estimate: np.ndarray, change: np.ndarray) -> np.ndarray:

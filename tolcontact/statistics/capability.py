@@ -240,12 +240,12 @@ class Verdict(NamedTuple):
 def verdict(share: np.ndarray, realizations: int, *, varies: bool = True) -> Verdict | None:
     """Return the verdict on a share (estimate, lower, upper) out of specification; None for a share that is not a number.
 
-    A measure that does not vary needs no further realizations: it is CONSTANT within its limits, and fails outside of them.
+    A measure that does not vary needs no further realizations: it is CONSTANT if none is out of specification.
     """
     estimate, lower, upper = (float(value) for value in share)
     if not all(map(math.isfinite, (estimate, lower, upper))):
         return None
-    word = _word(lower, upper) if varies else FAILS if estimate > 0 else CONSTANT
+    word = _word(lower, upper) if varies or estimate > 0 else CONSTANT
     return Verdict(word, _more(estimate, realizations) if word == UNDECIDED else 0.0)
 
 

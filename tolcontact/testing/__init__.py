@@ -79,7 +79,7 @@ def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) ->
     moving or the reference part, and n the nominal normal rotated with the reference part; the deviation of the unilateral
     locator that a point represents is subtracted. The gap between a ball or a shaft and a wall is their distance, from their
     sizes and positions. Faces of features are first displaced in their parts, then offset outwards by their sizes and form
-    deviations. The two results may differ by `within` [mm].
+    deviations. The two results may differ by `within` [mm], by default 1e-9.
 
     Where faces end (pairs that the archive calls `bounded`), contact is searched again at the archived poses, between archived
     bodies. This is the simulation's own search, so it detects inconsistent poses and gaps, not an error of the search itself;

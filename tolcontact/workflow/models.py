@@ -41,7 +41,7 @@ def build(model: Model, *, solver: Solver = DEFAULT_SOLVER, method: Choice | Non
 
 
 def check(model: Model, *, solver: Solver = DEFAULT_SOLVER, method: Choice | None = None) -> tuple[str, ...]:
-    """Return every fault of a model, with `solver` and `method` as in `build`; empty if it can be built.
+    """Return every fault of a model, with `solver` and `method` (and defaults) as in `build`; empty if it can be built.
 
     `for fault in tc.check("model.py"): print(fault)`
     """

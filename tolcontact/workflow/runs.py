@@ -130,7 +130,7 @@ def run(
     client: Any = None,
     progress: RunProgress | None = None,
 ) -> xr.DataTree:
-    """Simulate `samples` realizations, raw and corrected, into the archive `out`, and open it.
+    """Simulate `samples` realizations, by default 1000, raw and corrected, into the archive `out`, and open it.
 
     `model` is anything that `build` takes or returns. A Program has its solver and method already; the default solver is
     qpoases, and the default method is the model's own.
@@ -148,7 +148,7 @@ def run(
     is narrow enough. If that needs too many realizations, the run stops with a warning.
     `client` is a client of dask.distributed. Its workers simulate, this process writes, and the results are the same to the
     last bit (see tolcontact.simulation).
-    `surfaces` is the number of certified realizations that are checked against the surfaces between contact points at the end.
+    `surfaces` (64 by default) certified realizations are checked against the surfaces between contact points at the end.
     With `resume`, continue an interrupted run up to the number of samples it was started with, or `samples` if larger.
     `progress` is called with the number of finished realizations. An interrupted run (Ctrl-C) leaves an archive that can be
     read and resumed; its fields cover the finished realizations.

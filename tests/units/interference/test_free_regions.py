@@ -44,7 +44,7 @@ def size_of(body, radius, columns, outward):
     walls = np.flatnonzero(np.abs(body.normals[:, 2]) < 0.5)
     centres = body.vertices[body.faces[walls]]
     kept = walls[np.abs(np.linalg.norm(centres[..., :2], axis=2) - radius).max(axis=1) < 1e-9]
-    return kept, np.array(columns), np.full((len(kept), 3, 1), outward)
+    return kept, np.array(columns), outward * body.normals[kept][:, None, :, None].repeat(3, axis=1)
 
 
 def plate(half, *, varies):

@@ -43,6 +43,11 @@ def test_the_number_that_would_decide_is_no_accident_of_a_share_that_seems_to_be
         assert 1.8 * count < more < 12 * count
 
 
+def test_a_still_measure_of_assemblies_that_may_not_go_together_has_the_verdict_of_their_share():
+    share = np.array(intervals.proportion_of(1, 1500))
+    assert verdict(share, 1500, varies=False) == verdict(share, 1500) and verdict(share, 1500).word == UNDECIDED
+
+
 def test_a_measure_that_does_not_vary_needs_no_more_realizations():
     a = tc.Assembly("still")
     block = a.part("block", tc.Box(50, 25, 10), rotation=(0.3, -1.2, 0.7))
