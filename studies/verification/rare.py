@@ -198,8 +198,8 @@ def main():
     parser.add_argument("--samples", type=int, nargs="*", default=SIZES)
     parser.add_argument("--only", nargs="*", default=[*SCORES, *MODELS])
     options = parser.parse_args()
-    columns = "event", "samples", "p", "covered %", "missed unwarned %", "warned %", "median / p", "upper / estimate"
-    columns += "realizations", "plain", "s"
+    columns = ["event", "samples", "p", "covered %", "missed unwarned %", "warned %", "median / p", "upper / estimate"]
+    columns += ["realizations", "plain", "s"]
     print("| " + " | ".join(columns) + " |\n" + "|---" * len(columns) + "|")
     cells = []
     for name, samples in itertools.product(options.only, options.samples):

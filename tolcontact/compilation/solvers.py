@@ -21,7 +21,7 @@ _CHOICES: tuple[SolverChoice, ...] = (
     # Rarely (about 1e-5 of all problems) it does not converge from the previous problem; with a new memory it succeeds.
     Plugin("qpoases", QPOASES, remembers=True),
     Plugin("osqp", {"osqp": OSQP}, remembers=True),
-    # It cycles if rows contradict each other and two-sided locators are exact. So may qpOASES, where a slack hardly opens a row.
+    # It cycles if rows contradict each other and two-sided locators are exact; qpOASES may fail there, too.
     # Parallel rows that differ only by stiff springs are not dependent: its default limit of 1e-11 would drop some.
     Plugin("daqp", {"daqp": DAQP}, fallbacks=("piqp", "qpoases"), springs={"daqp": {**DAQP, "zero_tol": 1e-15}}),
     GraphChoice("graph", fallbacks=("daqp", "piqp", "qpoases"), growth=1),

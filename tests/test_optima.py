@@ -1,0 +1,26 @@
+"""The default's answers are optima: a nonlinear solver that shares no code finds no better pose near them."""
+
+import pytest
+
+from studies.certificates.ends import scene
+from studies.certificates.optima import NEAR, judged
+from tests.cases.ends import CASES, case
+from tests.helpers import nightly
+
+pytestmark = pytest.mark.filterwarnings("ignore::tolcontact.errors.NominalWarning")
+
+
+@pytest.mark.parametrize("first", [6000, *nightly(6004, *range(6100, 6300, 10))])
+def test_no_better_pose_is_near_a_resolved_one(first):
+    assert_best([row for seed in range(first, first + 4) for row in judged(*scene(seed), samples=6, seed=seed, starts=1)])
+
+
+@pytest.mark.parametrize("name", ["chamfer", *nightly(*(name for name in CASES if name != "chamfer"))])
+def test_nor_where_faces_end_within_reach(name):
+    assert_best(judged(*case(name), samples=8, seed=1, starts=1))
+
+
+def assert_best(rows):
+    """No search that begins at an answer finds a better pose beside it; and most that begin elsewhere find this answer."""
+    assert rows and not [row for row in rows if row["near is better"] and row["way to near"] < NEAR]
+    assert sum(row["found again"] for row in rows) >= len(rows) / 2
