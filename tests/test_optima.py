@@ -4,7 +4,7 @@ import pytest
 
 from studies.certificates.ends import scene
 from studies.certificates.optima import NEAR, judged
-from tests.cases.ends import CASES, case
+from tests.cases.ends import case
 from tests.helpers import nightly
 
 pytestmark = pytest.mark.filterwarnings("ignore::tolcontact.errors.NominalWarning")
@@ -15,7 +15,11 @@ def test_no_better_pose_is_near_a_resolved_one(first):
     assert_best([row for seed in range(first, first + 4) for row in judged(*scene(seed), samples=6, seed=seed, starts=1)])
 
 
-@pytest.mark.parametrize("name", ["chamfer", *nightly(*(name for name in CASES if name != "chamfer"))])
+# The others are seldom touched.
+TOUCHED = ("needles, tilted", "chamfered pads", "cone", "steep cone", "cone above", "rib", "roof", "crossing roofs")
+
+
+@pytest.mark.parametrize("name", ["steep cone", *nightly(*(name for name in TOUCHED if name != "steep cone"))])
 def test_nor_where_faces_end_within_reach(name):
     assert_best(judged(*case(name), samples=8, seed=1, starts=1))
 
