@@ -207,7 +207,7 @@ def table_of(rows):
         stated = {statistic: float(cell[0]) for statistic, cell in column.items() if not np.isnan(cell[0])}
         worst = min(stated, key=lambda statistic: stated[statistic])
         weak = [f"{statistic} {percent:.1f}" for _, statistic, percent, _ in below({(name, size): column})]
-        table.append([name, size, len(stated), f"{stated[worst]:.1f}", worst, ", ".join(weak) or "none"])
+        table.append([name, str(size), str(len(stated)), f"{stated[worst]:.1f}", worst, ", ".join(weak) or "none"])
     return markdown(table)
 
 
