@@ -68,16 +68,17 @@ def read_table(path: Path, names: Collection[str] = (), max_bytes: int = MAX_BYT
     """
     lines = text_of(path, max_bytes).split("\n")
     used = (k for k, line in enumerate(lines) if line.strip() and not _COMMENT.match(line))
-    first = next(used, None)
-    stated = re.fullmatch(r'"?sep=([^\w"])"?', lines[first]) if first is not None else None
-    first = next(used, None) if stated else first
-    if first is None:
+    heading_index = next(used, None)
+    stated = re.fullmatch(r'"?sep=([^\w"])"?', lines[heading_index]) if heading_index is not None else None
+    heading_index = next(used, None) if stated else heading_index
+    if heading_index is None:
         raise ValueError("it is empty; expected a heading with the names of columns, and rows below it")
-    unquoted = re.sub(r'"[^"]*(?:"|$)', "", "\n".join(lines[first : first + MAX_HEADING_LINES])).partition("\n")[0]
-    marks = (mark for mark in SEPARATORS if mark in unquoted and lines[first].strip() not in names)
+    head = "\n".join(lines[heading_index : heading_index + MAX_HEADING_LINES])
+    unquoted = re.sub(r'"[^"]*(?:"|$)', "", head).partition("\n")[0]
+    marks = (mark for mark in SEPARATORS if mark in unquoted and lines[heading_index].strip() not in names)
     separator = stated[1] if stated else next(marks, ",")
     try:
-        (_, heading), *rows = _records(lines, first, separator)
+        (_, heading), *rows = _records(lines, heading_index, separator)
     except csv.Error as error:
         raise ValueError(str(error)) from error
     while rows and not rows[-1][1]:
@@ -85,9 +86,9 @@ def read_table(path: Path, names: Collection[str] = (), max_bytes: int = MAX_BYT
     return Table(heading, rows, separator != ",")
 
 
-def _records(lines: list[str], first: int, separator: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the line number, from 1, and the cells of each record from the line with the index `first`."""
-    numbered = enumerate(itertools.islice(lines, first, None), start=first + 1)
+def _records(lines: list[str], heading_index: int, separator: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield the line number, from 1, and the cells of each record from the line with the index `heading_index`."""
+    numbered = enumerate(itertools.islice(lines, heading_index, None), start=heading_index + 1)
     for line_number, line in numbered:
         if _COMMENT.match(line):
             continue

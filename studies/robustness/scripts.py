@@ -194,6 +194,8 @@ def functions(count: int, rng: random.Random, folder: Path, table: Table) -> Non
         ("", f"        mask = {value}") for value in VALUES if "value" not in value
     ]
     heights = None
+    if not count:
+        return
     for in_measure, in_face in [("", ""), *rng.sample(measured + picked, min(count, len(measured + picked)))]:
         (folder / "m.py").write_text(SCRIPT.format(measured=in_measure, picked=in_face), encoding="utf-8")
         (folder / "m.nc").unlink(missing_ok=True)

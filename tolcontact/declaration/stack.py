@@ -113,15 +113,13 @@ class Stack(Assembly):
 
 def _table(path: Path, stack: str) -> Table:
     """Return a table of links, its heading in lower case. Raises ModelError if it cannot be read."""
-    faults, title = Faults(), shown(path.name)
     try:
         table = _workbook(path) if path.suffix.lower() == ".xlsx" else read_table(path, max_bytes=MAX_BYTES)
         heading = [cell if cell.casefold().startswith(GAP) else cell.casefold() for cell in table.heading]
         return table._replace(heading=heading)
     except (OSError, ValueError, ImportError) as error:
         remedy = '; install it: pip install "tolcontact[xlsx]"' if isinstance(error, ImportError) else ""
-        faults.append(f'table "{title}" cannot be read: {str(error).splitlines()[0]}{remedy}')
-    raise ModelError(stack, faults)
+        raise ModelError(stack, [f'table "{shown(path.name)}" cannot be read: {str(error).splitlines()[0]}{remedy}']) from error
 
 
 def _workbook(path: Path) -> Table:

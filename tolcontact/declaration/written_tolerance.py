@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from tolcontact.declaration.tolerance_class import UndefinedClass, tolerance_class
 from tolcontact.declaration.values import is_length
+from tolcontact.tables import MAX_NUMBER
 
 EXAMPLES = '"±0.1", "+0.1/-0.05" or (-0.05, 0.1)'
 MAX_SHOWN = 40  # characters of a text in a message
@@ -114,8 +115,8 @@ def _parsed(text: str) -> Deviations | float:
 
 def _number(text: str) -> float:
     number = float(Decimal(text.replace(",", ".").replace(" ", "")))
-    if not math.isfinite(number):
-        raise TextFault("expected a finite number")
+    if abs(number) > MAX_NUMBER:
+        raise TextFault(f"expected numbers up to {MAX_NUMBER:g}")
     return number + 0.0
 
 

@@ -31,8 +31,8 @@ REFUSED = {
     "+0.1": 'write "+0.1/0" if the other one is 0, "±0.1" for both sides', "-0.1": 'write "0/-0.1"', "1,000": "thousands",
     "±50 µm": "its unit is µm; expected mm", "±0.1 in": "its unit is in; expected mm", "±1°": "its unit is °",
     "9.9/10.1": "a limit has no sign", "H7": 'for sizes, as in tc.Size(10, "H7")', "H7/g6": 'give "H7" to the hole, and "g6"',
-    "q7": 'no letters "q"', "": 'such as "±0.1"', "±": 'such as "±0.1"', "about 0.1": 'such as "±0.1"', "±1e999": "finite",
-    "nan": 'such as "±0.1"', "±-0.1": 'such as "±0.1"', "+0.1/-0.05/0": 'such as "±0.1"', "9" * 100_000: "finite",
+    "q7": 'no letters "q"', "": 'such as "±0.1"', "±": 'such as "±0.1"', "about 0.1": 'such as "±0.1"', "±1e999": "up to 1e+15",
+    "nan": 'such as "±0.1"', "±-0.1": 'such as "±0.1"', "+0.1/-0.05/0": 'such as "±0.1"', "9" * 100_000: "up to 1e+15",
     "\N{LATIN SMALL LETTER A}" * 100_000: 'such as "±0.1"', "+0.1\n-x": 'such as "±0.1"',
 }  # fmt: skip
 
