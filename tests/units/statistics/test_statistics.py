@@ -115,7 +115,7 @@ def test_the_mean_at_a_stop_is_covered_or_has_no_interval(share, size):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", [10, 30])
+@pytest.mark.parametrize("size", [20, 30])
 def test_intervals_of_spreads_cover_in_small_samples(size):
     rng = np.random.default_rng(2)
     covered = np.zeros(2)
@@ -131,7 +131,7 @@ def test_intervals_of_spreads_cover_in_small_samples(size):
 
 
 def test_the_smallest_samples_have_no_interval_of_their_spread():
-    x = np.random.default_rng(1).normal(size=9)
+    x = np.random.default_rng(1).normal(size=19)
     for estimate, lower, upper in (intervals.variance(x), intervals.variance_ratio(x, x[::-1] ** 2)):
         assert estimate > 0 and np.isnan(lower) and np.isnan(upper)
 
