@@ -18,8 +18,8 @@ Realizations within the event walk by u' = sqrt(1 - b^2) u + b v, v standard nor
 and others, 2015). The results of both searches are the centres of a mixture of standard normals, which gives the probability by
 importance sampling. This estimate is unbiased for any centres, but a region that neither search found is missing from it. It is
 therefore used only if its weights are spread over many realizations, with no dominant one, and if neither search gives a
-significantly larger value. Where a region was reached by single strands only, there may be others, and the interval is widened
-(Good, 1953). Otherwise the result is the mean of the searches; where they disagree, the interval covers both, and
+significantly larger value. Where a region was reached by one or two strands only, there may be others, and the interval is
+widened (Good, 1953). Otherwise the result is the mean of the searches; where they disagree, the interval covers both, and
 `disagreement` states it.
 
 A search ends below 1e-9. The probability of the event is then reported as 0. Its upper bound is the probability of the last
