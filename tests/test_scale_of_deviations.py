@@ -227,6 +227,20 @@ def test_a_variable_in_inches_is_refused_where_it_drives_lengths():
     assert re.search(r'variable "A" .*: units is "in", and nothing is converted; .* its tolerance times 25.4', fault)
 
 
+@pytest.mark.parametrize(("factor", "count"), [(1.0, 0), (1000.0, 1)])
+def test_a_population_of_a_variable_in_micrometres_is_noticed(factor, count):
+    a = tc.Assembly("block")
+    block = Part(a, a.part("block", tc.Box(50, 30, 20)), 50.0, 0.2, np.random.default_rng(0))
+    block.located(0.1)
+    a.variable("A", 0.1, drives={"block.A1": 1.0})
+    a.population({"A": factor * block.deviations})
+    a.measure("end", block.part.point(50, 0, 0), along="x")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        tc.check(a)
+    assert [("to block.A1, which does not fit" in str(one.message)) for one in caught] == [True] * count
+
+
 def test_a_capability_in_per_cent_is_noticed():
     a = tc.Assembly("block")
     block = Part(a, a.part("block", tc.Box(50, 30, 20)), 50.0, 0.2, np.random.default_rng(0))

@@ -32,12 +32,14 @@ def out_of_scale(draws: TrialDraws) -> Iterator[str]:
         label: scale if scale.width else replace(scale, width=SIX_SIGMA * math.sqrt(freedoms[label].variance))
         for label, scale in stated.items()
     }
+    measured = {}
     for population in program.nominal.assembly.populations:
-        for label, values in zip(population.columns, population.values.T, strict=True):
+        columns = dict(zip(population.columns, population.values.T, strict=True))
+        measured |= columns
+        for label, values in columns.items():
             if label in by_label and (doubt := doubt_of_rows(by_label[label], label, values)):
                 yield f"{population.designation}: {doubt}"
                 break
-    measured = {label for population in program.nominal.assembly.populations for label in population.columns}
     reported = set[tuple[str, str]]()
     for label, freedom in freedoms.items():
         doubt = "" if label in measured else _doubt(freedom, stated.get(label))
@@ -45,7 +47,11 @@ def out_of_scale(draws: TrialDraws) -> Iterator[str]:
             reported.add((freedom.label.rpartition(".")[0], doubt))
             yield f'{freedom.source} "{label}": {doubt}'
     for variable in program.nominal.assembly.variables:
-        yield from _doubts_of_variable(variable, freedoms, by_label)
+        values = measured.get(variable.name)
+        own = centre_and_width(freedoms[variable.name])
+        yield from _doubts_of_variable(
+            variable, *(own if values is None else (values.mean(), SIX_SIGMA * values.std())), by_label
+        )
 
 
 def _doubt(freedom: Freedom, scale: Scale | None) -> str:
@@ -58,9 +64,8 @@ def _doubt(freedom: Freedom, scale: Scale | None) -> str:
     return doubt_of_distribution(scale, *centre_and_width(freedom))
 
 
-def _doubts_of_variable(variable: Variable, freedoms: dict[str, Freedom], by_label: dict[str, Scale]) -> Iterator[str]:
-    """Yield what is odd about what a variable adds to the first of its contributors that it does not fit."""
-    centre, width = centre_and_width(freedoms[variable.name])
+def _doubts_of_variable(variable: Variable, centre: float, width: float, by_label: dict[str, Scale]) -> Iterator[str]:
+    """Yield what is odd about what a variable, of a centre and a width, adds to the first contributor that it does not fit."""
     for label, factor in variable.drives.items():
         scale = by_label.get(label)
         if scale is None or not factor or not width:
