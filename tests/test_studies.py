@@ -28,6 +28,7 @@ STUDIES = {
     "certificates/coincidences.py": ["--scenes", "6", "--samples", "3"],
     "certificates/ends.py": ["--scenes", "6", "--samples", "3"],
     "certificates/judge.py": ["--scenes", "3", "--samples", "20"],
+    "certificates/optima.py": ["--first", "6000", "--scenes", "2", "--samples", "3", "--starts", "1"],
     "cost/cluster.py": ["--samples", "20000", "--to", "."],
     "cost/measure.py": ["--scenes", "ra1", "ring", "--sizes", "3", "--seconds", "0.01", "--to", "."],
     "cost/solvers.py": ["--realizations", "2", "--to", "."],
