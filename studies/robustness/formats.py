@@ -182,10 +182,12 @@ def main() -> None:
         parser.add_argument(f"--{name}", type=int, default=0)
     parser.add_argument("--seed", type=int, default=0)
     options, table = parser.parse_args(), Table()
-    for kind in (spreadsheets, scans):
-        with tempfile.TemporaryDirectory() as folder:
-            kind(getattr(options, kind.__name__), random.Random(options.seed), Path(folder), table)
-    write_table("formats", table)
+    try:
+        for kind in (spreadsheets, scans):
+            with tempfile.TemporaryDirectory() as folder:
+                kind(getattr(options, kind.__name__), random.Random(options.seed), Path(folder), table)
+    finally:  # a run that is stopped has its counts as well
+        write_table("formats", table)
 
 
 if __name__ == "__main__":

@@ -220,10 +220,12 @@ def main() -> None:
         parser.add_argument(f"--{name}", type=int, default=0)
     parser.add_argument("--seed", type=int, default=0)
     options, table = parser.parse_args(), Table()
-    for kind in (names, pmi, functions):
-        with tempfile.TemporaryDirectory() as folder:
-            kind(getattr(options, kind.__name__), random.Random(options.seed), Path(folder), table)
-    write_table("scripts", table)
+    try:
+        for kind in (names, pmi, functions):
+            with tempfile.TemporaryDirectory() as folder:
+                kind(getattr(options, kind.__name__), random.Random(options.seed), Path(folder), table)
+    finally:  # a run that is stopped has its counts as well
+        write_table("scripts", table)
 
 
 if __name__ == "__main__":
