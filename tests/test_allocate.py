@@ -218,6 +218,7 @@ def supported(shift):
     return a
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("shift", [0.0, *nightly(-0.4)])
 def test_a_tolerance_that_decides_nothing_before_it_is_wider_gets_the_range_of_least_cost(shift):

@@ -60,6 +60,7 @@ def test_every_solver_certifies_what_the_others_do(solver):
     assert run["kkt_residual"].max() < 1e-8
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_far_answers_are_not_certified():
     """With a limit of half a degree, hardly any answer of a tower is near."""
@@ -94,6 +95,7 @@ def shaft_on_points():
     return built(cases.shaft_in_a_v(720, points=200))
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_shaft_on_sampled_points_is_off_and_a_warning_says_by_how_much(shaft_on_points):
     program, warned = shaft_on_points

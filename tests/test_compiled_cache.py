@@ -53,6 +53,7 @@ def test_without_a_place_to_write_it_compiles_anew(home):
     assert count(home, HOME="/dev/null") == (0, 1)
 
 
+@pytest.mark.nightly
 def test_several_processes_may_begin_at_once(tmp_path):
     begun = [started(tmp_path) for _ in range(3)]
     assert all(sum(counted(one)) == 1 for one in begun)

@@ -11,7 +11,7 @@ from tolcontact.errors import ArchiveError
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("solver", "keep"), [("daqp", "all"), *nightly(("qpoases", "measures"))])
+@pytest.mark.parametrize(("solver", "keep"), nightly(("daqp", "all"), ("qpoases", "measures")))
 def test_resume_gives_the_same_data_as_an_undisturbed_run(solver, keep, tmp_path):
     paths = [tmp_path / "grown.nc", tmp_path / "whole.nc"]
     for samples in (300, 5000, 5000, 9000):

@@ -62,6 +62,7 @@ def test_a_lobed_shaft_lies_on_its_highest_line(tmp_path):
     assert_gaps_recompute(path)
 
 
+@pytest.mark.nightly
 def test_gaps_of_sections_and_lines_with_form_follow_from_the_archive_alone(tmp_path):
     path = tmp_path / "fit.nc"
     rough, lobed = tc.Form("matern 5/2", length=12, modes=6), tc.Form("matern 3/2", lobes=3, modes=4)

@@ -76,6 +76,7 @@ def grooved(radius, half, sides=40):
     return strip(list(zip(radius * np.cos(azimuths), radius * np.sin(azimuths), strict=True)))
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_ball_beside_edges_gaps_and_curves_that_are_not_known_has_points():
     floor = strip([(-20, 0), (20, 0)])

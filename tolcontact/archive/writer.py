@@ -27,6 +27,7 @@ from tolcontact.errors import ArchiveError
 from tolcontact.replacing import replacing
 from tolcontact.system import files
 
+MAY_CHANGE = ("samples", "solver_second")  # when a run is resumed: another version may have other second solvers
 POINT_TOLERANCE = 1e-9  # mm: points may differ by rounding from one machine to the next
 
 
@@ -38,7 +39,7 @@ def check_same_run(file: netCDF4.Dataset, path: Path, program: Program, settings
     _check_same_distributions(file, path, program)
     for name, value in settings.items():
         was = getattr(file, name, None)
-        if name != "samples" and was != value:
+        if name not in MAY_CHANGE and was != value:
             raise ArchiveError(
                 f'"{path}" was run with {name} = {was}, now it is {value}; resume with the same, or write to a new file'
             )

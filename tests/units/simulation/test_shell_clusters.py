@@ -112,6 +112,7 @@ class SlowLine:
         writer.close()
 
 
+@pytest.mark.nightly
 def test_a_slow_network_changes_nothing(dask_processes, tmp_path):
     port, own = free_port(), free_port()
     scheduler(dask_processes, port)
@@ -128,6 +129,7 @@ def test_a_slow_network_changes_nothing(dask_processes, tmp_path):
     assert_same_archive(tmp_path / "run.nc", tmp_path / "whole.nc")
 
 
+@pytest.mark.nightly
 @posix_only
 def test_a_run_that_all_workers_left_ends(dask_processes):
     port = free_port()

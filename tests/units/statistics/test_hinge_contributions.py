@@ -62,6 +62,7 @@ def test_a_hinge_hangs_on_its_lines(program):
     assert np.ptp(off) < 4e-4 and found.measured[:, 1].std(axis=0).min() > 5e-3
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_contributions_of_a_hinge_are_those_of_its_lines(program):
     spreads = np.array([hinge.BORE] * 4 + [hinge.SHAFT]) / 6
