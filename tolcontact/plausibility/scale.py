@@ -4,6 +4,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from tolcontact.declaration import Variable
 from tolcontact.declaration.scale import (
     COARSEST,
@@ -32,7 +34,7 @@ def out_of_scale(draws: TrialDraws) -> Iterator[str]:
         label: scale if scale.width else replace(scale, width=SIX_SIGMA * math.sqrt(freedoms[label].variance))
         for label, scale in stated.items()
     }
-    measured = {}
+    measured = dict[str, np.ndarray]()
     for population in program.nominal.assembly.populations:
         columns = dict(zip(population.columns, population.values.T, strict=True))
         measured |= columns
@@ -47,11 +49,11 @@ def out_of_scale(draws: TrialDraws) -> Iterator[str]:
             reported.add((freedom.label.rpartition(".")[0], doubt))
             yield f'{freedom.source} "{label}": {doubt}'
     for variable in program.nominal.assembly.variables:
-        values = measured.get(variable.name)
-        own = centre_and_width(freedoms[variable.name])
-        yield from _doubts_of_variable(
-            variable, *(own if values is None else (values.mean(), SIX_SIGMA * values.std())), by_label
-        )
+        centre, width = centre_and_width(freedoms[variable.name])
+        if variable.name in measured:
+            values = measured[variable.name]
+            centre, width = float(values.mean()), SIX_SIGMA * float(values.std())
+        yield from _doubts_of_variable(variable, centre, width, by_label)
 
 
 def _doubt(freedom: Freedom, scale: Scale | None) -> str:
