@@ -27,7 +27,8 @@ from tolcontact.errors import ArchiveError
 from tolcontact.replacing import replacing
 from tolcontact.system import files
 
-MAY_CHANGE = ("samples", "solver_second")  # when a run is resumed: another version may have other second solvers
+# When a run is resumed: another version may have other second solvers, or words for correlations, which the model determines.
+MAY_CHANGE = ("samples", "solver_second", terms.CORRELATIONS)
 POINT_TOLERANCE = 1e-9  # mm: points may differ by rounding from one machine to the next
 
 

@@ -190,6 +190,7 @@ def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
         yield f"datum shift of {shifted}: not drawn; contact of the datum features determines it"
     if stored := summary.attrs["stored_coordinates"]:
         yield stored
+    yield from summary.attrs["correlations"].splitlines()
     yield f"largest penetration at contact points: {raw:.3g} mm without, {corrected:.3g} mm with contact"
     yield from _between(summary, count)
     yield from _advice(summary, corrected)
