@@ -265,6 +265,7 @@ def test_choices_of_tables_are_the_cheapest_of_all_combinations():
     assert cost <= least_cost_of_tables(TABLES, 0.97 * sigma)  # the bound of a fresh run keeps a margin
 
 
+@pytest.mark.nightly
 def test_grades_of_sizes_are_choices_and_others_keep_any_range(tmp_path):
     """A block of 20 mm on a table: ISO 286-1 has IT7 of 21, IT8 of 33, IT9 of 52 and IT10 of 84 micrometres for it."""
     a = tc.Assembly("graded")

@@ -73,6 +73,7 @@ def test_points_on_curved_faces_lie_on_them_and_look_outward(solid):
     assert np.abs(pair.n_r - true / radius[:, None]).max() < 0.005
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_halving_the_spacing_moves_measures_on_curved_faces_by_less_than_their_interval():
     method = replace(ALL_POINTS, search="fixed")

@@ -171,6 +171,7 @@ def stack(frame: Frame = STILL, **options) -> tc.Assembly:
     return bolted([(-45, 0), (45, 0)], position=(1.9, 1.9), size=0.1, frame=frame, **options)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_bolted_assembly_is_rebuilt_from_its_archive_and_from_json(tmp_path):
     a = stack(shank=tc.Size(10, 0.0, -0.1))

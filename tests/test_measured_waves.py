@@ -119,6 +119,7 @@ def test_few_points_show_a_smooth_form(tmp_path):
     assert not sentences and np.abs(heights - expected).max() < 0.02 * np.ptp(expected)
 
 
+@pytest.mark.nightly
 def test_lobes_of_measured_cylinders_are_kept(tmp_path):
     """Six lobes of a bore of radius 10, with three waves along it."""
     azimuths, z = (values.ravel() for values in np.meshgrid(np.arange(72) * np.pi / 36, np.linspace(0, 30, 31)))

@@ -256,6 +256,7 @@ def test_a_few_hundred_thousand_records_take_seconds(read):
     assert len(pmi.tolerances) == 5000 and time.process_time() - start < 20
 
 
+@pytest.mark.nightly
 def test_tolerances_that_all_refer_to_all_faces_are_refused(read):
     faces = ",".join(f"#{k}" for k in range(1000, 11_000))
     with pytest.raises(OptionError, match="refer to more than 2000000 faces"):

@@ -27,6 +27,7 @@ def heights_on(program, run, feature, radius, along, azimuths):
     return coefficients(program, run, feature) @ form_of(program, feature).heights(places).T
 
 
+@pytest.mark.nightly
 def test_a_two_lobed_shaft_in_a_two_lobed_bore_by_closed_form():
     """In a direction the shaft goes as far as the clearance there less both forms, since all such limits are touched."""
     model = shaft_in_a_bore(tc.Cylindricity(0.02, form=TWO_LOBES), tc.Cylindricity(0.02, form=TWO_LOBES), clearance=0.1)

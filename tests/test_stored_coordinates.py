@@ -45,6 +45,7 @@ def test_bodies_without_clearance_fit_in_other_files(suffix, options, largest, t
     assert 0 < run["contact"].coordinate_error.item() < largest
 
 
+@pytest.mark.nightly
 def test_fixed_contact_points_allow_for_rounding_too(tmp_path):
     run = tc.run(stored_case("key", tmp_path, faces=True), method=FIXED, keep="all", **QUICK)
     assert_resolved(run)

@@ -72,7 +72,7 @@ def test_the_settings_of_a_run_are_its_attributes(archive):
         "title": "variation simulation of stack",
     }  # fmt: skip
     assert {word: said[word] for word in expected} == expected
-    assert json.loads(said["solver_options"]) and said["solver_second"] == "piqp, qpoases"
+    assert json.loads(said["solver_options"]) and said["solver_second"] == "qpoases, piqp"
     assert f"tolcontact {tc.__version__}" in said["versions"] and said["history"].endswith("created")
 
 

@@ -10,6 +10,7 @@ from tolcontact.simulation.lazy import CHUNK_BLOCKS
 from tolcontact.simulation.packing import pack_model, packed_program
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_workers_compute_the_same():
     program = tc.build(cases.ra1(), solver="qpoases")
