@@ -7,7 +7,7 @@ import tolcontact as tc
 from tests.cases.frames import STILL, Frame
 from tests.cases.measured import ring, shaft
 from tests.cases.seats import seat
-from tests.helpers import SEATED, R_t, simulate
+from tests.helpers import SEATED, R_t, nightly, simulate
 from tests.test_form import coefficients, modes_at
 from tolcontact.vocabulary import CORRECTED, RAW
 
@@ -42,15 +42,16 @@ def test_between_planes_they_are_those_of_the_corners_and_of_the_middle_of_the_o
     assert run["measured"][:, CORRECTED].min() > -1e-9 and run["measured"][:, RAW].min() < -0.01 * frame.scale
 
 
-def test_with_form_they_are_those_of_a_dense_grid_in_a_run_and_in_its_archive(tmp_path):
+@pytest.mark.parametrize("samples", [6, *nightly(20)])
+def test_with_form_they_are_those_of_a_dense_grid_in_a_run_and_in_its_archive(samples, tmp_path):
     model = seat(tc.Form(modes=6))
     faces = model.parts[1].face("-z"), model.parts[0].face("+z")
     model.measure("largest", tc.LargestGap(*faces))
     model.measure("mean", tc.MeanGap(*faces))
-    results = tc.run(model, samples=6, solver="daqp", method=SEATED, out=tmp_path / "run.nc", surfaces=0, fields="none")
+    results = tc.run(model, samples=samples, solver="daqp", method=SEATED, out=tmp_path / "run.nc", surfaces=0, fields="none")
     measured = results["measured"].values
     results.close()
-    program, again = simulate(tmp_path / "run.nc", samples=6, build=tc.build, solver="daqp")
+    program, again = simulate(tmp_path / "run.nc", samples=samples, build=tc.build, solver="daqp")
     np.testing.assert_array_equal(again["measured"], measured)
     grid = np.stack(np.meshgrid(np.linspace(0, 100, 101), np.linspace(0, 50, 51)), axis=-1).reshape(-1, 2)
     places = np.column_stack([grid, np.zeros(len(grid))])

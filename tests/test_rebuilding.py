@@ -1,11 +1,14 @@
 """A model is rebuilt from its archive, and gives the same results."""
 
+from dataclasses import replace
+
 import pytest
+import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import ALL_POINTS
-from tolcontact.testing import assert_same_run
+from tests.helpers import ALL_POINTS, SEATED
+from tolcontact.testing import assert_gaps_recompute, assert_same_run
 
 
 @pytest.mark.slow
@@ -27,3 +30,18 @@ def test_faces_of_step_files_are_rebuilt_without_the_files():
     second = tc.run(rebuilt, samples=50, seed=2, solver="daqp", method=ALL_POINTS, surfaces=4)
     assert_same_run(first, second)
     assert (first["contact/moving_point"].values == second["contact/moving_point"].values).all()
+
+
+@pytest.mark.slow
+def test_forces_supports_and_stiffness_are_rebuilt_and_gaps_of_supports_recomputed(tmp_path):
+    path, method = tmp_path / "table.nc", replace(SEATED, search="fixed")
+    with tc.run(cases.table(), samples=100, seed=2, solver="daqp", method=method, out=path) as results:
+        first = results.load()
+    second = tc.run(tc.io.model_of(first), samples=100, seed=2, solver="daqp", method=method)
+    assert_same_run(first, second)
+    assert_gaps_recompute(path)
+    root, contact = (xr.load_dataset(path, group=group) for group in (None, "contact"))
+    assert [root.attrs[word] for word in ("resolution", "objective", "search")] == ["exact", "seating", "fixed"]
+    assert root.reaction.attrs["units"] == "N"
+    assert list(contact.reference_part) == [-1]
+    assert (contact.locator_of_point >= 0).all()

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import pytest
 
-from tests.helpers import COMMAND, ROOT, SCRIPTS, run
+from tests.helpers import COMMAND, ROOT, SCRIPTS, nightly, run
 from tests.step_files import step_block
 
 PACKAGE = ROOT / "tolcontact"
@@ -91,15 +91,18 @@ def python(code: str, *arguments, **options):
     return stripped([sys.executable, "-c", code, *arguments], **options)
 
 
+MODEL = ROOT / "models" / "ra1.py"
+
+
 @pytest.mark.slow
-def test_commands_work_without_what_only_posix_has(tmp_path):
-    model = ROOT / "models" / "ra1.py"
+@pytest.mark.parametrize(
+    "others",
+    [[("report", "x.nc")], *nightly([("--version",), ("summary", "x.nc"), *2 * [("report", "x.nc")], ("check", MODEL)])],
+)
+def test_commands_work_without_what_only_posix_has(others, tmp_path):
     (tmp_path / "block.step").write_text(step_block())
-    commands = [
-        ("run", model, "--samples", 50, "--out", "x.nc"), ("report", "x.nc"),
-        ("run", model, "--samples", 60, "--out", "x.nc", "--resume"), ("bodies", "block.step"),
-    ]  # fmt: skip
-    for command in commands:
+    resumed = ("run", MODEL, "--samples", 60, "--out", "x.nc", "--resume")
+    for command in (("run", MODEL, "--samples", 50, "--out", "x.nc"), *others, resumed, ("bodies", "block.step")):
         done = stripped([*COMMAND, *command], cwd=tmp_path)
         assert done.returncode == 0 and "Traceback" not in done.stderr, (command, done.stderr)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["block.step", "x.html", "x.nc"]

@@ -163,7 +163,8 @@ class Population(Declaration):
         for column, label in enumerate(self.columns[: self.values.shape[1]] if self.values.ndim == 2 else ()):
             gaps = [row for row, value in enumerate(self.values[:, column]) if not abs(value) <= MAX_NUMBER]
             if gaps:
-                yield f"row {gaps[0] + 1} of the column for {label} is no number up to {MAX_NUMBER:g}; mend the table"
+                where = f"row {gaps[0] + 1} of the column for {label}"
+                yield f"{where} is no number up to {MAX_NUMBER:g}; mend it, or leave out the row"
 
     def __str__(self) -> str:
         return f"population {self.source}: {len(self.values)} rows of {', '.join(self.columns)}"

@@ -30,7 +30,7 @@ MIN_ROWS, ROWS_PER_CONTRIBUTOR = 200, 5  # fewer realizations give no shares
 MIN_RESIDUALS, MAX_KURTOSIS = 1000, 10.0  # realizations, and the kurtosis of their residuals: otherwise R^2 has no interval
 MIN_EFFECTIVE = 20  # effective realizations behind the variance of a contributor: with fewer, a share has no interval
 MAX_LEVERAGE = 0.9  # of a realization in its own fit
-MIN_SHARE, MAX_LOGIT = 1e-6, 50.0  # of the logit scale
+MIN_SHARE = 1e-6  # on the logit scale
 MIN_R2 = 0.5  # below this, linear shares do not describe a measurement
 
 
@@ -111,7 +111,7 @@ def _with_interval(share: float, influences: np.ndarray) -> Estimate:
     influences = influences - influences.mean()
     _, lower, upper = intervals.from_influences(0.0, influences)
     lower, upper = lower + influences.min() / len(influences), upper + influences.max() / len(influences)
-    inner = min(max(share, MIN_SHARE), 1 - MIN_SHARE)
-    steps = np.clip(np.array([lower, upper]) / (inner * (1 - inner)), -MAX_LOGIT, MAX_LOGIT)
-    least, most = scipy.special.expit(scipy.special.logit(inner) + steps)
+    error = min(max(upper, -lower, MIN_SHARE), 0.5)  # nearer to 0 or 1 than by its error, the logit scale has no meaning
+    inner = min(max(share, error), 1 - error)
+    least, most = scipy.special.expit(scipy.special.logit(inner) + np.array([lower, upper]) / (inner * (1 - inner)))
     return Estimate(float(share), float(min(share + lower, least)), float(max(min(share + upper, 1.0), most, share)))

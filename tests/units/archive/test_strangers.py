@@ -94,7 +94,7 @@ def test_whatever_stands_anywhere_in_a_document_ends_in_one_error(stride, docume
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_two_strange_values_end_in_one_error_too(document, data):
     values = st.recursive(
