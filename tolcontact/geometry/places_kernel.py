@@ -331,7 +331,8 @@ def find(A, B, candidates, reach, margin, error, poses, retained, directions, la
     count = candidates.kinds.size
     scratch = (
         np.empty(A.vertices.shape), np.empty(A.edges.shape), np.empty(B.vertices.shape),
-        np.empty(candidates.facing.shape[0], dtype=np.bool_), np.empty(candidates.facing.shape[0] + 1), np.empty(count, dtype=np.int64),
+        np.empty(candidates.facing.shape[0], dtype=np.bool_),
+        np.empty(candidates.facing.shape[0] + 1), np.empty(count, dtype=np.int64),
         np.zeros(A.vertices.shape[0] + B.vertices.shape[0], dtype=np.bool_), np.zeros(count, dtype=np.bool_),
         np.full(count, np.inf), np.empty((3, count, 3)),
     )  # fmt: skip
