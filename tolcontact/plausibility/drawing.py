@@ -109,7 +109,7 @@ def _moot_modifiers(nominal: Nominal, pattern: NominalPattern, tolerance: Geomet
         if modifier and not all(isinstance(datum.geometry, FeatureOfSize) for datum in features):
             yield f"{tolerance}: datum {letters[0]} has no size, so a material modifier says nothing; leave it out"
         elif modifier and len(features) > 1:
-            yield f"{tolerance}: datum {'-'.join(letters)} has several features, whose play at their material boundary is not drawn"
+            yield f"{tolerance}: datum {'-'.join(letters)} has several features: the play of its gauge is not drawn"
 
 
 def _stated(nominal: Nominal) -> list[NominalPattern]:
