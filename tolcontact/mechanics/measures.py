@@ -124,7 +124,8 @@ def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list
     expressions: list[ca.SX] = []
     for measure, measurement in zip(nominal.measures, nominal.measurements, strict=True):
         if measurement is not None:
-            expressions.append(value_of(measurement, Observed(poses, deviations, expressions)))
+            value = value_of(measurement, Observed(poses, deviations, expressions))
+            expressions.append(value if measure.unit == 1 else value / measure.unit)
             continue
         try:
             expressions.append(_expression(measure, nominal, poses, deviations))
@@ -146,7 +147,7 @@ def _expression(measure: Measure, nominal: Nominal, poses: Sequence[Pose], devia
         else:
             origin = nominal.position(point) if measure.quantity == "displacement" else np.zeros(3)
             moved = part_poses.position(point) - ca.DM(origin)
-        return ca.dot(ca.DM(np.array(measure.along)), moved)
+        return ca.dot(ca.DM(np.array(measure.along) / measure.unit), moved)
     function: Any = measure.of
     recorded = isinstance(function, tuple)
     expression = called(lambda: ca.SX(replay(function, poses, deviations) if recorded else function(part_poses)))
