@@ -19,8 +19,9 @@ DRAWN = (0.1, 0.4, 0.9)
 Shape = Literal["normal", "uniform", "triangular", "truncated normal"]
 Distribution = Shape | Any  # or a frozen distribution of scipy.stats
 SHAPES = get_args(Shape)
-Side = Literal["up", "down"]  # to which a process is off its centre
-SIDES: dict[Any, float] = {None: 1.0, "up": 1.0, "down": -1.0}
+Side = Literal["up", "down", "either"]  # to which a process is off its centre
+EITHER = "either"
+SIDES: dict[Any, float] = {None: 1.0, "up": 1.0, "down": -1.0, EITHER: 0.0}
 
 
 @dataclass(frozen=True, repr=False)
@@ -35,7 +36,8 @@ class Tolerance(Readable):
     The range may be written as on drawings: "±0.1" has the range 0.2, and "+0.1/-0.05" or (-0.05, 0.1) the range 0.15 with a
     shift of 0.025. `shift` [mm] moves the whole distribution. `cp` and `cpk` are the capability of a process with a normal
     distribution: 6 sigma = range / cp, and the mean moves by a further range / 2 * (1 - cpk / cp), to the `side` "up" or
-    "down"; by default up, which a check tells where shifts would cancel.
+    "down"; by default up, which a check tells where shifts would cancel. With "either" each lot has its mean on one of the two
+    sides, with equal odds, and each realization takes its part from another lot: the density is the mean of the two.
     `tc.Tolerance(0.6, "uniform")` and `tc.Tolerance(0.6, cp=1.33, cpk=1.0)` are examples.
     `distribution` may also be a frozen continuous distribution of `scipy.stats`. It defines the spread alone; leave
     `range` out.
@@ -112,10 +114,15 @@ class Tolerance(Readable):
 
     @property
     def capability_shift(self) -> float:
-        """The shift [mm] of the mean that `cpk` states, with the sign of its side."""
+        """The shift [mm] of the mean that `cpk` states, with the sign of its side; 0 if it may be on either."""
+        return SIDES.get(self.side, 1.0) * self.off_centre
+
+    @property
+    def off_centre(self) -> float:
+        """The distance [mm] of a lot's mean from the centre, which `cpk` states."""
         if self.cp is None or self.cpk is None:
             return 0.0
-        return SIDES.get(self.side, 1.0) * (float(self.range or 0) / 2 * (1 - self.cpk / self.cp))
+        return float(self.range or 0) / 2 * (1 - self.cpk / self.cp)
 
     @property
     def width(self) -> float:
@@ -140,16 +147,19 @@ class Tolerance(Readable):
         numbers = [(name, value) for name, value in (("cp", self.cp), ("cpk", self.cpk)) if is_length(value)]
         capability = "".join(f", {name} {value:g}" for name, value in numbers)
         if len(numbers) > 1 and is_length(self.range):
-            capability += (
-                f" (mean {'up' if self.capability_shift >= 0 else 'down'} by {abs(self.capability_shift):.4g} {units})"
-            )
+            capability += f" (mean {side_in_words(self.side)} by {self.off_centre:.4g} {units})"
         return spread + capability + (f", shifted by {self.shift:g} {units}" if is_length(self.shift) and self.shift else "")
+
+
+def side_in_words(side: Side | None) -> str:
+    """Return the side of a process's mean in words."""
+    return "up, as assumed," if side is None else "up or down" if side == EITHER else side
 
 
 def side_faults(side: Any, cpk: Any) -> Iterator[str]:
     """Yield the fault of the side of a process's mean."""
     if side not in SIDES:
-        yield f"side is {side!r}; expected up or down"
+        yield f"side is {side!r}; expected up, down or either"
     elif side is not None and cpk is None:
         yield "side is given without cpk, which states how far the mean is off; leave it out"
 
