@@ -48,6 +48,7 @@ class Size(Checked):
     distribution: Distribution = "normal"
     tolerance_class: str = ""
     envelope: bool | None = None
+    parts: int | None = None
 
     def __post_init__(self) -> None:
         if self.lower is not None or not is_length(self.nominal):
@@ -69,9 +70,9 @@ class Size(Checked):
     def tolerance(self) -> Tolerance:
         """The tolerance of deviations from the nominal size [mm]; the limits have to be numbers."""
         if not isinstance(self.distribution, str):
-            return Tolerance(distribution=self.distribution)
+            return Tolerance(distribution=self.distribution, parts=self.parts)
         width, middle = self.upper - self.lower, (self.upper + self.lower) / 2
-        return Tolerance(width, self.distribution, shift=middle, cp=self.cp, cpk=self.cpk, side=self.side)
+        return Tolerance(width, self.distribution, middle, self.cp, self.cpk, self.side, self.parts)
 
     def faults(self) -> Iterator[str]:
         if not is_length(self.nominal):

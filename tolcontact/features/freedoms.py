@@ -61,6 +61,11 @@ class Freedom:
         return np.nan if self.tolerance is None or self.tolerance.range is None else float(self.tolerance.range)
 
     @property
+    def parts(self) -> int:
+        """The number of parts that its distribution was estimated from; 0 if it is known."""
+        return 0 if self.tolerance is None else self.tolerance.parts or 0
+
+    @property
     def mean_shift(self) -> float:
         """The mean of its distribution; NaN if the distribution has none."""
         if self.tolerance is None:

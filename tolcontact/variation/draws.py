@@ -70,9 +70,14 @@ class Draws:
         for freedom in self.contributors:
             if freedom.side_in_words:
                 sides.setdefault(freedom.side_in_words, []).append(freedom.label)
-        for labels in sides.values():
-            labels[MAX_NAMED:] = [f"{len(labels) - MAX_NAMED} more"] * (len(labels) > MAX_NAMED)
-        means = [f"{', '.join(labels)} {side.rstrip(',')}" for side, labels in sides.items()]
+        means = [f"{_shortened(labels)} {side.rstrip(',')}" for side, labels in sides.items()]
+        few: dict[int, list[str]] = {}
+        for freedom in (freedom for freedom in self.contributors if freedom.parts):
+            few.setdefault(freedom.parts, []).append(freedom.label)
+        for (_, values), label in zip(self.populations, self.population_labels, strict=True):
+            few.setdefault(len(values), []).append(label)
+        known = [f"{_shortened(labels)} from {parts} parts" for parts, labels in few.items()]
+        lines += [f"known from few parts, which intervals of measurements include: {'; '.join(known)}"] * bool(known)
         return lines + [f"means off centre by cpk: {'; '.join(means)}"] * bool(means)
 
     def planned(self, name: str) -> "Draws":
@@ -239,6 +244,12 @@ class Draws:
                 distribution = contributor.tolerance or contributor.description
                 fault = f"its distribution, {distribution}, yields non-finite deviations"
                 raise ModelError(self._assembly.name, [f'{contributor.source} "{contributor.label}": {fault}'])
+
+
+def _shortened(labels: list[str]) -> str:
+    """Return the first labels in words, with the number of further ones."""
+    more = len(labels) - MAX_NAMED
+    return ", ".join(labels[:MAX_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def draw(nominal: Nominal, *, seed: int, start: int, stop: int) -> np.ndarray:
