@@ -126,7 +126,7 @@ def test_the_page_of_a_comparison_is_read(runs, width, tmp_path, open_page):
     write_comparison(odd, tc.compare_runs(odd), tmp_path / "runs.html")
     opened = open_page(tmp_path / "runs.html", width, drawn=".js-plotly-plot")
     assert opened.evaluate("document.documentElement.scrollWidth") <= width
-    assert "<img src=x" in opened.locator("ul").inner_text()
+    assert "<img src=x" in opened.locator("ul").first.inner_text()
     y = opened.evaluate("document.querySelectorAll('.chart')[1].data.map((trace) => trace.y.reduce((a, b) => a + b, 0))")
     assert y == pytest.approx([100, 100, 100])
 

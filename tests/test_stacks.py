@@ -223,7 +223,7 @@ def test_links_from_a_table_are_those_of_a_script(kind, tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", 'table "links.csv" cannot be read: it is empty; expected a heading with the names of columns'),
+        ("", "it is empty; expected a heading with the names of columns, and rows below it; its columns are some of: name, "),
         ("name,nominal,tolerance\n", "it has no rows below its heading"),
         ("name,nominl,tolerance\nA,1,0.1\n", 'it has a column "nominl"; the nearest name is "nominal"'),
         ("name,nominal\nA,1\n", 'expected either a column "tolerance", or two, "upper" and "lower"'),
@@ -231,7 +231,7 @@ def test_links_from_a_table_are_those_of_a_script(kind, tmp_path):
         ("name,nominal,nominal,tolerance\nA,1,1,0.1\n", 'it has 2 columns "nominal"; expected one'),
         ("name,nominal,tolerance\nA,one,0.1\n", 'row 2: nominal is "one"; expected a number'),
         ("name,nominal,tolerance\nA,1,0.1\n\nB,#DIV/0!,0.1\n", 'row 4: nominal is "#DIV/0!"; expected a number'),
-        ("name;nominal;tolerance\nA;1,250;0.1\n", 'row 2: nominal is "1,250"; expected a number; write a decimal point'),
+        ("name;nominal;tolerance\nA;1,250;0.1\n", "its comma may separate decimals or thousands: write 1.250 or 1250"),
         ("name,nominal,tolerance\nA,1_0,0.1\n", 'row 2: nominal is "1_0"; expected a number'),
         ("name,nominal,tolerance\nA,1e16,0.1\n", 'row 2: nominal is "1e16"; expected a number up to 1e+15'),
         ("name,nominal,tolerance\nA,1,±1e16\n", 'row 2: tolerance is "±1e16"; expected numbers up to 1e+15'),

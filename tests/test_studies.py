@@ -49,6 +49,7 @@ STUDIES = {
     "round/measure.py": ["--samples", "100", "--to", "."],
     "site/build.py": ["site", "--samples", "20"],
     "verification/intervals.py": ["--repeats", "3", "--sizes", "100"],
+    "verification/parts.py": ["--repetitions", "2", "--samples", "200"],
     "verification/rare.py": ["--seeds", "1", "--samples", "30000", "--only", "two ways", "does not fit"],
 }
 UNCOMPARED = ("cluster.py: cluster", "measure.py: cost", "solvers.py: solvers")  # times, and solvers of other packages

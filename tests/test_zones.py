@@ -10,6 +10,7 @@ import tolcontact as tc
 from tests.cases import Frame, toleranced
 from tests.population_referee import measured_back
 from tolcontact.discretization import discretize
+from tolcontact.features import Freedom
 from tolcontact.variation import Draws
 
 MOVED = Frame(turn=(0.4, -1.1, 2.0), shift=(1000, -700, 300))
@@ -148,8 +149,52 @@ def test_a_mean_shift_has_a_side():
         block = toleranced.block_with("top", tc.Profile(0.3, "A", cp=1.5, cpk=1.2, side=side))
         means = [freedom.mean for freedom in tc.build(block).draws.contributors if freedom.mean]
         assert len(means) == 1 and means[0] * sign > 0
-    assert "side is 'left'; expected up or down" in list(tc.Tolerance(0.2, cp=1, cpk=0.9, side="left").faults())
+    assert "side is 'left'; expected up, down or either" in list(tc.Tolerance(0.2, cp=1, cpk=0.9, side="left").faults())
     assert any("side is given without cpk" in fault for fault in tc.Tolerance(0.2, side="up").faults())
+
+
+EITHER = tc.Tolerance(0.2, cp=1.33, cpk=1.0, side="either")
+EITHER_SIDE = Freedom("part", "variable", EITHER)
+
+
+def test_a_mean_on_either_side_is_a_mixture_of_two_normal_distributions():
+    sd, shift, z = 0.2 / 6 / 1.33, 0.1 * (1 - 1 / 1.33), np.linspace(-0.25, 0.25, 201)
+    shares = (norm.cdf(z, shift, sd) + norm.cdf(z, -shift, sd)) / 2
+    inside = (shares > 1e-12) & (shares < 1 - 1e-6)  # above, shares round to 1
+    assert inside.sum() > 100
+    assert np.abs(EITHER_SIDE.deviations(shares[inside]) - z[inside]).max() < 1e-10
+    u = np.array([2.0**-40, 0.25, 0.375])
+    assert np.array_equal(EITHER_SIDE.deviations(u), -EITHER_SIDE.deviations(1 - u))
+    centred, plain = tc.Tolerance(0.2, cp=1.33, cpk=1.33, side="either"), tc.Tolerance(0.2, cp=1.33)
+    assert np.array_equal(*(Freedom("part", "variable", tolerance).deviations(u) for tolerance in (centred, plain)))
+
+
+def test_lots_on_either_side_widen_a_measure_and_stack_up_arithmetically():
+    a = tc.Stack("play")
+    a.link("left", 10, EITHER)
+    a.link("right", 10, EITHER, sensitivity=-2)
+    a.gap("step", tolerance=0.5)
+    variance, shift = 5 * (0.2 / 6 / 1.33) ** 2, 0.1 * (1 - 1 / 1.33)
+    figures = tc.analyses.stack_up(a, samples=3000)
+    assert figures.lots.values == pytest.approx([3 * shift])
+    assert figures.half_width.sel(approach="worst case").values == pytest.approx([0.3])
+    measured = Draws(discretize(a))(seed=2, start=0, stop=40_000) @ [1, -2]
+    assert abs(measured.mean()) < 5 * measured.std() / 200
+    assert measured.var() == pytest.approx(variance + 5 * shift**2, rel=0.03)  # its own error is 0.4 %
+
+
+def test_the_side_of_a_feature_may_be_unknown():
+    known, either = (
+        tc.build(toleranced.block_with("top", tc.Profile(0.3, "A", cp=1.5, cpk=1.2, side=side))).draws.contributors
+        for side in ("up", "either")
+    )
+    moved = [(one, other) for one, other in zip(known, either, strict=True) if one.mean]
+    assert [other.lot for _, other in moved] == [pytest.approx(0.9)]  # 3 (1.5 - 1.2)
+    for one, other in moved:
+        assert other.lot_distance == pytest.approx(one.mean) and other.mean == 0
+        assert other.variance == pytest.approx(one.spread**2 + one.mean**2)
+    words = tc.build(toleranced.block_with("top", tc.Profile(0.3, "A", cp=1.5, cpk=1.2, side="either"))).draws.in_words
+    assert words == ["means off centre by cpk: block.top.offset up or down"]
 
 
 def test_sides_that_are_assumed_are_told_where_shifts_cancel():

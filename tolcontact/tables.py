@@ -12,9 +12,11 @@ from tolcontact.texts import clipped
 
 MAX_NUMBER = 1e15  # of a length [mm], a force, a stiffness: nothing overflows
 MAX_HEADING_LINES = 20
+EMPTY = "it is empty"
 SEPARATORS = ";\t,"  # of columns, in the order in which they are looked for
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?(?:0?,[0-9]+|[0-9]+,(?:[0-9]{1,2}|[0-9]{4,}))(?:[eE][+-]?[0-9]+)?")  # others: thousands
+_AMBIGUOUS = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
 _COMMENT = re.compile(r"\s*#(?:\s|$)")  # "#DIV/0!" is none
 
 
@@ -34,6 +36,8 @@ def number(cell: str, *, has_decimal_commas: bool = False) -> float:
     if _NUMBER.fullmatch(text) and abs(value := float(text)) <= MAX_NUMBER:
         return value
     advice = "; write a decimal point" if re.fullmatch(r"[+-]?[0-9.]*,[0-9]+", text) else ""
+    if _AMBIGUOUS.fullmatch(text):
+        advice = f"; its comma may separate decimals or thousands: write {text.replace(',', '.')} or {text.replace(',', '')}"
     expected = f"a number up to {MAX_NUMBER:g}" if _NUMBER.fullmatch(text) else "a number"
     actual = f'"{clipped(cell, 40)}"' if cell else "empty"
     raise ValueError(f"is {actual}; expected {expected}{advice}")
@@ -72,7 +76,7 @@ def read_table(path: Path, names: Collection[str] = (), max_bytes: int = MAX_BYT
     stated = re.fullmatch(r'"?sep=([^\w"])"?', lines[heading_index]) if heading_index is not None else None
     heading_index = next(used, None) if stated else heading_index
     if heading_index is None:
-        raise ValueError("it is empty; expected a heading with the names of columns, and rows below it")
+        raise ValueError(f"{EMPTY}; expected a heading with the names of columns, and rows below it")
     head = "\n".join(lines[heading_index : heading_index + MAX_HEADING_LINES])
     unquoted = re.sub(r'"[^"]*(?:"|$)', "", head).partition("\n")[0]
     marks = (mark for mark in SEPARATORS if mark in unquoted and lines[heading_index].strip() not in names)

@@ -41,6 +41,8 @@ def stack_up(
         drawn       (measure)                        value without deviations
         centred     (measure)                        linear value at the centres of all zones
         half_width  (measure, approach)              worst case, RSS, MRSS (Drake) and 1.5 RSS (Bender), about the centred value
+        lots        (measure)                        largest shift of the mean if each lot with side="either" is on the worse
+                                                     side: the sum of slopes times distances of the means from the centre
         simulated   (measure, state, end, interval)  0.135 % and 99.865 % percentiles of a Monte Carlo run
         links       (measure)                        number of contributors that have an effect
         forms       (measure)                        those among them that are forms of faces: they count with 3 sigma in RSS,
@@ -65,6 +67,7 @@ def stack_up(
         "drawn": linear.measures,
         "centred": linear.measures + [row[0] for row in rows],
         "half_width": [row[1] for row in rows],
+        "lots": np.abs(slopes) @ [contributor.lot_distance for contributor in analysis.program.draws.contributors],
         "simulated": [[_ends(measured[:, k, m]) for k in range(len(terms.STATES))] for m in range(len(rows))],
         "links": [row[2] for row in rows],
         "forms": [row[3] for row in rows],

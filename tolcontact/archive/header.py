@@ -262,6 +262,8 @@ def _write_sample(new: Definitions, group: netCDF4.Group, program: Program, *, d
     new.add(group, terms.TOLERANCE_RANGE, [contributor.range for contributor in contributors])
     new.add(group, terms.DISTRIBUTION, [contributor.description for contributor in contributors])
     new.add(group, terms.MEAN_SHIFT, [contributor.mean_shift for contributor in contributors])
+    if any(parts := [contributor.parts for contributor in contributors]):
+        new.add(group, terms.PARTS, parts)
     locators = nominal.locators
     new.add(group, terms.LOCATOR_LABEL, locators.labels)
     new.add(group, terms.STIFFNESS, locators.stiffness)

@@ -59,7 +59,7 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
         "block_rows": np.int64(block_rows(program)),
         **({terms.STANDARD: standards} if (standards := program.nominal.assembly.standards) else {}),
         **({terms.STORED_COORDINATES: program.stored_coordinates} if program.stored_coordinates else {}),
-        **({terms.CORRELATIONS: "\n".join(lines)} if (lines := program.draws.correlations_in_words) else {}),
+        **({terms.CORRELATIONS: "\n".join(lines)} if (lines := program.draws.in_words) else {}),
     }
 
 

@@ -87,7 +87,7 @@ def check(
         common.echo(f"  part {part.name}: {size} mm along x, y, z of the assembly, {len(part.mesh.faces)} triangles")
     for k, pair in enumerate(program.nominal.pairs):
         common.echo(f"  contact {pair.name}: {program.contact_in_words(k)}")
-    for line in program.draws.correlations_in_words:
+    for line in program.draws.in_words:
         common.echo(f"  {line}")
     if program.stored_coordinates:
         common.echo(f"  {program.stored_coordinates}")

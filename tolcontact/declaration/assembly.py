@@ -28,6 +28,7 @@ from tolcontact.declaration.values import (
     text_faults,
     vector as _vector,
 )
+from tolcontact.declaration.widening import widened
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
 
@@ -104,6 +105,17 @@ class Assembly(Causes, Pictured, Checked):
     def effective_method(self) -> Method:
         """The method of the assembly; without one, the default, by which declared forces seat the parts."""
         return self.method or Method(objective="seating" if self.forces else "")
+
+    def widened(self, factor: float, *names: str) -> "Assembly":
+        """Return a copy whose tolerances are `factor` times as wide, each about its centre, as if suppliers were worse.
+
+        `names` choose the tolerances of parts, of single locators and features ("part.feature"), and of variables; by default
+        all are widened. Rows of populations stay as measured, and capabilities keep their Cp and Cpk. Both models have the same
+        draws, so that tc.compare states the differences of two runs by pairs. Raises ValueError for an unknown name.
+
+        `tc.run(model.widened(1.2, "cover"), seed=1)`
+        """
+        return widened(self, factor, names)  # type: ignore[no-any-return]
 
     def replaced(self, **lists: Iterable[Any]) -> "Assembly":
         """Return a copy with other lists, as in replaced(parts=..., pairs=...). Raises TypeError for other names."""

@@ -63,7 +63,7 @@ CODECS[Tolerance] = Choice(
     "Tolerance",
     "a width in mm, a text such as '±0.1', or named values",
     Record(
-        Tolerance, name="Zone", omitted="range shift cp cpk side", floats="shift cpk", range=Plain(NOT_NEGATIVE | str),
+        Tolerance, name="Zone", omitted="range shift cp cpk side parts", floats="shift cpk", range=Plain(NOT_NEGATIVE | str),
         distribution=DISTRIBUTION, cp=Plain(POSITIVE, floats),
     ),
     WIDTH,
@@ -74,7 +74,7 @@ CONTROL = CODECS[Size | GeometricTolerance] = Choice(
     "FeatureTolerance",
     f"kind: one of {', '.join(['size', *KINDS])}",
     Record(
-        Size, kind="size", omitted="tolerance_class envelope side",
+        Size, kind="size", omitted="tolerance_class envelope side parts",
         nominal=Plain(POSITIVE), upper=Plain(float | str), distribution=DISTRIBUTION,
     ),
     *(

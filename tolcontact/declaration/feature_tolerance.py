@@ -119,7 +119,8 @@ class GeometricTolerance(Checked):
                 inside, where components are equal, independent and normal. "6 sigma at the extremes": six standard deviations
                 at the worst extreme of the feature equal the width. "translation": the default without tilts
     cp, cpk     process capability: the spread is divided by `cp`, and the mean is shifted until `cpk` results
-    side        "up" or "down": the sense of this shift in the first freedom that the tolerance adds, such as "offset"
+    side        "up", "down" or "either": the sense of this shift in the first freedom that the tolerance adds, such as
+                "shift x", or "offset", which points out of the material; for "either" see tc.Tolerance
     """
 
     of: ToleranceKind

@@ -28,9 +28,10 @@ class Size(Checked):
     "H7")` with a `tolerance_class` of ISO 286-1. Sizes vary about the midpoint of the limits by `distribution` (see
     tc.Tolerance). `moves` states which of two planes moves with the size: "both" by half each (default), or the "first" or
     "second" alone. `cp` and `cpk` are the capability of its process: by default six standard deviations equal `upper` less
-    `lower`, with the mean in their middle; `side` is the side that the mean is on, "up" or "down". With `envelope` the form of
-    the feature stays inside the envelope of perfect form at maximum material (ISO 8015, ASME Y14.5 Rule #1); by default as the
-    `standard` of its part has it.
+    `lower`, with the mean in their middle; `side` is the side that the mean is on, "up", "down" or "either" (see
+    tc.Tolerance). `parts` is the number of parts that a mean and a standard deviation as its distribution come from (see
+    tc.Tolerance). With `envelope` the form of the feature stays inside the envelope of perfect form at maximum material (ISO
+    8015, ASME Y14.5 Rule #1); by default as the `standard` of its part has it.
     """
 
     kind: ClassVar[str] = "size"
@@ -48,6 +49,7 @@ class Size(Checked):
     distribution: Distribution = "normal"
     tolerance_class: str = ""
     envelope: bool | None = None
+    parts: int | None = None
 
     def __post_init__(self) -> None:
         if self.lower is not None or not is_length(self.nominal):
@@ -69,9 +71,9 @@ class Size(Checked):
     def tolerance(self) -> Tolerance:
         """The tolerance of deviations from the nominal size [mm]; the limits have to be numbers."""
         if not isinstance(self.distribution, str):
-            return Tolerance(distribution=self.distribution)
+            return Tolerance(distribution=self.distribution, parts=self.parts)
         width, middle = self.upper - self.lower, (self.upper + self.lower) / 2
-        return Tolerance(width, self.distribution, shift=middle, cp=self.cp, cpk=self.cpk, side=self.side)
+        return Tolerance(width, self.distribution, middle, self.cp, self.cpk, self.side, self.parts)
 
     def faults(self) -> Iterator[str]:
         if not is_length(self.nominal):

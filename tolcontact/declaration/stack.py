@@ -15,7 +15,7 @@ from tolcontact.declaration.values import is_length
 from tolcontact.declaration.written_tolerance import TextFault, written
 from tolcontact.errors import Faults, ModelError, nearest_name
 from tolcontact.input_files import check_inputs
-from tolcontact.tables import Table, number, read_table
+from tolcontact.tables import EMPTY, Table, number, read_table
 from tolcontact.texts import shown
 
 GAP = "gap "  # heading of a column with the sensitivities of a gap
@@ -118,7 +118,8 @@ def _table(path: Path, stack: str) -> Table:
         return table._replace(heading=heading)
     except (OSError, ValueError, ImportError) as error:
         remedy = '; install it: pip install "tolcontact[xlsx]"' if isinstance(error, ImportError) else ""
-        raise ModelError(stack, [f'table "{shown(path.name)}" cannot be read: {str(error).splitlines()[0]}{remedy}']) from error
+        fault = str(error).splitlines()[0] + (f"; its columns are some of: {', '.join(COLUMNS)}" if EMPTY in str(error) else "")
+        raise ModelError(stack, [f'table "{shown(path.name)}" cannot be read: {fault}{remedy}']) from error
 
 
 def _workbook(path: Path) -> Table:

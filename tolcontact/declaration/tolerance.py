@@ -15,12 +15,14 @@ from tolcontact.readable import Readable
 from tolcontact.tables import MAX_NUMBER
 
 MAX_DRAW_SECONDS = 0.01
+MIN_PARTS = 5
 DRAWN = (0.1, 0.4, 0.9)
 Shape = Literal["normal", "uniform", "triangular", "truncated normal"]
 Distribution = Shape | Any  # or a frozen distribution of scipy.stats
 SHAPES = get_args(Shape)
-Side = Literal["up", "down"]  # to which a process is off its centre
-SIDES: dict[Any, float] = {None: 1.0, "up": 1.0, "down": -1.0}
+Side = Literal["up", "down", "either"]  # to which a process is off its centre
+EITHER = "either"
+SIDES: dict[Any, float] = {None: 1.0, "up": 1.0, "down": -1.0, EITHER: 0.0}
 
 
 @dataclass(frozen=True, repr=False)
@@ -35,10 +37,13 @@ class Tolerance(Readable):
     The range may be written as on drawings: "±0.1" has the range 0.2, and "+0.1/-0.05" or (-0.05, 0.1) the range 0.15 with a
     shift of 0.025. `shift` [mm] moves the whole distribution. `cp` and `cpk` are the capability of a process with a normal
     distribution: 6 sigma = range / cp, and the mean moves by a further range / 2 * (1 - cpk / cp), to the `side` "up" or
-    "down"; by default up, which a check tells where shifts would cancel.
+    "down"; by default up, which a check tells where shifts would cancel. With "either" each lot has its mean on one of the two
+    sides, with equal odds, and each realization takes its part from another lot: the density is the mean of the two.
     `tc.Tolerance(0.6, "uniform")` and `tc.Tolerance(0.6, cp=1.33, cpk=1.0)` are examples.
     `distribution` may also be a frozen continuous distribution of `scipy.stats`. It defines the spread alone; leave
-    `range` out.
+    `range` out. A supplier's mean 0.012 and standard deviation 0.008 of 30 parts are
+    `tc.Tolerance(distribution=scipy.stats.norm(0.012, 0.008), parts=30)`: with the number of `parts`, 5 or more, the intervals
+    of results include what so few parts leave open (see tolcontact.statistics).
     """
 
     range: float | None = None  # a text or a pair only if it is no tolerance
@@ -47,6 +52,7 @@ class Tolerance(Readable):
     cp: float | None = None
     cpk: float | None = None
     side: Side | None = None
+    parts: int | None = None
 
     def __post_init__(self) -> None:
         with contextlib.suppress(TextFault):  # faults() reports it
@@ -80,6 +86,7 @@ class Tolerance(Readable):
             yield f"cpk is {self.cpk!r} with cp {self.cp!r}; expected cp, and cpk not above it"
 
         yield from side_faults(self.side, self.cpk)
+        yield from parts_faults(self.parts, self.distribution)
 
     def _scipy_faults(self) -> Iterator[str]:
         frozen = self.frozen
@@ -112,10 +119,15 @@ class Tolerance(Readable):
 
     @property
     def capability_shift(self) -> float:
-        """The shift [mm] of the mean that `cpk` states, with the sign of its side."""
+        """The shift [mm] of the mean that `cpk` states, with the sign of its side; 0 if it may be on either."""
+        return SIDES.get(self.side, 1.0) * self.off_centre
+
+    @property
+    def off_centre(self) -> float:
+        """The distance [mm] of a lot's mean from the centre, which `cpk` states."""
         if self.cp is None or self.cpk is None:
             return 0.0
-        return SIDES.get(self.side, 1.0) * (float(self.range or 0) / 2 * (1 - self.cpk / self.cp))
+        return float(self.range or 0) / 2 * (1 - self.cpk / self.cp)
 
     @property
     def width(self) -> float:
@@ -134,24 +146,39 @@ class Tolerance(Readable):
         """Return the tolerance in words, of a variable with these units."""
         if hasattr(self.frozen, "dist"):
             spread = f"scipy.stats.{self.frozen.dist.name}"
+            if self.parts:
+                spread = f"mean {self.frozen.mean():g}, standard deviation {self.frozen.std():g} {units} of {self.parts} parts"
         else:
             width = f"{self.range:g} {units}" if is_length(self.range) else repr(self.range)
             spread = f"{self.distribution}, full width {width}"
         numbers = [(name, value) for name, value in (("cp", self.cp), ("cpk", self.cpk)) if is_length(value)]
         capability = "".join(f", {name} {value:g}" for name, value in numbers)
         if len(numbers) > 1 and is_length(self.range):
-            capability += (
-                f" (mean {'up' if self.capability_shift >= 0 else 'down'} by {abs(self.capability_shift):.4g} {units})"
-            )
+            capability += f" (mean {side_in_words(self.side)} by {self.off_centre:.4g} {units})"
         return spread + capability + (f", shifted by {self.shift:g} {units}" if is_length(self.shift) and self.shift else "")
+
+
+def side_in_words(side: Side | None) -> str:
+    """Return the side of a process's mean in words."""
+    return "up, as assumed," if side is None else "up or down" if side == EITHER else side
 
 
 def side_faults(side: Any, cpk: Any) -> Iterator[str]:
     """Yield the fault of the side of a process's mean."""
     if side not in SIDES:
-        yield f"side is {side!r}; expected up or down"
+        yield f"side is {side!r}; expected up, down or either"
     elif side is not None and cpk is None:
         yield "side is given without cpk, which states how far the mean is off; leave it out"
+
+
+def parts_faults(parts: Any, distribution: Any) -> Iterator[str]:
+    """Yield the fault of a number of parts that a distribution was estimated from."""
+    if parts is None:
+        return
+    if not (type(parts) is int and parts >= MIN_PARTS):
+        yield f"parts is {parts!r}; expected a whole number, {MIN_PARTS} or more: fewer do not show a standard deviation"
+    if getattr(getattr(distribution, "dist", None), "name", "") != "norm":
+        yield "parts is given, which goes with a mean and a standard deviation: distribution=scipy.stats.norm(mean, sd)"
 
 
 def tolerance(value: Any) -> Tolerance:

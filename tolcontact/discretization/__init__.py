@@ -7,11 +7,12 @@ from tolcontact.discretization.coordinates_in_words import coordinates_in_words
 from tolcontact.discretization.discretizing import discretize
 from tolcontact.discretization.form_places import FIRST_POINT, raised_places, rim_points
 from tolcontact.discretization.locators import Locators, NominalPart
+from tolcontact.discretization.measured_planes import MeasuredPlanes, measured_planes
 from tolcontact.discretization.nominal import ContactPoints, Nominal
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_points import RoundPoint, RoundPoints
 
 __all__ = [
-    "FIRST_POINT", "ContactPoints", "Locators", "Nominal", "NominalPart", "Offsets", "RoundPoint",
-    "RoundPoints", "coordinates_in_words", "discretize", "raised_places", "rim_points",
+    "FIRST_POINT", "ContactPoints", "Locators", "MeasuredPlanes", "Nominal", "NominalPart", "Offsets", "RoundPoint",
+    "RoundPoints", "coordinates_in_words", "discretize", "measured_planes", "raised_places", "rim_points",
 ]  # fmt: skip

@@ -104,7 +104,10 @@ def _scan(cloud: np.ndarray, path: str, face: Surface, everywhere: np.ndarray, a
     feet = associated.surface.project(cloud)
     _, distinct = np.unique(feet.round(DIGITS), axis=0, return_index=True)
     if len(distinct) < MIN_POINTS:
-        raise GeometryFault(f'"{path}" has {len(distinct)} points; expected at least {MIN_POINTS}, all over the face')
+        raise GeometryFault(
+            f'"{path}" has {len(distinct)} points; expected at least {MIN_POINTS}, all over the face, for its '
+            "form; tc.io.measured_planes(...) takes a plane without form from 3 or more"
+        )
     distance = float(scipy.spatial.KDTree(feet).query(everywhere)[0].max())
     if distance > face.mesh.scale / 4:
         raise GeometryFault(

@@ -208,7 +208,7 @@ def assumed_sides(draws: TrialDraws) -> Iterator[str]:
             yield (
                 f"{measure.designation}: the means of {count} contributors are assumed to be above the centre by cpk, which "
                 f"moves it by {assumed:.3g} {measure.units}; if their sides are unknown, by up to ±{largest:.3g}; state them, "
-                'side="up" or "down"'
+                'side="up", "down" or "either"'
             )
 
 

@@ -1,17 +1,19 @@
 """Comparisons of runs, and of solvers, as text."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import xarray as xr
 from rich.console import Group
 from rich.text import Text
 
 from tolcontact import vocabulary as terms
+from tolcontact.report.contributor_shares import ContributorShares
 from tolcontact.report.figures import grouped, number, percent, settled
 from tolcontact.report.table import Table
 
 VALUES = ("", "mean", "6 sigma", terms.PPK, terms.OUT_OF_SPECIFICATION_COLUMN)
+MAX_CONTRIBUTORS = 5  # of a run
 CHANGES = ("", "shift of mean", "6 sigma", f"{terms.OUT_OF_SPECIFICATION_COLUMN},\npoints", "largest\ndifference")
 _DRAWS = {
     terms.SAME_DRAWS: "the same draws; changes are from the same realizations",
@@ -79,6 +81,15 @@ def change_table(measure: xr.Dataset) -> Table:
             cells = [number(mean, sign=True), percent(ratio - 1, sign=True), percent(outside, sign=True)]
             rows.append([f"  {terms.WORD_OF_STATE[state]}", *cells, f"{furthest:.2g}" if math.isfinite(furthest) else "-"])
     return Table("", CHANGES, rows)
+
+
+def contributor_table(shares: Mapping[str, ContributorShares]) -> Table:
+    """Return the largest contributors of a measure in each run, by their share of its variance; no rows without shares."""
+    by_run = {run: dict(zip(of_run.groups, of_run.shares, strict=True)) for run, of_run in shares.items()}
+    largest = dict.fromkeys(group for of_run in by_run.values() for group in list(of_run)[:MAX_CONTRIBUTORS])
+    missing = [math.nan] * len(terms.ESTIMATE)
+    rows = [[group, *(percent(of_run.get(group, missing)) for of_run in by_run.values())] for group in largest]
+    return Table("Contributors, share of the variance with contact", ["", *by_run], rows)
 
 
 def _depth(run: xr.Dataset, state: str) -> str:

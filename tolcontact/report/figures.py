@@ -49,13 +49,14 @@ def limits_text(measure: xr.Dataset) -> str:
 def number(values: object, *, sign: bool = False, max_decimals: int = MAX_DECIMALS) -> str:
     """Return `estimate [lower, upper]` with the decimals that its width supports; "-" without an estimate.
 
-    An estimate without an interval has four digits, and says so.
+    An estimate without an interval has two significant digits, and says so.
     """
     estimate, lower, upper = (float(v) for v in values)  # type: ignore[attr-defined]
     if not math.isfinite(estimate):
         return "-"
     if math.isnan(lower) and math.isnan(upper):
-        return f"{estimate:{'+' if sign else ''}.4g} {NO_INTERVAL}"
+        decimals = 1 - math.floor(math.log10(abs(estimate))) if estimate else 0
+        return f"{_rounded(estimate, decimals):{'+' if sign else ''}.{max(decimals, 0)}f} {NO_INTERVAL}"
     finite = [abs(bound - estimate) for bound in (lower, upper) if math.isfinite(bound)]
     width = max(finite, default=0.0)
     decimals = (

@@ -52,6 +52,8 @@ def _remarks(dataset: xr.Dataset, centred: float, rss: float) -> Iterator[str]:
         return
     if int(dataset["forms"]):
         yield f"RSS has {int(dataset['forms'])} forms of faces with 3 sigma; worst case and MRSS have no figure for them."
+    if lots := float(dataset.get("lots", 0.0)):  # archives of earlier versions have none
+        yield f"Lots with their means on either side shift the mean by up to ±{lots:.4g}, if all are on the worse one."
     states = dict(terms.WORD_OF_STATE)
     if _is_without_contact(dataset):
         states.pop(terms.STATES[0])

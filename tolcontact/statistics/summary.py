@@ -12,8 +12,10 @@ from tolcontact.readable import Pictured
 from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import contact, convention, intervals
 from tolcontact.statistics.contact import surface_values
+from tolcontact.statistics.few_parts import worlds_of
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.measure_statistics import STATISTICS, MeasuredValues, limits, measure_estimates
+from tolcontact.statistics.parts_intervals import with_few_parts
 from tolcontact.vocabulary import ArchiveVariable
 
 MIN_REALIZATIONS = 2
@@ -81,6 +83,8 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
     rows = results.to_dataset().isel({terms.REALIZATION: slice(count)})
     combinations, smallest = contact.combinations(rows), _smallest_range(results, rows)
     statistics, changes, notes = measure_estimates(rows)
+    if worlds := worlds_of(results, count):
+        statistics, changes = with_few_parts(rows, worlds, statistics, changes)
     rigid, (clashes, clash_names) = _is_rigid(results), contact.clashes(rows)
     values = {
         terms.STATISTIC_VALUE: statistics,

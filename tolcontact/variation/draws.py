@@ -20,6 +20,7 @@ from tolcontact.variation.spreads import envelopes, fill_zones
 from tolcontact.vocabulary import MONTE_CARLO
 
 MIN_UNIFORM = 1e-16  # smallest distance of a number from 0 and 1
+MAX_NAMED = 4  # contributors with means on one side
 ROUNDING = 1e-12  # of a column: independent deviations that are no larger are what sums leave over
 
 
@@ -59,12 +60,25 @@ class Draws:
         return copula_matrix(correlation, freedoms, self._assembly.name)
 
     @property
-    def correlations_in_words(self) -> list[str]:
-        """A line for each correlation: its coefficient of the copula, of deviations and of ranks."""
-        return [
+    def in_words(self) -> list[str]:
+        """A line for each correlation: its coefficient of the copula, of deviations and of ranks; and one on means by cpk."""
+        lines = [
             in_words(correlation, self._copula(correlation), [self.contributors[self._column[k]] for k in correlation.labels])
             for correlation in self._assembly.correlations
         ]
+        sides: dict[str, list[str]] = {}
+        for freedom in self.contributors:
+            if freedom.side_in_words:
+                sides.setdefault(freedom.side_in_words, []).append(freedom.label)
+        means = [f"{_shortened(labels)} {side.rstrip(',')}" for side, labels in sides.items()]
+        few: dict[int, list[str]] = {}
+        for freedom in (freedom for freedom in self.contributors if freedom.parts):
+            few.setdefault(freedom.parts, []).append(freedom.label)
+        for (_, values), label in zip(self.populations, self.population_labels, strict=True):
+            few.setdefault(len(values), []).append(label)
+        known = [f"{_shortened(labels)} from {parts} parts" for parts, labels in few.items()]
+        lines += [f"known from few parts, which intervals of measurements include: {'; '.join(known)}"] * bool(known)
+        return lines + [f"means off centre by cpk: {'; '.join(means)}"] * bool(means)
 
     def planned(self, name: str) -> "Draws":
         """Return draws of the same contributors by a sampling plan (see plans)."""
@@ -230,6 +244,12 @@ class Draws:
                 distribution = contributor.tolerance or contributor.description
                 fault = f"its distribution, {distribution}, yields non-finite deviations"
                 raise ModelError(self._assembly.name, [f'{contributor.source} "{contributor.label}": {fault}'])
+
+
+def _shortened(labels: list[str]) -> str:
+    """Return the first labels in words, with the number of further ones."""
+    more = len(labels) - MAX_NAMED
+    return ", ".join(labels[:MAX_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def draw(nominal: Nominal, *, seed: int, start: int, stop: int) -> np.ndarray:

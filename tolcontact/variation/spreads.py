@@ -14,6 +14,7 @@ from tolcontact.declaration.tolerance import SIDES
 from tolcontact.discretization import Nominal
 from tolcontact.errors import GeometryFault, ModelError, designation
 from tolcontact.features import FeatureOfSize, FormField, Freedom, Layer, NominalPattern
+from tolcontact.features.freedoms import lot_score
 from tolcontact.features.minimum_zone import ZoneMember, minimum_widths
 from tolcontact.features.tolerance_kinds import floats, includes_form
 from tolcontact.geometry.tolerances import MIN_PART
@@ -185,6 +186,7 @@ def _fill_layers(
     """
     basis, spreads, columns = np.zeros((pattern.count, 0)), np.zeros(0), np.zeros(0, dtype=int)
     for layer in pattern.layers:
+        lots = np.zeros(layer.added.shape[1])
         inner_count, count, tolerance = len(spreads), layer.added.shape[1], layer.tolerance
         if not count:
             continue
@@ -209,8 +211,11 @@ def _fill_layers(
             yield zone if not tolerance.material else _with_bonus(zone, pattern, members, group, tolerance.material)
             if tolerance.cpk is not None:
                 means[added[:1] - inner_count] += SIDES[tolerance.side] * (3 * spread * (1 - tolerance.cpk / tolerance.cp))
-        for column, mean, middle in zip(layer.columns, means, middles[inner_count:], strict=True):
-            freedoms[column] = replace(freedoms[column], spread=spread / tolerance.cp, mean=float(mean), middle=float(middle))
+                lots[added[:1] - inner_count] = lot_score(tolerance)
+        for column, mean, middle, lot in zip(layer.columns, means, middles[inner_count:], lots, strict=True):
+            freedoms[column] = replace(
+                freedoms[column], spread=spread / tolerance.cp, mean=float(mean), middle=float(middle), lot=float(lot)
+            )
 
 
 def _member_zones(

@@ -182,6 +182,7 @@ STACK_UP = AnalysisRecord(
         variable("f8 drawn(measure)", "value without deviations"),
         variable("f8 centred(measure)", "linear value at the centres of all zones"),
         variable("f8 half_width(measure, approach)", "half of the range about the centred value, by linear sensitivities"),
+        variable("f8 lots(measure)", "largest shift of the mean by lots with means on either side, by linear sensitivities"),
         variable("f8 simulated(measure, state, end, interval)", "0.135 % and 99.865 % percentiles of the realizations"),
         variable("i8 links(measure)", "number of contributors that have an effect", "1"),
         variable("i8 forms(measure)", "number of forms of faces among them", "1"),

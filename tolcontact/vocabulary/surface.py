@@ -80,7 +80,9 @@ SURFACE = (
 )  # fmt: skip
 
 
-CORRELATIONS = "correlations"  # attribute of archives and summaries: coefficients of each kind, a line for each correlation
+CORRELATIONS = (
+    "correlations"  # attribute of archives and summaries: lines on coefficients of each kind, sides of means and few parts
+)
 STORED_COORDINATES = "stored_coordinates"  # attribute of archives and summaries: how exactly files store which parts
 STATED_ERROR_SHARE = 1e-4  # of the smallest tolerance range: a larger error of coordinates in files is reported
 

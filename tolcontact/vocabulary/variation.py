@@ -23,6 +23,7 @@ DISTRIBUTION = variable(
     "str distribution(contributor)",
     "distribution of the deviation; of a feature its tolerance, and the rule from zone to spread",
 )
+PARTS = variable("i8 parts(contributor)", "number of parts that its distribution was estimated from; 0 if it is known", "1")
 MEAN_SHIFT = variable(
     "f8 mean_shift(contributor)", "mean of the contributor's own distribution, without what shared variables add to it", "mm"
 )

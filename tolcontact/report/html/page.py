@@ -17,16 +17,18 @@ from tolcontact.declaration import Assembly, Chain, TitleBlock
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.discretization import Nominal, discretize
 from tolcontact.errors import ArchiveError, ModelError
+from tolcontact.realizations import finished
 from tolcontact.replacing import replacing
 from tolcontact.report.analysis_tables import analysis_report
 from tolcontact.report.archived_analysis import archived_analysis
-from tolcontact.report.comparison_text import change_table, runs_lines, value_table
+from tolcontact.report.comparison_text import change_table, contributor_table, runs_lines, value_table
 from tolcontact.report.contributor_shares import ContributorShares, contributor_shares
 from tolcontact.report.convention_text import offset_table
 from tolcontact.report.figures import grouped, limits_text
 from tolcontact.report.html.charts import bars_of, charts_of, compared_charts, relations_of
 from tolcontact.report.html.loop import loops_of
 from tolcontact.report.html.scene import gap_rows, scene_of, view_of
+from tolcontact.report.model_changes import model_changes
 from tolcontact.report.model_tables import archived_settings, chains_of, declaration_of, dimensions_of, model_tables
 from tolcontact.report.results_table import COLUMNS, SIDES, result_rows, share_heading
 from tolcontact.report.summary_text import contact_lines, measure_table, pair_table
@@ -55,6 +57,7 @@ WORDS = {
     "contributors_heading": terms.CONTRIBUTORS, "settings_heading": terms.SIMULATION_SETTINGS,
 }  # fmt: skip
 MAX_BARS = 15  # of a chart
+MAX_CHANGES = 30  # of a model, that a comparison lists
 CASES_NOTE = "Those with contact are the first of the single realizations above."
 
 
@@ -88,7 +91,7 @@ def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock |
     values = {
         "title": summary.attrs["title"],
         "titles": titles,
-        "block": {word: entry for name, word in TITLE_ENTRIES.items() if (entry := titles.entries[name])},
+        "block": _block(results, titles),
         "realizations": grouped(summary.attrs["realizations"]),
         "begun": grouped(summary.attrs["samples"]) if summary.attrs["samples"] > summary.attrs["realizations"] else "",
         "results": _results(summary),
@@ -152,18 +155,36 @@ def _file(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) ->
 
 def comparison_page(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> str:
     """Return the comparison of runs as a page."""
-    measures = []
+    measures, (reference, *others) = [], runs
+    documents = {name: declaration_of(results) for name, results in runs.items()}
+    shares = {name: _shares_by_measure(results) for name, results in runs.items()}
     for name in comparison["measure"].values:
         measure = comparison.sel(measure=name)
-        tables = [value_table(measure), change_table(measure)]
+        contributors = contributor_table({run: of_run[str(name)] for run, of_run in shares.items()})
+        tables = [value_table(measure), change_table(measure), *([contributors] if contributors.rows else [])]
         measures.append({"name": str(name), "units": str(measure["measure_units"].values), "tables": tables})
     values = {
         "title": comparison.attrs["title"],
         "reference": comparison.attrs["reference_run"],
         "lines": list(runs_lines(comparison)),
+        "blocks": {name: _block(results, title_block_of(results.attrs)) for name, results in runs.items()},
+        "changes": {name: list(model_changes(documents[reference], documents[name])) for name in others},
+        "max_changes": MAX_CHANGES,
         "measures": measures,
     }
     return _page("compare", values, {"charts": compared_charts(runs, comparison)})
+
+
+def _block(results: xr.DataTree, titles: TitleBlock) -> dict[str, str]:
+    """Return what identifies a run: entries of a title block, the standard of the drawings, and the seed."""
+    entries = {word: titles.entries[name] for name, word in TITLE_ENTRIES.items()}
+    entries |= {"standard": str(results.attrs.get(terms.STANDARD, "")), "seed": str(results.attrs["seed"])}
+    return {word: entry for word, entry in entries.items() if entry}
+
+
+def _shares_by_measure(results: xr.DataTree) -> dict[str, ContributorShares]:
+    names = map(str, results.to_dataset()[terms.MEASURE].values)
+    return dict(zip(names, contributor_shares(results, finished(results)), strict=True))
 
 
 def summary_table(summary: xr.Dataset) -> str:

@@ -1,0 +1,122 @@
+"""Intervals that include what few measured parts leave open, against closed forms and nested simulation."""
+
+import numpy as np
+import pytest
+from scipy import optimize, stats
+
+import tolcontact as tc
+
+PARTS, MEAN, SD = 30, 0.01, 0.02
+OTHERS = {"Z2": (0, 0, 0), "Z3": (20, 0, 0), "Y1": (0, 0, 5), "Y2": (20, 0, 5), "X1": (0, 10, 5)}
+FIGURES = ["mean", "6 sigma", "outside limits", "Ppk as normal"]
+
+
+def exact_upper(hits, count):
+    """Return the upper bound of Clopper and Pearson."""
+    return stats.beta.ppf(0.975, hits + 1, count - hits)
+
+
+def supplied(count=1, parts=PARTS, limits=(None, 0.06)):
+    stack = tc.Stack("supplied")
+    for k in range(count):
+        stack.link(f"link {k}", 0, tc.Tolerance(distribution=stats.norm(MEAN, SD), parts=parts))
+    stack.gap("gap", limits=limits)
+    return stack
+
+
+def figures(model, samples=10_000, measure="gap"):
+    """Return the FIGURES (figure, interval) of a measure."""
+    summary = tc.summarize(tc.run(model, samples=samples, seed=3))
+    return summary.statistic_value.sel(measure=measure, state="corrected", statistic=FIGURES).values
+
+
+def test_intervals_of_one_contributor_are_those_of_its_parts():
+    mean, six_sigma, share, index = figures(supplied(), samples=40_000)
+    half = stats.t(PARTS - 1).ppf(0.975) * SD / np.sqrt(PARTS)
+    assert np.allclose(mean[1:] - mean[0], [-half, half], atol=0.04 * half)
+    ends = 6 * SD * np.sqrt((PARTS - 1) / stats.chi2(PARTS - 1).ppf([0.975, 0.025]))
+    assert np.allclose(six_sigma[1:], ends, rtol=0.04)
+    k = (0.06 - MEAN) / SD  # the exact interval of a normal share: noncentral t
+    exact = [
+        stats.norm.sf(optimize.brentq(lambda z, q=q: stats.nct.cdf(k * PARTS**0.5, PARTS - 1, z * PARTS**0.5) - q, 0, 6))
+        for q in (0.025, 0.975)
+    ]
+    assert np.allclose(np.log(share[1:]), np.log(exact), atol=0.3)  # it also has the error of the run
+    assert share[2] > 4 * share[0] > 2 * exact_upper(share[0] * 40_000, 40_000)
+    assert np.allclose(index[1:], stats.norm.isf(share[:0:-1]) / 3, rtol=0.05)
+
+
+def test_many_parts_leave_nothing_open():
+    few, many, none = (figures(supplied(parts=parts)) for parts in (PARTS, 1_000_000, None))
+    assert np.array_equal(few[:, 0], none[:, 0])
+    assert np.allclose(many, none, rtol=5e-3, atol=1e-4)
+    assert ((few[:, 2] - few[:, 1]) > 1.5 * (none[:, 2] - none[:, 1])).all()
+
+
+def test_nested_simulation_gives_the_same_intervals_of_a_value_that_stops():
+    """y = max(x1 - x2, 0) as contact makes it: parts are drawn anew, and their stack is simulated, by other code."""
+    play = tc.Assembly("stop")
+    base = play.part("base", tc.Box(40, 40, 10), fixed=True)
+    block = play.part("block", tc.Box(20, 20, 10), at=(10, 10, 10))
+    tolerance = tc.Tolerance(distribution=stats.norm(0.002, SD), parts=PARTS)
+    play.variable("lift", tolerance, drives={f"block.A{k}": 1 for k in (1, 2, 3)})
+    play.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=2), tolerance=0)
+    play.contact("seat", moving=block.face("-z"), reference=base.face("+z"))
+    play.measure("gap", block.point(10, 10, 0), along="z", limits=(None, 0.05))
+    mean, six_sigma, share, _ = figures(play, samples=15_000)
+    rng, z = np.random.default_rng(5), stats.norm.ppf((np.arange(3000) + 0.5) / 3000)
+    nested = []
+    for _ in range(2000):
+        sigma = SD * np.sqrt((PARTS - 1) / rng.chisquare(PARTS - 1))
+        y = np.maximum(0.002 + sigma * rng.standard_normal() / np.sqrt(PARTS) + sigma * z, 0)
+        nested.append([y.mean(), 6 * y.std(), (y > 0.05).mean()])
+    ends = np.quantile(nested, [0.025, 0.975], axis=0).T
+    assert np.allclose(np.log([mean[1:], six_sigma[1:]]), np.log(ends[:2]), atol=0.12)
+    assert share[2] == pytest.approx(ends[2, 1], rel=0.15)
+
+
+def test_a_share_of_a_population_is_known_as_well_as_its_parts_are():
+    values = np.round(stats.norm(0, SD).ppf((np.arange(PARTS) + 0.5) / PARTS), 4)
+    stack = tc.Stack("population")
+    stack.link("measured", 0, 0.1)
+    stack.link("other", 0, 0.1)
+    stack.gap("gap", {"measured": 1}, limits=(-0.1, 0.1))
+    stack.gap("far", {"other": 1}, limits=(-0.1, 0.1))
+    stack.population({"measured": values})
+    upper = exact_upper(0, PARTS)
+    assert figures(stack)[2, 2] == pytest.approx(upper, rel=0.02)
+    assert figures(stack, measure="far")[2, 2] == pytest.approx(exact_upper(0, 10_000), rel=1e-12)
+    sigma = figures(stack)[1]
+    assert 0.7 < sigma[1] / sigma[0] < 0.9
+    assert 1.1 < sigma[2] / sigma[0] < 1.3
+
+
+def test_causes_are_no_parts():
+    """What a shared cause adds to a contributor does not widen its own figures."""
+    seat = tc.Assembly("seat")
+    block = seat.part("block", tc.Box(20, 20, 10))
+    known = tc.Tolerance(distribution=stats.norm(MEAN, SD), parts=PARTS)
+    lift = tc.Locator("Z1", (10, 10, 0), "z", known)
+    others = [tc.Locator(name, point, name[0].lower(), 0) for name, point in OTHERS.items()]
+    seat.locate(block, [lift, *others])
+    seat.variable("heat", tc.Tolerance(distribution=stats.norm(0, 0.05)), drives={"block.Z1": 1})
+    seat.measure("gap", block.point(10, 10, 0), along="z", limits=(None, 0.06))
+    mean = figures(seat)[0]
+    of_run = 1.96 * np.hypot(SD, 0.05) / 100
+    half = stats.t(PARTS - 1).ppf(0.975) * SD / np.sqrt(PARTS)
+    assert mean[2] - mean[0] == pytest.approx(np.hypot(of_run, half), rel=0.1)
+
+
+def test_parts_are_declared_kept_and_told():
+    model = supplied(count=6)
+    assert str(model.variables[0].tolerance) == "mean 0.01, standard deviation 0.02 mm of 30 parts"
+    (line,) = tc.build(model).draws.in_words
+    assert line.endswith("include: link 0, link 1, link 2, link 3 and 2 more from 30 parts")
+    faults = {
+        tc.Tolerance(distribution=stats.norm(0, 1), parts=4): "parts is 4; expected a whole number, 5 or more",
+        tc.Tolerance(0.2, parts=30): r"parts is given, which goes with a mean and a standard deviation: distribution=scipy",
+    }
+    for tolerance, fault in faults.items():
+        assert any(fault in text for text in tolerance.faults())
+    bore = tc.Size(8, "H7", distribution=stats.norm(0.007, 0.002), parts=30)
+    assert bore.tolerance.parts == 30 and not list(bore.faults())

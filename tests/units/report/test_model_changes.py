@@ -1,0 +1,14 @@
+"""Changes of a model by the documents in two archives."""
+
+from tolcontact.report.model_changes import model_changes
+
+
+def test_changes_are_by_name_and_moved_lines_do_not_count():
+    assert list(model_changes({"a": [{"name": "x", "declared_at": "1"}]}, {"a": [{"name": "x", "declared_at": "2"}]})) == []
+    before = {"parts": [{"name": "p", "at": [0, 0]}, {"name": "q"}], "mu": 0.1}
+    after = {"parts": [{"name": "q"}, {"name": "p", "at": [0, 1]}, {"name": "q"}], "mu": None}
+    assert list(model_changes(before, after)) == [
+        "parts, p, at: [0, 0], now [0, 1]",
+        "parts, q 3: added (q)",
+        "mu: 0.1, now null",
+    ]

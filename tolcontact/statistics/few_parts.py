@@ -1,0 +1,168 @@
+"""What few measured parts leave open about a result: posterior draws of contributors, as weights of realizations.
+
+A supplier states a mean m and a standard deviation s of n parts, from a normal distribution. With the prior 1 / sigma, whose
+intervals of mean, sigma and any quantile have their coverage exactly, the posterior is
+
+    sigma^2 = (n - 1) s^2 / chi^2(n - 1),     mu = m + sigma N(0, 1) / n^(1/2).
+
+A `world` is one draw of all means and sigmas. The realizations of the run, drawn at m and s, have the density of another world
+with weights. A measurement y depends on these contributors through t = b.x, with its least-squares slopes b, which is normal in
+each world; a realization has the ratio of the two densities of t as its weight. One number decides, whatever the number of
+contributors, so that weights stay near 1. They are exact for one contributor and for linear measurements, and a value kept by
+contact stays where it is. Beyond the largest value of the run there is nothing to weigh: where few realizations are beyond
+a limit, y is also moved along b, and the larger share bounds the interval.
+
+Measured rows of a population are weighted by a flat Dirichlet distribution (Rubin, The Bayesian Bootstrap, 1981), which assumes
+no shape. Parts that were not measured are one more row of that distribution, outside of all limits in upper bounds of shares,
+and inside in lower ones: with one population this is the interval of Clopper and Pearson for that many parts.
+
+The spread over the worlds adds to the interval of the run like an independent error, on the log scale for spreads.
+"""
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import compress
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy
+import xarray as xr
+
+from tolcontact import vocabulary as terms
+from tolcontact.statistics.intervals import CONFIDENCE
+from tolcontact.statistics.linear_shares import required_realizations
+
+WORLDS = 512  # a power of 2: the points of a Sobol' sequence
+MAX_WEIGHTS = 1 << 20  # in memory
+MIN_UNIFORM = 1e-9
+MAX_FITTED = 20_000  # realizations that slopes are fitted to
+NEGLIGIBLE = 1e-6  # of the largest effect of a contributor
+FEW_BEYOND = 100  # realizations beyond a limit: with fewer, values are also moved
+BOUNDS = [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2]
+
+
+class MeasuredRows(NamedTuple):
+    """A population of measured parts.
+
+    columns         of the deviations
+    of_realization  (realization,) the row that each realization has
+    counts          (row,) how often each row occurs
+    """
+
+    columns: np.ndarray
+    of_realization: np.ndarray
+    counts: np.ndarray
+
+
+class Worlds:
+    """Posterior draws for contributors that are known from few parts.
+
+    deviations   (realization, contributor) of all that varies, without what shared causes add to it
+    parts        (contributor,) number of parts behind a mean and a standard deviation; 0 if these are known
+    populations  measured rows
+    luck         (world,) numbers between 0 and 1 for the error of the run itself
+    """
+
+    def __init__(self, deviations: np.ndarray, parts: np.ndarray, populations: Sequence[MeasuredRows] = ()) -> None:
+        rng = np.random.default_rng(0)
+        self._x, self._columns, self._populations = deviations, np.flatnonzero(parts), populations
+        n, x = parts[self._columns], deviations[:, self._columns]
+        u = scipy.stats.qmc.Sobol(2 * len(n) + 2, rng=rng).random(WORLDS).clip(MIN_UNIFORM, 1 - MIN_UNIFORM)
+        scale = np.sqrt((n - 1) / scipy.special.chdtri(n - 1, u[:, 2 : 2 + len(n)]))
+        self._means, self._spreads = x.mean(axis=0), x.std(axis=0)
+        self._mean_changes = self._spreads * scale * scipy.special.ndtri(u[:, 2 + len(n) :]) / np.sqrt(n)
+        self._scale = scale
+        self._correlation = np.atleast_2d(np.corrcoef(x.T)) if len(n) else np.zeros((0, 0))
+        self._row_weights = [rng.dirichlet(rows.counts, WORLDS) * rows.counts.sum() / rows.counts for rows in populations]
+        self.luck, self._unseen = u[:, 0], u[:, 1]
+
+    @property
+    def moves(self) -> bool:
+        """Whether values can be moved: contributors have a distribution, and not measured rows alone."""
+        return bool(len(self._columns))
+
+    def unseen(self, index: "Index") -> np.ndarray:
+        """Return the share (world,) of parts not measured, in the smallest population that a measurement depends on."""
+        fewest = min((rows.counts.sum() for rows in compress(self._populations, index.depends)), default=math.inf)
+        return np.asarray(-np.expm1(np.log(self._unseen) / fewest))  # quantiles of a beta distribution
+
+    def index(self, y: np.ndarray) -> "Index":
+        """Return the index of a measurement y (realization,) in all worlds; values that are NaN do not count."""
+        rows = np.flatnonzero(np.isfinite(y[:MAX_FITTED]))
+        fitted = np.flatnonzero(np.ptp(self._x[:MAX_FITTED], axis=0) > 0)
+        measured = [rows.columns for rows in self._populations]
+        if len(rows) < required_realizations(len(fitted)):
+            fitted = np.unique(np.concatenate([self._columns, *measured]))
+        x = self._x[np.ix_(rows, fitted)]
+        slopes = np.zeros(self._x.shape[1])
+        if len(fitted) and len(rows):
+            slopes[fitted] = np.linalg.lstsq(x - x.mean(axis=0), y[rows] - y[rows].mean(), rcond=1e-10)[0]
+        effects = np.abs(slopes) * self._x.std(axis=0)
+        depends = [bool(effects[columns].max() > NEGLIGIBLE * effects.max()) for columns in measured]
+        slopes = slopes[self._columns]
+        t = (self._x[:, self._columns] - self._means) @ slopes
+        deviations = slopes * self._spreads * self._scale
+        variances = np.einsum("wi,ij,wj->w", deviations, self._correlation, deviations)
+        return Index(t, float(t.std()), self._mean_changes @ slopes, np.sqrt(variances), depends)
+
+    def weights(self, index: "Index") -> Iterator[np.ndarray]:
+        """Yield weights (world, realization) of some worlds after another; each world has a sum of 1."""
+        for start in range(0, WORLDS, count := max(MAX_WEIGHTS // len(index.t), 1)):
+            worlds = np.arange(start, min(start + count, WORLDS))
+            weights = index.weights(worlds)
+            for rows, row_weights in compress(zip(self._populations, self._row_weights, strict=True), index.depends):
+                weights *= row_weights[worlds][:, rows.of_realization]
+            yield weights / weights.sum(axis=1, keepdims=True)
+
+
+class Index(NamedTuple):
+    """The contributors of few parts in one number, as a measurement depends on them.
+
+    t        (realization,) of the run, about its mean
+    spread   its standard deviation
+    means    (world,)
+    spreads  (world,) its standard deviations
+    depends  (population,) whether the measurement depends on these measured rows
+    """
+
+    t: np.ndarray
+    spread: float
+    means: np.ndarray
+    spreads: np.ndarray
+    depends: list[bool]
+
+    def weights(self, worlds: np.ndarray) -> np.ndarray:
+        """Return the ratios (world, realization) of the densities of t in worlds and in the run."""
+        if not self.spread > 0:
+            return np.ones((len(worlds), len(self.t)))
+        mean, spread = self.means[worlds, None], self.spreads[worlds, None]
+        return np.asarray(np.exp(((self.t / self.spread) ** 2 - ((self.t - mean) / spread) ** 2) / 2) * self.spread / spread)
+
+    def moved(self, world: int) -> np.ndarray:
+        """Return the changes (realization,) of a linear measurement in a world."""
+        growth = self.spreads[world] / self.spread - 1 if self.spread > 0 else 0.0
+        return np.asarray(self.means[world] + growth * self.t)
+
+
+def worlds_of(results: xr.DataTree, count: int) -> Worlds | None:
+    """Return the posterior draws for `count` realizations; None if nothing was measured, or no deviations are kept."""
+    sample, document = results["sample"].to_dataset(), json.loads(str(results["model"][terms.DECLARATION.name].values))
+    populations = document.get("populations", [])
+    parts = sample[terms.PARTS.name].values if terms.PARTS.name in sample else np.zeros(sample.sizes[terms.CONTRIBUTOR], int)
+    if not (parts.any() or populations) or terms.DEVIATION.name not in sample:
+        return None
+    labels = [str(label) for label in sample[terms.CONTRIBUTOR].values]
+    x = sample[terms.DEVIATION.name].values[:count].copy()
+    driven = x.copy()
+    for variable in document.get("variables", []):
+        for label, factor in variable["drives"].items():
+            x[:, labels.index(label)] -= factor * driven[:, labels.index(variable["name"])]
+    return Worlds(x, parts, [_measured_rows(population, labels, x) for population in populations])
+
+
+def _measured_rows(population: Mapping[str, Any], labels: list[str], x: np.ndarray) -> MeasuredRows:
+    values, counts = np.unique(np.array(population["values"], dtype=float), axis=0, return_counts=True)
+    scale = np.where(np.ptp(values, axis=0) > 0, np.ptp(values, axis=0), 1.0)
+    columns = [labels.index(label) for label in population["columns"]]
+    return MeasuredRows(np.array(columns), scipy.spatial.cKDTree(values / scale).query(x[:, columns] / scale)[1], counts)
