@@ -258,6 +258,7 @@ def _locators(
         stiffness=np.array([float(locator.stiffness or USUAL_STIFFNESS) for locator in declared]),
         one_sided=np.array([locator.one_sided for locator in declared], dtype=bool),
         springy=np.array([locator.stiffness is not None for locator in declared], dtype=bool) & may_give,
+        elastic=np.full(len(declared), scene.is_elastic(part)),
         faces=(None,) * len(declared),
         grounds=(None,) * len(declared),
         placing=location.placing if location else FIRST_ORDER,

@@ -47,6 +47,8 @@ class ContactPoints:
     locators    (point,) indices of the one-sided locators
     stiffness   (point,) [N/mm] of springs, infinite for rigid one-sided locators; None for rigid faces
     pulls       (point,): whether the spring of a two-sided locator pulls at a point; None if none does
+    holds       whether its point is a two-sided locator, which pushes and pulls
+    elastic     whether one of its parts is elastic
     """
 
     name: str
@@ -66,6 +68,8 @@ class ContactPoints:
     locators: np.ndarray | None = None
     stiffness: np.ndarray | None = None
     pulls: np.ndarray | None = None
+    holds: bool = False
+    elastic: bool = False
 
     @cached_property
     def facing(self) -> np.ndarray:
@@ -110,7 +114,7 @@ class ContactPoints:
     @cached_property
     def minima(self) -> PlaneMinima | None:
         """The gap between contact points of two rigid planes with form; None for other pairs."""
-        if not self.has_form or self.moving_face is None or self.reference_face is None or self.stiffness is not None:
+        if not self.has_form or self.moving_face is None or self.reference_face is None or self.is_springy:
             return None
         if not (self.moving_face.is_flat and self.reference_face.is_flat):
             return None
@@ -185,8 +189,8 @@ class ContactPoints:
 
     @property
     def is_springy(self) -> bool:
-        """Whether some of the points are compliant."""
-        return self.stiffness is not None and bool(np.isfinite(self.stiffness).any())
+        """Whether some of the points are compliant, by springs or by elastic parts."""
+        return self.elastic or (self.stiffness is not None and bool(np.isfinite(self.stiffness).any()))
 
     @property
     def is_supports(self) -> bool:
