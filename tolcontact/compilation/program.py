@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.compilation.bounded_pairs import TRIAL_SEED, Trial, allowed_depths, bounded_pairs
-from tolcontact.compilation.contact_qp import ContactQP, contact_qp
+from tolcontact.compilation.contact_qp import ContactQP, contact_qp, row_count
 from tolcontact.compilation.contact_rows import MIN_SLOTS, SLOTS, standing_points
 from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.functions import NamedFunction
@@ -23,6 +23,13 @@ from tolcontact.discretization import ContactPoints, Nominal, RoundPoints, coord
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.interference import Watch
 from tolcontact.limits import Limits
+from tolcontact.mechanics.flexibility import (
+    Bending,
+    elastic_bodies,
+    group_flexibility,
+    part_flexibilities,
+    with_weights,
+)
 from tolcontact.mechanics.gap import GapMap, gap_map, gap_matrix
 from tolcontact.mechanics.group_equations import face_heights, face_poses, facing_pose
 from tolcontact.mechanics.groups import Group, contact_groups
@@ -61,6 +68,8 @@ class Program(Pictured):
     meetings     by pair index: where its bodies can touch, if fixed planes do not represent its reference face
     trials       by pair index: the trial that decided this; none unless the search is bounded
     groups       the contact QPs
+    observe_bent  poses, deviations, loads (realization, load) [N]: reactions between elastic parts -> measured
+                 (realization, measure) of bent parts; None without elastic parts
     nominal_measures  values of the measures in the nominal assembly
     accuracies   accuracies of the measures, in their units (see measure_accuracies)
     stations     stations of an assembly that is built in steps, in their order; `place` then places the parts of all stations
@@ -79,6 +88,7 @@ class Program(Pictured):
     meetings: dict[int, Meeting]
     trials: dict[int, Trial]
     groups: tuple[ContactGroup, ...]
+    observe_bent: NamedFunction | None
     nominal_measures: np.ndarray
     accuracies: np.ndarray
     watch: Watch
@@ -136,7 +146,8 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         entries = ca.SX.sym("poses", ENTRIES * len(nominal.parts))
         values = measured(nominal, poses_of(entries), d)
         place, observe = _place(nominal, d), _observe(nominal, entries, d, values)
-        groups = contact_groups(nominal, weighs_areas=method.is_exact)
+        bodies = elastic_bodies(nominal)
+        groups = [with_weights(group, nominal, bodies) for group in contact_groups(nominal, weighs_areas=method.is_exact)]
         if method.minimizes.presses:
             check_forces(nominal, groups)
         watch = _watch(nominal, draws, place)
@@ -144,7 +155,16 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         gaps = tuple(None if pair.round else gap_map(gap_matrix(pair), pair.offsets) for pair in nominal.pairs)
         rows = [_rows(pair, gaps[k], trials[k] if k in meetings else None, method) for k, pair in enumerate(nominal.pairs)]
         log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
-        qps = [(group, contact_qp(nominal, group, gaps, method, [rows[k] for k in group.pairs])) for group in groups]
+        standing = [[rows[k] for k in group.pairs] for group in groups]
+        elastic = part_flexibilities(nominal, bodies)
+        bent = [
+            group_flexibility(nominal, group, list(map(row_count, points)), elastic)
+            for group, points in zip(groups, standing, strict=True)
+        ]
+        qps = [
+            (group, contact_qp(nominal, group, gaps, method, points, flexibility=flexibility))
+            for group, points, flexibility in zip(groups, standing, bent, strict=True)
+        ]
         return Program(
             nominal=nominal,
             draws=draws,
@@ -157,6 +177,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             meetings=meetings,
             trials=trials,
             groups=tuple(ContactGroup(group, qp, ContactSolver(qp, choice)) for group, qp in qps),
+            observe_bent=_observe_bent(nominal, entries, d, Bending(nominal, elastic)) if elastic else None,
             accuracies=measure_accuracies(nominal, groups, draws, place, observe),
             watch=watch.allowing(allowed_depths(nominal, meetings, trials)),
             nominal_measures=_nominal_measures(nominal, observe),
@@ -184,6 +205,13 @@ def _observe(nominal: Nominal, entries: ca.SX, deviations: ca.SX, values: Sequen
     return NamedFunction.dense(
         ca.Function("observe", [entries, deviations], results, ["poses", "deviations"], ["measured", "relative"])
     )
+
+
+def _observe_bent(nominal: Nominal, entries: ca.SX, deviations: ca.SX, bending: Bending) -> NamedFunction:
+    """Return the function of the measures of bent parts, see Program."""
+    values = ca.vertcat(*measured(nominal, poses_of(entries), deviations, bending))
+    inputs = {"poses": entries, "deviations": deviations, "loads": bending.loads}
+    return NamedFunction.dense(ca.Function("observe_bent", [*inputs.values()], [values], [*inputs], ["measured"]))
 
 
 def _round_gaps(pair: ContactPoints, points: RoundPoints, deviations: ca.SX) -> NamedFunction:

@@ -1,5 +1,6 @@
 """The nominal model: every declared thing with its numbers, in the nominal assembly frame W. Lengths in mm."""
 
+import itertools
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -231,6 +232,13 @@ class Nominal:
                 FITTED_ERRORS * pair.coordinate_error,
             )
         return self._face_pairs[index]
+
+    @cached_property
+    def load_spans(self) -> dict[int, slice]:
+        """The loads of each pair with an elastic part, by the index of the pair: one for each contact point."""
+        pairs = [k for k, pair in enumerate(self.pairs) if pair.elastic]
+        ends = np.cumsum([0, *(len(self.pairs[k].P_m) for k in pairs)]).tolist()
+        return {k: slice(*span) for k, span in zip(pairs, itertools.pairwise(ends), strict=True)}
 
     @cached_property
     def locators(self) -> Locators:

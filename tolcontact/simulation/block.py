@@ -1,6 +1,6 @@
 """A block of realizations: its simulation, from deviations to corrected poses and measures, and its results as arrays."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -30,6 +30,7 @@ class Block(Record, Readable):
     active        (n, pair): number of active contact points in the raw state
     carrying      (n, pair): number of contact points under load: with more than 1e-4 of the largest reaction
     reaction      (n, pair): sum of the reactions of these points, in the units of the objective
+    load          (n, load) [N]: reactions at the contact points between elastic parts, see Nominal.load_spans
     clashes       (n,): number of pairs of parts without declared contact that lie in each other in the corrected state; -1 if
                   they were not tested
     clash_depth   (n,) [mm]: penetration of the deepest of these pairs, NaN if it is not measured; clash_part, clash_other (n,)
@@ -51,6 +52,7 @@ class Block(Record, Readable):
     active: Int[Array, "n pair"] = field(metadata={"variable": terms.ACTIVE})
     carrying: Int[Array, "n pair"] = field(metadata={"variable": terms.CARRYING})
     reaction: Float[Array, "n pair"] = field(metadata={"variable": terms.REACTION})
+    load: Float[Array, "n load"] = field(metadata={"variable": terms.LOAD})
     clashes: Int[Array, " n"] = field(metadata={"variable": terms.CLASHES})
     clash_depth: Float[Array, " n"] = field(metadata={"variable": terms.CLASH_DEPTH})
     clash_part: Int[Array, " n"] = field(metadata={"variable": terms.CLASH_PART})
@@ -81,6 +83,7 @@ class Block(Record, Readable):
         measured: Float[Array, "n measure"],
         pairs: int,
         stations: int,
+        loads: int,
     ) -> "Block":
         """Return realizations at their raw poses (n, part, 12), with measures (n, measure), that contact does not change."""
         count, states = len(raw), len(terms.STATES)
@@ -94,6 +97,7 @@ class Block(Record, Readable):
             active=np.zeros((count, pairs), dtype=int),
             carrying=np.zeros((count, pairs), dtype=int),
             reaction=np.zeros((count, pairs)),
+            load=np.zeros((count, loads)),
             clashes=np.full(count, -1),
             clash_depth=np.zeros(count),
             clash_part=np.full(count, -1),
@@ -129,7 +133,9 @@ def simulate_block(
     placed = program.place(deviations=deviations)["poses"]
     raw = placed.reshape(len(deviations), len(program.nominal.parts), ENTRIES)
     measured, relative = _observe(program, raw, deviations)
-    block = Block.untouched(start, deviations, raw, measured, len(program.nominal.pairs), len(program.stations))
+    nominal = program.nominal
+    loads = max((span.stop for span in nominal.load_spans.values()), default=0)
+    block = Block.untouched(start, deviations, raw, measured, len(nominal.pairs), len(program.stations), loads)
     stages = program.stations or (None,)
     outcomes_by_stage = np.zeros((len(block), len(stages)), dtype=np.int8)
     # NaN gaps count as no contact, so realizations with NaN poses are marked as unsolved below.
@@ -143,7 +149,7 @@ def simulate_block(
         )
         for resolver in resolvers if station is None else [resolvers[index] for index in station.groups]:
             resolved = resolver.resolve(raw, relative, deviations)
-            _put(block, resolver, resolved)
+            _put(block, resolver, resolved, nominal.load_spans)
             if is_placed_again:
                 _put_raw(block, resolver, changed, raw_relative)
             worst[resolved.touched] = np.maximum(worst[resolved.touched], resolved.state.outcome)
@@ -168,6 +174,10 @@ def simulate_block(
     worst = outcomes_by_stage.max(axis=1)
     touched = worst > Outcome.UNTOUCHED
     block.measured[touched, CORRECTED], _ = _observe(program, block.poses[touched, CORRECTED], deviations[touched])
+    if program.observe_bent is not None:
+        poses = block.poses[touched, CORRECTED].reshape(int(touched.sum()), -1)
+        bent = program.observe_bent(poses=poses, deviations=deviations[touched], loads=block.load[touched])
+        block.measured[touched, CORRECTED] = bent["measured"]
     block.locator_offset[touched] = locator_offsets(program.nominal, block.poses[touched])
     statuses = _statuses(program.method.is_exact)
     block.status[:], block.station_status[:] = statuses[worst], statuses[outcomes_by_stage[:, : len(program.stations)]]
@@ -197,14 +207,17 @@ def _hand_over(
     return True
 
 
-def _put(block: Block, resolver: ContactResolver, resolved: Resolved) -> None:
-    """Write the results of a group into the block."""
+def _put(block: Block, resolver: ContactResolver, resolved: Resolved, load_spans: Mapping[int, slice]) -> None:
+    """Write the results of a group into the block, and its reactions between elastic parts, by pair."""
     touched, state, pairs = resolved.touched, resolved.state, resolver.pairs
     block.poses[touched[:, None], CORRECTED, resolver.parts] = state.poses
     block.gap_min[:, :, pairs], block.active[:, pairs] = resolved.gap_min, resolved.active
     block.carrying[np.ix_(touched, pairs)] = resolved.carrying(resolver.spans)
     block.reaction[np.ix_(touched, pairs)] = resolved.reactions(resolver.spans, resolver.contact_points)
     join_groups(block, touched, state)
+    for k, span in zip(pairs.tolist(), resolver.spans, strict=True):
+        if k in load_spans:
+            block.load[touched, load_spans[k]] = state.multipliers[:, span]
 
 
 def _put_raw(block: Block, resolver: ContactResolver, rows: np.ndarray, relative: Float[Array, "n pair 12"]) -> None:
