@@ -1,6 +1,5 @@
 """The nominal model: every declared thing with its numbers, in the nominal assembly frame W. Lengths in mm."""
 
-import itertools
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -8,7 +7,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from tolcontact import poses as pose
-from tolcontact.arrays import Array, Float
+from tolcontact.arrays import Array, Float, Int
 from tolcontact.declaration import Assembly, Face, Measure, Part, Point
 from tolcontact.discretization.form_points import COVER_SHARE, form_lengths, form_spacing
 from tolcontact.discretization.locators import Locators, NominalPart
@@ -234,11 +233,10 @@ class Nominal:
         return self._face_pairs[index]
 
     @cached_property
-    def load_spans(self) -> dict[int, slice]:
-        """The loads of each pair with an elastic part, by the index of the pair: one for each contact point."""
-        pairs = [k for k, pair in enumerate(self.pairs) if pair.elastic]
-        ends = np.cumsum([0, *(len(self.pairs[k].P_m) for k in pairs)]).tolist()
-        return {k: slice(*span) for k, span in zip(pairs, itertools.pairwise(ends), strict=True)}
+    def loads(self) -> Int[Array, "load 2"]:
+        """The pair and the point of each load: of the reactions at the contact points of pairs with an elastic part."""
+        points = [(k, point) for k, pair in enumerate(self.pairs) if pair.elastic for point in range(len(pair.P_m))]
+        return np.array(points, dtype=int).reshape(-1, 2)
 
     @cached_property
     def locators(self) -> Locators:

@@ -35,11 +35,14 @@ class Flexibility:
     C         (row, row) [mm/N]; rows of rigid pairs are zero
     opening   (row,) [mm] by the constant forces
     holds     (row,): whether it is a two-sided locator, whose gap is zero
+    loads     (load,) the loads of the model that are reactions of rows, see Nominal.loads; and these `load_rows` (load,)
     """
 
     C: Float[Array, "row row"]
     opening: Float[Array, " row"]
     holds: Bool[Array, " row"]
+    loads: Int[Array, " load"]
+    load_rows: Int[Array, " load"]
 
     @property
     def rows(self) -> Int[Array, " k"]:
@@ -68,7 +71,7 @@ class PartFlexibility(NamedTuple):
     """The flexibility of one elastic part of a group.
 
     part       its index in the model
-    loads      (k,) the loads of the model that act on it, see Nominal.load_spans
+    loads      (k,) the loads of the model that act on it, see Nominal.loads
     C          (k, k) [mm/N]
     opening    (k,) [mm] by the constant forces
     points     (point, 3) nominal places [mm] whose displacements are measured
@@ -90,7 +93,7 @@ class Bending:
     """
 
     def __init__(self, nominal: Nominal, parts: Iterable[PartFlexibility]) -> None:
-        self.loads = ca.SX.sym("loads", max(span.stop for span in nominal.load_spans.values()))
+        self.loads = ca.SX.sym("loads", len(nominal.loads))
         self._parts = {part.part: part for part in parts}
 
     def displacement(self, part: int, position: Float[Array, " 3"]) -> ca.SX:
@@ -159,11 +162,11 @@ def part_flexibilities(nominal: Nominal, bodies: Bodies) -> list[PartFlexibility
 
 def _part_flexibility(nominal: Nominal, index: int, body: ElasticBody) -> PartFlexibility:
     part, acting = nominal.parts[index], [(np.zeros(0, dtype=int), *np.zeros((2, 0, 3)))]
-    for k, span in nominal.load_spans.items():
-        pair = nominal.pairs[k]
+    for k in np.unique(nominal.loads[:, 0]):
+        pair, loads_of_pair = nominal.pairs[k], np.flatnonzero(nominal.loads[:, 0] == k)
         for side, P, sign in ((pair.moving, pair.P_m, 1.0), (pair.reference, pair.P_r, -1.0)):
             if side == index:
-                acting.append((np.arange(span.start, span.stop), P, sign * pair.n_r))
+                acting.append((loads_of_pair, P, sign * pair.n_r))
     loads_on_part, P, n = (np.concatenate(values) for values in zip(*acting, strict=True))
     points = _measured_points(nominal, index)
     loads = [_spread(part, body, P, n), _spread(part, body, np.repeat(points, 3, axis=0), np.tile(np.eye(3), (len(points), 1)))]
@@ -205,18 +208,18 @@ def group_flexibility(
     pairs, starts = [nominal.pairs[k] for k in group.pairs], np.cumsum([0, *row_counts])
     if not any(pair.elastic for pair in pairs):
         return None
-    row_of_load = np.full(max(span.stop for span in nominal.load_spans.values()), -1)
-    for k, start in zip(group.pairs, starts, strict=False):
-        if k in nominal.load_spans:
-            row_of_load[nominal.load_spans[k]] = start + np.arange(len(nominal.pairs[k].P_m))
+    start_of_pair = np.full(len(nominal.pairs), -1)
+    start_of_pair[list(group.pairs)] = starts[:-1]
+    loads = np.flatnonzero(start_of_pair[nominal.loads[:, 0]] >= 0)
+    row_of_load = start_of_pair[nominal.loads[:, 0]] + nominal.loads[:, 1]
     C, opening = np.zeros((starts[-1], starts[-1])), np.zeros(starts[-1])
     for part in parts:
-        rows = row_of_load[part.loads]
         if part.part in group.parts:
+            rows = row_of_load[part.loads]
             C[np.ix_(rows, rows)] += part.C
             opening[rows] += part.opening
     compliance = [
         np.zeros(count) if pair.stiffness is None else 1 / pair.stiffness for count, pair in zip(row_counts, pairs, strict=True)
     ]
     holds = np.repeat([pair.holds for pair in pairs], row_counts)
-    return Flexibility(C + np.diag(np.concatenate(compliance)), opening, holds)
+    return Flexibility(C + np.diag(np.concatenate(compliance)), opening, holds, loads, row_of_load[loads])

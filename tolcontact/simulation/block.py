@@ -1,6 +1,6 @@
 """A block of realizations: its simulation, from deviations to corrected poses and measures, and its results as arrays."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -30,7 +30,7 @@ class Block(Record, Readable):
     active        (n, pair): number of active contact points in the raw state
     carrying      (n, pair): number of contact points under load: with more than 1e-4 of the largest reaction
     reaction      (n, pair): sum of the reactions of these points, in the units of the objective
-    load          (n, load) [N]: reactions at the contact points between elastic parts, see Nominal.load_spans
+    load          (n, load) [N]: reactions at the contact points between elastic parts, see Nominal.loads
     clashes       (n,): number of pairs of parts without declared contact that lie in each other in the corrected state; -1 if
                   they were not tested
     clash_depth   (n,) [mm]: penetration of the deepest of these pairs, NaN if it is not measured; clash_part, clash_other (n,)
@@ -133,9 +133,8 @@ def simulate_block(
     placed = program.place(deviations=deviations)["poses"]
     raw = placed.reshape(len(deviations), len(program.nominal.parts), ENTRIES)
     measured, relative = _observe(program, raw, deviations)
-    nominal = program.nominal
-    loads = max((span.stop for span in nominal.load_spans.values()), default=0)
-    block = Block.untouched(start, deviations, raw, measured, len(nominal.pairs), len(program.stations), loads)
+    nominal, stations = program.nominal, len(program.stations)
+    block = Block.untouched(start, deviations, raw, measured, len(nominal.pairs), stations, len(nominal.loads))
     stages = program.stations or (None,)
     outcomes_by_stage = np.zeros((len(block), len(stages)), dtype=np.int8)
     # NaN gaps count as no contact, so realizations with NaN poses are marked as unsolved below.
@@ -149,7 +148,7 @@ def simulate_block(
         )
         for resolver in resolvers if station is None else [resolvers[index] for index in station.groups]:
             resolved = resolver.resolve(raw, relative, deviations)
-            _put(block, resolver, resolved, nominal.load_spans)
+            _put(block, resolver, resolved)
             if is_placed_again:
                 _put_raw(block, resolver, changed, raw_relative)
             worst[resolved.touched] = np.maximum(worst[resolved.touched], resolved.state.outcome)
@@ -207,17 +206,16 @@ def _hand_over(
     return True
 
 
-def _put(block: Block, resolver: ContactResolver, resolved: Resolved, load_spans: Mapping[int, slice]) -> None:
-    """Write the results of a group into the block, and its reactions between elastic parts, by pair."""
+def _put(block: Block, resolver: ContactResolver, resolved: Resolved) -> None:
+    """Write the results of a group into the block."""
     touched, state, pairs = resolved.touched, resolved.state, resolver.pairs
     block.poses[touched[:, None], CORRECTED, resolver.parts] = state.poses
     block.gap_min[:, :, pairs], block.active[:, pairs] = resolved.gap_min, resolved.active
     block.carrying[np.ix_(touched, pairs)] = resolved.carrying(resolver.spans)
     block.reaction[np.ix_(touched, pairs)] = resolved.reactions(resolver.spans, resolver.contact_points)
     join_groups(block, touched, state)
-    for k, span in zip(pairs.tolist(), resolver.spans, strict=True):
-        if k in load_spans:
-            block.load[touched, load_spans[k]] = state.multipliers[:, span]
+    if resolver.flexibility is not None:
+        block.load[touched[:, None], resolver.flexibility.loads] = state.multipliers[:, resolver.flexibility.load_rows]
 
 
 def _put_raw(block: Block, resolver: ContactResolver, rows: np.ndarray, relative: Float[Array, "n pair 12"]) -> None:

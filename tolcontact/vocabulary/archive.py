@@ -80,11 +80,6 @@ GAP_MIN = variable(
 ACTIVE = variable("i4 active(realization, pair)", "number of active contact points in the raw state", "1")
 CARRYING = variable("i4 carrying(realization, pair)", "number of contact points under load in the corrected state", "1")
 REACTION = variable("f8 reaction(realization, pair)", "sum of the reactions of the contact points of a pair")
-LOAD = variable(
-    "f8 load(realization, load)",
-    "reaction at a contact point between elastic parts; negative: a two-sided locator pulls",
-    "N",
-)
 KKT_RESIDUAL = variable(
     "f8 kkt_residual(realization)",
     "largest residual of the optimality conditions of the contact problem; in an exact resolution also its last step",
