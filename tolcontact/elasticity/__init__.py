@@ -3,7 +3,8 @@
 .. include:: ../guide/elasticity.md
 """
 
+from tolcontact.elasticity.bodies import elastic_body
 from tolcontact.elasticity.elastic_body import ElasticBody, flexibility
-from tolcontact.elasticity.sources import MatrixSource, MeshSource, elastic_body
+from tolcontact.elasticity.sources import MatrixSource, MeshSource
 
 __all__ = ["ElasticBody", "MatrixSource", "MeshSource", "elastic_body", "flexibility"]

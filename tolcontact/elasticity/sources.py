@@ -4,9 +4,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tolcontact.arrays import Array, Float, Int
-from tolcontact.elasticity.elastic_body import ElasticBody
-from tolcontact.elasticity.imported_body import imported_body
-from tolcontact.errors import GeometryFault
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +41,3 @@ class MatrixSource:
     vertices: Float[Array, "vertex 3"] | None = None
     faces: Int[Array, "face 3"] | None = None
     tolerance: float = 1.0
-
-
-def elastic_body(source: MeshSource | MatrixSource) -> ElasticBody:
-    """Return the elastic body of a source. Raises GeometryFault, which names the file, for anything that cannot be used."""
-    if isinstance(source, MatrixSource):
-        surface = None if source.vertices is None or source.faces is None else (source.vertices, source.faces)
-        return imported_body(source.stiffness, source.nodes, surface, source.tolerance)
-    raise GeometryFault("elastic parts with tetrahedra of their own are not supported yet; import a stiffness matrix")
