@@ -1,6 +1,7 @@
 """The group `elastic` of an archive: from its loads and flexibility, gaps and measures of bent parts can be computed again."""
 
 import hashlib
+from collections.abc import Collection
 from pathlib import Path
 
 import netCDF4
@@ -9,19 +10,23 @@ import numpy as np
 from tolcontact import vocabulary as terms
 from tolcontact.archive.variables import Definitions, define
 from tolcontact.compilation import Program
-from tolcontact.discretization import NominalPart
+from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.poses import AT_REST
+from tolcontact.vocabulary import ArchiveVariable
 
 
-def write_elastic(new: Definitions, group: netCDF4.Group, program: Program, *, loads: bool) -> None:
-    """Write the loads between elastic parts and their flexibility; `loads`: whether reactions are kept."""
+def write_elastic(new: Definitions, group: netCDF4.Group, program: Program, kept: Collection[ArchiveVariable]) -> None:
+    """Write the loads between elastic parts and their flexibility, and define the variables of realizations that are `kept`."""
     nominal, count = program.nominal, len(program.nominal.loads)
     group.createDimension(terms.LOADS, count)
-    if loads:
-        define(group, terms.LOAD)
+    group.createDimension(terms.WELD_ROWS, nominal.input_count - len(nominal.contributors))
+    for variable in terms.ELASTIC_ROWS:
+        if variable in kept:
+            define(group, variable)
     starts = np.cumsum([0, *(len(pair.P_m) for pair in nominal.pairs)])
     pairs, points = nominal.loads.T
     new.add(group, terms.POINT_OF_LOAD, starts[pairs] + points)
+    new.add(group, terms.WELD_OF_LOAD, [_weld_row(nominal, k, point) for k, point in nominal.loads.tolist()])
     new.add(group, terms.HOLDS, [nominal.pairs[k].holds for k in pairs])
     C, opening = np.zeros((count, count)), np.zeros(count)
     for flexibility in (compiled.qp.flexibility for compiled in program.groups):
@@ -37,6 +42,13 @@ def write_elastic(new: Definitions, group: netCDF4.Group, program: Program, *, l
     new.add(group, terms.ELASTIC_LABEL, [part.name for part in parts])
     new.add(group, terms.ELASTIC_SOURCE, [str(part.part.elasticity) for part in parts])
     new.add(group, terms.ELASTIC_HASH, [_hash(part) for part in parts])
+
+
+def _weld_row(nominal: Nominal, pair: int, point: int) -> int:
+    """Return the number of the weld row whose gap a point of a pair keeps, -1 for none."""
+    offsets, first = nominal.pairs[pair].offsets, len(nominal.contributors)
+    column = offsets.columns[offsets.matrix[:, point] != 0]
+    return int(column[0]) - first if column.size and column[0] >= first else -1
 
 
 def changed_body(file: netCDF4.Dataset, program: Program) -> str:

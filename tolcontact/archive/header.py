@@ -56,7 +56,7 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
     new.add_all(file.createGroup("contact"), contact_values(program) | empty_touching(points))
     _write_sample(new, file.createGroup("sample"), program, deviations=Row("sample", terms.DEVIATION) in rows)
     if len(nominal.loads):
-        write_elastic(new, file.createGroup(terms.ELASTIC_GROUP), program, loads=Row(terms.ELASTIC_GROUP, terms.LOAD) in rows)
+        write_elastic(new, file.createGroup(terms.ELASTIC_GROUP), program, [row.variable for row in rows])
     new.add_all(file.createGroup("surface"), empty_checks(run.surfaces, len(nominal.pairs)))
     if objectives := compared_objectives(program):
         group = file.createGroup(terms.OBJECTIVES_GROUP)

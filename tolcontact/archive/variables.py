@@ -144,6 +144,7 @@ def sizes_of_rows(nominal: Nominal) -> dict[str, int]:
     return {name: len(labels) for name, labels in labels_of_rows(nominal).items()} | {
         terms.CONTRIBUTOR: len(nominal.contributors),
         terms.LOADS: len(nominal.loads),
+        terms.WELD_ROWS: nominal.input_count - len(nominal.contributors),
     }
 
 

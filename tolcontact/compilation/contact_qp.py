@@ -198,7 +198,7 @@ def _inputs(nominal: Nominal, group: Group, standing: Standing) -> dict[str, ca.
     poses (12 p)         poses of the group's parts: the gaps are linearized about them
     raw (12 p)           raw poses of the group's parts, which displacements are measured from
     moments (10, sides)  moments of the weighted points of each side in the objective
-    deviations (c)       deviations of all contributors of the model
+    deviations (c)       deviations of all contributors of the model, and the gaps that welds keep
     regularization_factor    factor of the regularization: 1, or more in early steps
     newton               1 to count the curvature of objective and gaps, 0 for the linear step of the paper
     stride               in an exact resolution: step bound, the largest rotation angle [rad] of a mover
@@ -216,7 +216,7 @@ def _inputs(nominal: Nominal, group: Group, standing: Standing) -> dict[str, ca.
         "poses": (ENTRIES * len(group.parts), 1),
         "raw": (ENTRIES * len(group.parts), 1),
         "moments": (MOMENTS, len(group.sides)),
-        "deviations": (len(nominal.contributors), 1),
+        "deviations": (nominal.input_count, 1),
         "regularization_factor": (1, 1),
         "newton": (1, 1),
         "stride": (1, 1),

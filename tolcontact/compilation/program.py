@@ -68,6 +68,7 @@ class Program(Pictured):
     meetings     by pair index: where its bodies can touch, if fixed planes do not represent its reference face
     trials       by pair index: the trial that decided this; none unless the search is bounded
     groups       the contact QPs
+    bending      the elastic displacements of measured points and welds; None without elastic parts
     observe_bent  poses, deviations, loads (realization, load) [N]: reactions between elastic parts -> measured
                  (realization, measure) of bent parts; None without elastic parts
     nominal_measures  values of the measures in the nominal assembly
@@ -88,6 +89,7 @@ class Program(Pictured):
     meetings: dict[int, Meeting]
     trials: dict[int, Trial]
     groups: tuple[ContactGroup, ...]
+    bending: Bending | None
     observe_bent: NamedFunction | None
     nominal_measures: np.ndarray
     accuracies: np.ndarray
@@ -157,6 +159,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
         standing = [[rows[k] for k in group.pairs] for group in groups]
         elastic = part_flexibilities(nominal, bodies)
+        bending = Bending(nominal, elastic) if elastic else None
         bent = [
             group_flexibility(nominal, group, list(map(row_count, points)), elastic)
             for group, points in zip(groups, standing, strict=True)
@@ -173,11 +176,12 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             place=place,
             observe=observe,
             gaps=gaps,
-            round_gaps={k: _round_gaps(pair, pair.round, d) for k, pair in enumerate(nominal.pairs) if pair.round},
+            round_gaps={k: _round_gaps(nominal, pair, pair.round) for k, pair in enumerate(nominal.pairs) if pair.round},
             meetings=meetings,
             trials=trials,
             groups=tuple(ContactGroup(group, qp, ContactSolver(qp, choice)) for group, qp in qps),
-            observe_bent=_observe_bent(nominal, entries, d, Bending(nominal, elastic)) if elastic else None,
+            bending=bending,
+            observe_bent=_observe_bent(nominal, entries, d, bending) if bending else None,
             accuracies=measure_accuracies(nominal, groups, draws, place, observe),
             watch=watch.allowing(allowed_depths(nominal, meetings, trials)),
             nominal_measures=_nominal_measures(nominal, observe),
@@ -214,9 +218,9 @@ def _observe_bent(nominal: Nominal, entries: ca.SX, deviations: ca.SX, bending: 
     return NamedFunction.dense(ca.Function("observe_bent", [*inputs.values()], [values], [*inputs], ["measured"]))
 
 
-def _round_gaps(pair: ContactPoints, points: RoundPoints, deviations: ca.SX) -> NamedFunction:
+def _round_gaps(nominal: Nominal, pair: ContactPoints, points: RoundPoints) -> NamedFunction:
     """Return the function of the gaps of round faces, see Program."""
-    X_RM = ca.SX.sym("X_RM", ENTRIES)
+    X_RM, deviations = ca.SX.sym("X_RM", ENTRIES), ca.SX.sym("deviations", nominal.input_count)
     results = round_gaps(points, X_RM, face_heights(pair, deviations), ca.SX(len(points), 1), ca.SX(ENTRIES, 0))
     outputs = {"gaps": results.gaps, "distances": results.distances}
     function = ca.Function("round_gaps", [X_RM, deviations], [*outputs.values()], ["X_RM", "deviations"], [*outputs])

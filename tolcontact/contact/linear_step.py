@@ -40,6 +40,7 @@ class LinearStep:
         self.spans = group.qp.spans
         # Reactions of contact push; those of two-sided locators at elastic parts pull, too.
         flexibility = group.qp.flexibility
+        self.bends = flexibility is not None
         self._least_reaction: float | np.ndarray = 0.0 if flexibility is None else np.where(flexibility.holds, -np.inf, 0.0)
         self._slots = {k: points for k, points in enumerate(group.qp.standing) if isinstance(points, int)}
         self.varying = list(self._slots)

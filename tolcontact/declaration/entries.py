@@ -252,6 +252,6 @@ RECORDS = {
     "correlations": Record(Correlation, omitted="kind"),
     "populations": Record(Population, fields="values columns source declared_at"),
     "stations": Record(Station),
-    "joints": Record(Joint),
+    "joints": Record(Joint, omitted="at pad"),
     "overlaps": Record(Overlap),
 }  # fmt: skip

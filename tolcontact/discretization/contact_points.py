@@ -22,6 +22,7 @@ from tolcontact.discretization.form_points import (
 from tolcontact.discretization.locators import Locators, NominalPart
 from tolcontact.discretization.nominal import ContactPoints
 from tolcontact.discretization.offsets import Offsets
+from tolcontact.discretization.retained_nodes import retained_nodes
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.scenes import Scene
@@ -70,6 +71,8 @@ def contact_points(
         P_m, P_r, n_r = (np.array(rows) for rows in zip(*(point.nominal() for point in balls_and_shafts), strict=True))
     else:
         candidates = coaxial_points(moving_face, reference_face, deviating) if _is_open(pair) and lengths else None
+        if candidates is None and _is_open(pair):
+            candidates = retained_nodes((moving, reference), moving_face)
         if candidates is None:
             faces = moving_face, reference_face
             candidates, undetected = _candidates(scene.assembly, pair, moving, unplaced.mesh, faces, reach, lengths)

@@ -16,6 +16,7 @@ from tolcontact.discretization.offsets import Offsets, PairForm
 from tolcontact.discretization.plane_minima import PlaneMinima
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
+from tolcontact.discretization.weld import Weld
 from tolcontact.features import FaceDeviation, Features, Freedom, NominalFeature, NominalPattern
 from tolcontact.features.freedoms import LOCATOR, VARIABLE
 from tolcontact.features.zone_kernel import sum_modes
@@ -205,6 +206,7 @@ class Nominal:
     measurements   of each measure; None if it measures points or an expression
     scenes         the models of the stations, which share the parts: each has its own measures; none without stations
     station        the name of the station, in the model of one
+    welds          of elastic parts; their gaps are inputs of a realization after its deviations
 
     With stations a part has an entry among the `parts` in each station that holds it, station by station.
     """
@@ -217,6 +219,7 @@ class Nominal:
     measurements: tuple[NominalMeasurement | None, ...] = ()
     scenes: "tuple[Nominal, ...]" = ()
     station: str = ""
+    welds: tuple[Weld, ...] = ()
     _face_pairs: dict[int, FacePair] = field(default_factory=dict, init=False)
 
     def face_pair(self, index: int) -> FacePair | None:
@@ -231,6 +234,11 @@ class Nominal:
                 FITTED_ERRORS * pair.coordinate_error,
             )
         return self._face_pairs[index]
+
+    @property
+    def input_count(self) -> int:
+        """The number of inputs of a realization: its deviations, and the gaps that welds keep."""
+        return len(self.contributors) + sum(len(weld.columns) for weld in self.welds)
 
     @cached_property
     def loads(self) -> Int[Array, "load 2"]:

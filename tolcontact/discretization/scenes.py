@@ -35,9 +35,11 @@ class Scene:
     def movers(self, part: Part) -> tuple[int, ...]:
         """Return the indices of the free parts whose corrections move a part: those it is located on, then the part itself.
 
-        A part of a joint is moved by the first part of the joint.
+        A part of a joint of rigid parts is moved by the first part of the joint.
         """
         chain = dict.fromkeys(self.assembly.support_chain(part))
+        if self.is_elastic(part):  # its body bends: its members move on their own
+            chain = dict.fromkeys([part, *list(chain)[1:]])
         return tuple(self.index(link) for link in reversed(chain) if self.is_free(link) and self._touches(link))
 
     def is_free(self, part: Part) -> bool:
@@ -54,7 +56,7 @@ class Scene:
         return floats or is_moving or self.has_supports(part) or self.is_elastic(part)
 
     def is_elastic(self, part: Part) -> bool:
-        """Return whether the body of a part is elastic, or the part that it is located on."""
+        """Return whether a part of its body is elastic, or the part that it is located on."""
         location = self.assembly.location_of(part)
         bodies = (*self.assembly.body_of(part), location.parent if location else None)
         return any(body is not None and body.elasticity is not None for body in bodies)

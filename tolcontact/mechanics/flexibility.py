@@ -16,9 +16,10 @@ import casadi as ca
 import numpy as np
 from scipy import linalg, sparse
 
+from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.declaration import Mesh, Part, Point
-from tolcontact.discretization import Nominal, NominalPart
+from tolcontact.discretization import Nominal, NominalPart, Weld
 from tolcontact.elasticity import ElasticBody, MatrixSource, MeshSource, elastic_body, flexibility
 from tolcontact.errors import Faults, designation
 from tolcontact.mechanics.groups import Group, Load
@@ -85,6 +86,10 @@ class PartFlexibility(NamedTuple):
     points: Float[Array, "point 3"]
     moved: Float[Array, "point 3 load"]
 
+    def place(self, point: Float[Array, " 3"]) -> int:
+        """Return the index of a measured point."""
+        return int(np.flatnonzero((self.points == point).all(axis=1))[0])
+
 
 class Bending:
     """The elastic displacements of measured points, as expressions of the loads.
@@ -101,8 +106,19 @@ class Bending:
         if part not in self._parts:
             return ca.SX.zeros(3)
         bent = self._parts[part]
-        point = int(np.flatnonzero((bent.points == position).all(axis=1))[0])
-        return ca.DM(bent.moved[point]) @ ca.vertcat(self.loads[bent.loads.tolist()], 1)
+        return ca.DM(bent.moved[bent.place(position)]) @ ca.vertcat(self.loads[bent.loads.tolist()], 1)
+
+    def weld_gaps(self, weld: Weld, poses: Float[Array, "n part 12"], loads: Float[Array, "n load"]) -> Float[Array, "n row"]:
+        """Return the gaps (n, row) [mm] of a weld, at poses of the parts of its station and under loads [N]."""
+        X_RM = pose.relative(poses[:, weld.moving], poses[:, weld.reference])
+        gaps = ((pose.apply(X_RM, weld.P_m) - weld.P_r) * weld.n_r).sum(axis=2)
+        for index, P, sign in ((weld.moving, weld.P_m, 1.0), (weld.reference, weld.P_r, -1.0)):
+            if index in self._parts:
+                bent = self._parts[index]
+                for row, (point, n) in enumerate(zip(P, sign * weld.n_r, strict=True)):
+                    by_load = n @ bent.moved[bent.place(point)]
+                    gaps[:, row] += (loads[:, bent.loads] * by_load[:-1]).sum(axis=1) + by_load[-1]
+        return np.asarray(gaps)
 
 
 def elastic_bodies(nominal: Nominal) -> Bodies:
@@ -190,7 +206,7 @@ def _spread(part: NominalPart, body: ElasticBody, P: np.ndarray, n: np.ndarray) 
 
 
 def _measured_points(nominal: Nominal, index: int) -> np.ndarray:
-    """Return the points (point, 3) of a part that measures refer to, in the nominal assembly."""
+    """Return the points (point, 3) of a part that measures or its welds refer to, in the nominal assembly."""
     points = [
         model.position(point)
         for model in nominal.scenes or (nominal,)
@@ -198,6 +214,8 @@ def _measured_points(nominal: Nominal, index: int) -> np.ndarray:
         for point in (measure.of, measure.to)
         if isinstance(point, Point) and model.part_index(point.part) == index
     ]
+    for weld in nominal.welds:
+        points += [*(weld.P_m if weld.moving == index else ()), *(weld.P_r if weld.reference == index else ())]
     return np.unique(np.array(points).reshape(-1, 3), axis=0)
 
 

@@ -30,6 +30,7 @@ class Block(Record, Readable):
     active        (n, pair): number of active contact points in the raw state
     carrying      (n, pair): number of contact points under load: with more than 1e-4 of the largest reaction
     reaction      (n, pair): sum of the reactions of these points, in the units of the objective
+    weld_gap      (n, weld row) [mm]: gaps that welds keep, from the station that joined their parts
     load          (n, load) [N]: reactions at the contact points between elastic parts, see Nominal.loads
     clashes       (n,): number of pairs of parts without declared contact that lie in each other in the corrected state; -1 if
                   they were not tested
@@ -52,6 +53,7 @@ class Block(Record, Readable):
     active: Int[Array, "n pair"] = field(metadata={"variable": terms.ACTIVE})
     carrying: Int[Array, "n pair"] = field(metadata={"variable": terms.CARRYING})
     reaction: Float[Array, "n pair"] = field(metadata={"variable": terms.REACTION})
+    weld_gap: Float[Array, "n weld_row"] = field(metadata={"variable": terms.WELD_GAP})
     load: Float[Array, "n load"] = field(metadata={"variable": terms.LOAD})
     clashes: Int[Array, " n"] = field(metadata={"variable": terms.CLASHES})
     clash_depth: Float[Array, " n"] = field(metadata={"variable": terms.CLASH_DEPTH})
@@ -84,6 +86,7 @@ class Block(Record, Readable):
         pairs: int,
         stations: int,
         loads: int,
+        welds: int,
     ) -> "Block":
         """Return realizations at their raw poses (n, part, 12), with measures (n, measure), that contact does not change."""
         count, states = len(raw), len(terms.STATES)
@@ -98,6 +101,7 @@ class Block(Record, Readable):
             carrying=np.zeros((count, pairs), dtype=int),
             reaction=np.zeros((count, pairs)),
             load=np.zeros((count, loads)),
+            weld_gap=np.zeros((count, welds)),
             clashes=np.full(count, -1),
             clash_depth=np.zeros(count),
             clash_part=np.full(count, -1),
@@ -134,12 +138,14 @@ def simulate_block(
     raw = placed.reshape(len(deviations), len(program.nominal.parts), ENTRIES)
     measured, relative = _observe(program, raw, deviations)
     nominal, stations = program.nominal, len(program.stations)
-    block = Block.untouched(start, deviations, raw, measured, len(nominal.pairs), stations, len(nominal.loads))
+    counts = {"pairs": len(nominal.pairs), "loads": len(nominal.loads), "welds": nominal.input_count - deviations.shape[1]}
+    block = Block.untouched(start, deviations, raw, measured, stations=stations, **counts)
     stages = program.stations or (None,)
     outcomes_by_stage = np.zeros((len(block), len(stages)), dtype=np.int8)
     # NaN gaps count as no contact, so realizations with NaN poses are marked as unsolved below.
     is_unknown = ~np.isfinite(raw).all(axis=(1, 2))
     raw_relative = relative.copy() if program.stations else relative
+    inputs = np.concatenate([deviations, block.weld_gap], axis=1) if nominal.welds else deviations
     for position, station in enumerate(stages):
         worst = outcomes_by_stage[:, position]
         changed = np.flatnonzero(outcomes_by_stage.any(axis=1))
@@ -147,11 +153,14 @@ def simulate_block(
             station, changed, raw, relative, block.poses[:, CORRECTED], deviations
         )
         for resolver in resolvers if station is None else [resolvers[index] for index in station.groups]:
-            resolved = resolver.resolve(raw, relative, deviations)
+            resolved = resolver.resolve(raw, relative, inputs)
             _put(block, resolver, resolved)
             if is_placed_again:
                 _put_raw(block, resolver, changed, raw_relative)
             worst[resolved.touched] = np.maximum(worst[resolved.touched], resolved.state.outcome)
+        for weld in nominal.welds:
+            if program.bending is not None and station is not None and weld.station == station.name:
+                inputs[:, weld.columns] = program.bending.weld_gaps(weld, block.poses[:, CORRECTED], block.load)
     if program.method.is_bounded:
         worst = outcomes_by_stage.max(axis=1)
         bodies = watched_bodies(
@@ -168,6 +177,7 @@ def simulate_block(
         for index, rows in bodies.withdrawn:
             worst = outcomes_by_stage[:, index]
             worst[rows] = np.where(worst[rows] <= Outcome.RESOLVED, Outcome.DOUBTFUL, worst[rows])
+    block.weld_gap[:] = inputs[:, deviations.shape[1] :]
     is_unknown |= ~np.isfinite(raw).all(axis=(1, 2))
     outcomes_by_stage[is_unknown], block.kkt_residual[is_unknown] = Outcome.UNSOLVED, np.inf
     worst = outcomes_by_stage.max(axis=1)

@@ -147,7 +147,7 @@ def assert_same_run(a: Results, b: Results, *, variables: Sequence[str] | None =
 
     Raises AssertionError with the number of variables that differ, and the first realization that differs in the first of them.
     """
-    names = [variable.name for variable in (*terms.BY_REALIZATION, terms.LOAD)]
+    names = [variable.name for variable in (*terms.BY_REALIZATION, *terms.ELASTIC_ROWS)]
     if unknown := [name for name in variables or () if name not in names]:
         raise OptionError(f"no realization has {', '.join(map(repr, unknown))}; expected some of: {', '.join(names)}")
     with opened(a) as expected, opened(b) as actual:

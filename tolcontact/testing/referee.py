@@ -199,6 +199,11 @@ class ArchivedBending:
         self.loads = np.flatnonzero(np.isin(group[terms.POINT_OF_LOAD.name].values, points))
         self._by_load = group[terms.FLEXIBILITY.name].values[self.loads]
         self._by_forces = group[terms.OPENING.name].values[self.loads]
+        self._weld_rows = group[terms.WELD_OF_LOAD.name].values[self.loads]
+
+    def kept(self, gaps: np.ndarray) -> np.ndarray:
+        """Return the gaps (realization, point) [mm] that welds keep, from those of all welds; 0 of other points."""
+        return np.where(self._weld_rows >= 0, gaps[:, self._weld_rows], 0.0) if gaps.size else np.zeros((1, len(self.loads)))
 
     def openings(self, loads: np.ndarray) -> np.ndarray:
         """Return the openings (realization, point) [mm] under reactions `loads` (realization, load) [N]."""
@@ -250,6 +255,7 @@ class ArchivedPair:
         gaps = self._rigid_gaps(rows, piece)
         if self.bending is not None and self.bending.loads.size:
             gaps[:, terms.CORRECTED] += self.bending.openings(_needed(rows, terms.LOAD.name, piece))
+            gaps -= self.bending.kept(_needed(rows, terms.WELD_GAP.name, piece))[:, None]
         return gaps
 
     def _rigid_gaps(self, rows: Rows, piece: slice) -> np.ndarray:
