@@ -20,6 +20,7 @@ from tolcontact.geometry.triangle_mesh import edges
 from tolcontact.temporary import temporary_folder
 
 PROGRAM = Path(__file__).with_name("mesher.py")
+CUBIC_METRES = 1e-9  # in a cubic millimetre
 MEMORY, SECONDS = 4 << 30, 300  # [byte] and [s] of processor time for a mesh
 
 
@@ -30,11 +31,17 @@ def meshed_body(source: MeshSource) -> ElasticBody:
     corners = vertices[faces]
     area = float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2)
     mesh = _mesh(vertices, faces, source.step, element_size(vertices, faces, area, source.element_size))
-    stiffness, volumes = stiffness_of(mesh, source.young, source.poisson)
-    shares = volumes / volumes.sum()
-    mass = np.nan if source.density is None else float(source.density * 1e-9 * volumes.sum())
+    return body_of(mesh, source.young, source.poisson, source.density)
+
+
+def body_of(mesh: Tetrahedra, young: float, poisson: float, density: float | None = None) -> ElasticBody:
+    """Return the elastic body of a mesh, with Young's modulus [MPa], Poisson's ratio and density [kg/m^3]."""
+    stiffness, volumes = stiffness_of(mesh, young, poisson)
+    volume = float(volumes.sum())
+    shares = volumes / volume
     solve = balanced_solver(stiffness, rigid_motions(mesh.nodes, shares), mesh.nodes)
-    return ElasticBody(mesh.nodes, shares, mass, SurfacePads(mesh, 2 * float(volumes.sum()) / area), solve)
+    mass = np.nan if density is None else CUBIC_METRES * density * volume
+    return ElasticBody(mesh.nodes, shares, mass, SurfacePads(mesh, volume), solve)
 
 
 def _check(source: MeshSource) -> None:

@@ -9,7 +9,7 @@ from tolcontact.declaration.geometry import UNITS
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.triangle_mesh import triangle_tree
 
-MIN_SPAN = 0.1  # of the part, by all nodes together
+MIN_SPAN = 0.2  # of the part, by all nodes together: others may be in smaller units
 
 
 def check_nodes(
@@ -19,15 +19,23 @@ def check_nodes(
     faces: Int[Array, "face 3"],
     tolerance: float,
 ) -> None:
-    """Raise GeometryFault unless `nodes` lie within `tolerance` [mm] of the part's surface, and span a tenth of it."""
+    """Raise GeometryFault unless `nodes` lie within `tolerance` [mm] of the part's surface.
+
+    Nodes in smaller units lie close together, and may all be near the surface at the origin: those that span less than a fifth
+    of the part must not fit it in other units.
+    """
     distances = _distances(nodes, vertices, faces)
     span, size = np.linalg.norm(np.ptp(nodes, axis=0)), np.linalg.norm(np.ptp(vertices, axis=0))
     if distances.max() <= tolerance and span >= MIN_SPAN * size:
         return
+    offsets = {unit: _distances(factor * nodes, vertices, faces).max() for unit, factor in UNITS.items() if unit != "mm"}
+    fits = [unit for unit, offset in offsets.items() if offset <= tolerance and UNITS[unit] * span >= MIN_SPAN * size]
+    if distances.max() <= tolerance and not fits:
+        return  # all at one end of the part
     k = int(np.argmax(distances))
-    fits = [unit for unit, factor in UNITS.items() if unit != "mm" and _fits(factor * nodes, vertices, faces, tolerance)]
+    unit = max(fits, key=lambda unit: UNITS[unit], default="")
     advice = (
-        f"they do if they are in {fits[0]}: convert them, and the stiffness, to mm and N/mm"
+        f"they do if they are in {unit}: convert them, and the stiffness, to mm and N/mm"
         if fits
         else "give them in mm in the part's own frame, or mend the tolerance"
     )
@@ -35,11 +43,6 @@ def check_nodes(
         f'node file "{path}": its nodes do not lie on the part: node {k + 1} of {len(nodes)} is {distances[k]:.4g} mm from its '
         f"surface (at most {tolerance:g} mm is allowed), and they span {span:.4g} of {size:.4g} mm; {advice}"
     )
-
-
-def _fits(nodes: np.ndarray, vertices: np.ndarray, faces: np.ndarray, tolerance: float) -> bool:
-    span, size = np.linalg.norm(np.ptp(nodes, axis=0)), np.linalg.norm(np.ptp(vertices, axis=0))
-    return bool(span >= MIN_SPAN * size and _distances(nodes, vertices, faces).max() <= tolerance)
 
 
 def _distances(nodes: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -30,9 +30,9 @@ class SurfacePads:
     the centroid c of w; a and b follow from the resultant d and the moment (p - c) x d.
     """
 
-    def __init__(self, mesh: Tetrahedra, usual_radius: float) -> None:
-        """Prepare the boundary of a mesh, and the radius [mm] of pads for which none is required."""
-        self.mesh, self.usual_radius = mesh, usual_radius
+    def __init__(self, mesh: Tetrahedra, volume: float) -> None:
+        """Prepare the boundary of a mesh. Its `volume` [mm^3] by its area is the thickness, and the usual radius of pads."""
+        self.mesh = mesh
         self.corners = corners = mesh.nodes[mesh.triangles[:, :3]]
         inner = mesh.nodes.mean(axis=0)
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -40,6 +40,7 @@ class SurfacePads:
         self.normals = normals / (2 * self.areas[:, None])
         if np.einsum("fx,fx->", self.normals * self.areas[:, None], corners.mean(axis=1) - inner) < 0:
             self.normals = -self.normals  # the volume that the normals enclose is positive
+        self.usual_radius = 2 * volume / float(self.areas.sum())
         self.size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
         self.edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
         self.centres = corners.mean(axis=1)

@@ -18,10 +18,10 @@ MAX_LISTED = 5
 
 
 def free_stiffness(file: StiffnessFile, table: NodeTable) -> tuple[Float[Array, "node 3"], Float[Array, "force force"]]:
-    """Return the nodes [mm] of a matrix and its stiffness (3 node, 3 node) [N/mm], without rotations of nodes.
+    """Return the nodes [mm] of a matrix and its stiffness (3 node, 3 node) [N/mm], without rotations and modes.
 
-    Nothing acts on rotations, so they are condensed: K = K_uu - K_ur K_rr^-1 K_ru. Rounding of the file is evened out, so that
-    K is symmetric, and K R = 0. Raises GeometryFault with the names of the files.
+    Nothing acts on rotations and modes, so they are condensed: K = K_uu - K_ur K_rr^-1 K_ru. Rounding of
+    the file is evened out, so that K is symmetric, and K R = 0. Raises GeometryFault with the names of the files.
     """
     name = f'stiffness file "{file.path}"'
     freedoms, positions = _freedoms(file, table)
@@ -31,12 +31,12 @@ def free_stiffness(file: StiffnessFile, table: NodeTable) -> tuple[Float[Array, 
     freedoms, K = freedoms[is_used], K[np.ix_(is_used, is_used)]
     _check_symmetry(name, K, freedoms)
     K = (K + K.T) / 2
-    nodes, row_nodes = np.unique(freedoms[:, 0], return_inverse=True)
-    where = np.array([positions[int(node)] for node in nodes])
-    _check_rigid_motions(name, K, freedoms, where, row_nodes, table.path)
     order = np.lexsort((freedoms[:, 1], freedoms[:, 0]))
-    moves, turns = order[freedoms[order, 1] <= 3], order[freedoms[order, 1] > 3]
-    K = _condensed(name, K, moves, turns)
+    freedoms, K = freedoms[order], K[np.ix_(order, order)]
+    is_displacement = np.isin(freedoms[:, 1], (1, 2, 3))
+    where = np.array([positions[int(node)] for node in freedoms[is_displacement][::3, 0]])
+    _check_rigid_motions(name, K, freedoms, where, table.path)
+    K = _condensed(name, K, np.flatnonzero(is_displacement), np.flatnonzero(~is_displacement))
     return where, _checked_spectrum(name, K, where)
 
 
@@ -58,13 +58,14 @@ def _freedoms(file: StiffnessFile, table: NodeTable) -> tuple[Int[Array, "row 2"
         )
     else:
         numbers, freedoms = table.numbers, file.freedoms
-    missing = np.setdiff1d(freedoms[:, 0], numbers)
+    physical = freedoms[freedoms[:, 1] > 0]
+    missing = np.setdiff1d(physical[:, 0], numbers)
     if len(missing):
         raise GeometryFault(
             f'node file "{table.path}" has no node {_listed(missing)}, which "{file.path}" has; add its position'
         )
-    listed, counts = np.unique(np.unique(freedoms[freedoms[:, 1] <= 3], axis=0)[:, 0], return_counts=True)
-    held = np.setdiff1d(freedoms[:, 0], listed[counts == 3])
+    listed, counts = np.unique(np.unique(physical[physical[:, 1] <= 3], axis=0)[:, 0], return_counts=True)
+    held = np.setdiff1d(physical[:, 0], listed[counts == 3])
     if len(held):
         raise GeometryFault(
             f'stiffness file "{file.path}" lacks displacements of node {_listed(held)}; expected x, y and z of '
@@ -78,7 +79,7 @@ def _check_diagonal(name: str, K: np.ndarray, freedoms: np.ndarray) -> None:
     negative = freedoms[diagonal < 0]
     if len(negative):
         raise GeometryFault(f"{name} has negative stiffness at node {_listed(negative[:, 0])}; check its sign, export it again")
-    is_empty = (diagonal == 0) & ((freedoms[:, 1] <= 3) | (K != 0).any(axis=1))
+    is_empty = (diagonal == 0) & (np.isin(freedoms[:, 1], (1, 2, 3)) | (K != 0).any(axis=1))
     if is_empty.any():
         raise GeometryFault(
             f"{name} has no stiffness at node {_listed(freedoms[is_empty, 0])}; leave nodes out that hang on nothing"
@@ -97,18 +98,19 @@ def _check_symmetry(name: str, K: np.ndarray, freedoms: np.ndarray) -> None:
         )
 
 
-def _check_rigid_motions(
-    name: str, K: np.ndarray, freedoms: np.ndarray, where: np.ndarray, row_nodes: np.ndarray, table: Path
-) -> None:
+def _check_rigid_motions(name: str, K: np.ndarray, freedoms: np.ndarray, where: np.ndarray, table: Path) -> None:
     """Raise GeometryFault unless K R = 0, row by row: forces of rigid motions vanish up to the rounding of their terms."""
     motions = rigid_motions(where, np.full(len(where), 1 / len(where))).reshape(-1, 3, 6)
     size = np.sqrt(((where - where.mean(axis=0)) ** 2).sum(axis=1).mean())
     turning = np.zeros((3, 6))
     turning[:, 3:] = np.eye(3) / size
-    full = np.concatenate([motions, np.broadcast_to(turning, motions.shape)], axis=1)  # (node, 6, motion)
-    R = full[row_nodes, freedoms[:, 1] - 1]
-    forces = np.abs(K @ R)
-    errors = (forces / (np.abs(K) @ np.abs(R)).max(axis=1, keepdims=True)).max(axis=0)
+    modes = np.zeros((len(where), 1, 6))
+    full = np.concatenate([modes, motions, np.broadcast_to(turning, motions.shape)], axis=1)  # (node, freedom, motion)
+    is_mode = freedoms[:, 1] == 0
+    nodes = np.unique(freedoms[~is_mode, 0])
+    R = full[np.where(is_mode, 0, np.searchsorted(nodes, freedoms[:, 0])), freedoms[:, 1]]
+    forces, terms = np.abs(K @ R), (np.abs(K) @ np.abs(R)).max(axis=1, keepdims=True)
+    errors = (forces / np.where(terms > 0, terms, 1)).max(axis=0)
     if errors.max() <= SINGLE:
         return
     worst = freedoms[int(np.argmax(forces.max(axis=1))), 0]
@@ -120,17 +122,17 @@ def _check_rigid_motions(
     raise GeometryFault(f"{name} resists rigid motions, relative to its entries: {resisted}: {cause}")
 
 
-def _condensed(name: str, K: np.ndarray, moves: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """Return the stiffness of displacements if no moments act on nodes."""
+def _condensed(name: str, K: np.ndarray, moves: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return the stiffness of displacements if nothing acts on other freedoms."""
     stiffness = K[np.ix_(moves, moves)]
-    if not len(turns):
+    if not len(others):
         return stiffness
-    coupling = K[np.ix_(turns, moves)]
+    coupling = K[np.ix_(others, moves)]
     try:
-        return stiffness - coupling.T @ linalg.solve(K[np.ix_(turns, turns)], coupling, assume_a="pos")
+        return stiffness - coupling.T @ linalg.solve(K[np.ix_(others, others)], coupling, assume_a="pos")
     except linalg.LinAlgError as error:
         raise GeometryFault(
-            f"{name} has rotations of nodes that meet no stiffness, or a negative one; retain displacements only"
+            f"{name} has rotations of nodes, or modes, that meet no stiffness, or a negative one; retain displacements only"
         ) from error
 
 

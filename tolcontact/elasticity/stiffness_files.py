@@ -1,6 +1,7 @@
 """Stiffness matrices in the files of finite-element programs, by the content of the file.
 
-A freedom is a pair: the number of a node, and 1 to 3 for its displacements x, y, z, or 4 to 6 for its rotations.
+A freedom is a pair: the number of a node, and 1 to 3 for its displacements x, y, z, or 4 to 6 for its rotations. Amplitudes of
+modes are freedoms 0.
 """
 
 import re

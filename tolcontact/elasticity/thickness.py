@@ -10,7 +10,7 @@ RAYS = 600
 WALL_COSINE = -0.5  # of normals: a ray that leaves through a face turned further away has crossed no wall
 THIN_SHARE = 0.1  # of the surface that may be thinner: edges of wedges, small lips
 MAX_RATIO = 5.0  # edge by thickness: clamped sheets under pressure deflect 1.3 % too little there, 25 % at 10
-USUAL_RATIO, USUAL_DIVISIONS = 2.5, 12  # edges by thickness, and along the diagonal of the part
+USUAL_RATIO, USUAL_DIVISIONS = 2.5, 25  # edges by thickness, and along the diagonal of the part
 MAX_NODES = 60_000
 NODES_PER_SQUARE = 4.6  # of a surface, for edges of length 1: two triangles of 0.43, with two nodes each
 
