@@ -85,12 +85,12 @@ def _products(matrix: ca.SX, vector: ca.SX, spans: Sequence[slice], call: Call) 
 def row_residuals(rows: Rows, excess: ca.SX, lam: ca.SX, length: ca.SX) -> ca.SX:
     """Return the residuals of rows (row, 1): of min(row, multiplier) = 0, and the depth of gaps that remain negative.
 
-    The rows of two-sided locators are equations.
+    The rows of two-sided locators are equations: of these, it is the distance [mm] from the locator.
     """
-    natural = ca.fmin(excess, -lam)
+    natural, depth = ca.fmin(excess, -lam), ca.fmin(excess * length, 0)
     if rows.flexibility is not None:
-        natural = ca.if_else(ca.DM(rows.flexibility.holds.astype(float)), excess, natural)
-    return ca.vertcat(natural, ca.fmin(excess * length, 0))
+        natural = ca.if_else(ca.DM(rows.flexibility.holds.astype(float)), excess * length, natural)
+    return ca.vertcat(natural, depth)
 
 
 def reactions(lam: ca.SX, length: ca.SX, filled: ca.SX, scale: ca.SX) -> ca.SX:

@@ -117,7 +117,9 @@ class Bending:
                 bent = self._parts[index]
                 for row, (point, n) in enumerate(zip(P, sign * weld.n_r, strict=True)):
                     by_load = n @ bent.moved[bent.place(point)]
-                    gaps[:, row] += (loads[:, bent.loads] * by_load[:-1]).sum(axis=1) + by_load[-1]
+                    gaps[:, row] += by_load[-1]
+                    for load, share in zip(bent.loads, by_load, strict=False):  # in a fixed order
+                        gaps[:, row] += loads[:, load] * share
         return np.asarray(gaps)
 
 
