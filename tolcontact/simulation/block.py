@@ -145,7 +145,8 @@ def simulate_block(
     # NaN gaps count as no contact, so realizations with NaN poses are marked as unsolved below.
     is_unknown = ~np.isfinite(raw).all(axis=(1, 2))
     raw_relative = relative.copy() if program.stations else relative
-    inputs = np.concatenate([deviations, block.weld_gap], axis=1) if nominal.welds else deviations
+    raw_inputs = np.concatenate([deviations, block.weld_gap], axis=1) if nominal.welds else deviations
+    inputs = raw_inputs.copy() if nominal.welds else deviations
     for position, station in enumerate(stages):
         worst = outcomes_by_stage[:, position]
         changed = np.flatnonzero(outcomes_by_stage.any(axis=1))
@@ -156,7 +157,7 @@ def simulate_block(
             resolved = resolver.resolve(raw, relative, inputs)
             _put(block, resolver, resolved)
             if is_placed_again:
-                _put_raw(block, resolver, changed, raw_relative)
+                _put_raw(block, resolver, changed, raw_relative, raw_inputs)
             worst[resolved.touched] = np.maximum(worst[resolved.touched], resolved.state.outcome)
         for weld in nominal.welds:
             if program.bending is not None and station is not None and weld.station == station.name:
@@ -228,9 +229,18 @@ def _put(block: Block, resolver: ContactResolver, resolved: Resolved) -> None:
         block.load[touched[:, None], resolver.flexibility.loads] = state.multipliers[:, resolver.flexibility.load_rows]
 
 
-def _put_raw(block: Block, resolver: ContactResolver, rows: np.ndarray, relative: Float[Array, "n pair 12"]) -> None:
-    """Write gaps and active points of the raw state for rows whose contact was resolved from handed-over poses."""
-    gaps, active = resolver.raw_contact(relative[rows], block.deviations[rows])
+def _put_raw(
+    block: Block,
+    resolver: ContactResolver,
+    rows: np.ndarray,
+    relative: Float[Array, "n pair 12"],
+    inputs: Float[Array, "n input"],
+) -> None:
+    """Write gaps and active points of the raw state for rows whose contact was resolved from handed-over poses.
+
+    inputs   deviations, and 0 for the gaps of welds, which keep none before contact
+    """
+    gaps, active = resolver.raw_contact(relative[rows], inputs[rows])
     block.gap_min[rows[:, None], RAW, resolver.pairs] = gaps
     block.active[rows[:, None], resolver.pairs] = active
 

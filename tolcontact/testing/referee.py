@@ -255,7 +255,7 @@ class ArchivedPair:
         gaps = self._rigid_gaps(rows, piece)
         if self.bending is not None and self.bending.loads.size:
             gaps[:, terms.CORRECTED] += self.bending.openings(_needed(rows, terms.LOAD.name, piece))
-            gaps -= self.bending.kept(_needed(rows, terms.WELD_GAP.name, piece))[:, None]
+            gaps[:, terms.CORRECTED] -= self.bending.kept(_needed(rows, terms.WELD_GAP.name, piece))
         return gaps
 
     def _rigid_gaps(self, rows: Rows, piece: slice) -> np.ndarray:
