@@ -16,10 +16,11 @@ from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.measure_accuracy import measure_accuracies
 from tolcontact.compilation.method_checks import check_forces, check_method
 from tolcontact.compilation.solver import SolverChoice
-from tolcontact.compilation.solvers import solver_choice
+from tolcontact.compilation.solvers import SOLVERS, solver_choice, usable_solvers
 from tolcontact.compilation.station_program import StationProgram, station_programs
 from tolcontact.declaration.measure import Tape
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints, coordinates_in_words
+from tolcontact.errors import OptionError
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.interference import Watch
 from tolcontact.limits import Limits
@@ -149,6 +150,9 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         values = measured(nominal, poses_of(entries), d)
         place, observe = _place(nominal, d), _observe(nominal, entries, d, values)
         bodies = elastic_bodies(nominal)
+        if bodies and not choice.bends:
+            able = ", ".join(name for name in usable_solvers() if SOLVERS[name].bends)
+            raise OptionError(f'solver "{choice.name}" has no elastic parts, and the model has; choose one of: {able}')
         groups = [with_weights(group, nominal, bodies) for group in contact_groups(nominal, weighs_areas=method.is_exact)]
         if method.minimizes.presses:
             check_forces(nominal, groups)
