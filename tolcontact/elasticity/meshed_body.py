@@ -1,7 +1,8 @@
 """An elastic body of tetrahedra, which a process of its own makes. Meshes are kept in the cache folder of the user."""
 
-import hashlib
 import io
+from collections.abc import Callable
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -10,10 +11,10 @@ import numpy as np
 from tolcontact import code_cache
 from tolcontact.child import ChildDiedError, run_child
 from tolcontact.elasticity.cholesky import balanced_solver
-from tolcontact.elasticity.elastic_body import ElasticBody, rigid_motions
+from tolcontact.elasticity.elastic_body import ElasticBody, digest, rigid_motions
 from tolcontact.elasticity.pads import SurfacePads
 from tolcontact.elasticity.sources import MeshSource
-from tolcontact.elasticity.tetrahedra import Tetrahedra, stiffness_of, straightened
+from tolcontact.elasticity.tetrahedra import Tetrahedra, node_volumes, stiffness_of, straightened
 from tolcontact.elasticity.thickness import MAX_NODES, element_size
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.triangle_mesh import edges
@@ -35,13 +36,21 @@ def meshed_body(source: MeshSource) -> ElasticBody:
 
 
 def body_of(mesh: Tetrahedra, young: float, poisson: float, density: float | None = None) -> ElasticBody:
-    """Return the elastic body of a mesh, with Young's modulus [MPa], Poisson's ratio and density [kg/m^3]."""
-    stiffness, volumes = stiffness_of(mesh, young, poisson)
+    """Return the elastic body of a mesh, with Young's modulus [MPa], Poisson's ratio and density [kg/m^3].
+
+    Its stiffness is assembled and factorized when it is first needed: flexibilities may be in the cache.
+    """
+    volumes = node_volumes(mesh)
     volume = float(volumes.sum())
     shares = volumes / volume
-    solve = balanced_solver(stiffness, rigid_motions(mesh.nodes, shares), mesh.nodes)
     mass = np.nan if density is None else CUBIC_METRES * density * volume
-    return ElasticBody(mesh.nodes, shares, mass, SurfacePads(mesh, volume), solve)
+
+    @cache
+    def solver() -> Callable[[np.ndarray], np.ndarray]:
+        return balanced_solver(stiffness_of(mesh, young, poisson), rigid_motions(mesh.nodes, shares), mesh.nodes)
+
+    key = digest(mesh.nodes, mesh.elements, np.array([young, poisson]))
+    return ElasticBody(mesh.nodes, shares, mass, SurfacePads(mesh, volume), lambda forces: solver()(forces), key)
 
 
 def _check(source: MeshSource) -> None:
@@ -67,8 +76,7 @@ def _check(source: MeshSource) -> None:
 def _mesh(vertices: np.ndarray, faces: np.ndarray, step: Path | None, size: float) -> Tetrahedra:
     """Return the tetrahedra of a part with edges up to `size` [mm], from the cache or from netgen."""
     content = b"" if step is None else step.read_bytes()
-    pieces = (PROGRAM.read_bytes(), vertices.tobytes(), faces.tobytes(), content, np.float64(size).tobytes())
-    key = "mesh-" + hashlib.blake2b(b"".join(hashlib.blake2b(piece).digest() for piece in pieces), digest_size=16).hexdigest()
+    key = "mesh-" + digest(PROGRAM.read_bytes(), vertices, faces, content, np.array(size))
     stored = code_cache.load(key)
     if stored is None:
         stored = _made(vertices, faces, step, size)

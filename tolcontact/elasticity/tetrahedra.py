@@ -54,29 +54,33 @@ def straightened(mesh: Tetrahedra) -> Tetrahedra:
     raise GeometryFault(f"{turned.sum()} of its {len(turned)} tetrahedra are flat or inside out; give another element_size")
 
 
-def stiffness_of(mesh: Tetrahedra, young: float, poisson: float) -> tuple[sparse.csr_array, np.ndarray]:
-    """Return the stiffness (3 node, 3 node) [N/mm] of an isotropic material, and the volume (node,) [mm^3] of each node.
+def node_volumes(mesh: Tetrahedra) -> Float[Array, " node"]:
+    """Return the integral (node,) [mm^3] of each node's shape function; those of corners are negative."""
+    _, volumes = _gradients(mesh.nodes, mesh.elements)
+    total = np.zeros(len(mesh.nodes))
+    np.add.at(total, mesh.elements, np.abs(volumes) @ shape_functions(POINTS))
+    return total
+
+
+def stiffness_of(mesh: Tetrahedra, young: float, poisson: float) -> sparse.csr_array:
+    """Return the stiffness (3 node, 3 node) [N/mm] of an isotropic material.
 
     K_ij = sum over points of w (lambda g_i g_j' + mu g_j g_i' + mu g_i.g_j 1), with the gradients g of shape functions.
     """
     lame, shear = young * poisson / (1 + poisson) / (1 - 2 * poisson), young / 2 / (1 + poisson)
     size = 3 * len(mesh.nodes)
     stiffness = sparse.csr_array((size, size))
-    node_volumes = np.zeros(len(mesh.nodes))
-    values = shape_functions(POINTS)
     for start in range(0, len(mesh.elements), BLOCK_ELEMENTS):
         elements = mesh.elements[start : start + BLOCK_ELEMENTS]
         gradients, volumes = _gradients(mesh.nodes, elements)  # (element, point, node, 3), (element, point)
-        volumes = np.abs(volumes)
-        np.add.at(node_volumes, elements, volumes @ values)
-        flat = (np.sqrt(volumes)[..., None, None] * gradients).reshape(len(elements), len(POINTS), 30)
+        flat = (np.sqrt(np.abs(volumes))[..., None, None] * gradients).reshape(len(elements), len(POINTS), 30)
         products = (flat.swapaxes(1, 2) @ flat).reshape(-1, 10, 3, 10, 3)  # (element, i, a, j, b)
         blocks = lame * products + shear * products.transpose(0, 1, 4, 3, 2)
         blocks += shear * np.einsum("eicjc,ab->eiajb", products, np.eye(3))
         freedoms = (3 * elements[..., None] + np.arange(3)).reshape(len(elements), 30)
         rows, columns = np.repeat(freedoms, 30, axis=1), np.tile(freedoms, 30)
         stiffness += sparse.coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)).tocsr()
-    return stiffness, node_volumes
+    return stiffness
 
 
 def _gradients(nodes: np.ndarray, elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
