@@ -3,7 +3,7 @@
 Loads at single points of a solid do not converge as its mesh is refined; forces on pads do.
 """
 
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from scipy import sparse
@@ -14,7 +14,7 @@ from tolcontact.elasticity.tetrahedra import Tetrahedra, shape_functions
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.triangle_mesh import triangle_tree
 
-SAMPLES = 6  # quadrature points across the radius of a pad
+SAMPLES = 4  # quadrature points across the radius of a pad
 MIN_RADIUS = 0.05  # of the edges at the pad: the shape functions do not resolve a smaller one
 SAME_FACE = 0.5  # cosine between normals within a pad
 NEAREST = 1e-6  # of the size of the part: triangles at the distance of the nearest one
@@ -74,15 +74,14 @@ class SurfacePads:
                 f"something acts on it at ({', '.join(f'{x:.6g}' for x in p)}), {distance:.4g} mm off its surface; move "
                 "the point onto the part"
             )
-        near = np.array(self.tree.query_ball_point(p, distance + NEAREST * self.size + self.reach))
+        largest = np.hypot(distance, max(radius, MIN_RADIUS * 2 * self.reach)) + NEAREST * self.size
+        near = np.array(self.tree.query_ball_point(p, largest + self.reach))
         to_triangles = _triangle_distances(p, self.corners[near])
         nearest = near[to_triangles <= to_triangles.min() + NEAREST * self.size]
         radius = max(radius, MIN_RADIUS * self.edges[nearest].max())
         is_on = distance <= OFF_SURFACE * radius
         outer = radius if is_on else float(np.hypot(distance, radius))
-        near = np.array(self.tree.query_ball_point(p, outer + self.reach))
-        near = near[_triangle_distances(p, self.corners[near]) < outer]
-        samples, normals, areas, shapes, triangles = self._samples(near, radius)
+        samples, normals, areas, shapes, triangles = self._samples(near[to_triangles < outer], radius)
         offsets = samples - p
         weights = areas * np.maximum(1 - (offsets**2).sum(axis=1) / outer**2, 0)
         if is_on:
@@ -98,9 +97,7 @@ class SurfacePads:
         turn = np.linalg.solve(inertia, np.cross(p - c, d))
         forces = weights[:, None] * (d / weights.sum() + np.cross(turn, arms))
         nodes, index = np.unique(self.mesh.triangles[triangles], return_inverse=True)
-        sums = np.zeros((len(nodes), 3))
-        np.add.at(sums, index.reshape(triangles.shape[0], 6), shapes[:, :, None] * forces[:, None, :])
-        return nodes, sums
+        return nodes, np.stack([np.bincount(index.ravel(), (shapes * forces[:, [c]]).ravel()) for c in range(3)], axis=1)
 
     def _samples(self, near: np.ndarray, radius: float) -> tuple[np.ndarray, ...]:
         """Return quadrature points (sample, 3) of triangles `near`: normals, areas, shape functions (sample, 6), triangles."""
@@ -124,6 +121,7 @@ class SurfacePads:
         return tuple(np.concatenate(columns) for columns in zip(*pieces, strict=True))
 
 
+@cache
 def _centres(count: int) -> np.ndarray:
     """Return the centres (count^2, 3), barycentric, of the equal triangles into which `count` divisions of edges divide one."""
     i, j = np.divmod(np.arange(count * count), count)
