@@ -21,6 +21,7 @@ from tolcontact.geometry.triangle_mesh import edges
 from tolcontact.temporary import temporary_folder
 
 PROGRAM = Path(__file__).with_name("mesher.py")
+VOLUME_ERROR = 0.02  # relative, of a mesh: flat facets of round faces
 CUBIC_METRES = 1e-9  # in a cubic millimetre
 MEMORY, SECONDS = 4 << 30, 300  # [byte] and [s] of processor time for a mesh
 
@@ -29,8 +30,7 @@ def meshed_body(source: MeshSource) -> ElasticBody:
     """Return the elastic body of a part that is meshed here. Raises GeometryFault if its shape or material cannot be used."""
     _check(source)
     vertices, faces = np.ascontiguousarray(source.vertices, dtype=float), np.ascontiguousarray(source.faces, dtype=np.int64)
-    corners = vertices[faces]
-    area = float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2)
+    area = float(np.linalg.norm(_normals(vertices, faces), axis=1).sum() / 2)
     mesh = _mesh(vertices, faces, source.step, element_size(vertices, faces, area, source.element_size))
     return body_of(mesh, source.young, source.poisson, source.density)
 
@@ -51,6 +51,12 @@ def body_of(mesh: Tetrahedra, young: float, poisson: float, density: float | Non
 
     key = digest(mesh.nodes, mesh.elements, np.array([young, poisson]))
     return ElasticBody(mesh.nodes, shares, mass, SurfacePads(mesh, volume), lambda forces: solver()(forces), key)
+
+
+def _normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return normals (face, 3) whose length is twice the area."""
+    corners = vertices[faces]
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 def _check(source: MeshSource) -> None:
@@ -82,12 +88,20 @@ def _mesh(vertices: np.ndarray, faces: np.ndarray, step: Path | None, size: floa
         stored = _made(vertices, faces, step, size)
         code_cache.store(key, stored)
     with np.load(io.BytesIO(stored), allow_pickle=False) as arrays:
-        mesh = Tetrahedra(arrays["nodes"], arrays["tetrahedra"], arrays["triangles"])
+        mesh = Tetrahedra(arrays["nodes"], arrays["tetrahedra"])
     if len(mesh.nodes) > MAX_NODES:
         raise GeometryFault(
             f"its mesh has {len(mesh.nodes)} nodes with edges of {size:.3g} mm, and at most {MAX_NODES} are supported; give a "
             "larger element_size, leave small features out, or import a stiffness matrix"
         )
+    volume, expected = node_volumes(mesh).sum(), np.einsum("fx,fx->", vertices[faces[:, 0]], _normals(vertices, faces)) / 6
+    if abs(volume - expected) > VOLUME_ERROR * expected:
+        raise GeometryFault(
+            f"netgen fills {volume:.5g} mm3 with tetrahedra, and it encloses {expected:.5g} mm3: cavities are not meshed, nor "
+            "surfaces that intersect themselves; mend it, give its STEP file, or import a stiffness matrix"
+        )
+    if mesh.piece_count > 1:
+        raise GeometryFault(f"it consists of {mesh.piece_count} pieces; an elastic part is one: declare a part for each piece")
     return straightened(mesh)
 
 

@@ -18,14 +18,14 @@ SAMPLES = 4  # quadrature points across the radius of a pad
 MIN_RADIUS = 0.05  # of the edges at the pad: the shape functions do not resolve a smaller one
 SAME_FACE = 0.5  # cosine between normals within a pad
 NEAREST = 1e-6  # of the size of the part: triangles at the distance of the nearest one
-OFF_SURFACE = 0.05  # radii: points at a larger distance are not on the surface
+OFF_SURFACE = 0.05  # radii: higher points are outside the material
 
 
 class SurfacePads:
     """The boundary of a mesh, on which forces are spread.
 
     A pad is the surface within the radius around a point, on the faces of its nearest triangles, with the pressure
-    1 - (r / radius)^2. Around a point off the surface, such as one on the axis of a hole, it is the surface that faces the
+    1 - (r / radius)^2. Around a point outside the material, such as one on the axis of a hole, it is all surface that faces the
     point, up to the radius beyond the nearest place. The force d at p acts as f(x) = w(x) (a + b x (x - c)) with
     the centroid c of w; a and b follow from the resultant d and the moment (p - c) x d.
     """
@@ -34,12 +34,9 @@ class SurfacePads:
         """Prepare the boundary of a mesh. Its `volume` [mm^3] by its area is the thickness, and the usual radius of pads."""
         self.mesh = mesh
         self.corners = corners = mesh.nodes[mesh.triangles[:, :3]]
-        inner = mesh.nodes.mean(axis=0)
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         self.areas = np.linalg.norm(normals, axis=1) / 2
         self.normals = normals / (2 * self.areas[:, None])
-        if np.einsum("fx,fx->", self.normals * self.areas[:, None], corners.mean(axis=1) - inner) < 0:
-            self.normals = -self.normals  # the volume that the normals enclose is positive
         self.usual_radius = 2 * volume / float(self.areas.sum())
         self.size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
         self.edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
@@ -79,17 +76,17 @@ class SurfacePads:
         to_triangles = _triangle_distances(p, self.corners[near])
         nearest = near[to_triangles <= to_triangles.min() + NEAREST * self.size]
         radius = max(radius, MIN_RADIUS * self.edges[nearest].max())
-        is_on = distance <= OFF_SURFACE * radius
-        outer = radius if is_on else float(np.hypot(distance, radius))
+        outer = float(np.hypot(distance, radius))
+        height = ((p - self.corners[nearest, 0]) * self.normals[nearest]).sum(axis=1).max()
         samples, normals, areas, shapes, triangles = self._samples(near[to_triangles < outer], radius)
         offsets = samples - p
         weights = areas * np.maximum(1 - (offsets**2).sum(axis=1) / outer**2, 0)
-        if is_on:
-            weights[(normals @ self.normals[nearest].T).max(axis=1) < SAME_FACE] = 0
+        if height > OFF_SURFACE * radius:
+            weights[(normals * offsets).sum(axis=1) >= 0] = 0
         else:
-            facing = np.einsum("sx,sx->s", normals, -offsets) / np.linalg.norm(offsets, axis=1)
-            sense = np.sign(facing[np.argmin((offsets**2).sum(axis=1))])
-            weights[sense * facing < SAME_FACE] = 0
+            weights[(normals @ self.normals[nearest].T).max(axis=1) < SAME_FACE] = 0
+        inside = weights > 0
+        samples, shapes, triangles, weights = samples[inside], shapes[inside], triangles[inside], weights[inside]
         c = weights @ samples / weights.sum()
         arms = samples - c
         inertia = (weights[:, None] * arms).T @ arms
