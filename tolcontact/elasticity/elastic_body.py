@@ -1,13 +1,16 @@
 """A part as a free elastic body: nodes, and their displacements under forces. Lengths in mm, forces in N."""
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 from scipy import sparse
 
+from tolcontact import code_cache
 from tolcontact.arrays import Array, Float
 from tolcontact.errors import GeometryFault
 
@@ -31,6 +34,7 @@ class ElasticBody:
     mass       [kg]; NaN if it is unknown
     pads       spreads unit forces
     balanced   returns displacements (3 node, load) [mm], up to rigid motions, under balanced forces (3 node, load) [N]
+    key        a digest of nodes and stiffness: equal bodies have equal keys
     """
 
     nodes: Float[Array, "node 3"]
@@ -38,6 +42,7 @@ class ElasticBody:
     mass: float
     pads: Pads
     balanced: Callable[[np.ndarray], np.ndarray]
+    key: str
 
     def spread(
         self, points: Float[Array, "load 3"], directions: Float[Array, "load 3"], radius: float | None
@@ -80,8 +85,29 @@ class ElasticBody:
 def flexibility(body: ElasticBody, loads: sparse.csc_array) -> Float[Array, "load load"]:
     """Return the flexibility N'GN [mm/N] among `loads` N (3 node, load): entry (i, j) is the displacement at i due to load j.
 
-    By Betti's theorem it is symmetric; rounding is evened out.
+    By Betti's theorem it is symmetric; rounding is evened out. It is kept in the cache folder of the user.
     """
+    key = "flexibility-" + digest(_sources(), body.key.encode(), body.shares, loads.data, loads.indices, loads.indptr)
+    stored = code_cache.load(key)
+    if stored is None:
+        stored = _flexibility(body, loads).tobytes()
+        code_cache.store(key, stored)
+    return np.frombuffer(stored).reshape(loads.shape[1], loads.shape[1])
+
+
+def digest(*contents: np.ndarray | bytes) -> str:
+    """Return a digest of arrays and bytes."""
+    pieces = (content.tobytes() if isinstance(content, np.ndarray) else content for content in contents)
+    return hashlib.blake2b(b"".join(hashlib.blake2b(piece).digest() for piece in pieces), digest_size=16).hexdigest()
+
+
+@cache
+def _sources() -> bytes:
+    """Return the sources of this package: what they compute is not what others computed."""
+    return b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
+
+
+def _flexibility(body: ElasticBody, loads: sparse.csc_array) -> np.ndarray:
     blocks = range(0, loads.shape[1], BLOCK_LOADS)
     columns = [loads.T @ body.response(loads[:, start : start + BLOCK_LOADS].toarray()) for start in blocks]
     matrix = np.concatenate(columns, axis=1) if columns else np.zeros((0, 0))

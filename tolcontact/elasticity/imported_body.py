@@ -7,7 +7,7 @@ from scipy import linalg, sparse
 from scipy.spatial import KDTree
 
 from tolcontact.arrays import Array, Float, Int
-from tolcontact.elasticity.elastic_body import ElasticBody, rigid_motions
+from tolcontact.elasticity.elastic_body import ElasticBody, digest, rigid_motions
 from tolcontact.elasticity.node_table import node_table
 from tolcontact.elasticity.nodes_on_part import check_nodes
 from tolcontact.elasticity.stiffness_checks import free_stiffness
@@ -49,4 +49,4 @@ def imported_body(
         columns = np.broadcast_to(np.arange(len(points))[:, None], rows.shape)
         return sparse.csc_array((directions.ravel(), (rows.ravel(), columns.ravel())), shape=(len(K), len(points)))
 
-    return ElasticBody(positions, shares, np.nan, pads, lambda forces: linalg.cho_solve(factor, forces))
+    return ElasticBody(positions, shares, np.nan, pads, lambda forces: linalg.cho_solve(factor, forces), digest(positions, K))

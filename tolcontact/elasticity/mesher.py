@@ -31,12 +31,11 @@ def mesh(source: Path) -> str:
         geometry = STLGeometry(os.fspath(path))
     volume = geometry.GenerateMesh(maxh=size)
     volume.SecondOrder()
-    tetrahedra, triangles = volume.Elements3D().NumPy()["nodes"], volume.Elements2D().NumPy()["nodes"]
+    tetrahedra = volume.Elements3D().NumPy()["nodes"]
     np.savez(
         source.with_suffix(".mesh.npz"),
         nodes=np.asarray(volume.Coordinates()),
         tetrahedra=tetrahedra.astype(np.int64) - 1,
-        triangles=triangles[:, :6].astype(np.int64) - 1,
     )
     return "triangles" if solid is None else "faces"
 

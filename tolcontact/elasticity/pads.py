@@ -3,7 +3,7 @@
 Loads at single points of a solid do not converge as its mesh is refined; forces on pads do.
 """
 
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from scipy import sparse
@@ -14,18 +14,18 @@ from tolcontact.elasticity.tetrahedra import Tetrahedra, shape_functions
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.triangle_mesh import triangle_tree
 
-SAMPLES = 6  # quadrature points across the radius of a pad
+SAMPLES = 4  # quadrature points across the radius of a pad
 MIN_RADIUS = 0.05  # of the edges at the pad: the shape functions do not resolve a smaller one
 SAME_FACE = 0.5  # cosine between normals within a pad
 NEAREST = 1e-6  # of the size of the part: triangles at the distance of the nearest one
-OFF_SURFACE = 0.05  # radii: points at a larger distance are not on the surface
+OFF_SURFACE = 0.05  # radii: higher points are outside the material
 
 
 class SurfacePads:
     """The boundary of a mesh, on which forces are spread.
 
     A pad is the surface within the radius around a point, on the faces of its nearest triangles, with the pressure
-    1 - (r / radius)^2. Around a point off the surface, such as one on the axis of a hole, it is the surface that faces the
+    1 - (r / radius)^2. Around a point outside the material, such as one on the axis of a hole, it is all surface that faces the
     point, up to the radius beyond the nearest place. The force d at p acts as f(x) = w(x) (a + b x (x - c)) with
     the centroid c of w; a and b follow from the resultant d and the moment (p - c) x d.
     """
@@ -34,12 +34,9 @@ class SurfacePads:
         """Prepare the boundary of a mesh. Its `volume` [mm^3] by its area is the thickness, and the usual radius of pads."""
         self.mesh = mesh
         self.corners = corners = mesh.nodes[mesh.triangles[:, :3]]
-        inner = mesh.nodes.mean(axis=0)
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         self.areas = np.linalg.norm(normals, axis=1) / 2
         self.normals = normals / (2 * self.areas[:, None])
-        if np.einsum("fx,fx->", self.normals * self.areas[:, None], corners.mean(axis=1) - inner) < 0:
-            self.normals = -self.normals  # the volume that the normals enclose is positive
         self.usual_radius = 2 * volume / float(self.areas.sum())
         self.size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
         self.edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
@@ -74,23 +71,22 @@ class SurfacePads:
                 f"something acts on it at ({', '.join(f'{x:.6g}' for x in p)}), {distance:.4g} mm off its surface; move "
                 "the point onto the part"
             )
-        near = np.array(self.tree.query_ball_point(p, distance + NEAREST * self.size + self.reach))
+        largest = np.hypot(distance, max(radius, MIN_RADIUS * 2 * self.reach)) + NEAREST * self.size
+        near = np.array(self.tree.query_ball_point(p, largest + self.reach))
         to_triangles = _triangle_distances(p, self.corners[near])
         nearest = near[to_triangles <= to_triangles.min() + NEAREST * self.size]
         radius = max(radius, MIN_RADIUS * self.edges[nearest].max())
-        is_on = distance <= OFF_SURFACE * radius
-        outer = radius if is_on else float(np.hypot(distance, radius))
-        near = np.array(self.tree.query_ball_point(p, outer + self.reach))
-        near = near[_triangle_distances(p, self.corners[near]) < outer]
-        samples, normals, areas, shapes, triangles = self._samples(near, radius)
+        outer = float(np.hypot(distance, radius))
+        height = ((p - self.corners[nearest, 0]) * self.normals[nearest]).sum(axis=1).max()
+        samples, normals, areas, shapes, triangles = self._samples(near[to_triangles < outer], radius)
         offsets = samples - p
         weights = areas * np.maximum(1 - (offsets**2).sum(axis=1) / outer**2, 0)
-        if is_on:
-            weights[(normals @ self.normals[nearest].T).max(axis=1) < SAME_FACE] = 0
+        if height > OFF_SURFACE * radius:
+            weights[(normals * offsets).sum(axis=1) >= 0] = 0
         else:
-            facing = np.einsum("sx,sx->s", normals, -offsets) / np.linalg.norm(offsets, axis=1)
-            sense = np.sign(facing[np.argmin((offsets**2).sum(axis=1))])
-            weights[sense * facing < SAME_FACE] = 0
+            weights[(normals @ self.normals[nearest].T).max(axis=1) < SAME_FACE] = 0
+        inside = weights > 0
+        samples, shapes, triangles, weights = samples[inside], shapes[inside], triangles[inside], weights[inside]
         c = weights @ samples / weights.sum()
         arms = samples - c
         inertia = (weights[:, None] * arms).T @ arms
@@ -98,9 +94,7 @@ class SurfacePads:
         turn = np.linalg.solve(inertia, np.cross(p - c, d))
         forces = weights[:, None] * (d / weights.sum() + np.cross(turn, arms))
         nodes, index = np.unique(self.mesh.triangles[triangles], return_inverse=True)
-        sums = np.zeros((len(nodes), 3))
-        np.add.at(sums, index.reshape(triangles.shape[0], 6), shapes[:, :, None] * forces[:, None, :])
-        return nodes, sums
+        return nodes, np.stack([np.bincount(index.ravel(), (shapes * forces[:, [c]]).ravel()) for c in range(3)], axis=1)
 
     def _samples(self, near: np.ndarray, radius: float) -> tuple[np.ndarray, ...]:
         """Return quadrature points (sample, 3) of triangles `near`: normals, areas, shape functions (sample, 6), triangles."""
@@ -124,6 +118,7 @@ class SurfacePads:
         return tuple(np.concatenate(columns) for columns in zip(*pieces, strict=True))
 
 
+@cache
 def _centres(count: int) -> np.ndarray:
     """Return the centres (count^2, 3), barycentric, of the equal triangles into which `count` divisions of edges divide one."""
     i, j = np.divmod(np.arange(count * count), count)
