@@ -146,7 +146,7 @@ def test_sensitivities_and_contributions_of_tips_are_those_of_their_stiffness(tm
     found = tc.analyses.sensitivities(model, samples=40)["sensitivity"]
     where = {"measure": "left tip", "state": "corrected", "interval": "estimate"}
     assert found.sel(contributor=causes, **where).values == pytest.approx(slopes, abs=1e-4)
-    first = tc.analyses.contributions(model, samples=256)["first"].sel(measure="left tip", state="corrected", group=causes)
+    first = tc.analyses.contributions(model, samples=2048)["first"].sel(measure="left tip", state="corrected", group=causes)
     exact = slopes**2 / (slopes**2).sum()
     assert (first.sel(interval="lower").values <= exact).all()
     assert (first.sel(interval="upper").values >= exact).all()
