@@ -4,6 +4,8 @@ from tolcontact.vocabulary.labels import MEASURE, label, variable
 
 ELASTIC_GROUP, LOADS, WELD_ROWS, ELASTIC_PART = "elastic", "load", "weld_row", "elastic_part"
 
+ELASTIC_PARTS = "elastic_parts"  # attribute of archives and summaries: elastic parts, and the source of their stiffness
+
 LOAD = variable(
     f"f8 reaction_at_load(realization, {LOADS})",
     "reaction at a contact point or two-sided locator of an elastic part; negative: the locator pulls",
