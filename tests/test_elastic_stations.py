@@ -6,8 +6,8 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 import tolcontact as tc
-from tests.cases import elastic as cases
-from tests.helpers import compiled, nightly
+from tests.cases import MODELS, elastic as cases
+from tests.helpers import assembly_of, compiled, nightly
 from tolcontact.compilation import ACCURACY
 from tolcontact.simulation import simulate_block
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
@@ -133,3 +133,11 @@ def test_blocks_and_threads_change_no_bit(tmp_path):
             assert (getattr(part, name) == getattr(whole, name)[rows]).all(), name
     (again,) = tc.simulate_blocks(program, samples=12, seed=3, threads=2)
     assert (again.load == whole.load).all()
+
+
+def test_the_model_of_welded_sheets_varies_less_once_it_is_released():
+    program = compiled(assembly_of(MODELS / "welded_sheets.py"))
+    block = simulate_block(program, program.draws(seed=1, start=0, stop=12))
+    assert (block.status == Status.RESOLVED).all()
+    clamped, released = block.measured[:, CORRECTED].std(axis=0)
+    assert released < 0.8 * clamped
