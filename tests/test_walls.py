@@ -73,8 +73,8 @@ ORDER = (
     "version", "texts", "errors", "user_functions", "input_files", "tables", "system", "interrupts", "readable", "child",
     "stored_coordinates", "shape_worker", "kernel", "vocabulary", "realizations", "arrays", "method", "poses", "limits",
     "code_cache", "replacing", "temporary", "compiled", "declaration", "select", "geometry", "elasticity", "features",
-    "fasteners", "pmi", "discretization", "interference", "variation", "mechanics", "compilation", "statics", "contact", "simulation",
-    "plausibility", "statistics", "archive", "report", "plot", "workflow", "io", "analyses", "testing", "cli", "__init__",
+    "fasteners", "pmi", "discretization", "interference", "variation", "mechanics", "compilation", "statics", "contact",
+    "simulation", "plausibility", "statistics", "archive", "report", "plot", "workflow", "io", "analyses", "testing", "cli", "__init__",
     "__main__",
 )  # fmt: skip
 

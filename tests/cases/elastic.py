@@ -144,4 +144,3 @@ def welded_sheets(folder, *, tolerance=0.05, contact=True, measured=((150, 100),
             place = parts[name].point(x - SHEETS[name][0], y, 0)
             station.measure(f"{station.name} {k}", place, along="z", tolerance=1)
     return model
-
