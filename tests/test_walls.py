@@ -74,7 +74,8 @@ ORDER = (
     "stored_coordinates", "shape_worker", "kernel", "vocabulary", "realizations", "arrays", "method", "poses", "limits",
     "code_cache", "replacing", "temporary", "compiled", "declaration", "select", "geometry", "elasticity", "features",
     "fasteners", "pmi", "discretization", "interference", "variation", "mechanics", "compilation", "statics", "contact",
-    "simulation", "plausibility", "statistics", "archive", "report", "plot", "workflow", "io", "analyses", "testing", "cli", "__init__",
+    "simulation", "plausibility", "statistics", "archive", "report", "plot", "workflow", "io", "analyses", "testing",
+    "cli", "__init__",
     "__main__",
 )  # fmt: skip
 
