@@ -69,6 +69,7 @@ def watch_settings(program: Program) -> dict[str, Any]:
         return {}
     watch, assembly = program.watch, program.nominal.assembly
     untested = {
+        "elastic parts": [part.name for part in assembly.parts if part.elasticity is not None],
         "parts that are not closed": watch.open_parts,
         "contact pairs that give way or have form": watch.untested_pairs,
         "round faces of contact pairs, which are judged by their gaps": watch.round_pairs,

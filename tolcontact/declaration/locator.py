@@ -233,7 +233,7 @@ class Location(Declaration):
                 f"it has {count}; a rigid part needs six independent ones (3-2-1, for example), or locate(..., floating=True) "
                 "if contact holds it in the other directions"
             )
-        elif len(two_sided) > 6 and self.placing != BEST_FIT:
+        elif len(two_sided) > 6 and self.placing != BEST_FIT and self.part.elasticity is None:
             idle = [locator.name for locator in _repeating(two_sided)]
             sufficient = ", ".join(locator.name for locator in two_sided if locator.name not in idle)
             verb = "is" if len(idle) == 1 else "are"

@@ -10,8 +10,9 @@ from tolcontact.discretization.locators import Locators, NominalPart
 from tolcontact.discretization.nominal import ContactPoints, Nominal
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_points import RoundPoint, RoundPoints
+from tolcontact.discretization.weld import Weld
 
 __all__ = [
     "FIRST_POINT", "ContactPoints", "Locators", "Nominal", "NominalPart", "Offsets", "RoundPoint",
-    "RoundPoints", "coordinates_in_words", "discretize", "raised_places", "rim_points",
+    "RoundPoints", "Weld", "coordinates_in_words", "discretize", "raised_places", "rim_points",
 ]  # fmt: skip

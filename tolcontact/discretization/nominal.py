@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from tolcontact import poses as pose
-from tolcontact.arrays import Array, Float
+from tolcontact.arrays import Array, Float, Int
 from tolcontact.declaration import Assembly, Face, Measure, Part, Point
 from tolcontact.discretization.form_points import COVER_SHARE, form_lengths, form_spacing
 from tolcontact.discretization.locators import Locators, NominalPart
@@ -16,6 +16,7 @@ from tolcontact.discretization.offsets import Offsets, PairForm
 from tolcontact.discretization.plane_minima import PlaneMinima
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
+from tolcontact.discretization.weld import Weld
 from tolcontact.features import FaceDeviation, Features, Freedom, NominalFeature, NominalPattern
 from tolcontact.features.freedoms import LOCATOR, VARIABLE
 from tolcontact.features.zone_kernel import sum_modes
@@ -47,6 +48,8 @@ class ContactPoints:
     locators    (point,) indices of the one-sided locators
     stiffness   (point,) [N/mm] of springs, infinite for rigid one-sided locators; None for rigid faces
     pulls       (point,): whether the spring of a two-sided locator pulls at a point; None if none does
+    holds       whether its point is a two-sided locator, which pushes and pulls
+    elastic     whether one of its parts is elastic
     """
 
     name: str
@@ -66,6 +69,8 @@ class ContactPoints:
     locators: np.ndarray | None = None
     stiffness: np.ndarray | None = None
     pulls: np.ndarray | None = None
+    holds: bool = False
+    elastic: bool = False
 
     @cached_property
     def facing(self) -> np.ndarray:
@@ -110,7 +115,7 @@ class ContactPoints:
     @cached_property
     def minima(self) -> PlaneMinima | None:
         """The gap between contact points of two rigid planes with form; None for other pairs."""
-        if not self.has_form or self.moving_face is None or self.reference_face is None or self.stiffness is not None:
+        if not self.has_form or self.moving_face is None or self.reference_face is None or self.is_springy:
             return None
         if not (self.moving_face.is_flat and self.reference_face.is_flat):
             return None
@@ -185,8 +190,8 @@ class ContactPoints:
 
     @property
     def is_springy(self) -> bool:
-        """Whether some of the points are compliant."""
-        return self.stiffness is not None and bool(np.isfinite(self.stiffness).any())
+        """Whether some of the points are compliant, by springs or by elastic parts."""
+        return self.elastic or (self.stiffness is not None and bool(np.isfinite(self.stiffness).any()))
 
     @property
     def is_supports(self) -> bool:
@@ -201,6 +206,7 @@ class Nominal:
     measurements   of each measure; None if it measures points or an expression
     scenes         the models of the stations, which share the parts: each has its own measures; none without stations
     station        the name of the station, in the model of one
+    welds          of elastic parts; their gaps are inputs of a realization after its deviations
 
     With stations a part has an entry among the `parts` in each station that holds it, station by station.
     """
@@ -213,6 +219,7 @@ class Nominal:
     measurements: tuple[NominalMeasurement | None, ...] = ()
     scenes: "tuple[Nominal, ...]" = ()
     station: str = ""
+    welds: tuple[Weld, ...] = ()
     _face_pairs: dict[int, FacePair] = field(default_factory=dict, init=False)
 
     def face_pair(self, index: int) -> FacePair | None:
@@ -227,6 +234,17 @@ class Nominal:
                 FITTED_ERRORS * pair.coordinate_error,
             )
         return self._face_pairs[index]
+
+    @property
+    def input_count(self) -> int:
+        """The number of inputs of a realization: its deviations, and the gaps that welds keep."""
+        return len(self.contributors) + sum(len(weld.columns) for weld in self.welds)
+
+    @cached_property
+    def loads(self) -> Int[Array, "load 2"]:
+        """The pair and the point of each load: of the reactions at the contact points of pairs with an elastic part."""
+        points = [(k, point) for k, pair in enumerate(self.pairs) if pair.elastic for point in range(len(pair.P_m))]
+        return np.array(points, dtype=int).reshape(-1, 2)
 
     @cached_property
     def locators(self) -> Locators:

@@ -5,6 +5,8 @@
 
 from tolcontact.elasticity.bodies import elastic_body
 from tolcontact.elasticity.elastic_body import ElasticBody, flexibility
+from tolcontact.elasticity.imported_body import MAX_OFFSET
+from tolcontact.elasticity.node_table import node_table
 from tolcontact.elasticity.sources import MatrixSource, MeshSource
 
-__all__ = ["ElasticBody", "MatrixSource", "MeshSource", "elastic_body", "flexibility"]
+__all__ = ["MAX_OFFSET", "ElasticBody", "MatrixSource", "MeshSource", "elastic_body", "flexibility", "node_table"]

@@ -191,6 +191,25 @@ class ArchivedFaces:
         return pushes
 
 
+class ArchivedBending:
+    """How elastic parts open the gaps at some contact points, by their indices; `loads` are the loads at these points."""
+
+    def __init__(self, tree: xr.DataTree, points: np.ndarray) -> None:
+        group = tree.children[terms.ELASTIC_GROUP].to_dataset()
+        self.loads = np.flatnonzero(np.isin(group[terms.POINT_OF_LOAD.name].values, points))
+        self._by_load = group[terms.FLEXIBILITY.name].values[self.loads]
+        self._by_forces = group[terms.OPENING.name].values[self.loads]
+        self._weld_rows = group[terms.WELD_OF_LOAD.name].values[self.loads]
+
+    def kept(self, gaps: np.ndarray) -> np.ndarray:
+        """Return the gaps (realization, point) [mm] that welds keep, from those of all welds; 0 of other points."""
+        return np.where(self._weld_rows >= 0, gaps[:, self._weld_rows], 0.0) if gaps.size else np.zeros((1, len(self.loads)))
+
+    def openings(self, loads: np.ndarray) -> np.ndarray:
+        """Return the openings (realization, point) [mm] under reactions `loads` (realization, load) [N]."""
+        return np.asarray(loads @ self._by_load.T + self._by_forces)
+
+
 class ArchivedPair:
     """The nominal contact points of a pair, and their positions at the archived poses.
 
@@ -221,6 +240,7 @@ class ArchivedPair:
             float(contact[terms.COORDINATE_ERROR.name][pair]) if terms.COORDINATE_ERROR.name in contact else 0.0
         )
         self.facing = contact[terms.FACING.name][is_own] if terms.FACING.name in contact else None
+        self.bending = ArchivedBending(tree, np.flatnonzero(is_own)) if terms.ELASTIC_GROUP in tree.children else None
 
     @property
     def _needs_deviations(self) -> bool:
@@ -228,10 +248,18 @@ class ArchivedPair:
         return bool((self.locators >= 0).any()) or max(self.moving_face, self.reference_face) >= 0
 
     def gaps(self, rows: Rows, piece: slice) -> np.ndarray:
-        """Return the gaps (realization, state, point) [mm] of a piece of the realizations.
+        """Return the gaps (realization, state, point) [mm] of a piece of the realizations; parts bend in corrected states only.
 
         Raises MissingVariableError, with the name of a required variable that the archive does not have.
         """
+        gaps = self._rigid_gaps(rows, piece)
+        if self.bending is not None and self.bending.loads.size:
+            gaps[:, terms.CORRECTED] += self.bending.openings(_needed(rows, terms.LOAD.name, piece))
+            gaps[:, terms.CORRECTED] -= self.bending.kept(_needed(rows, terms.WELD_GAP.name, piece))
+        return gaps
+
+    def _rigid_gaps(self, rows: Rows, piece: slice) -> np.ndarray:
+        """Return the gaps (realization, state, point) [mm] between stress-free parts."""
         moving, reference = (_pose(rows, piece, part) for part in (self.moving_part, self.reference_part))
         deviations = _needed(rows, terms.DEVIATION.name, piece) if self._needs_deviations else np.zeros((1, 0))
         R_m, t_m = self.faces.placed(self.moving_face, deviations, *moving)
