@@ -151,8 +151,7 @@ def contact_qp(
     if isinstance(call, FunctionCalls):
         rows, terms = summed_terms(system, points, current, reactions, call, projects=projects)
     else:
-        rows = contact_rows(system, points, current, moved, reactions)
-        rows = rows if flexibility is None else rows.bent(flexibility)
+        rows = contact_rows(system, points, current, moved, reactions).bent(flexibility)
         terms = quadratic_terms(system, rows, motion, reactions, ca.sum1(reactions), projects=projects)
     exact = misfit(system, moved, linear=True) if method.minimizes.presses else ca.SX(0, 1)
     problem = conditioned(
@@ -161,8 +160,7 @@ def contact_qp(
     end = motion.by(rigid if method.is_exact else published)
     solution, results = outcome(system, terms.scale, rows, end, problem, inputs["stride"], call)
     pure_energy = ca.substitute(energy(system, current).value, inputs["regularization_factor"], 1)
-    if flexibility is None:  # else the energy of springs is among that of all reactions
-        pure_energy += spring_energy(system, points, current) / terms.scale
+    pure_energy += spring_energy(system, points if flexibility is None else [], current) / terms.scale
     relative = ca.vertcat(*(X.vector() for X in system.relative(current)))
     return ContactQP(
         assemble=_function("assemble", inputs, problem),

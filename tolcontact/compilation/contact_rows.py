@@ -70,8 +70,10 @@ class Rows:
         """The compliant rows."""
         return springs_of(self.compliance)
 
-    def bent(self, flexibility: Flexibility) -> "Rows":
-        """Return the rows between elastic parts."""
+    def bent(self, flexibility: Flexibility | None) -> "Rows":
+        """Return the rows between elastic parts; the same ones if there are none."""
+        if flexibility is None:
+            return self
         compliance = ca.SX(ca.sparsify(ca.DM(np.diag(flexibility.C))))
         return replace(self, gaps=self.gaps + flexibility.opening, compliance=compliance, flexibility=flexibility)
 
@@ -164,9 +166,11 @@ def relative_poses(
 
 
 def spring_energy(system: GroupEquations, points_of_pairs: Sequence[RowPoints], poses: Sequence[Pose]) -> ca.SX:
-    """Return the energy [N mm] of the compressed springs at `poses`."""
+    """Return the energy [N mm] of the compressed springs at `poses`; 0 without points."""
     energy = ca.SX(0)
-    for k, (X_RM, (points, compliance, _)) in enumerate(zip(system.relative(poses), points_of_pairs, strict=True)):
+    for k, (X_RM, (points, compliance, _)) in enumerate(
+        zip(system.relative(poses), points_of_pairs, strict=bool(points_of_pairs))
+    ):
         pair = system.nominal.pairs[system.group.pairs[k]]
         springs = springs_of(compliance)
         if springs and pair.round is not None:

@@ -65,6 +65,7 @@ class Elastic(Checked):
 class Deformable(Declaration):
     """A part that may be declared elastic."""
 
+    noun: ClassVar[str] = "part"
     fixed: bool | None
     _declared: list[Any]
 

@@ -37,7 +37,6 @@ class Part(Deformable):
     fixed: bool | None = None
     standard: Standard = ""
     declared_at: str = field(default_factory=script_line)
-    noun: ClassVar[str] = "part"
     checks: ClassVar = {"standard": one_of(get_args(Standard))}
     _declared: "list[Feature | Pattern | DatumTargets | Elastic]" = field(default_factory=list, init=False)
 

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from tolcontact import poses as pose
-from tolcontact.arrays import Array, Float, Int
+from tolcontact.arrays import Array, Float
 from tolcontact.declaration import Assembly, Face, Measure, Part, Point
 from tolcontact.discretization.form_points import COVER_SHARE, form_lengths, form_spacing
 from tolcontact.discretization.locators import Locators, NominalPart
@@ -16,7 +16,7 @@ from tolcontact.discretization.offsets import Offsets, PairForm
 from tolcontact.discretization.plane_minima import PlaneMinima
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
-from tolcontact.discretization.weld import Weld
+from tolcontact.discretization.weld import ElasticInputs, Weld
 from tolcontact.features import FaceDeviation, Features, Freedom, NominalFeature, NominalPattern
 from tolcontact.features.freedoms import LOCATOR, VARIABLE
 from tolcontact.features.zone_kernel import sum_modes
@@ -48,8 +48,7 @@ class ContactPoints:
     locators    (point,) indices of the one-sided locators
     stiffness   (point,) [N/mm] of springs, infinite for rigid one-sided locators; None for rigid faces
     pulls       (point,): whether the spring of a two-sided locator pulls at a point; None if none does
-    holds       whether its point is a two-sided locator, which pushes and pulls
-    elastic     whether one of its parts is elastic
+    holds, elastic   whether its point is a two-sided locator, which pushes and pulls; whether one of its parts is elastic
     """
 
     name: str
@@ -200,7 +199,7 @@ class ContactPoints:
 
 
 @dataclass(frozen=True, eq=False)
-class Nominal:
+class Nominal(ElasticInputs):
     """An assembly with numbers.
 
     measurements   of each measure; None if it measures points or an expression
@@ -234,17 +233,6 @@ class Nominal:
                 FITTED_ERRORS * pair.coordinate_error,
             )
         return self._face_pairs[index]
-
-    @property
-    def input_count(self) -> int:
-        """The number of inputs of a realization: its deviations, and the gaps that welds keep."""
-        return len(self.contributors) + sum(len(weld.columns) for weld in self.welds)
-
-    @cached_property
-    def loads(self) -> Int[Array, "load 2"]:
-        """The pair and the point of each load: of the reactions at the contact points of pairs with an elastic part."""
-        points = [(k, point) for k, pair in enumerate(self.pairs) if pair.elastic for point in range(len(pair.P_m))]
-        return np.array(points, dtype=int).reshape(-1, 2)
 
     @cached_property
     def locators(self) -> Locators:

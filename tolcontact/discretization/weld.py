@@ -1,6 +1,10 @@
-"""A weld: points and directions at which a joint keeps the gaps between two parts."""
+"""What elastic parts add to a model: welds, which keep gaps between parts, and loads at contact points."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
 
 from tolcontact.arrays import Array, Float, Int
 
@@ -22,3 +26,22 @@ class Weld:
     P_r: Float[Array, "row 3"]
     n_r: Float[Array, "row 3"]
     columns: Int[Array, " row"]
+
+
+class ElasticInputs:
+    """The inputs and the loads of a nominal model with elastic parts."""
+
+    pairs: Any
+    contributors: Any
+    welds: tuple[Weld, ...]
+
+    @property
+    def input_count(self) -> int:
+        """The number of inputs of a realization: its deviations, and the gaps that welds keep."""
+        return len(self.contributors) + sum(len(weld.columns) for weld in self.welds)
+
+    @cached_property
+    def loads(self) -> Int[Array, "load 2"]:
+        """The pair and the point of each load: of the reactions at the contact points of pairs with an elastic part."""
+        points = [(k, point) for k, pair in enumerate(self.pairs) if pair.elastic for point in range(len(pair.P_m))]
+        return np.array(points, dtype=int).reshape(-1, 2)
