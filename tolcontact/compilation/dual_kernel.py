@@ -10,12 +10,18 @@ method (Goldfarb and Idnani 1983) continues, row by row: it ends, and finds QPs 
 
 import numpy as np
 
+from tolcontact.compilation.row_factor_kernel import (
+    ROUNDING,
+    append_row,
+    back_substitute,
+    flexibility_between,
+    forward_substitute,
+    remove_row,
+)
 from tolcontact.compiled import compiled, inner
 
 SOLVED, INFEASIBLE, UNFINISHED = 0, 1, 2
 MAX_ROUNDS, PATIENCE = 30, 4  # rounds in all, and rounds in which the number of wrong rows may not fall
-INDEPENDENT = 1e-6  # of a row's own flexibility: if more of it remains beside the active rows, rounding does not matter
-ROUNDING = 2.2e-16  # relative
 SHALLOW = 0.5  # of the deepest penetration: shallower rows wait, since most of them come free when deeper ones push
 FEW_ROWS = 6  # that may enter in any round
 STEPS_PER_ROW = 10
@@ -88,57 +94,6 @@ def _mover_motion(L, v, B, reactions, x):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _stiffness(B, C, i, j):  # type: ignore[no-untyped-def]
-    """Return the entry (i, j) of W."""
-    total = C[i, j]
-    for c in range(len(B)):
-        total += B[c, i] * B[c, j]
-    return total
-
-
-@inner
-def _append(work, k, row):  # type: ignore[no-untyped-def]
-    """Write column k of the factor U, W = U'U, for a `row` that follows k active ones; return whether it is independent."""
-    B, C, factor, y, active = work[0], work[1], work[5], work[6], work[7]
-    for j in range(k):
-        y[j] = _stiffness(B, C, row, active[j])
-    _forward_substitute(factor, k, y)
-    own = _stiffness(B, C, row, row)
-    total = own
-    for j in range(k):
-        factor[j, k] = y[j]
-        total -= y[j] * y[j]
-    factor[k, k] = np.sqrt(max(total, 0.0))
-    if total > INDEPENDENT * own:
-        return True
-    # The remainder is the quadratic form of W for the row less its combination of active ones, in rounded terms.
-    _back_substitute(factor, k, y)
-    terms = np.sqrt(own)
-    for j in range(k):
-        terms += abs(y[j]) * np.sqrt(_stiffness(B, C, active[j], active[j]))
-    return total > (k + 4) * ROUNDING * terms * terms
-
-
-@inner
-def _forward_substitute(factor, k, y):  # type: ignore[no-untyped-def]
-    """Solve U'z = y for the first k unknowns, in place."""
-    for j in range(k):
-        y[j] /= factor[j, j]
-        value = y[j]
-        for i in range(j + 1, k):
-            y[i] -= value * factor[j, i]
-
-
-@inner
-def _back_substitute(factor, k, y):  # type: ignore[no-untyped-def]
-    """Solve U z = y for the first k unknowns, in place."""
-    for j in range(k - 1, -1, -1):
-        for i in range(j + 1, k):
-            y[j] -= factor[j, i] * y[i]
-        y[j] /= factor[j, j]
-
-
-@inner
 def _solve_active(work, k, start):  # type: ignore[no-untyped-def]
     """Write the reactions of k active rows for which their gaps are 0. If `start` is not 0, refine those that are there."""
     q, gaps, reactions, factor, y, active = work[2], work[3], work[4], work[5], work[6], work[7]
@@ -148,8 +103,8 @@ def _solve_active(work, k, start):  # type: ignore[no-untyped-def]
             gaps[i] = q[i]
     for j in range(k):
         y[j] = -gaps[active[j]]
-    _forward_substitute(factor, k, y)
-    _back_substitute(factor, k, y)
+    forward_substitute(factor, k, y)
+    back_substitute(factor, k, y)
     for j in range(k):
         reactions[active[j]] += y[j]
     return _write_gaps(work, k)
@@ -173,7 +128,7 @@ def _write_gaps(work, k):  # type: ignore[no-untyped-def]
             gaps[i] += B[c, i] * total
     terms = 0.0
     for j in range(k):
-        terms += abs(reactions[active[j]]) * _stiffness(B, C, active[j], active[j])
+        terms += abs(reactions[active[j]]) * flexibility_between(B, C, active[j], active[j])
     return max(work[10], 4.0 * ROUNDING * terms)
 
 
@@ -220,7 +175,7 @@ def _extended(work, kept):  # type: ignore[no-untyped-def]
     k = kept
     for row in range(len(is_active) - 1, -1, -1):
         if is_active[row]:
-            is_active[row] = _append(work, k, row)
+            is_active[row] = append_row(work, k, row)
             if is_active[row]:
                 active[k] = row
                 k += 1
@@ -265,23 +220,6 @@ def _mark_penetrating(work, k, tolerance):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _remove(work, k, position):  # type: ignore[no-untyped-def]
-    """Take the row at a position out of k active ones; plane rotations make the factor triangular again."""
-    factor, active, is_active = work[5], work[7], work[8]
-    is_active[active[position]] = False
-    for j in range(position, k - 1):
-        active[j] = active[j + 1]
-        for c in range(j + 2):
-            factor[c, j] = factor[c, j + 1]
-    for j in range(position, k - 1):
-        length = np.hypot(factor[j, j], factor[j + 1, j])
-        cosine, sine = factor[j, j] / length, factor[j + 1, j] / length
-        for i in range(j, k - 1):
-            upper, lower = factor[j, i], factor[j + 1, i]
-            factor[j, i], factor[j + 1, i] = cosine * upper + sine * lower, cosine * lower - sine * upper
-
-
-@inner
 def _feasible_start(work):  # type: ignore[no-untyped-def]
     """Activate independent rows, and drop those that pull most until none does; return how many remain."""
     reactions, active, is_active, first = work[4], work[7], work[8], work[9]
@@ -296,7 +234,7 @@ def _feasible_start(work):  # type: ignore[no-untyped-def]
                 worst = j
         if worst < 0:
             return k
-        _remove(work, k, worst)
+        remove_row(work, k, worst)
         k -= 1
 
 
@@ -338,10 +276,10 @@ def _activate(work, k, new):  # type: ignore[no-untyped-def]
     reactions, factor, y, active, first = work[4], work[5], work[6], work[7], work[9]
     gap = work[3][new]
     while True:
-        is_independent = _append(work, k, new)
+        is_independent = append_row(work, k, new)
         for j in range(k):
             y[j] = factor[j, k]
-        _back_substitute(factor, k, y)
+        back_substitute(factor, k, y)
         rate = factor[k, k] ** 2
         step, blocking = (-gap / rate if is_independent else np.inf), -1
         for j in range(k):
@@ -358,5 +296,5 @@ def _activate(work, k, new):  # type: ignore[no-untyped-def]
             active[k] = new
             return k + 1
         reactions[active[blocking]] = 0.0
-        _remove(work, k, blocking)
+        remove_row(work, k, blocking)
         k -= 1

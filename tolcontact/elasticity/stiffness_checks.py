@@ -12,7 +12,7 @@ from tolcontact.elasticity.stiffness_files import StiffnessFile
 from tolcontact.errors import GeometryFault
 
 SINGLE = 1e-6  # relative: numbers in single precision pass
-ACCURACY = 0.01  # of the softest motion, beside the rounding of the file
+ACCURACY = 0.01  # relative error of the softest stiffness that rounding in the file may cause
 MOTIONS = ("x", "y", "z", "rotation about x", "rotation about y", "rotation about z")
 MAX_LISTED = 5
 

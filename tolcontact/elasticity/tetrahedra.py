@@ -72,7 +72,7 @@ def straightened(mesh: Tetrahedra) -> Tetrahedra:
 
 
 def node_volumes(mesh: Tetrahedra) -> Float[Array, " node"]:
-    """Return the integral (node,) [mm^3] of each node's shape function; those of corners are negative."""
+    """Return the integral (node,) [mm^3] of each node's shape function, which is negative at corners."""
     _, volumes = _gradients(mesh.nodes, mesh.elements)
     total = np.zeros(len(mesh.nodes))
     np.add.at(total, mesh.elements, np.abs(volumes) @ shape_functions(POINTS))

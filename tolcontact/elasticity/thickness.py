@@ -36,7 +36,7 @@ def wall_thickness(vertices: Float[Array, "vertex 3"], faces: Int[Array, "face 3
 
 
 def element_size(vertices: Float[Array, "vertex 3"], faces: Int[Array, "face 3"], area: float, required: float | None) -> float:
-    """Return the edge length [mm] of tetrahedra, `required` or by thickness. `area` [mm^2] is that of the surface.
+    """Return the edge length [mm] of tetrahedra, `required` or by thickness. `area` is the area [mm^2] of the surface.
 
     Raises GeometryFault if they would be too coarse to bend, or too many.
     """

@@ -71,7 +71,7 @@ def test_displacements_have_no_mean_rigid_motion_and_store_the_work_of_the_force
 
 
 def test_rotations_of_nodes_are_condensed(tmp_path):
-    """A free frame of beams, bent by three forces: the deflection in the middle is that of two spans, F l^3 / 48 E I."""
+    """A free frame of beams, bent by three forces: its middle deflects by F l^3 / 48 E I."""
     nodes = np.linspace(0, 1, 9)[:, None] * np.array([300.0, 200, 100])
     nodes = np.vstack([nodes, [20.0, -30, 0]])  # an arm at the first node, so that nodes are not on a line
     chain = bernoulli_frame(nodes[:9])

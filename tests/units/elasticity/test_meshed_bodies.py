@@ -164,7 +164,7 @@ def test_a_hollow_body_is_meshed_with_its_cavity():
 
 
 def test_a_body_from_its_step_file_has_true_round_faces():
-    """The cover of the models: volumes as by the CAD kernel's triangles, which are within 2 um; flexible alike by STL."""
+    """The cover of the models: the CAD kernel's triangles, within 2 um, have its volume; STL gives the same flexibility."""
     surface = shape(tc.Mesh(COVER))
     part = np.array(surface.vertices), np.array(surface.faces)
     bodies = [elastic_body(MeshSource(*part, 70e3, 0.33, 2700, path, 6.0)) for path in (COVER, None)]
