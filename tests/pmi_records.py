@@ -59,7 +59,7 @@ class Annotated:
         compartments = []
         for compartment in text.split("|"):
             letters, _, material = compartment.rstrip(")").partition("(")
-            modifier = f"(SIMPLE_DATUM_REFERENCE_MODIFIER(.{MATERIALS[material]}.))" if material else "$"
+            modifier = f"(SIMPLE_DATUM_REFERENCE_MODIFIER(.{MATERIALS.get(material, material)}.))" if material else "$"
             bases = [f"#{self.letters[letter]}" for letter in letters.split("-")]
             if len(bases) > 1:
                 elements = [self.add(f"DATUM_REFERENCE_ELEMENT('',$,#1,.F.,{base},$)") for base in bases]
@@ -75,7 +75,7 @@ class Annotated:
         if datums:
             entities.append(f"GEOMETRIC_TOLERANCE_WITH_DATUM_REFERENCE((#{self.system(datums)}))")
         if modifier:
-            entities.append(f"GEOMETRIC_TOLERANCE_WITH_MODIFIERS((.{MATERIALS[modifier]}.))")
+            entities.append(f"GEOMETRIC_TOLERANCE_WITH_MODIFIERS((.{MATERIALS.get(modifier, modifier)}.))")
         number = self.add(f"({''.join(entities)})")
         if zone:
             form = self.add(f"TOLERANCE_ZONE_FORM('{zone}')")

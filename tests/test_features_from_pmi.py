@@ -1,6 +1,7 @@
 """Features and patterns that the PMI of a STEP file states: what is declared, and the reason for what is not."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from tests.pmi_records import Annotated
 from tests.test_cad import COVER
 from tolcontact.discretization import discretize
 from tolcontact.errors import OptionError
+from tolcontact.pmi import OF_DATUMS, OF_TOLERANCES
 from tolcontact.variation import Draws
 
 ROUND = "cylindrical or circular"
@@ -234,6 +236,48 @@ def test_limits_of_a_fit_are_about_the_nominal_size_of_the_drawing(tmp_path):
     assert str(feature.tolerances[0]) == "size 8.1 +0.005 -0.01 mm"
 
 
+def test_each_modifier_is_declared_or_refused_with_its_standard_as_the_table_of_the_guide_has_it(tmp_path):
+    """One hole for each modifier; what the table calls declared has the option, and what it does not has the reason."""
+    guide = (Path(tc.__file__).parent / "guide" / "pmi.md").read_text()
+    for table in (OF_TOLERANCES, OF_DATUMS):
+        for word, entry in table.items():
+            assert f"| {entry.sign} | {word} | {entry.standard} | {entry.outcome} |" in guide
+    (tmp_path / "of_tolerance").mkdir()
+    for word, entry in OF_TOLERANCES.items():
+        modifier, datum = word.upper().replace(" ", "_"), "(M)" if "simultaneous" in entry.declared else ""
+
+        def annotate(file, modifier=modifier, datum=datum):
+            datums(file)
+            file.size(file.aspect(*HOLE), 8.1, (0, 0.03))
+            kind, place = ("parallelism", TOP) if "TANGENT" in modifier else ("position", *HOLE)
+            file.tolerance(
+                kind, 0.2, file.aspect(place), f"A|B{datum}|C" if place != TOP else "A", zone=ROUND, modifier=modifier
+            )
+
+        declared = tc.io.features_from_pmi(cover(annotate, tmp_path / "of_tolerance"))
+        reasons = [outcome.reason for outcome in declared.undeclared]
+        if isinstance(entry.declared, str):
+            assert reasons == [f"its modifier, {word} ({entry.sign}, {entry.standard}): {entry.declared}"]
+        else:
+            assert not reasons
+            (stated,) = [tolerance for feature in declared.features for tolerance in feature.geometric]
+            assert {name: getattr(stated, name) for name in entry.declared} == entry.declared
+
+
+@pytest.mark.parametrize(("word", "reads"), [("FREE_STATE", "A|B|C"), ("ORIENTATION", "A|B><|C"), ("TRANSLATION", None)])
+def test_modifiers_of_datums_are_marks_or_reasons(word, reads, tmp_path):
+    def annotate(file):
+        datums(file)
+        file.tolerance("position", 0.2, file.aspect(*HOLE), f"A|B({word})|C", zone=ROUND)
+
+    declared = tc.io.features_from_pmi(cover(annotate, tmp_path))
+    stated = [tolerance.datums for feature in declared.features for tolerance in feature.geometric]
+    assert stated == ([] if reads is None else [reads])
+    assert [outcome.reason for outcome in declared.undeclared] == (
+        ["datum B: its modifier, translation (▷, ASME Y14.5): " + OF_DATUMS["translation"].declared] if reads is None else []
+    )
+
+
 NO_SIZE = "sizes of features are those of cylinders, spheres and two opposed planes, and it is a plane"
 REASONS = {
     "all over": (all_over, ["it is for all faces of the file; declare it for the faces that matter"]),
@@ -242,7 +286,8 @@ REASONS = {
     "one letter for two datums": (one_letter, ["the part has a datum A already"]),
     "two letters for one datum": (two_letters, ["its surfaces are datum A already"]),
     "free state": (
-        of_one("flatness", 0.1, (UNDER,), modifier="F"), ["it is for the part in its free state, and parts are rigid here"],
+        of_one("flatness", 0.1, (UNDER,), modifier="F"),
+        ["its modifier, free state (F, ISO 10579): it is for the part in its free state, and parts are rigid here"],
     ),
     "an unequal profile of a hole": (
         unequal, ["profile is for planes, if it says how much of it is outside, and it is a cylinder"],

@@ -62,7 +62,7 @@ MISTAKES = {
     "one for each locator": ({"locate": ", tolerance=[0.1] * 6"},
         "expected two numbers, the lower and the upper limit deviation"),
     "upper before lower": ({"locate": ", tolerance=(0.1, -0.05)"}, "swap them"),
-    "micrometres": ({"locate": ', tolerance="±50 µm"'}, "its unit is µm; expected mm"),
+    "another unit": ({"locate": ', tolerance="±50 kg"'}, "its unit is kg; expected mm"),
     "a general tolerance": ({"locate": ', tolerance="ISO 2768-m"'}, EITHER),
     "no tolerance": ({"locate": ""}, "has no tolerance; give one to the locate call"),
     "distribution first": ({"locate": ', tolerance=tc.Tolerance("uniform", 0.1)'}, "expected one of normal, uniform"),

@@ -180,7 +180,7 @@ def test_references_without_a_datum_system_are_in_order_of_precedence(read):
     )  # fmt: skip
     angularity, symmetry = pmi.tolerances
     assert angularity.datum_system == "B | A"
-    assert symmetry.datum_system == "A (circular or cylindrical 1) (translation)"
+    assert symmetry.datum_system == "A (circular or cylindrical 1) (▷)"
 
 
 @pytest.mark.parametrize("version, edition", [(1, 1), (2, 2), (3, 2), (4, 3)])

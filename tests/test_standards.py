@@ -165,7 +165,7 @@ def test_a_datum_at_maximum_material_has_the_play_of_its_gauge():
     model = bored(tc.Position(0.1, "A|B(M)"), "ASME")
     program, run = simulate(model, samples=20_000, solver="daqp")
     assert [label for label in program.nominal.contributors if "mobility" in label] == [
-        "plate.bore.mobility shift x", "plate.bore.mobility shift y",
+        "plate.bore.mobility of datum B of A|B(M): shift x", "plate.bore.mobility of datum B of A|B(M): shift y",
     ]  # fmt: skip
     worst = tc.analyses.worst_case(model)["worst"].sel(state="raw").values + 60
     np.testing.assert_allclose(worst, [[-0.15, 0.15]] * 2, atol=1e-7)
@@ -194,9 +194,21 @@ def test_the_play_is_there_with_a_standard_and_without_a_mate(datums, standard, 
     np.testing.assert_allclose(worst.values[:2].max() + 60, found, atol=1e-6)
 
 
-def test_holes_that_refer_to_one_datum_share_its_gauge():
-    """Along x the play moves both holes alike: their distance has no share of it."""
-    _, run = simulate(bored(tc.Position(1e-4, "A|B(M)|C"), "ASME", holes=2), samples=500, solver="daqp")
+@pytest.mark.parametrize(
+    ("standard", "simultaneous", "shared"),
+    [("ASME", None, True), ("ISO", None, False), *nightly(("ASME", False, False), ("ISO", True, True))],
+)
+def test_holes_share_the_gauge_of_a_datum_in_a_simultaneous_requirement(standard, simultaneous, shared):
+    """Then the play moves both holes alike along x, and their distance has no share of it; else each has its own."""
+    model = bored(tc.Position(1e-4, "A|B(M)|C", simultaneous=simultaneous), standard, holes=2)
+    program, run = simulate(model, samples=2000, solver="daqp")
+    play = [label for label in program.nominal.contributors if "mobility" in label]
+    assert {label.split(".")[1] for label in play} == ({"bore"} if shared else {"hole 0", "hole 1"})
     first, second = run["measured"][:, CORRECTED, 0], run["measured"][:, CORRECTED, 2]
     assert first.std() > 0.01
-    assert (first - second).std() < 1e-4
+    if shared:
+        assert (first - second).std() < 1e-4
+    else:  # both depend on the size of the bore, and are uncorrelated
+        assert (first - second).var() == pytest.approx(first.var() + second.var(), rel=0.1)
+    worst = tc.analyses.worst_case(model)["worst"].sel(state="raw").values
+    np.testing.assert_allclose(worst[0, 1] - worst[0, 0], 0.2 + 1e-4, atol=1e-6)

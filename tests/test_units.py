@@ -1,77 +1,77 @@
-"""What is said of points that lie far off their part."""
+"""Units of measurements: inches, micrometres and degrees, and texts of tolerances in other units than mm."""
 
-import warnings
-
+import numpy as np
 import pytest
-import trimesh
 
 import tolcontact as tc
-
-PLACES = [
-    ((10, 10, 0), "z"),
-    ((190, 10, 0), "z"),
-    ((100, 140, 0), "z"),
-    ((10, 0, 10), "y"),
-    ((190, 0, 10), "y"),
-    ((0, 75, 10), "x"),
-]
+from tolcontact.vocabulary import OUTSIDE
 
 
-def lid(path, units=None, places=PLACES):
-    """A lid of 200 x 150 x 20 mm on a table, held by locators whose places are said in mm."""
-    a = tc.Assembly("lid")
-    part = a.part("lid", tc.Mesh(path, units))
-    a.locate(part, [tc.Locator(f"L{k}", *place, 1) for k, place in enumerate(places)])
-    a.measure("height", part.point(100, 75, 20), along="z")
+def block(units="mm", angle=None):
+    """A block on a table with a measurement of each kind, whose limits are the same lengths in all units."""
+    size = tc.declaration.UNITS[units]
+    a = tc.Assembly("block", units=units)
+    table, part = a.part("table", tc.Box(100, 50, 10), fixed=True), a.part("part", tc.Box(100, 50, 20), at=(0, 0, 10))
+    a.locate(part, tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x")), tolerance=0.3)
+    a.contact("seat", moving=part.face("-z"), reference=table.face("+z"))
+    corner = part.point(100, 50, 20)
+    a.measure("height", corner, along="z", tolerance=0.254 / size)
+    a.measure("distance", table.point(0, 0, 0), to=corner, along="z", limits=(29.8 / size, 30.3 / size))
+    a.measure("gap", tc.Gap(part.point(100, 0, 0), table.face("+z")))
+    a.measure("least", tc.Minimum("gap", "height"))
+    a.measure("nested", tc.Minimum(tc.Gap(part.point(0, 0, 0), table.face("+z")), tc.Gap(corner, table.face("+z"))))
+    a.measure("turn", tc.Angle(part.face("-z"), table.face("+z")), units=angle)
+    a.measure("own", lambda poses: poses.position(corner)[2], units="mm")
     return a
 
 
-def warned(assembly) -> list[str]:
-    with warnings.catch_warnings(record=True) as found:
-        warnings.simplefilter("always")
-        tc.build(assembly)
-    return [str(one.message) for one in found]
+@pytest.mark.parametrize("units", ["in", "um"])
+def test_values_limits_and_shares_are_those_of_mm_in_other_units(units, tmp_path):
+    factor = np.array([tc.declaration.UNITS[units]] * 5 + [np.pi / 180, 1.0])
+    expected, found = (tc.run(block(*given), samples=300, solver="daqp") for given in ((), (units, "deg")))
+    assert found["measure_units"].values.tolist() == [units] * 5 + ["deg", "mm"]
+    np.testing.assert_allclose(found["measured"].values * factor, expected["measured"].values, rtol=0, atol=1e-12)
+    shares = [tc.summarize(run)["statistic_value"].sel(statistic=OUTSIDE).values for run in (found, expected)]
+    np.testing.assert_array_equal(*shares)
+    tc.io.write_model(block(units, "deg"), tmp_path / "model.json")
+    with tc.run(tmp_path / "model.json", samples=300, solver="daqp") as again:
+        np.testing.assert_array_equal(again["measured"], found["measured"])
+    worst = [tc.analyses.worst_case(block(*given), solver="daqp")["worst"].values for given in ((), (units, "deg"))]
+    np.testing.assert_allclose(worst[1] * factor[:, None, None], worst[0], rtol=1e-6, atol=1e-6)
 
 
-def box(path, factor):
-    trimesh.creation.box(bounds=[[0, 0, 0], [200 * factor, 150 * factor, 20 * factor]]).export(path)
-    return path
+@pytest.mark.parametrize(
+    ("text", "width"),
+    [
+        ("±0.005 in", 0.254),
+        ('±0.005"', 0.254),
+        ("+0.010/-0 inch", 0.254),
+        ("±5 um", 0.01),
+        ("+0.1/-0.2 mm", 0.3),
+        ("±1 cm", 20.0),
+    ],
+)
+def test_a_tolerance_is_written_in_any_unit_of_length(text, width):
+    assert tc.Size(50, text).tolerance.width == pytest.approx(width, abs=1e-12)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("unit", "length"), [("in", 25.4), ("cm", 10.0), ("m", 1000.0), ("ft", 304.8)])
-def test_the_unit_that_explains_it_is_named(unit, length, tmp_path):
-    (told,) = warned(lid(box(tmp_path / "lid.stl", 1 / length)))
-    assert "mm away from it; if the file is in other units" in told
-    assert f'units="{unit}") it would be 250.8 mm' in told
-
-
-@pytest.mark.slow
-def test_metres_of_a_glb_that_are_mm(tmp_path):
-    places = [((x * 1000, y * 1000, z * 1000), along) for (x, y, z), along in PLACES]
-    assert not warned(lid(box(tmp_path / "lid.glb", 1e-3)))
-    told = warned(lid(box(tmp_path / "mm.stl", 1.0), "um"))
-    assert len(told) == 1 and 'units="mm") it would be 250.8 mm' in told[0]
-    assert "check the coordinates" in warned(lid(box(tmp_path / "far.stl", 1.0), None, places[:1] + PLACES[1:]))[0]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("wrong", [(1900, 10, 0), (190, 10, 4321), (-777, 10, 0)])
-def test_one_wrong_coordinate_is_no_matter_of_units(wrong, tmp_path):
-    places = [PLACES[0], (wrong, "z"), *PLACES[2:]]
-    (told,) = warned(lid(box(tmp_path / "lid.stl", 1.0), None, places))
-    assert 'locator "L1": its point ({:.4g}, {:.4g}, {:.4g}) lies'.format(*wrong) in told and "tc.Mesh(" not in told
-    assert told.startswith("[point]") and told.endswith("; check the coordinates, which are in the part's own frame [mm]")
-
-
-def test_coordinates_of_the_assembly_are_no_matter_of_units(tmp_path):
-    places = [((x + 3000, y - 2000, z), along) for (x, y, z), along in PLACES]
-    (told,) = warned(lid(box(tmp_path / "lid.stl", 1.0), None, places))
-    assert "check the coordinates" in told and "tc.Mesh(" not in told
-
-
-def test_a_mesh_that_states_its_units_is_not_said_to_have_others():
-    mesh = trimesh.creation.box(bounds=[[0, 0, 0], [20, 15, 2]])
-    mesh.units = "mm"
-    (told,) = warned(lid(mesh))
-    assert "check the coordinates" in told
+@pytest.mark.parametrize(
+    ("declare", "message"),
+    [
+        (
+            lambda a, point: a.measure("x", point, along="z", units="inch"),
+            "units is 'inch'; expected one of: um, mm, cm, m, in, ft",
+        ),
+        (lambda a, point: a.measure("x", point, along="z", units="deg"), "units is 'deg'; expected one of: um"),
+        (
+            lambda a, point: a.measure("x", tc.Minimum("gap", "height"), units="um"),
+            "units is 'um', but its measurement is in in",
+        ),
+        (lambda a, point: a.measure("x", tc.Minimum("gap", "own")), "it combines measurements in in and mm"),
+    ],
+)
+def test_units_that_a_value_cannot_have_are_refused(declare, message):
+    model = block("in")
+    declare(model, model.parts[1].point(0, 0, 0))
+    with pytest.raises(tc.ModelError, match=message):
+        tc.build(model)

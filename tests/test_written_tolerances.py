@@ -83,7 +83,7 @@ def test_a_bore_with_a_class_varies_about_the_middle_of_its_limits():
         (tc.Size(10, "H7/g6"), "size: tolerance is 'H7/g6'; it is a fit of two parts"),
         (tc.Size(10, "+0.1", -0.1), "it states one of two limits"),
         (tc.Size(10, "±0.1", -0.1), "upper is '±0.1', which states both limits; leave lower=-0.1 out"),
-        (tc.Size(10, "0.1 inch"), "its unit is inch; expected mm"),
+        (tc.Size(10, "0.1 thou"), "its unit is thou; expected mm"),
         (tc.Size("10", "H7"), "nominal is '10'; expected a number in mm"),
         (tc.Size(10, (0.1, -0.1)), "swap them"),
         (tc.Size(10, 0.1, -0.1, tolerance_class="H7"), "'H7', which has other limits than +0.1 -0.1; leave it out"),
@@ -112,8 +112,8 @@ def test_a_wrong_tolerance_of_a_location_has_one_message_that_names_the_part(wro
 def test_a_wrong_tolerance_of_a_locator_names_the_locator():
     model = tc.Assembly("a")
     part = model.part("block", tc.Box(1, 1, 1))
-    model.locate(part, [tc.Locator("A1", (0, 0, 0), "z", "0.1 inch")], floating=True, tolerance=0.1)
-    assert any("locator \"A1\": tolerance is '0.1 inch'; its unit is inch; expected mm" in fault for fault in tc.check(model))
+    model.locate(part, [tc.Locator("A1", (0, 0, 0), "z", "0.1 thou")], floating=True, tolerance=0.1)
+    assert any("locator \"A1\": tolerance is '0.1 thou'; its unit is thou; expected mm" in fault for fault in tc.check(model))
 
 
 def test_a_measure_has_limits_around_its_nominal_value():
@@ -133,7 +133,7 @@ def test_a_measure_has_limits_around_its_nominal_value():
     assert tc.io.model_of(results).measures[0].tolerance == (-0.05, 0.1)
 
 
-@pytest.mark.parametrize("wrong", ["H7", "abc", "±0.1 inch", (0.1, -0.1), (0.1, 0.1), 0, "0", -1, True, {}])
+@pytest.mark.parametrize("wrong", ["H7", "abc", "±0.1 thou", (0.1, -0.1), (0.1, 0.1), 0, "0", -1, True, {}])
 def test_a_wrong_tolerance_of_a_measure_has_one_message_that_names_it(wrong):
     (fault,) = tc.check(block(0.2, tolerance=wrong))
     assert fault.startswith('measurement "height" (')

@@ -48,7 +48,7 @@ def measure_accuracies(
                 slopes[kind, axis] = (displaced - initial) / STEP
             sizes = np.sqrt((slopes**2).sum(axis=1))
             gains += np.nan_to_num((sizes[0] + LEVER_FACTOR / span * sizes[1]), nan=0.0, posinf=0.0).max(axis=0)
-    return np.asarray(GAP_ACCURACY * np.maximum(gains, 1.0))
+    return np.asarray(GAP_ACCURACY * np.maximum(gains, [1 / measure.unit for measure in nominal.measures]))
 
 
 def _contact_of(nominal: Nominal, group: Group, part: int) -> tuple[np.ndarray, float]:

@@ -54,7 +54,7 @@ class SolverChoice(ABC):
 
     name: str
     options: dict[str, Any] = field(default_factory=dict)
-    fallbacks: tuple[str, ...] = ("qpoases", "daqp")
+    fallbacks: tuple[str, ...] = ("qpoases", "daqp", "piqp")
     remembers: bool = False
     growth: int = 3
     bends: bool = True

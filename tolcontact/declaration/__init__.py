@@ -24,7 +24,7 @@ from tolcontact.declaration.feature_tolerance import (
     Symmetry,
     TotalRunout,
 )
-from tolcontact.declaration.geometry import Box, Geometry, Mesh, Pin
+from tolcontact.declaration.geometry import UNITS, Box, Geometry, Mesh, Pin
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import (
@@ -55,9 +55,9 @@ from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import degrees
 
 __all__ = [
-    "OUTSIDE", "Angle", "Angularity", "Assembly", "AxisDistance", "Box", "Brep", "Chain", "CircularRunout", "Clearance",
-    "Coaxiality", "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets", "Difference",
-    "Elastic", "Face", "Facing", "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance",
+    "OUTSIDE", "UNITS", "Angle", "Angularity", "Assembly", "AxisDistance", "Box", "Brep", "Chain", "CircularRunout",
+    "Clearance", "Coaxiality", "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets",
+    "Difference", "Elastic", "Face", "Facing", "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance",
     "Geometry", "Inside", "Joint", "Largest", "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean",
     "MeanGap", "Measure", "Measurement", "Mesh", "Minimum", "Near", "Overlap", "Parallelism", "Part", "Pattern",
     "Perpendicularity", "Picked", "Pin", "Point", "Population", "Position", "Profile", "Roundness", "Size", "Stack",

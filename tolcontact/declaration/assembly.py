@@ -14,7 +14,7 @@ from tolcontact.declaration.dependence import (
     Variable,
 )
 from tolcontact.declaration.elastic import gravity_faults
-from tolcontact.declaration.geometry import Geometry
+from tolcontact.declaration.geometry import UNITS, Geometry
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.part import Feature, Part, Standard
@@ -61,7 +61,9 @@ class Assembly(Causes, Pictured, Checked):
     run may state another one. `title_block` heads its reports. `mu` is the coefficient of friction of all contacts;
     `tc.analyses.seating` uses it. `standard` is that of the drawings, "ISO" or "ASME": under ISO the zones of a pattern are
     separate, and sizes do not limit form; under ASME zones are combined, and form is inside the envelope of sizes. Without
-    one, zones are combined, and sizes do not limit form. Raises TypeError for an argument of a wrong type.
+    one, zones are combined, and sizes do not limit form. `units` are those of its measured lengths, as in
+    units="in"; all that is declared stays in mm, but for texts such as "±0.005 in". Raises TypeError for an argument of a wrong
+    type.
     """
 
     checks: ClassVar = {"mu": FRICTION, "standard": one_of(get_args(Standard))}
@@ -85,6 +87,7 @@ class Assembly(Causes, Pictured, Checked):
         title_block: TitleBlock | None = None,
         mu: float | None = None,
         standard: Standard = "",
+        units: str = "mm",
     ) -> None:
         expect(f'assembly "{name}": method', method, Method | None, "tc.Method(...)")
         expect(f'assembly "{name}": title_block', title_block, TitleBlock | None, "tc.TitleBlock(...)")
@@ -93,6 +96,7 @@ class Assembly(Causes, Pictured, Checked):
         self.title_block = title_block
         self.mu = mu
         self.standard = standard
+        self.units = units
         self.acceleration: Vector | None = None
         self._declared: dict[str, list[Any]] = {name: [] for name in MAX_COUNTS}
 
@@ -109,7 +113,7 @@ class Assembly(Causes, Pictured, Checked):
     def replaced(self, **lists: Iterable[Any]) -> "Assembly":
         """Return a copy with other lists, as in replaced(parts=..., pairs=...). Raises TypeError for other names."""
         copy = Assembly(self.name, method=self.method, title_block=self.title_block, mu=self.mu, standard=self.standard)
-        copy.acceleration = self.acceleration
+        copy.units, copy.acceleration = self.units, self.acceleration
         copy._declared |= {name: list(lists.pop(name, things)) for name, things in self._declared.items()}
         if lists:
             raise TypeError(f"an assembly has no list {', '.join(lists)}; its lists are: {', '.join(MAX_COUNTS)}")
@@ -225,8 +229,8 @@ class Assembly(Causes, Pictured, Checked):
         widths = [zone.width for zone in zones if zone is not None]
         sound = [control for feature in self.features for control in feature.tolerances if not any(control.faults())]
         widths += [control.tolerance.width if isinstance(control, Size) else float(control.width) for control in sound]
-        measures = [measure for measure in self.measures if measure.units == "mm" and not any(measure.faults())]
-        widths += [float(measure.width) for measure in measures if measure.width is not None]
+        measures = [measure for measure in self.measures if measure.units in UNITS and not any(measure.faults())]
+        widths += [float(measure.width) * UNITS[measure.units] for measure in measures if measure.width is not None]
         return min((width for width in widths if width > CONSTANT_SHARE * max(widths)), default=math.inf)
 
     def omissions(self) -> Iterator[str]:

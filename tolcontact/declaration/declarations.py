@@ -133,7 +133,8 @@ class Declarations:
         tolerance   width of its limits about the nominal value [mm or rad], or "+0.2/-0.1"
         limits      (lower, upper) values in place of a tolerance; None for an open side
         absolute    True: values are coordinates or distances; False: they are differences from nominal
-        units       of an expression, by default mm; a measurement has its own
+        units       of its values and limits: "in", "um", ... for lengths, by default those of the assembly; "deg" for angles,
+                    by default "rad"; of a function, what it returns, by default mm
 
         `model.measure("flush", lid.point(100, 30, 4), to=base.point(100, 30, 24), along="x", limits=(-0.2, 0.2))`
         """
@@ -141,6 +142,8 @@ class Declarations:
         if units is None:
             earlier = {measure.name: measure.units for measure in self.assembly.measures}
             units = min(of.units_among(earlier), default="mm") if isinstance(of, Measurement) else "mm"
+            is_plain = isinstance(of, Point) or (isinstance(of, Measurement) and not of.names)
+            units = self.assembly.units if units == "mm" and is_plain else units
         bounds: Any = tuple(limits) if isinstance(limits, list | tuple) else limits
         measure = Measure(
             name, of, to=to, along=axis, tolerance=tolerance, units=units, limits=bounds, absolute=absolute,

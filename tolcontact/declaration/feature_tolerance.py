@@ -53,6 +53,7 @@ class ToleranceOptions(TypedDict, total=False):
     per: float | tuple[float, float] | None
     tangent: bool
     combined: bool | None
+    simultaneous: bool | None
     form: Form | None
     rule: Rule
     cp: float
@@ -109,6 +110,9 @@ class GeometricTolerance(Checked):
     tangent     True for a zone of the plane that touches a plane from outside the material; its form may then be outside
     combined    of a pattern: True if the zones of its members keep their places to each other (CZ of ISO 5458), False if each
                 has its own (SZ); by default as the `standard` of the part has it: separate under ISO, else combined
+    simultaneous  of datums at their material boundary, such as "B(M)": True if their gauge lies in one place for all tolerances
+                with the same datums (SIM), False if each may shift it (SEP REQT); by default as the `standard` of the part has
+                it: True under ASME, else False
     form        of a tolerance of form, or a profile without datums: how the form deviates; None if it is stated alone, and the
                 feature keeps its shape
     rule        from the zone to the spread of all freedoms together. "99.73 % inside" (default): this share of features lies
@@ -130,13 +134,14 @@ class GeometricTolerance(Checked):
     per: float | tuple[float, float] | None = None
     tangent: bool = False
     combined: bool | None = None
+    simultaneous: bool | None = None
     form: Form | None = USUAL_FORM
     rule: Rule = "99.73 % inside"
     cp: float = 1.0
     cpk: float | None = None
     side: Side | None = None
 
-    checks: ClassVar = {**OPTION_CHECKS, "rule": one_of(RULES)}
+    checks: ClassVar = {**OPTION_CHECKS, "simultaneous": TRUTH, "rule": one_of(RULES)}
 
     @property
     def kind(self) -> str:
@@ -214,6 +219,8 @@ class GeometricTolerance(Checked):
             return
         if len(set(self.letters)) < len(self.letters):
             yield f"datums {self.datums!r} names a datum twice"
+        if self.simultaneous is not None and not any(self.modifiers):
+            yield 'simultaneous is given, but no datum is at its material boundary, as in "A|B(M)"; leave it out'
 
     def _zone_faults(self) -> Iterator[str]:
         for option in (*OPTION_CHECKS, "along"):
@@ -255,7 +262,8 @@ class GeometricTolerance(Checked):
         unequal = "" if self.outside is None else f" Ⓤ{self.outside:g}"
         tangent = " Ⓣ" if self.tangent else ""
         frame = f"{self.kind} {diameter}{self.width:g}{unit}{unequal}{material}{projected}{tangent}{self._zones}"
-        return " ".join([frame, *(re.sub(r"\(([ML])\)", lambda m: f" {SYMBOLS[m[1]]}", datum) for datum in self._compartments)])
+        datums = [re.sub(r"\(([ML])\)", lambda m: f" {SYMBOLS[m[1]]}", datum) for datum in self._compartments]
+        return " ".join([frame, *datums, *{None: (), True: ("SIM",), False: ("SEP REQT",)}[self.simultaneous]])
 
     @property
     def archived_text(self) -> str:

@@ -12,12 +12,15 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from tolcontact.declaration.checks import TRUTH, Declaration, direction_faults
+from tolcontact.declaration.geometry import UNITS
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Part, Point
 from tolcontact.declaration.place import Place
 from tolcontact.declaration.values import Vector, is_length, is_line
 from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
 from tolcontact.tables import MAX_NUMBER
+
+_KINDS: dict[str, dict[str, float]] = {"mm": UNITS, "rad": {"deg": math.pi / 180, "mrad": 1e-3}}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,7 +34,8 @@ class Measure(Declaration):
         of a function               the CasADi expression that the function returns for the symbolic poses
 
     `limits` are the smallest and the largest allowed value; None leaves a side open. `tolerance` is short for limits around the
-    nominal value: at half of a number below and above it, or at deviations such as "±0.1", "+0.1/-0.05" or (-0.05, 0.1).
+    nominal value: at half of a number below and above it, or at deviations such as "±0.1", "+0.1/-0.05" or (-0.05, 0.1). All of
+    these, and the values, are in `units`: "in", "um", ... for lengths, and "deg" for angles; of a function, what it returns.
     """
 
     name: str
@@ -67,6 +71,13 @@ class Measure(Declaration):
     def is_expression(self) -> bool:
         """Whether the measure is a user's own expression of the poses."""
         return not isinstance(self.of, Point | Measurement)
+
+    @property
+    def unit(self) -> float:
+        """Its unit in mm or rad; 1 for a function, and for a combination, which is in the units of its measurements."""
+        if isinstance(self.of, Measurement) and not self.of.names:
+            return _conversion(self.units, self.of.units) or 1.0
+        return (_conversion(self.units, "mm") or 1.0) if isinstance(self.of, Point) else 1.0
 
     @property
     def quantity(self) -> str:
@@ -106,6 +117,8 @@ class Measure(Declaration):
                 f'units is {self.units!r}; expected a text such as "mm", "rad", or "1" for a pure number, '
                 "without control characters"
             )
+        elif isinstance(self.of, Point) and _conversion(self.units, "mm") is None:
+            yield f"units is {self.units!r}; expected one of: {', '.join(UNITS)}"
         if self.to is not None and not isinstance(self.to, Point):
             yield f"to is a {type(self.to).__name__}; expected part.point(x, y, z)"
         yield from self._limits_faults()
@@ -164,7 +177,7 @@ class Measure(Declaration):
         own = self.of.units_among(units)
         if len(own) > 1:
             yield f"it combines measurements in {' and '.join(sorted(own))}; expected the same units"
-        elif own and own != {self.units}:
+        elif own and (self.of.names or _conversion(self.units, min(own)) is None) and own != {self.units}:
             yield f"units is {self.units!r}, but its measurement is in {min(own)}; leave units out"
 
     def __str__(self) -> str:
@@ -187,6 +200,11 @@ class Measure(Declaration):
         if lower is None or upper is None:
             return f", at most {upper:g} {self.units}" if lower is None else f", at least {lower:g} {self.units}"
         return f", limits {lower:g} to {upper:g} {self.units}"
+
+
+def _conversion(units: str, own: str) -> float | None:
+    """Return the size of a unit in the `own` units of a measured value, "mm" or "rad"; None if it is none of their kind."""
+    return 1.0 if units == own else _KINDS.get(own, {}).get(units)
 
 
 Tape = tuple[tuple[Any, ...], ...]

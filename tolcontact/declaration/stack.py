@@ -37,8 +37,7 @@ class Stack(Assembly):
     """
 
     def __init__(self, name: str, *, units: str = "mm", title_block: TitleBlock | None = None) -> None:
-        super().__init__(name, title_block=title_block)
-        self.units = units
+        super().__init__(name, title_block=title_block, units=units)
         self._sensitivities: dict[str, float] = {}
 
     def link(self, name: str, nominal: float, tolerance: Any, *, sensitivity: float = 1.0) -> Variable:

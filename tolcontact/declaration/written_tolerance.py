@@ -1,4 +1,4 @@
-"""Tolerances as drawings write them: limit deviations such as "±0.1" and "+0.1/-0.05", and lengths such as "0.2 mm".
+"""Tolerances as drawings write them: limit deviations such as "±0.1" and "+0.1/-0.05", and lengths such as "0.2 mm", "0.01 in".
 
 Plus and minus may be written "±", "+-" and "+/-", a minus as in Unicode. Two deviations are separated by a slash, a semicolon,
 a space, or nothing. A comma between digits is a decimal comma. Deviations are pairs (lower, upper) everywhere else.
@@ -9,6 +9,7 @@ import re
 from decimal import Decimal
 from typing import Any, NamedTuple
 
+from tolcontact.declaration.geometry import UNITS
 from tolcontact.declaration.tolerance_class import UndefinedClass, tolerance_class
 from tolcontact.declaration.values import is_length
 from tolcontact.tables import MAX_NUMBER
@@ -24,6 +25,7 @@ _THOUSANDS = re.compile(r"(?<![\d.,])[1-9]\d{0,2}(?:,\d{3})+(?!\d)")
 _FIT = re.compile(r"([A-Z]{1,2}\d{1,2}) ?/ ?([a-z]{1,2}\d{1,2})")
 _UNIT = re.compile(r"[\d.,] ?([^\W\d_]+|[°%\"'])$")
 _DEGREES = re.compile(r" ?(?:°|deg)(?![^\W\d])")
+_ALSO = {'"': "in", "inch": "in", "\N{MICRO SIGN}m": "um", "\N{GREEK SMALL LETTER MU}m": "um"}
 _SIGNS = str.maketrans({"\N{MINUS SIGN}": "-", "\N{EN DASH}": "-", "\N{FULLWIDTH PLUS SIGN}": "+"})
 DIGITS = 12  # of widths and middles after the point: more than a double has of a deviation
 
@@ -55,8 +57,9 @@ class Deviations(NamedTuple):
 def written(value: Any, *, units: str = "mm", nominal: float | None = None) -> Any:
     """Return Deviations for texts of limit deviations and for pairs, a number for the text of one; other values as they are.
 
-    A tolerance class such as "H7" needs a `nominal` size [mm]. Degrees become radians if the `units` are "rad". NumPy numbers
-    become Python numbers. Raises TextFault for other texts and pairs.
+    A tolerance class such as "H7" needs a `nominal` size [mm]. Degrees become radians if the `units` are "rad", and lengths in
+    other units, such as "±0.005 in", lengths in `units`. NumPy numbers become Python
+    numbers. Raises TextFault for other texts and pairs.
     """
     if isinstance(value, list | tuple):
         return _pair(value)
@@ -76,7 +79,16 @@ def written(value: Any, *, units: str = "mm", nominal: float | None = None) -> A
     if units == "rad" and _DEGREES.search(text):
         value = _parsed(_DEGREES.sub("", text))
         return Deviations(*map(math.radians, value)) if isinstance(value, Deviations) else math.radians(value)
-    return _parsed(_without_units(text, units))
+    factor = 1.0
+    if (match := _UNIT.search(text)) and {unit := _ALSO.get(match[1], match[1]), units} <= UNITS.keys():
+        factor, units = UNITS[unit] / UNITS[units], match[1]
+    return _scaled(_parsed(_without_units(text, units)), factor)
+
+
+def _scaled(value: Deviations | float, factor: float) -> Deviations | float:
+    if factor == 1.0:
+        return value
+    return Deviations(*(round(factor * limit, DIGITS) for limit in value)) if isinstance(value, Deviations) else factor * value
 
 
 def _pair(pair: Any) -> Deviations:

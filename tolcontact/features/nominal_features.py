@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tolcontact.declaration import DatumTargets, Face, Feature, Pattern
+from tolcontact.declaration import DatumTargets, Face, Feature, GeometricTolerance, Pattern
 from tolcontact.errors import GeometryFault
 from tolcontact.features.datum_frames import DatumShift, Declared, datum_frame, padded
 from tolcontact.features.datum_mobility import mobile
@@ -35,6 +35,7 @@ class Features:
     mated: frozenset[Face] = frozenset()
     patterns: list[NominalPattern] = field(default_factory=list)
     features: dict[Feature, NominalFeature] = field(default_factory=dict)
+    _gauges: dict[str, NominalFeature] = field(default_factory=dict)
     _targets: dict[tuple[int, str], tuple[NominalFeature, ...]] = field(default_factory=dict)
     _used_faces: dict[tuple[Feature, int | None], FaceDeviation] = field(default_factory=dict)
 
@@ -49,7 +50,8 @@ class Features:
 
     def copy(self) -> "Features":
         """Return a copy, so that further features do not change these."""
-        return replace(self, patterns=list(self.patterns), features=dict(self.features), _targets=dict(self._targets))
+        copies = {name: getattr(self, name).copy() for name in ("patterns", "features", "_gauges", "_targets")}
+        return replace(self, **copies)
 
     def add(self, declared: Declared, part: int, meshes: Meshes) -> None:
         """Add a feature, a pattern or datum targets, whose datums and features have been added before. Raises GeometryFault."""
@@ -67,10 +69,10 @@ class Features:
         )
         if declared.tolerances and (fault := unlike_members(pattern.geometries)):
             raise GeometryFault(fault)
-        self._add_mobilities(declared, part)
+        systems = [self._system(declared, tolerance, part) for tolerance in declared.geometric]
         # The order of the freedoms is the order of their columns: displacements, datum shifts, sizes, modes of forms.
         start = self.first_column + len(self.freedoms)
-        pattern = replace(pattern, layers=tolerance_layers(pattern, self.datums(part), start))
+        pattern = replace(pattern, layers=tolerance_layers(pattern, systems, start))
         freedoms = list(_displacements(pattern))
         shifts, coordinates = _follow_datums(pattern, start, freedoms)
         if declared.size is not None:
@@ -94,24 +96,50 @@ class Features:
         members = tuple(self.features[member] for member in declared.members)
         self.patterns.append(replace(pattern, members=members, freedoms=tuple(freedoms), shifts=tuple(shifts), form=form))
 
-    def _add_mobilities(self, declared: Feature | Pattern, part: int) -> None:
-        """Add the freedoms of gauge elements that tolerances refer to, each once, if the standard of the part is stated."""
-        for tolerance in declared.geometric if declared.part.standard else ():
-            for k, (letters, modifier) in enumerate(zip(tolerance.system, tolerance.modifiers, strict=True)):
-                known = self.datums(part)
-                datums = [other for other in self.patterns if other.part == part and other.declared.datum == letters[0]]
-                if not modifier or len(letters) > 1 or not datums or any(self._has_play(datum) for datum in datums):
-                    continue
-                before = [[datum for letter in earlier for datum in known.get(letter, ())] for earlier in tolerance.system[:k]]
-                start = self.first_column + len(self.freedoms)
-                frame = datum_frame(before, datums[0].centre, datums[0].reach, start, tolerance.orientation_only[:k])
-                if (added := mobile(datums[0], frame.free, modifier, start)) is not None:
-                    self.patterns.append(added)
+    def _system(self, declared: Feature | Pattern, tolerance: GeometricTolerance, part: int) -> list[list[NominalFeature]]:
+        """Return the datums of a tolerance, compartment by compartment; those with play as their gauge elements have them.
 
-    def _has_play(self, datum: NominalPattern) -> bool:
-        """Return whether the play of a datum is known already: it has a gauge element, or a mate in a contact pair."""
-        members = datum.members
-        return any(member.mobility is not None or not self.mated.isdisjoint(member.feature.faces) for member in members)
+        Raises GeometryFault for a datum that could not be made.
+        """
+        known, system = self.datums(part), list[list[NominalFeature]]()
+        for letters, modifier in zip(tolerance.system, tolerance.modifiers, strict=True):
+            if absent := [letter for letter in letters if letter not in known]:
+                raise GeometryFault(
+                    f"{tolerance.kind} refers to datum {absent[0]}, which could not be made; mend its feature first"
+                )
+            compartment = [datum for letter in letters for datum in known[letter]]
+            patterns = [other for other in self._of(part) if other.declared.datum in letters]
+            if modifier and len(patterns) == 1 and declared.part.standard and not self._has_mate(compartment):
+                compartment = [self._at_gauge(declared, tolerance, patterns[0], system)]
+            system.append(compartment)
+        return system
+
+    def _at_gauge(
+        self,
+        declared: Feature | Pattern,
+        tolerance: GeometricTolerance,
+        datum: NominalPattern,
+        before: Sequence[Sequence[NominalFeature]],
+    ) -> NominalFeature:
+        """Return a datum as its gauge element has it, which other tolerances share in a simultaneous requirement.
+
+        before   the datums before it in the system of the tolerance
+        """
+        is_shared = tolerance.simultaneous
+        is_shared = declared.part.standard == "ASME" if is_shared is None else is_shared
+        owner = datum.label if is_shared else f"{declared.part.name}.{declared.name}"
+        label = f"{owner}.mobility of datum {datum.declared.datum} of {tolerance.datums}"
+        if label not in self._gauges:
+            start, k = self.first_column + len(self.freedoms), len(before)
+            frame = datum_frame(before, datum.centre, datum.reach, start, tolerance.orientation_only[:k])
+            gauge = mobile(datum, frame.free, tolerance.modifiers[k], start, label)
+            self.patterns += [gauge] if gauge.freedoms else []
+            self._gauges[label] = gauge.members[0]
+        return self._gauges[label]
+
+    def _has_mate(self, datums: Iterable[NominalFeature]) -> bool:
+        """Return whether a face of a datum is in a contact pair, whose contact decides where the datum lies."""
+        return any(not self.mated.isdisjoint(datum.feature.faces) for datum in datums)
 
     def _add_targets(self, targets: DatumTargets, part: int) -> None:
         """Add a datum whose features have been added before. Raises GeometryFault for a target that is not on its feature."""
@@ -123,8 +151,12 @@ class Features:
 
     def datums(self, part: int) -> dict[str | None, tuple[NominalFeature, ...]]:
         """Return the datums of a part that have been added, by letters: several features or targets for a common datum."""
-        patterns = {pattern.declared.datum: pattern.members for pattern in self.patterns if pattern.part == part}
+        patterns = {pattern.declared.datum: pattern.members for pattern in self._of(part)}
         return patterns | {letter: datums for (owner, letter), datums in self._targets.items() if owner == part}
+
+    def _of(self, part: int) -> list[NominalPattern]:
+        """Return the features and patterns of a part, without gauge elements."""
+        return [pattern for pattern in self.patterns if pattern.part == part and not pattern.is_gauge]
 
     def _recognized(self, feature: Feature, part: int, meshes: Meshes, members: Iterable[NominalFeature]) -> NominalFeature:
         """Return a feature without freedoms; `members` are the features before in its pattern. Raises GeometryFault."""

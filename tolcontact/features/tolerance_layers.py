@@ -1,6 +1,6 @@
 """Layers: the directions of a feature that each of its tolerances controls, from the innermost tolerance on."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import scipy
@@ -16,13 +16,17 @@ from tolcontact.geometry.tolerances import MIN_PART
 
 
 def tolerance_layers(
-    pattern: NominalPattern, datums: Mapping[str | None, Sequence[NominalFeature]], first_column: int
+    pattern: NominalPattern, systems: Sequence[Sequence[Sequence[NominalFeature]]], first_column: int
 ) -> tuple[Layer, ...]:
     """Return a layer for each geometric tolerance of a feature or pattern, from the one that controls fewest directions on.
 
-    `datums` are by their letters. Raises GeometryFault for tolerances that the feature cannot have, or that do not nest.
+    `systems` are the datums of each tolerance, compartment by compartment. Raises GeometryFault for tolerances that the feature
+    cannot have, or that do not nest.
     """
-    zones = [(tolerance, *_zone(tolerance, pattern, datums, first_column)) for tolerance in pattern.declared.geometric]
+    zones = [
+        (tolerance, *_zone(tolerance, pattern, system, first_column))
+        for tolerance, system in zip(pattern.declared.geometric, systems, strict=True)
+    ]
     zones.sort(key=lambda zone: (zone[3].shape[1], zone[0].width))
     layers: list[Layer] = []
     controlled_before, column = np.zeros((pattern.count, 0)), first_column
@@ -45,20 +49,14 @@ def tolerance_layers(
 def _zone(
     tolerance: GeometricTolerance,
     pattern: NominalPattern,
-    datums: Mapping[str | None, Sequence[NominalFeature]],
+    system: Sequence[Sequence[NominalFeature]],
     columns: int,
 ) -> tuple[tuple[np.ndarray, ...], DatumFrame, np.ndarray]:
     """Return the rows of a zone for each member, its datum frame, and the directions (coordinate, n) that it controls."""
-    absent = [letter for compartment in tolerance.system for letter in compartment if letter not in datums]
-    if absent:
-        raise GeometryFault(f"{tolerance.kind} refers to datum {absent[0]}, which could not be made; mend its feature first")
-    system = [
-        [datum.at_gauge(columns) if modifier else datum for letter in compartment for datum in datums[letter]]
-        for compartment, modifier in zip(tolerance.system, tolerance.modifiers, strict=True)
-    ]
     primary = system[0][0].geometry if system else None
     rows = tuple(zone_rows(tolerance, member, primary) for member in pattern.geometries)
-    frame = datum_frame(system, pattern.centre, pattern.reach, columns, tolerance.orientation_only)
+    at_gauge = [[datum.at_gauge(columns) for datum in compartment] for compartment in system]
+    frame = datum_frame(at_gauge, pattern.centre, pattern.reach, columns, tolerance.orientation_only)
     is_combined = pattern.declared.combines(tolerance)
     is_limited = system or is_combined  # a combined zone limits the members to each other
     controlled = _controlled(rows, pattern, frame, is_combined=is_combined) if is_limited else np.zeros((pattern.count, 0))

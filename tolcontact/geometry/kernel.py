@@ -48,17 +48,18 @@ def _tilt_sine(body, corner, n, normal):  # type: ignore[no-untyped-def]
 
 
 @inlined_uncounted
-def corner_on_facet(A, B, index_A, index_B, flat, plane, spare, reach, X, x):  # type: ignore[no-untyped-def]
+def corner_on_facet(A, B, index_A, index_B, flat, plane, is_level, spare, reach, X, x):  # type: ignore[no-untyped-def]
     """Return gap, point, projection and normal of a corner, now at x, of the moving body on a facet of the reference body.
 
-    flat   the facet of the moving body in the plane that faces the reference body's
+    flat       the facet of the moving body in the plane that faces the reference body's
+    is_level   whether these planes are so parallel that no edge in them rises too far above the other plane
     """
     n = row(B.normals, index_B)
     height = dot(n, minus(x, row_of(B.facets, index_B, 0)))
     if not (-reach[0] <= height <= reach[1]) or (plane < 0 and not is_over(B.facets, B.inward, index_B, x, spare)):
         return NOWHERE
     own = ORIGIN if plane < 0 else row(A.normals, flat)
-    if _tilt_sine(A, index_A, scaled(-1.0, turn_back(X, n)), own) > MAX_TILT_SINE:
+    if not is_level and _tilt_sine(A, index_A, scaled(-1.0, turn_back(X, n)), own) > MAX_TILT_SINE:
         return NOWHERE
     if plane < 0 and height < -INSIDE and not is_inside(B.triangles, x):
         return NOWHERE
@@ -66,7 +67,7 @@ def corner_on_facet(A, B, index_A, index_B, flat, plane, spare, reach, X, x):  #
 
 
 @inlined_uncounted
-def facet_on_corner(A, B, index_A, index_B, flat, plane, spare, reach, X, y):  # type: ignore[no-untyped-def]
+def facet_on_corner(A, B, index_A, index_B, flat, plane, is_level, spare, reach, X, y):  # type: ignore[no-untyped-def]
     """Return gap, point, projection and normal of a facet of the moving body on a corner of the reference body.
 
     flat   the facet of the reference body along whose normal facing planes touch
@@ -84,7 +85,9 @@ def facet_on_corner(A, B, index_A, index_B, flat, plane, spare, reach, X, y):  #
     if not (fall < -0.5 and -reach[0] <= height <= reach[1]):
         return NOWHERE
     place = along(y, height, d)
-    if (plane < 0 and not is_over(A.facets, A.inward, index_A, place, spare)) or _tilt_sine(B, index_B, n, own) > MAX_TILT_SINE:
+    if plane < 0 and not is_over(A.facets, A.inward, index_A, place, spare):
+        return NOWHERE
+    if not is_level and _tilt_sine(B, index_B, n, own) > MAX_TILT_SINE:
         return NOWHERE
     if plane < 0 and height < -INSIDE and not is_inside(A.triangles, y):
         return NOWHERE

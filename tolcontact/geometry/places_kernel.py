@@ -10,7 +10,9 @@ from tolcontact.geometry.kernel import (
     CORNER_ON_FACET,
     EDGE_ON_EDGE,
     FACET_ON_CORNER,
+    IN_PLANE,
     INSIDE,
+    MAX_TILT_SINE,
     NOWHERE,
     TINY,
     corner_on_facet,
@@ -31,6 +33,7 @@ from tolcontact.geometry.vector_kernel import (
     turn,
 )
 
+LEVEL = MAX_TILT_SINE - 2 * IN_PLANE  # sine of the angle between planes: edges in one of them rise no further above the other
 MAX_SHEAR = 1.8  # lateral shift of a corner's projection per unit height, where planes face each other
 EVERYWHERE = (-np.inf, -np.inf, np.inf, np.inf)
 
@@ -116,18 +119,19 @@ def _is_over_plane(candidates, plane, body, x, slack):  # type: ignore[no-untype
 @inlined_uncounted
 def _place(A, B, candidates, s, slack, reach, X, moved):  # type: ignore[no-untyped-def]
     """Return gap, point, projection and normal of candidate s, which may lie `slack` [mm] outside edges."""
-    corners, lines, back = moved
+    corners, lines, back, level = moved
     kind, index_A, index_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
+    is_level = plane >= 0 and level[plane]
     flat = 0 if plane < 0 else candidates.facing[plane, 0 if kind == CORNER_ON_FACET else 1]
     if kind == EDGE_ON_EDGE:
         return edge_on_edge(
             A, B, index_A, index_B, flat, plane, slack, reach, X, row_of(lines, index_A, 0), row_of(lines, index_A, 1)
         )
     if kind == CORNER_ON_FACET:
-        results = corner_on_facet(A, B, index_A, index_B, flat, plane, slack, reach, X, row(corners, index_A))
+        results = corner_on_facet(A, B, index_A, index_B, flat, plane, is_level, slack, reach, X, row(corners, index_A))
         is_over = plane < 0 or results[0] == np.inf or _is_over_plane(candidates, plane, 1, row(corners, index_A), slack)
     else:
-        results = facet_on_corner(A, B, index_A, index_B, flat, plane, slack, reach, X, row(back, index_B))
+        results = facet_on_corner(A, B, index_A, index_B, flat, plane, is_level, slack, reach, X, row(back, index_B))
         is_over = plane < 0 or results[0] == np.inf or _is_over_plane(candidates, plane, 0, results[1], slack)
     return results if is_over else NOWHERE
 
@@ -154,7 +158,7 @@ def _is_near(candidates, s, projection, projections, touching, gaps, distance): 
 @inlined_uncounted
 def _range(A, candidates, s, moved, slack):  # type: ignore[no-untyped-def]
     """Return the smallest and largest coordinates of the corner or edge of candidate s in the plane that faces it."""
-    corners, lines, back = moved
+    corners, lines, back, _ = moved
     kind, index_A, index_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
     body = 0 if kind == FACET_ON_CORNER else 1
     axis_1, axis_2 = row_of(candidates.frames[plane], body, 0), row_of(candidates.frames[plane], body, 1)
@@ -186,7 +190,7 @@ def _find_at(A, B, candidates, reach, margins, nearness, overhang, retained, X, 
     nearness      in margins: largest distance of such a contact point from a point where the planes touch
     retained      (k,): indices of the retained candidates, or -1
     moved         corners (v, 3), and starts and vectors of edges (e, 2, 3), of the moving body in the reference frame, and
-                  corners of the reference body in the moving frame
+                  corners of the reference body in the moving frame, and whether facing planes are level (see corner_on_facet)
     touching      (c,): indices of the candidates that touch
     is_held       (corner,), false: see drop_passed
     gaps          (c,) [mm], initially infinite
@@ -271,7 +275,7 @@ def _move(A, B, facing, X, corners, lines, back, sines):  # type: ignore[no-unty
 @uncounted
 def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, directions, results, scratch):  # type: ignore
     """Write the results of `find`: labels, gaps, points, projections and normals."""
-    corners, lines, back, margins, touching, is_held, is_chosen, all_gaps, all_points = scratch
+    corners, lines, back, level, margins, touching, is_held, is_chosen, all_gaps, all_points = scratch
     labels, gaps, points, projections, normals = results
     points_at, projections_at, normals_at = all_points
     count, room, facing = candidates.kinds.size, labels.shape[1], candidates.facing
@@ -280,8 +284,9 @@ def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, direc
         _move(A, B, facing, X, corners, lines, back, margins)
         margins[-1] = margin
         for j in range(facing.shape[0]):
+            level[j] = margins[j] < LEVEL
             margins[j] = max(margin, min(error[0] / max(margins[j], TINY), error[1]))
-        moved = (corners, lines, back)
+        moved = (corners, lines, back, level)
         number = _find_at(
             A, B, candidates, reach, margins, error[2], error[3], retained[k], X, moved, touching, is_held, all_gaps, all_points
         )
@@ -326,6 +331,7 @@ def find(A, B, candidates, reach, margin, error, poses, retained, directions, la
     count = candidates.kinds.size
     scratch = (
         np.empty(A.vertices.shape), np.empty(A.edges.shape), np.empty(B.vertices.shape),
+        np.empty(candidates.facing.shape[0], dtype=np.bool_),
         np.empty(candidates.facing.shape[0] + 1), np.empty(count, dtype=np.int64),
         np.zeros(A.vertices.shape[0] + B.vertices.shape[0], dtype=np.bool_), np.zeros(count, dtype=np.bool_),
         np.full(count, np.inf), np.empty((3, count, 3)),

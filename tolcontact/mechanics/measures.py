@@ -128,7 +128,8 @@ def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX, bending
     expressions: list[ca.SX] = []
     for measure, measurement in zip(nominal.measures, nominal.measurements, strict=True):
         if measurement is not None:
-            expressions.append(value_of(measurement, Observed(poses, deviations, expressions)))
+            value = value_of(measurement, Observed(poses, deviations, expressions))
+            expressions.append(value if measure.unit == 1 else value / measure.unit)
             continue
         try:
             expressions.append(_expression(measure, nominal, SymbolicPoses(nominal, poses, deviations, bending)))
@@ -149,7 +150,7 @@ def _expression(measure: Measure, nominal: Nominal, part_poses: SymbolicPoses) -
         else:
             origin = nominal.position(point) if measure.quantity == "displacement" else np.zeros(3)
             moved = part_poses.position(point) - ca.DM(origin)
-        return ca.dot(ca.DM(np.array(measure.along)), moved)
+        return ca.dot(ca.DM(np.array(measure.along) / measure.unit), moved)
     function: Any = measure.of
     recorded = isinstance(function, tuple)
     poses, deviations = part_poses.poses, part_poses.deviations

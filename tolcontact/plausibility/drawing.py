@@ -108,6 +108,8 @@ def _moot_modifiers(nominal: Nominal, pattern: NominalPattern, tolerance: Geomet
         features = [datum for letter in letters for datum in datums.get(letter, ())]
         if modifier and not all(isinstance(datum.geometry, FeatureOfSize) for datum in features):
             yield f"{tolerance}: datum {letters[0]} has no size, so a material modifier says nothing; leave it out"
+        elif modifier and len(features) > 1:
+            yield f"{tolerance}: datum {'-'.join(letters)} has several features: the play of its gauge is not drawn"
 
 
 def _stated(nominal: Nominal) -> list[NominalPattern]:

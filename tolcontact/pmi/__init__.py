@@ -6,9 +6,20 @@
 from tolcontact.pmi.annotations import Datum, DatumReference, DatumTarget, Dimension, Pmi, Tolerance
 from tolcontact.pmi.claims import DeclaredAnnotation
 from tolcontact.pmi.declared import DeclaredPmi, features_from_pmi
+from tolcontact.pmi.modifiers import OF_DATUMS, OF_TOLERANCES
 from tolcontact.pmi.reading import read_pmi
 
 __all__ = [
-    "Datum", "DatumReference", "DatumTarget", "DeclaredAnnotation", "DeclaredPmi", "Dimension", "Pmi", "Tolerance",
-    "features_from_pmi", "read_pmi",
+    "OF_DATUMS",
+    "OF_TOLERANCES",
+    "Datum",
+    "DatumReference",
+    "DatumTarget",
+    "DeclaredAnnotation",
+    "DeclaredPmi",
+    "Dimension",
+    "Pmi",
+    "Tolerance",
+    "features_from_pmi",
+    "read_pmi",
 ]  # fmt: skip

@@ -6,14 +6,10 @@ Records are numbers of the file: #12 is 12. `face_records` are B-rep faces; `oth
 from dataclasses import dataclass
 
 from tolcontact.declaration.values import Vector
+from tolcontact.pmi.modifiers import sign
 from tolcontact.readable import Readable
 from tolcontact.texts import shown
 
-_SIGNS = {
-    "maximum material requirement": "M", "least material requirement": "L", "reciprocity requirement": "R", "free state": "F",
-    "tangent plane": "T", "statistical tolerance": "ST", "common zone": "CZ", "separate requirement": "SEP REQT",
-    "each radial element": "EACH RADIAL ELEMENT", "line element": "LE",
-}  # fmt: skip
 _ZONES = {
     "cylindrical or circular": "diameter", "within a cylinder": "diameter", "within a circle": "diameter",
     "between two equidistant surfaces": "equidistant surfaces",
@@ -201,11 +197,6 @@ class Pmi(Readable):
     def is_empty(self) -> bool:
         """Whether the file states no tolerances, dimensions or datums."""
         return not (self.tolerances or self.dimensions or self.datums)
-
-
-def sign(modifier: str) -> str:
-    """Return the sign of a modifier on a drawing, such as M, or the modifier itself."""
-    return _SIGNS.get(modifier, modifier)
 
 
 def _bound(limit: float | None) -> str:

@@ -1,6 +1,7 @@
 """The annotations of a file that features can state: tolerances and sizes as they are declared. Lengths in mm."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from tolcontact.declaration import feature_tolerance as declared
@@ -9,23 +10,13 @@ from tolcontact.declaration.size import Size
 from tolcontact.declaration.tolerance_class import UndefinedClass, tolerance_class
 from tolcontact.features.tolerance_kinds import is_drawn
 from tolcontact.pmi.annotations import DatumReference, Dimension, Tolerance
+from tolcontact.pmi.modifiers import OF_DATUMS, OF_TOLERANCES, Modifier
 
 _KINDS = {
     "surface profile": declared.Profile, "circular runout": declared.CircularRunout, "total runout": declared.TotalRunout,
     "concentricity": declared.Coaxiality,
 }  # fmt: skip
-_MATERIALS = {"maximum material requirement": "M", "least material requirement": "L"}
 _ROUND_ZONES = ("cylindrical or circular", "within a cylinder", "within a circle", "spherical", "within a sphere")
-# Options of a declared tolerance by the modifiers of a stated one, or the reason why it is not declared.
-_MODIFIERS: dict[str, dict[str, Any] | str] = {
-    **{modifier: {"material": material} for modifier, material in _MATERIALS.items()},
-    "tangent plane": {"tangent": True},
-    # They change nothing here: the faces tell zones in common, and the draws are statistical anyhow.
-    "common zone": {},
-    "separate requirement": {},
-    "statistical tolerance": {},
-    "free state": "it is for the part in its free state, and parts are rigid here",
-}
 _DIGITS = 9  # of sizes [mm] after the point
 MAX_SIZE_DIFFERENCE = 1.0  # in widths of the limits: between them and the size of the shape
 
@@ -47,10 +38,12 @@ def tolerance(stated: Tolerance, *, is_axis: bool) -> GeometricTolerance:
     has_zone = "zone" in kind.options
     if is_axis and has_zone and stated.zone not in _ROUND_ZONES:
         raise Undeclared("its zone is flat, and the file does not state across which direction")
-    mark = "" if stated.refines is None else "><"  # the lower segments of a composite frame lock directions alone
-    system = "|".join(_compartment(reference) + mark for reference in stated.datums)
+    is_lower = stated.refines is not None  # the lower segments of a composite frame lock directions alone
+    system = "|".join(_compartment(reference, is_turned=is_lower) for reference in stated.datums)
     if (kind.is_form and not is_drawn(kind, options.get("per"))) or not (kind.is_form or kind.needs_datums or system):
         options["form"] = None  # a profile without datums may be of any surface
+    if "(" not in system:
+        options.pop("simultaneous", None)  # nothing is shared or separate
     result = kind(stated.value, system, **options)
     if not system and kind.needs_datums and kind is not declared.Position:  # which members of a pattern may have
         raise Undeclared("it needs datums, and the file states none")
@@ -63,21 +56,30 @@ def _options(stated: Tolerance) -> dict[str, Any]:
     """Return the options of a declared tolerance by their names. Raises Undeclared for modifiers that are none."""
     options: dict[str, Any] = {"projected": stated.projected, "outside": stated.displacement}
     for modifier in stated.modifiers:
-        entry = _MODIFIERS.get(modifier, f"its modifier, {modifier}, is not one of a declared tolerance")
-        if isinstance(entry, str):
-            raise Undeclared(entry)
-        options |= entry
+        options |= _declared(modifier, OF_TOLERANCES, "of a declared tolerance")
     if stated.per_unit:
         options["per"] = stated.per_unit if len(stated.per_unit) > 1 else stated.per_unit[0]
     return options
 
 
-def _compartment(reference: DatumReference) -> str:
-    """Return a place of a datum system as it is declared."""
-    materials = [_MATERIALS[modifier] for modifier in reference.modifiers if modifier in _MATERIALS]
-    if others := [modifier for modifier in reference.modifiers if modifier not in _MATERIALS]:
-        raise Undeclared(f"datum {'-'.join(reference.letters)} has the modifier {others[0]}, which datums here do not have")
-    return "-".join(reference.letters) + "".join(f"({material})" for material in materials[:1])
+def _compartment(reference: DatumReference, *, is_turned: bool) -> str:
+    """Return a place of a datum system as it is declared; with `is_turned` it locks directions alone."""
+    letters, marks = "-".join(reference.letters), {"><"} if is_turned else set[str]()
+    try:
+        marks |= {_declared(modifier, OF_DATUMS, "of a declared datum")["mark"] for modifier in reference.modifiers}
+    except Undeclared as reason:
+        raise Undeclared(f"datum {letters}: {reason}") from reason
+    return letters + "".join(sorted(marks))  # "(M)" comes before "><"
+
+
+def _declared(modifier: str, table: Mapping[str, Modifier], of_what: str) -> dict[str, Any]:
+    """Return how a modifier is declared. Raises Undeclared with the reason and the standard if it is not."""
+    if modifier not in table:
+        raise Undeclared(f"its modifier, {modifier}, is not one {of_what}")
+    entry = table[modifier]
+    if isinstance(entry.declared, str):
+        raise Undeclared(f"its modifier, {modifier} ({entry.sign}, {entry.standard}): {entry.declared}")
+    return entry.declared
 
 
 def size(stated: Dimension, nominal: float, *, is_inner: bool) -> Size:

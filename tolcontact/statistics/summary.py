@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
+from tolcontact.declaration import UNITS
 from tolcontact.errors import ArchiveError
 from tolcontact.readable import Pictured
 from tolcontact.realizations import finished, pieces, statuses
@@ -229,9 +230,9 @@ def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
     """Return the smallest tolerance range above 0 of any contributor or measure [mm]; infinite if there is none."""
     sample = results["sample"].to_dataset()
     contributors = sample[terms.TOLERANCE_RANGE.name].values[sample[terms.CONTRIBUTOR_UNITS.name].values == "mm"]
-    ranges = np.concatenate(
-        [contributors, rows[terms.MEASURE_TOLERANCE.name].values[rows[terms.MEASURE_UNITS.name].values == "mm"]]
-    )
+    sizes = np.array([UNITS.get(str(unit), np.nan) for unit in rows[terms.MEASURE_UNITS.name].values])
+    measures = rows[terms.MEASURE_TOLERANCE.name].values * sizes
+    ranges = np.concatenate([contributors, measures[np.isfinite(measures)]])
     return float(np.min(ranges, where=ranges > 0, initial=np.inf))
 
 

@@ -29,7 +29,7 @@ def test_a_text_of_a_number_is_that_number(text, number):
 
 REFUSED = {
     "+0.1": 'write "+0.1/0" if the other one is 0, "±0.1" for both sides', "-0.1": 'write "0/-0.1"', "1,000": "thousands",
-    "±50 µm": "its unit is µm; expected mm", "±0.1 in": "its unit is in; expected mm", "±1°": "its unit is °",
+    "±50 kg": "its unit is kg; expected mm", "±0.1 rad": "its unit is rad; expected mm", "±1°": "its unit is °",
     "9.9/10.1": "a limit has no sign", "H7": 'for sizes, as in tc.Size(10, "H7")', "H7/g6": 'give "H7" to the hole, and "g6"',
     "q7": 'no letters "q"', "": 'such as "±0.1"', "±": 'such as "±0.1"', "about 0.1": 'such as "±0.1"', "±1e999": "up to 1e+15",
     "nan": 'such as "±0.1"', "±-0.1": 'such as "±0.1"', "+0.1/-0.05/0": 'such as "±0.1"', "9" * 100_000: "up to 1e+15",
