@@ -131,9 +131,12 @@ class Locators:
         return to_q @ M
 
     def _contradicting(self, J: np.ndarray) -> str:
-        """Return the names of two-sided locators whose rows J (locator, 6) depend on each other; "" if there are none."""
+        """Return the names of two-sided locators whose rows J (locator, 6) depend on each other; "" if there are none.
+
+        More than six, which hold an elastic part, always do, and name no culprit.
+        """
         U, S, _ = np.linalg.svd(J)
-        if not len(J) or S[-1] * MAX_CONDITION > S[0]:
+        if not 0 < len(J) <= J.shape[1] or S[-1] * MAX_CONDITION > S[0]:
             return ""
         share = np.abs(U[:, len(S) - 1])
         names = np.array(self.labels)[~self.one_sided]

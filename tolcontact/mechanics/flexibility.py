@@ -21,10 +21,11 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.declaration import Mesh, Part, Point
 from tolcontact.discretization import Nominal, NominalPart, Weld
 from tolcontact.elasticity import ElasticBody, MatrixSource, MeshSource, elastic_body, flexibility
-from tolcontact.errors import Faults, designation
+from tolcontact.errors import Faults, GeometryFault, designation
 from tolcontact.mechanics.groups import Group, Load
 
 NULL = 1e-14  # of the largest eigenvalue of C, scaled to a unit diagonal: smaller ones are rounding
+SAME = 1e-12  # of the largest eigenvalue: of fewer motions at two-sided locators than there are locators
 
 Bodies = Mapping[Part, ElasticBody]
 
@@ -197,8 +198,30 @@ def _part_flexibility(nominal: Nominal, index: int, body: ElasticBody) -> PartFl
         constant += _nodal_weight(part, body, nominal)
     G = flexibility(body, sparse.hstack([*loads, sparse.csc_array(constant[:, None])], format="csc"))
     k = len(P)
+    _check_holding(nominal, index, loads_on_part, P, n, G[:k, :k])
     moved = G[k:-1][:, [*range(k), -1]].reshape(len(points), 3, k + 1)
     return PartFlexibility(index, loads_on_part, G[:k, :k], G[:k, -1], points, moved)
+
+
+def _check_holding(nominal: Nominal, index: int, loads: np.ndarray, P: np.ndarray, n: np.ndarray, C: np.ndarray) -> None:
+    """Raise GeometryFault for two-sided locators that contradict each other however their part moves and bends."""
+    pairs = [nominal.pairs[k] for k in nominal.loads[loads, 0]]
+    held = np.flatnonzero(
+        [p.holds and p.stiffness is not None and np.isinf(p.stiffness).all() and p.reference is None for p in pairs]
+    )
+    if not held.size:
+        return
+    arms = P[held] - P[held].mean(axis=0)
+    turns = np.cross(arms, n[held]) / (np.linalg.norm(arms, axis=1).max() or 1.0)
+    moves, bends = np.hstack([n[held], turns]), C[np.ix_(held, held)]
+    values, vectors = np.linalg.eigh(moves @ moves.T + bends / (np.abs(bends).max() or 1.0))
+    if values[0] < SAME * values[-1]:
+        share = np.abs(vectors[:, 0])
+        names = ", ".join(f'"{pairs[k].name}"' for k in held[share > 1e-3 * share.max()])
+        raise GeometryFault(
+            f"its two-sided locators {names} contradict each other if they deviate, however it bends; leave one of them out, "
+            "place them at different points, or make one of them one_sided=True"
+        )
 
 
 def _spread(part: NominalPart, body: ElasticBody, P: np.ndarray, n: np.ndarray) -> sparse.csc_array:
