@@ -1,23 +1,25 @@
 """Elastic parts that cannot be as they are declared: locators that contradict each other, no pose, and nothing that holds."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 import tolcontact as tc
 from tests.cases import elastic as cases
 from tests.helpers import compiled, nightly, simulate
-from tolcontact.errors import ModelError
+from tolcontact.errors import ModelError, NominalWarning
 from tolcontact.vocabulary import CERTIFIED, CORRECTED, Status
 
 FEET = [(x, y, 0.0) for x in (10.0, 200.0, 390.0) for y in (0.0, 20.0)]
 SIDES = [((10, 0, 0), "y"), ((390, 0, 0), "y"), ((10, 20, 0), "x")]
-ABOVE = (200, 20, 10)
+ABOVE = (200, 10, 10)
 
 
 def beam(folder, feet=range(6), *others, one_sided=False, press=-100.0):
     """A beam on some of six feet, soft in bending, with further locators (place, direction[, one-sided])."""
     nodes = np.array([*FEET, ABOVE], dtype=float)
-    middle = [(0.5, 200, 0), (0.5, 200, 20)]
+    middle = [(1 / 3, 200, y) for y in (0, 10, 20)]
     bend = cases.lifts(nodes, *middle, *((-0.25, x, y) for x in (10, 390) for y in (0, 20)))
     model = tc.Assembly("beam", method=tc.Method(objective="seating"))
     part = model.part("beam", tc.Box(400, 20, 10))
@@ -76,3 +78,24 @@ def test_a_beam_that_nothing_holds_down_is_never_certified(tmp_path, feet):
     _, run = simulate(beam(tmp_path, feet, press=100.0, one_sided=True), samples=8)
     assert (run["status"] == Status.NOT_CONVERGED).all()
     assert np.isinf(run["kkt_residual"]).all()
+    with pytest.warns(NominalWarning, match=r"\[bending\] the nominal assembly, which has elastic parts, is not_converged"):
+        tc.build(beam(tmp_path, feet, press=100.0, one_sided=True))
+
+
+@pytest.mark.parametrize(("press", "doubts"), [(-10.0, 0), (-200_000.0, 1)])
+def test_the_check_states_sizes_and_bending_and_doubts_what_is_too_much(tmp_path, press, doubts):
+    """300 N/mm of the middle against the ends: on its ends, the beam bends there by 667 mm under 200 kN, in a linear theory."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        program = tc.build(beam(tmp_path, (0, 1, 4, 5), press=press, one_sided=True))
+    texts = [str(warning.message) for warning in caught if "[bending]" in str(warning.message)]
+    assert len(texts) == doubts and all('part "beam"' in text and "beyond a theory of small" in text for text in texts)
+    (line,) = program.elastic_parts_in_words
+    K, nodes = (np.load(tmp_path / "beam.npz")[name] for name in ("K", "nodes"))
+    force = np.zeros(nodes.size)
+    force[-1] = press
+    Q = cases.rigid_motions(nodes)  # nodes have equal shares, so the mean rigid motion is the projection onto these
+    u = np.linalg.pinv(K, rcond=1e-9, hermitian=True) @ (force - Q @ (Q.T @ force))
+    largest = np.linalg.norm(u.reshape(-1, 3)[2])  # of the measured place, in the middle
+    assert line.startswith("elastic part beam: 7 nodes, 21 freedoms, 7 reactions, mass unknown, bent by ")
+    assert float(line.split("bent by ")[1].split()[0]) == pytest.approx(largest, rel=5e-3)

@@ -106,6 +106,7 @@ class Program(Pictured):
             f"{'joined' if part.carried else f'{len(part.locators)} locators'}{', free' * part.free}"
             for part in nominal.parts
         ]
+        rows += [f"  {line}" for line in self.elastic_parts_in_words]
         rows += [f"  contact {pair.name}: {self.contact_in_words(k)}" for k, pair in enumerate(nominal.pairs)]
         rows += [f"  {self.stored_coordinates}"] * bool(self.stored_coordinates)
         rows += [
@@ -118,6 +119,20 @@ class Program(Pictured):
     def stored_coordinates(self) -> str:
         """The accuracy of stored coordinates of parts in contact, and what contact allows; empty if it hardly matters."""
         return coordinates_in_words(self.nominal)
+
+    @property
+    def elastic_parts_in_words(self) -> list[str]:
+        """A line for each elastic part, in each of its stations: its size, and how far its constant forces bend it."""
+        lines, loads = [], np.zeros(len(self.nominal.loads))
+        for index, bent in self.bending.parts.items() if self.bending else ():
+            part = self.nominal.parts[index]
+            mass = f"mass {bent.mass:.4g} kg" if np.isfinite(bent.mass) else "mass unknown"
+            lines.append(
+                f"elastic part {part.name}{f' in station {part.station}' * bool(part.station)}: {bent.nodes} nodes, "
+                f"{3 * bent.nodes} freedoms, {len(bent.loads)} reactions, {mass}, bent by "
+                f"{bent.largest_displacement(loads):.3g} mm by its constant forces as a free body"
+            )
+        return lines
 
     def limits(self, measure: int) -> Limits:
         """Return the limits of a measure, given by index, with its accuracy."""

@@ -73,6 +73,8 @@ class PartFlexibility(NamedTuple):
     """The flexibility of one elastic part of a group.
 
     part       its index in the model
+    nodes      their number
+    mass       [kg], NaN if it is unknown
     loads      (k,) the loads of the model that act on it, see Nominal.loads
     C          (k, k) [mm/N]
     opening    (k,) [mm] by the constant forces
@@ -81,6 +83,8 @@ class PartFlexibility(NamedTuple):
     """
 
     part: int
+    nodes: int
+    mass: float
     loads: Int[Array, " k"]
     C: Float[Array, "k k"]
     opening: Float[Array, " k"]
@@ -91,22 +95,33 @@ class PartFlexibility(NamedTuple):
         """Return the index of a measured point."""
         return int(np.flatnonzero((self.points == point).all(axis=1))[0])
 
+    def largest_displacement(self, loads: Float[Array, " load"]) -> float:
+        """Return the largest displacement [mm] under loads [N] and the constant forces, where something acts or is measured."""
+        own = loads[self.loads]
+        return float(
+            max(
+                np.abs(self.C @ own + self.opening).max(initial=0),
+                np.linalg.norm(self.moved @ [*own, 1], axis=1).max(initial=0),
+            )
+        )
+
 
 class Bending:
     """The elastic displacements of measured points, as expressions of the loads.
 
     loads   (load, 1) [N]: reactions of all contact points between elastic parts
+    parts   the elastic parts, by their index in the model
     """
 
     def __init__(self, nominal: Nominal, parts: Iterable[PartFlexibility]) -> None:
         self.loads = ca.SX.sym("loads", len(nominal.loads))
-        self._parts = {part.part: part for part in parts}
+        self.parts = {part.part: part for part in parts}
 
     def displacement(self, part: int, position: Float[Array, " 3"]) -> ca.SX:
         """Return the displacement (3, 1) [mm], in the nominal assembly frame, of a point of a part; zero if it is rigid."""
-        if part not in self._parts:
+        if part not in self.parts:
             return ca.SX.zeros(3)
-        bent = self._parts[part]
+        bent = self.parts[part]
         return ca.DM(bent.moved[bent.place(position)]) @ ca.vertcat(self.loads[bent.loads.tolist()], 1)
 
     def weld_gaps(self, weld: Weld, poses: Float[Array, "n part 12"], loads: Float[Array, "n load"]) -> Float[Array, "n row"]:
@@ -114,8 +129,8 @@ class Bending:
         X_RM = pose.relative(poses[:, weld.moving], poses[:, weld.reference])
         gaps = ((pose.apply(X_RM, weld.P_m) - weld.P_r) * weld.n_r).sum(axis=2)
         for index, P, sign in ((weld.moving, weld.P_m, 1.0), (weld.reference, weld.P_r, -1.0)):
-            if index in self._parts:
-                bent = self._parts[index]
+            if index in self.parts:
+                bent = self.parts[index]
                 for row, (point, n) in enumerate(zip(P, sign * weld.n_r, strict=True)):
                     by_load = n @ bent.moved[bent.place(point)]
                     gaps[:, row] += by_load[-1]
@@ -200,7 +215,7 @@ def _part_flexibility(nominal: Nominal, index: int, body: ElasticBody) -> PartFl
     k = len(P)
     _check_holding(nominal, index, loads_on_part, P, n, G[:k, :k])
     moved = G[k:-1][:, [*range(k), -1]].reshape(len(points), 3, k + 1)
-    return PartFlexibility(index, loads_on_part, G[:k, :k], G[:k, -1], points, moved)
+    return PartFlexibility(index, len(body.nodes), body.mass, loads_on_part, G[:k, :k], G[:k, -1], points, moved)
 
 
 def _check_holding(nominal: Nominal, index: int, loads: np.ndarray, P: np.ndarray, n: np.ndarray, C: np.ndarray) -> None:
