@@ -147,3 +147,23 @@ def test_a_pressed_pad_is_not_in_conflict():
     assert (results["status"] == Status.NOT_ASSEMBLABLE).any()
     conflicts = dict(zip(results["pair"].values.tolist(), tc.summarize(results)["conflicts"].values.tolist(), strict=True))
     assert conflicts["pad"] == 0 and conflicts["left"] > 0 and conflicts["right"] > 0
+
+
+def test_a_point_that_stands_for_no_area_does_not_spoil_its_pair():
+    """Of 118 points of a flange one stands for none: its spring is a thousandth of the mean, and realizations converge."""
+    model = tc.Assembly("flange", method=tc.Method(objective="seating"))
+    front, rear = (
+        model.part("front", tc.Box(300, 200, 1), fixed=True),
+        model.part("rear", tc.Box(300, 200, 1.5), at=(250, 0, 1)),
+    )
+    scheme = tc.three_two_one(rear.face("-z"), rear.face("-y"), rear.face("-x"), inset=5)
+    model.locate(rear, scheme, tolerance=0.1)
+    model.contact("flange", moving=rear.face("-z"), reference=front.face("+z"), points=600, within=2, stiffness=1e5)
+    model.force("press", at=rear.point(25, 100, 1.5), vector=(0, 0, -10))
+    model.measure("end", rear.point(300, 100, 0), along="z", tolerance=1)
+    program, run = simulate(model, samples=3, solver="daqp")
+    (pair,) = (pair for pair in program.nominal.pairs if pair.name == "flange")
+    assert pair.weights.min() == 0
+    assert pair.stiffness.min() > 0
+    assert pair.stiffness.sum() == pytest.approx(1e5)
+    assert (run["status"] == Status.RESOLVED).all()

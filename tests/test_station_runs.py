@@ -137,7 +137,7 @@ FAULTS = {
     ),
     "a joint is a mechanism": (
         lambda line, a, b, weld, check, ab: check.locate(ab, pinned(a, b)[:5], tolerance=1),
-        'joint "ab" (test_station_runs.py:{}): it has 5 locators; a rigid part needs six independent ones',
+        'joint "ab" (test_station_runs.py:{}): it has 5 locators; a part needs six independent ones',
     ),
     "locators of a joint hold the same": (
         lambda line, a, b, weld, check, ab: check.locate(

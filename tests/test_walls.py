@@ -32,6 +32,8 @@ ROOMS = {
     "trimesh": ("geometry/", "discretization/", "interference/"),
     "igl": ("geometry/", "interference/", "report/html/scene.py"),
     "OCP": ("kernel/",),
+    "netgen": ("elasticity/",),
+    "ngsolve": ("elasticity/",),
 }
 NOT_IN = {
     "xarray": (
@@ -47,6 +49,7 @@ LAZY = {
     "distributed": ("simulation/cluster.py",),
     "pandas": ("declaration/measured_table.py", "declaration/stack.py"),
     "trimesh": ("geometry/files/worker.py",),  # in a process that mostly reads STEP files
+    "ngsolve": ("elasticity/cholesky.py",),  # an extra
     "openpyxl": ("report/spreadsheet.py",),
     "psutil": ("system/",),  # where the system limits no process
     "ctypes": ("system/files.py",),  # for short names, on Windows
@@ -69,9 +72,10 @@ APART = {
 ORDER = (
     "version", "texts", "errors", "user_functions", "input_files", "tables", "system", "interrupts", "readable", "child",
     "stored_coordinates", "shape_worker", "kernel", "vocabulary", "realizations", "arrays", "method", "poses", "limits",
-    "code_cache", "replacing", "temporary", "compiled", "declaration", "select", "geometry", "features", "fasteners", "pmi",
-    "discretization", "interference", "variation", "mechanics", "compilation", "statics", "contact", "simulation",
-    "plausibility", "statistics", "archive", "report", "plot", "workflow", "io", "analyses", "testing", "cli", "__init__",
+    "code_cache", "replacing", "temporary", "compiled", "declaration", "select", "geometry", "elasticity", "features",
+    "fasteners", "pmi", "discretization", "interference", "variation", "mechanics", "compilation", "statics", "contact",
+    "simulation", "plausibility", "statistics", "archive", "report", "plot", "workflow", "io", "analyses", "testing",
+    "cli", "__init__",
     "__main__",
 )  # fmt: skip
 

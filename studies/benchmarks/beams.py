@@ -1,16 +1,20 @@
-"""Beams for reference solutions: stiffness by Hermite elements, with NumPy alone."""
+"""Beams for reference solutions: stiffness by elements whose nodes are exact, with NumPy alone."""
 
 import numpy as np
 
 
-def beam_stiffness(length: float, elements: int, bending: float) -> np.ndarray:
-    """Return the stiffness of a beam with E I = `bending` [N mm²]: deflection [mm] and slope of each node in turn."""
+def beam_stiffness(length: float, elements: int, bending: float, shear: float = np.inf) -> np.ndarray:
+    """Return the stiffness of a beam: deflection [mm] and slope of each node in turn.
+
+    E I = `bending` [N mm²], and kappa G A = `shear` [N], by Timoshenko's theory; by default it does not shear.
+    """
     h = length / elements
-    one = np.array([[12, 6 * h, -12, 6 * h], [6 * h, 4 * h * h, -6 * h, 2 * h * h]])
-    two = np.array([[-12, -6 * h, 12, -6 * h], [6 * h, 2 * h * h, -6 * h, 4 * h * h]])
+    p = 12 * bending / shear / h**2
+    one = np.array([[12, 6 * h, -12, 6 * h], [6 * h, (4 + p) * h * h, -6 * h, (2 - p) * h * h]])
+    two = np.array([[-12, -6 * h, 12, -6 * h], [6 * h, (2 - p) * h * h, -6 * h, (4 + p) * h * h]])
     stiffness = np.zeros((2 * elements + 2, 2 * elements + 2))
     for k in range(elements):
-        stiffness[2 * k : 2 * k + 4, 2 * k : 2 * k + 4] += bending / h**3 * np.vstack([one, two])
+        stiffness[2 * k : 2 * k + 4, 2 * k : 2 * k + 4] += bending / (1 + p) / h**3 * np.vstack([one, two])
     return stiffness
 
 

@@ -179,6 +179,14 @@ class Analysis:
         """Return deviations (n, contributor) of enough realizations for estimates of spreads."""
         return self.program.draws(seed=self.seed, start=0, stop=SPREAD_SAMPLES)
 
+    def check_rigid(self, advice: str) -> None:
+        """Raise OptionError, with an `advice`, for a model with elastic parts."""
+        elastic = [part.name for part in self.program.nominal.assembly.parts if part.elasticity is not None]
+        if elastic:
+            raise OptionError(
+                f'part "{elastic[0]}" of "{self.assembly}" is elastic, and this analysis is of rigid parts; {advice}'
+            )
+
     def check_varies(self, varies: object) -> None:
         """Raise OptionError if nothing varies."""
         if not varies:

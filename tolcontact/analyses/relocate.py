@@ -144,6 +144,12 @@ class TrialPositions:
         self._part = next(part for part in nominal.parts if locator in part.locators.labels)
         self._scheme = declared_locators(nominal, self._part)
         self._number = self._part.locators.labels.index(locator)
+        owner = nominal.parts[self._part.owners[self._number]] if self._part.owners else self._part
+        if owner.part.elasticity and owner.part.elasticity.stiffness:
+            raise OptionError(
+                f'locator "{locator}" holds part "{owner.name}", {owner.part.elasticity}, at a node of its matrix, and there '
+                "is none between nodes; declare the part elastic by E and nu, or compare models with the locator at other nodes"
+            )
 
     @property
     def point(self) -> np.ndarray:

@@ -44,6 +44,7 @@ def seating(model: Model | Program, *, into: str | Path | None = None) -> xr.Dat
     `tc.analyses.seating("model.py", into="model.nc")`
     """
     question = Analysis(terms.SEATING, model, into=into)
+    question.check_rigid("leave elastic out, or look at the reactions of a run")
     if not question.program.nominal.assembly.forces:
         raise OptionError(
             f'"{question.assembly}" has no forces, so nothing presses its parts onto their seats; declare them: '

@@ -139,6 +139,7 @@ def worst_case(
 
 def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
     """Return the dataset of `worst_case`, by searches with a given effort."""
+    analysis.check_rigid("ask for tails, or run many realizations")
     program, engine = analysis.program, analysis.engine(analysis.samples)
     region = AllowedRegion(program.draws, seed=analysis.seed)
     analysis.check_varies(region.varies.size)

@@ -7,6 +7,7 @@ import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as terms
+from tolcontact.archive.elastic_values import write_elastic
 from tolcontact.archive.form_values import datum_values, form_values
 from tolcontact.archive.rows import Row, kept_rows
 from tolcontact.archive.settings import Run, declaration, now, run_settings, versions, watch_settings
@@ -54,6 +55,8 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
     points = sum(len(pair.P_m) for pair in nominal.pairs)
     new.add_all(file.createGroup("contact"), contact_values(program) | empty_touching(points))
     _write_sample(new, file.createGroup("sample"), program, deviations=Row("sample", terms.DEVIATION) in rows)
+    if len(nominal.loads):
+        write_elastic(new, file.createGroup(terms.ELASTIC_GROUP), program, [row.variable for row in rows])
     new.add_all(file.createGroup("surface"), empty_checks(run.surfaces, len(nominal.pairs)))
     if objectives := compared_objectives(program):
         group = file.createGroup(terms.OBJECTIVES_GROUP)

@@ -23,7 +23,7 @@ from tolcontact.input_files import fault_of
 from tolcontact.system import files
 from tolcontact.system.resources import limit_resources
 from tolcontact.texts import CONTROL_CHARACTERS, shown
-from tolcontact.vocabulary import ArchiveVariable, archive, variation
+from tolcontact.vocabulary import ArchiveVariable, archive, elastic, variation
 
 MAX_SECONDS, SECONDS_PER_GB = 20.0, 20.0  # of processor time
 MEMORY = 1 << 30  # in addition to four times the size of the file
@@ -53,12 +53,30 @@ NEEDED = {  # variables of groups that summaries and models are read from
     "model": (terms.DECLARATION,),
 }  # fmt: skip
 OF_FIELD = (terms.FIELD_VERTICES, terms.FIELD_FACES, *terms.FIELDS, terms.FIELD_SUMS)
-TOGETHER = (terms.ROUND, terms.KNOWN_SURFACES, terms.FEATURE_FACES, terms.FORMS, terms.TANGENTS, terms.OF_STATIONS)
+TOGETHER = (
+    terms.ROUND,
+    terms.KNOWN_SURFACES,
+    terms.FEATURE_FACES,
+    terms.FORMS,
+    terms.TANGENTS,
+    terms.OF_STATIONS,
+    terms.OF_ELASTIC,
+)
 KINDS_OF_SURFACES = (terms.ROUND[1], terms.KNOWN_SURFACES[1])
-CHECKED_GROUPS = ("", "model", "contact", "sample", "surface", "field", terms.OBJECTIVES_GROUP, terms.STATIONS_GROUP)
+CHECKED_GROUPS = (
+    "",
+    "model",
+    "contact",
+    "sample",
+    "surface",
+    "field",
+    terms.OBJECTIVES_GROUP,
+    terms.STATIONS_GROUP,
+    terms.ELASTIC_GROUP,
+)
 VARIABLES = {  # by name; no two variables of an archive differ that have one name
     variable.name: variable
-    for module in (archive, variation)
+    for module in (archive, elastic, variation)
     for item in vars(module).values()
     for variable in (item if isinstance(item, tuple) else (item,))
     if isinstance(variable, ArchiveVariable)

@@ -15,7 +15,11 @@ from tolcontact.errors import ArchiveError
 from tolcontact.simulation import Block
 from tolcontact.vocabulary import ArchiveVariable
 
-OMITTED = {"measures": {*terms.POSES, *terms.STATION_POSES, terms.DEVIATION}, "poses": {terms.DEVIATION}, "all": set()}
+OMITTED = {
+    "measures": {*terms.POSES, *terms.STATION_POSES, *terms.ELASTIC_ROWS, terms.DEVIATION},
+    "poses": {terms.DEVIATION},
+    "all": set(),
+}
 COPIES = 2  # of each row for a moment: in the journal, and in the archive
 
 
@@ -41,12 +45,13 @@ def kept_rows(nominal: Nominal, keep: str) -> tuple[Row, ...]:
     stations = [terms.station_group(scene.station) for scene in nominal.scenes]
     rows = [Row(group_of_rows(variable), variable) for variable in terms.BY_REALIZATION]
     rows += [Row(group, variable) for group in stations for variable in terms.STATION_ROWS]
+    rows += [Row(terms.ELASTIC_GROUP, variable) for variable in terms.ELASTIC_ROWS if len(nominal.loads)]
     return tuple(row for row in rows if row.variable not in OMITTED[keep])
 
 
 def group_of_rows(variable: ArchiveVariable) -> str:
     """Return the path of the group that holds a variable of realizations, if it belongs to no station."""
-    return "sample" if variable is terms.DEVIATION else ""
+    return {terms.DEVIATION: "sample", **dict.fromkeys(terms.ELASTIC_ROWS, terms.ELASTIC_GROUP)}.get(variable, "")
 
 
 def row_values(block: Block, labels: Collection[str], nominal: Nominal) -> dict[str, np.ndarray]:

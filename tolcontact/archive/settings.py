@@ -59,8 +59,14 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
         "block_rows": np.int64(block_rows(program)),
         **({terms.STANDARD: standards} if (standards := program.nominal.assembly.standards) else {}),
         **({terms.STORED_COORDINATES: program.stored_coordinates} if program.stored_coordinates else {}),
+        **({terms.ELASTIC_PARTS: "; ".join(elastic)} if (elastic := _elastic_parts(program)) else {}),
         **({terms.CORRELATIONS: "\n".join(lines)} if (lines := program.draws.in_words) else {}),
     }
+
+
+def _elastic_parts(program: Program) -> list[str]:
+    """Return the elastic parts, and where their stiffness comes from."""
+    return [f"{part.name} ({part.elasticity})" for part in program.nominal.assembly.parts if part.elasticity is not None]
 
 
 def watch_settings(program: Program) -> dict[str, Any]:
@@ -69,6 +75,7 @@ def watch_settings(program: Program) -> dict[str, Any]:
         return {}
     watch, assembly = program.watch, program.nominal.assembly
     untested = {
+        "elastic parts": [part.name for part in assembly.parts if part.elasticity is not None],
         "parts that are not closed": watch.open_parts,
         "contact pairs that give way or have form": watch.untested_pairs,
         "round faces of contact pairs, which are judged by their gaps": watch.round_pairs,

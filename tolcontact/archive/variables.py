@@ -142,7 +142,9 @@ def labels_of_rows(nominal: Nominal) -> dict[str, Sequence[str]]:
 def sizes_of_rows(nominal: Nominal) -> dict[str, int]:
     """Return the sizes of the dimensions of a row."""
     return {name: len(labels) for name, labels in labels_of_rows(nominal).items()} | {
-        terms.CONTRIBUTOR: len(nominal.contributors)
+        terms.CONTRIBUTOR: len(nominal.contributors),
+        terms.LOADS: len(nominal.loads),
+        terms.WELD_ROWS: nominal.input_count - len(nominal.contributors),
     }
 
 

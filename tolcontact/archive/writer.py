@@ -14,6 +14,7 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive.archive_lock import locked_archive
+from tolcontact.archive.elastic_values import changed_body
 from tolcontact.archive.header import contact_values, write_header
 from tolcontact.archive.inspection import check_archive, inspect
 from tolcontact.archive.journal import Checkpoint, Journal
@@ -56,6 +57,8 @@ def check_same_model(file: netCDF4.Dataset, path: Path, program: Program) -> Non
     for part in program.nominal.last_parts:
         if not _is_equal(file[f"field/{terms.group_of(part.name)}"][terms.FIELD_VERTICES.name], part.vertices):
             raise ArchiveError(f'"{path}": part "{part.name}" had another shape (was its mesh replaced?); write to a new file')
+    if changed := changed_body(file, program):
+        raise ArchiveError(f'"{path}": the stiffness of part "{changed}" was another one; write to a new file')
     for variable, values in contact_values(program).items():
         if variable in (terms.BOUNDED, terms.PLANE_ERROR):  # they follow from the method, which is compared separately
             continue

@@ -85,6 +85,8 @@ def check(
     for part in program.nominal.last_parts:
         size = " x ".join(f"{length:.4g}" for length in part.body.extents.round(9))
         common.echo(f"  part {part.name}: {size} mm along x, y, z of the assembly, {len(part.mesh.faces)} triangles")
+    for line in program.elastic_parts_in_words:
+        common.echo(f"  {line}")
     for k, pair in enumerate(program.nominal.pairs):
         common.echo(f"  contact {pair.name}: {program.contact_in_words(k)}")
     for line in program.draws.in_words:

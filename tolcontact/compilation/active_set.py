@@ -17,7 +17,7 @@ Problem = Mapping[str, Float[Array, "QP ..."]]
 
 
 class ActiveSet(NamedTuple):
-    """The active sets of QPs: min x'Hx/2 + g'x, a x >= lba; the last rows are equations, the last variables, slacks, >= 0.
+    """The active sets of QPs: min x'Hx/2 + g'x, a x >= lba; some rows are equations, the last variables, slacks, >= 0.
 
     active    (QP, row): whether a row is active
     is_open   (QP, slack): whether a slack is positive
@@ -27,8 +27,10 @@ class ActiveSet(NamedTuple):
     is_open: Bool[Array, "QP slack"]
 
     @classmethod
-    def of_answer(cls, problem: Problem, answer: Mapping[str, np.ndarray], equations: int, slacks: int) -> "ActiveSet":
-        """Return the active sets of a solver's answers.
+    def of_answer(
+        cls, problem: Problem, answer: Mapping[str, np.ndarray], equalities: Int[Array, " k"], slacks: int, free: int
+    ) -> "ActiveSet":
+        """Return the active sets of a solver's answers; the rows `equalities` are equations, the last `free` slacks unbounded.
 
         problem     h (QP, n, n), g (QP, n), a (QP, row, n), lba (QP, row)
         answer      x (QP, n), lam_a (QP, row), lam_x (QP, n) of a solver; multipliers of active rows are negative
@@ -37,8 +39,10 @@ class ActiveSet(NamedTuple):
         x, lam_a, lam_x = (answer[name] for name in ("x", "lam_a", "lam_x"))
         # For every solver, either the row or its multiplier is zero up to rounding: the smaller of the two.
         active = -lam_a > np.einsum("kij,kj->ki", A, x) - lower
-        active[:, active.shape[1] - equations :] = True
-        return cls(active, (-lam_x <= x)[:, x.shape[1] - slacks :])
+        active[:, equalities] = True
+        is_open = (-lam_x <= x)[:, x.shape[1] - slacks :]
+        is_open[:, slacks - free :] = True
+        return cls(active, is_open)
 
     def answer(self, problem: Problem, order: Int[Array, " unknown"]) -> dict[str, np.ndarray]:
         """Return x, lam_a and lam_x (QP, entry) of the QPs; NaN if the conditions have no solution.

@@ -45,12 +45,34 @@ def conditioned(
     return {
         "h": ca.diagcat(H, ca.SX.eye(len(priced))),
         "g": ca.vertcat(to_z.T @ gradient, ca.DM(priced.astype(float)) * system.group.length),
-        "a": ca.blockcat([[gap_rows.A, ca.diag(gap_rows.opening) @ opens], [B, ca.SX(equations, len(priced))]]),
+        "a": ca.blockcat([[gap_rows.A, slack_openings(rows, gap_rows, opens, scale)], [B, ca.SX(equations, len(priced))]]),
         "lba": ca.vertcat(gap_rows.lower, targets),
-        "uba": ca.vertcat(ca.DM(np.full(len(rows), np.inf)), targets),
+        "uba": ca.vertcat(_upper(rows, gap_rows.lower), targets),
         "to_z": to_z,
         "length": gap_rows.length,
     }
+
+
+def slack_openings(rows: Rows, gap_rows: ConditionedRows, opens: ca.DM, scale: ca.SX) -> ca.SX:
+    """Return by how much slacks open the rows, from the slack that each row has alone, `opens` (row, slack).
+
+    The slacks of elastic rows open many rows, by L with L L' = C, and are not bounded: together they add C times the
+    multipliers to the gaps.
+    """
+    opened = ca.diag(gap_rows.opening) @ opens
+    if rows.flexibility is None:
+        return opened
+    bent = rows.flexibility.rows
+    shares = ca.diag(ca.sqrt(scale) / gap_rows.length[bent.tolist()])
+    opened[bent.tolist(), opened.size2() - len(bent) :] = shares @ ca.sparsify(ca.DM(rows.flexibility.factor))
+    return ca.sparsify(opened)
+
+
+def _upper(rows: Rows, lower: ca.SX) -> ca.SX:
+    """Return the upper bounds of the rows: infinite, but of two-sided locators the lower ones."""
+    if rows.flexibility is None:
+        return ca.SX(ca.DM(np.full(len(rows), np.inf)))
+    return ca.vertcat(*(lower[k] if holds else np.inf for k, holds in enumerate(rows.flexibility.holds)))
 
 
 def slack_owners(

@@ -55,6 +55,7 @@ class ConicSolver:
         self._results = [conic.name_out().index(name) for name in SOLUTION]
         lower_bounds = np.zeros(conic.numel_in("g"))
         lower_bounds[: -qp.slacks] = -np.inf
+        lower_bounds[len(lower_bounds) - qp.free_slacks :] = -np.inf
         bounds = {"lbx": lower_bounds, "ubx": np.full(lower_bounds.shape, np.inf)}
         # The other inputs, initial guesses, are zero: no plugin uses them.
         fixed_inputs = {i: bounds.get(name, np.zeros(1)) for i, name in enumerate(conic.name_in()) if name not in QP}

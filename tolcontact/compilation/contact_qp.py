@@ -26,6 +26,7 @@ from tolcontact.compilation.quadratic_terms import quadratic_terms
 from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import FREEDOMS, linear, published, rigid
 from tolcontact.mechanics.displacement import MOMENTS
+from tolcontact.mechanics.flexibility import Flexibility
 from tolcontact.mechanics.gap import GapMap
 from tolcontact.mechanics.group_equations import GroupEquations, face_heights, face_poses
 from tolcontact.mechanics.groups import Group, curved_pairs
@@ -55,10 +56,11 @@ class ContactQP:
 
     energy       poses, raw, moments, deviations -> the objective at `poses` (realization, 1) [mm^2], or [mm] for seating
     relate       poses, deviations -> X_RM of the pairs at `poses`
-    slacks       number of slacks: the QP's last variables, which are not negative
+    slacks       number of slacks: the QP's last variables, which are not negative, except for those of elastic parts
     has_springs  whether any row is compliant
     equations    number of equations: the QP's last rows, for two-sided locators that the objective makes exact
     standing     for each pair of the group the contact points that always have a row, or the number of its slots
+    flexibility  of the rows; None without elastic parts
     """
 
     assemble: ca.Function
@@ -69,6 +71,19 @@ class ContactQP:
     has_springs: bool
     equations: int
     standing: Standing
+    flexibility: Flexibility | None = None
+
+    @property
+    def free_slacks(self) -> int:
+        """The number of slacks that are not bounded, the last of them all."""
+        return 0 if self.flexibility is None else len(self.flexibility.rows)
+
+    @property
+    def equalities(self) -> np.ndarray:
+        """The rows of the QP that are equations."""
+        rows = self.sparsity("a").size1()
+        holds = np.zeros(0, dtype=int) if self.flexibility is None else np.flatnonzero(self.flexibility.holds)
+        return np.concatenate([holds, np.arange(rows - self.equations, rows)])
 
     @property
     def max_batch(self) -> int:
@@ -89,11 +104,12 @@ class ContactQP:
     @property
     def spans(self) -> list[slice]:
         """The range of rows of each pair in the group."""
-        ends = np.cumsum([0, *(_row_count(points) for points in self.standing)])
+        ends = np.cumsum([0, *(row_count(points) for points in self.standing)])
         return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
 
 
-def _row_count(points: np.ndarray | int) -> int:
+def row_count(points: np.ndarray | int) -> int:
+    """Return the number of rows of a pair with these standing points, or slots."""
     return points if isinstance(points, int) else len(points)
 
 
@@ -104,11 +120,13 @@ def contact_qp(
     method: Method,
     standing: Standing = (),
     call: Call | None = None,
+    flexibility: Flexibility | None = None,
 ) -> ContactQP:
     """Return the Functions of a group.
 
     `standing` lists the points of each pair of the group that always have a row, by default from `standing_points`. `call`
     evaluates what recurs, by default in place, or with many bodies by FunctionCalls; both give the same results up to rounding.
+    `flexibility` is that of the rows if there are elastic parts.
     `_inputs` describes the inputs. The outputs for `p` parts, `q` pairs and `k` rows are:
 
     corrected (12 p)     poses after the correction; in an exact resolution after the share of it that `stride` allows
@@ -128,12 +146,12 @@ def contact_qp(
     motion = system.motion(poses_of(inputs["poses"]))
     current, moved, reactions = motion.poses, motion.by(linear), inputs["reactions"]
     points = row_points(system, standing, inputs)
-    call = call or (FunctionCalls() if is_summed(group, method) else inline)
+    call = call or (FunctionCalls() if is_summed(group, method) and flexibility is None else inline)
     projects = bool(curved_pairs(nominal, group))
     if isinstance(call, FunctionCalls):
         rows, terms = summed_terms(system, points, current, reactions, call, projects=projects)
     else:
-        rows = contact_rows(system, points, current, moved, reactions)
+        rows = contact_rows(system, points, current, moved, reactions).bent(flexibility)
         terms = quadratic_terms(system, rows, motion, reactions, ca.sum1(reactions), projects=projects)
     exact = misfit(system, moved, linear=True) if method.minimizes.presses else ca.SX(0, 1)
     problem = conditioned(
@@ -142,7 +160,7 @@ def contact_qp(
     end = motion.by(rigid if method.is_exact else published)
     solution, results = outcome(system, terms.scale, rows, end, problem, inputs["stride"], call)
     pure_energy = ca.substitute(energy(system, current).value, inputs["regularization_factor"], 1)
-    pure_energy += spring_energy(system, points, current) / terms.scale
+    pure_energy += spring_energy(system, points if flexibility is None else [], current) / terms.scale
     relative = ca.vertcat(*(X.vector() for X in system.relative(current)))
     return ContactQP(
         assemble=_function("assemble", inputs, problem),
@@ -153,6 +171,7 @@ def contact_qp(
         has_springs=group.has_springs,
         equations=exact.numel(),
         standing=standing,
+        flexibility=flexibility,
     )
 
 
@@ -177,7 +196,7 @@ def _inputs(nominal: Nominal, group: Group, standing: Standing) -> dict[str, ca.
     poses (12 p)         poses of the group's parts: the gaps are linearized about them
     raw (12 p)           raw poses of the group's parts, which displacements are measured from
     moments (10, sides)  moments of the weighted points of each side in the objective
-    deviations (c)       deviations of all contributors of the model
+    deviations (c)       deviations of all contributors of the model, and the gaps that welds keep
     regularization_factor    factor of the regularization: 1, or more in early steps
     newton               1 to count the curvature of objective and gaps, 0 for the linear step of the paper
     stride               in an exact resolution: step bound, the largest rotation angle [rad] of a mover
@@ -190,12 +209,12 @@ def _inputs(nominal: Nominal, group: Group, standing: Standing) -> dict[str, ca.
     filled (m)           1 if a slot holds a point, 0 if it is empty
     """
     slots_of_pairs = [points for points in standing if isinstance(points, int)]
-    varying, slots, rows = len(slots_of_pairs), sum(slots_of_pairs), sum(_row_count(points) for points in standing)
+    varying, slots, rows = len(slots_of_pairs), sum(slots_of_pairs), sum(row_count(points) for points in standing)
     shapes = {
         "poses": (ENTRIES * len(group.parts), 1),
         "raw": (ENTRIES * len(group.parts), 1),
         "moments": (MOMENTS, len(group.sides)),
-        "deviations": (len(nominal.contributors), 1),
+        "deviations": (nominal.input_count, 1),
         "regularization_factor": (1, 1),
         "newton": (1, 1),
         "stride": (1, 1),

@@ -2,13 +2,14 @@
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from tolcontact.discretization import ContactPoints
+from tolcontact.mechanics.flexibility import Flexibility
 from tolcontact.mechanics.gap import GapMap, gap
 from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
@@ -45,6 +46,7 @@ class Rows:
     relative    (12 * pair, 1): X_RM of every pair, to first order in z
     bends       (12 * pair, 1): sums of previous reaction times gap gradient by the entries of X_RM
     compliance  (row, 1) [mm/N]: of compliant points; 0 for rigid rows
+    flexibility of all rows, if there are elastic parts; `compliance` is then its diagonal
     curvature, hollow_curvature   (z, z): sums of previous reaction times second derivative of gaps that are not linear in X_RM
                 (see round_gaps)
     """
@@ -58,6 +60,7 @@ class Rows:
     bends: ca.SX
     curvature: ca.SX
     hollow_curvature: ca.SX
+    flexibility: Flexibility | None = None
 
     def __len__(self) -> int:
         return len(self.pairs)
@@ -66,6 +69,19 @@ class Rows:
     def springs(self) -> list[int]:
         """The compliant rows."""
         return springs_of(self.compliance)
+
+    def bent(self, flexibility: Flexibility | None) -> "Rows":
+        """Return the rows between elastic parts; the same ones if there are none."""
+        if flexibility is None:
+            return self
+        compliance = ca.SX(ca.sparsify(ca.DM(np.diag(flexibility.C))))
+        return replace(self, gaps=self.gaps + flexibility.opening, compliance=compliance, flexibility=flexibility)
+
+    def opened(self, reactions: ca.SX) -> ca.SX:
+        """Return the gaps (row, 1) [mm] under reactions (row, 1) [N], at z = 0."""
+        if self.flexibility is None:
+            return self.gaps + self.compliance * reactions
+        return self.gaps + ca.DM(self.flexibility.C) @ reactions
 
 
 def springs_of(compliance: ca.SX) -> list[int]:
@@ -150,9 +166,11 @@ def relative_poses(
 
 
 def spring_energy(system: GroupEquations, points_of_pairs: Sequence[RowPoints], poses: Sequence[Pose]) -> ca.SX:
-    """Return the energy [N mm] of the compressed springs at `poses`."""
+    """Return the energy [N mm] of the compressed springs at `poses`; 0 without points."""
     energy = ca.SX(0)
-    for k, (X_RM, (points, compliance, _)) in enumerate(zip(system.relative(poses), points_of_pairs, strict=True)):
+    for k, (X_RM, (points, compliance, _)) in enumerate(
+        zip(system.relative(poses), points_of_pairs, strict=bool(points_of_pairs))
+    ):
         pair = system.nominal.pairs[system.group.pairs[k]]
         springs = springs_of(compliance)
         if springs and pair.round is not None:

@@ -27,6 +27,7 @@ class ContactSolver:
         self._qp, self._choice = qp, choice
         self._assemble, self._finish, self._energy, self._relate = qp.evaluators
         self._order = band_order(qp.sparsity("h"), qp.sparsity("a"), slacks=qp.slacks)
+        self._equalities = qp.equalities
         self._max_dense = max(MAX_DENSE_ENTRIES // (sum(qp.sparsity("a").shape) + qp.slacks) ** 2, 1)
         self._start_with(choice.solver(qp))
 
@@ -124,7 +125,7 @@ class ContactSolver:
         """
         active = np.zeros((len(slacks), self._qp.sparsity("a").size1()), dtype=np.bool_)
         active[:, : inputs["guess"].shape[1]] = inputs["guess"] > 0
-        active[:, active.shape[1] - self._qp.equations :] = True
+        active[:, self._equalities] = True
         outputs: Arrays = {}
         predicted = np.zeros(len(slacks), dtype=np.bool_)
         for rows in self._parts(np.flatnonzero(inputs["guess"].any(axis=1))):
@@ -142,7 +143,8 @@ class ContactSolver:
         outputs["residual"][failed] = np.inf
         for rows in self._parts(np.flatnonzero(_is_rough(outputs) & np.isfinite(outputs["residual"][:, 0]))):
             systems = self._dense_problem(problem, rows)
-            active = ActiveSet.of_answer(systems, _of(solution, rows), self._qp.equations, self._qp.slacks)
+            solutions, slacks = _of(solution, rows), self._qp.slacks
+            active = ActiveSet.of_answer(systems, solutions, self._equalities, slacks, self._qp.free_slacks)
             answer = self._finished(_of(inputs, rows) | _of(problem, rows) | active.answer(systems, self._order))
             better = answer["residual"][:, 0] < outputs["residual"][rows, 0]
             _replace(outputs, rows[better], _of(answer, better))

@@ -6,7 +6,7 @@ import numpy as np
 
 from tolcontact.declaration.locator import FIRST_ORDER
 from tolcontact.discretization import ContactPoints, Nominal
-from tolcontact.errors import Faults
+from tolcontact.errors import Faults, designation
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.groups import Group
 from tolcontact.method import Method
@@ -14,8 +14,38 @@ from tolcontact.method import Method
 
 def check_method(nominal: Nominal, method: Method) -> None:
     """Raise ModelError for a method that does not suit the model."""
+    _check_elastic(nominal, method)
     _check_placing(nominal, method)
     _check_springs(nominal, method)
+
+
+def _check_elastic(nominal: Nominal, method: Method) -> None:
+    """Raise ModelError for elastic parts that the method does not bend, or whose faces are measured."""
+    elastic = {index for index, part in enumerate(nominal.parts) if part.part.elasticity is not None}
+    if not elastic:
+        return
+    name = nominal.parts[min(elastic)].name
+    if not (method.minimizes.presses and method.is_exact):
+        Faults(
+            [
+                f'part "{name}" is elastic, which needs the objective "seating" and the resolution "exact"; '
+                f'here they are "{method.objective}" and "{method.resolution}"; choose those, or leave elastic out'
+            ]
+        ).refuse(nominal.assembly.name)
+    faults = Faults(
+        f"{designation(measure.noun, measure)}: it is a function of poses, which do not tell how parts bend; measure points, "
+        "and combine these measures, as in tc.Combination"
+        for measure in nominal.measures
+        if measure.is_expression
+    )
+    for measure, measurement in zip(nominal.measures, nominal.measurements, strict=True):
+        bent = [part.name for part in measure.parts if part.elasticity is not None and measurement is not None]
+        if bent:
+            faults.append(
+                f'{designation(measure.noun, measure)}: it measures faces of part "{bent[0]}", which is elastic; '
+                "measure displacements of points, or their distances"
+            )
+    faults.refuse(nominal.assembly.name)
 
 
 def _check_placing(nominal: Nominal, method: Method) -> None:
@@ -65,6 +95,6 @@ def check_forces(nominal: Nominal, groups: Sequence[Group]) -> None:
         for force in nominal.assembly.forces
         if nominal.part_index(force.at.part, force.station) not in moved
     )
-    if not nominal.assembly.forces:
+    if not nominal.assembly.forces and not len(nominal.loads):  # locators bend elastic parts, too
         faults.append('objective "seating" needs a force, and none is declared; declare one with assembly.force(...)')
     faults.refuse(nominal.assembly.name)

@@ -35,13 +35,14 @@ def outcome(
     """
     group, z, count = system.group, system.z, len(rows)
     slacks = len(group.pairs) + len(rows.springs)
+    bounded = slacks if rows.flexibility is None else len(group.pairs)
     size, equations = z.numel() + slacks, problem["a"].size1() - count
     symbols = {name: ca.SX.sym(name, problem[name].sparsity()) for name in QP_ENTRIES}
     symbols |= {"x": ca.SX.sym("x", size), "lam_a": ca.SX.sym("lam_a", count + equations), "lam_x": ca.SX.sym("lam_x", size)}
     x, lam_a, lam_x, length = symbols["x"], symbols["lam_a"], symbols["lam_x"], symbols["length"]
     y, s, lam_s = x[: z.numel()], x[z.numel() :], lam_x[z.numel() :]
     excess = ca.vertcat(*_products(symbols["a"], x, _spans(rows.pairs, equations), call)) - symbols["lba"]
-    natural = ca.vertcat(row_residuals(excess[:count], lam_a[:count], length), ca.fmin(s, -lam_s))
+    natural = ca.vertcat(row_residuals(rows, excess[:count], lam_a[:count], length), ca.fmin(s, -lam_s)[:bounded])
     movers = [slice(k, k + FREEDOMS) for k in range(0, z.numel(), FREEDOMS)] + [slice(z.numel(), size)]
     pull, push = (_products(matrix, values, movers, call) for matrix, values in ((symbols["h"], x), (symbols["a"].T, lam_a)))
     stationarity = ca.norm_inf(ca.vertcat(*pull) + symbols["g"] + ca.vertcat(*push) + lam_x)
@@ -81,9 +82,15 @@ def _products(matrix: ca.SX, vector: ca.SX, spans: Sequence[slice], call: Call) 
     return products
 
 
-def row_residuals(excess: ca.SX, lam: ca.SX, length: ca.SX) -> ca.SX:
-    """Return the residuals of rows (row, 1): of min(row, multiplier) = 0, and the depth of gaps that remain negative."""
-    return ca.vertcat(ca.fmin(excess, -lam), ca.fmin(excess * length, 0))
+def row_residuals(rows: Rows, excess: ca.SX, lam: ca.SX, length: ca.SX) -> ca.SX:
+    """Return the residuals of rows (row, 1): of min(row, multiplier) = 0, and the depth of gaps that remain negative.
+
+    The rows of two-sided locators are equations: of these, it is the distance [mm] from the locator.
+    """
+    natural, depth = ca.fmin(excess, -lam), ca.fmin(excess * length, 0)
+    if rows.flexibility is not None:
+        natural = ca.if_else(ca.DM(rows.flexibility.holds.astype(float)), excess * length, natural)
+    return ca.vertcat(natural, depth)
 
 
 def reactions(lam: ca.SX, length: ca.SX, filled: ca.SX, scale: ca.SX) -> ca.SX:

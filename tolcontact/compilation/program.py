@@ -9,20 +9,28 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.compilation.bounded_pairs import TRIAL_SEED, Trial, allowed_depths, bounded_pairs
-from tolcontact.compilation.contact_qp import ContactQP, contact_qp
+from tolcontact.compilation.contact_qp import ContactQP, contact_qp, row_count
 from tolcontact.compilation.contact_rows import MIN_SLOTS, SLOTS, standing_points
 from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.measure_accuracy import measure_accuracies
 from tolcontact.compilation.method_checks import check_forces, check_method
 from tolcontact.compilation.solver import SolverChoice
-from tolcontact.compilation.solvers import solver_choice
+from tolcontact.compilation.solvers import SOLVERS, solver_choice, usable_solvers
 from tolcontact.compilation.station_program import StationProgram, station_programs
 from tolcontact.declaration.measure import Tape
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints, coordinates_in_words
+from tolcontact.errors import OptionError
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.interference import Watch
 from tolcontact.limits import Limits
+from tolcontact.mechanics.flexibility import (
+    Bending,
+    elastic_bodies,
+    group_flexibility,
+    part_flexibilities,
+    with_weights,
+)
 from tolcontact.mechanics.gap import GapMap, gap_map, gap_matrix
 from tolcontact.mechanics.group_equations import face_heights, face_poses, facing_pose
 from tolcontact.mechanics.groups import Group, contact_groups
@@ -61,6 +69,9 @@ class Program(Pictured):
     meetings     by pair index: where its bodies can touch, if fixed planes do not represent its reference face
     trials       by pair index: the trial that decided this; none unless the search is bounded
     groups       the contact QPs
+    bending      the elastic displacements of measured points and welds; None without elastic parts
+    observe_bent  poses, deviations, loads (realization, load) [N]: reactions between elastic parts -> measured
+                 (realization, measure) of bent parts; None without elastic parts
     nominal_measures  values of the measures in the nominal assembly
     accuracies   accuracies of the measures, in their units (see measure_accuracies)
     stations     stations of an assembly that is built in steps, in their order; `place` then places the parts of all stations
@@ -79,6 +90,8 @@ class Program(Pictured):
     meetings: dict[int, Meeting]
     trials: dict[int, Trial]
     groups: tuple[ContactGroup, ...]
+    bending: Bending | None
+    observe_bent: NamedFunction | None
     nominal_measures: np.ndarray
     accuracies: np.ndarray
     watch: Watch
@@ -93,6 +106,7 @@ class Program(Pictured):
             f"{'joined' if part.carried else f'{len(part.locators)} locators'}{', free' * part.free}"
             for part in nominal.parts
         ]
+        rows += [f"  {line}" for line in self.elastic_parts_in_words]
         rows += [f"  contact {pair.name}: {self.contact_in_words(k)}" for k, pair in enumerate(nominal.pairs)]
         rows += [f"  {self.stored_coordinates}"] * bool(self.stored_coordinates)
         rows += [
@@ -105,6 +119,20 @@ class Program(Pictured):
     def stored_coordinates(self) -> str:
         """The accuracy of stored coordinates of parts in contact, and what contact allows; empty if it hardly matters."""
         return coordinates_in_words(self.nominal)
+
+    @property
+    def elastic_parts_in_words(self) -> list[str]:
+        """A line for each elastic part, in each of its stations: its size, and how far its constant forces bend it."""
+        lines, loads = [], np.zeros(len(self.nominal.loads))
+        for index, bent in self.bending.parts.items() if self.bending else ():
+            part = self.nominal.parts[index]
+            mass = f"mass {bent.mass:.4g} kg" if np.isfinite(bent.mass) else "mass unknown"
+            lines.append(
+                f"elastic part {part.name}{f' in station {part.station}' * bool(part.station)}: {bent.nodes} nodes, "
+                f"{3 * bent.nodes} freedoms, {len(bent.loads)} reactions, {mass}, bent by "
+                f"{bent.largest_displacement(loads):.3g} mm by its constant forces as a free body"
+            )
+        return lines
 
     def limits(self, measure: int) -> Limits:
         """Return the limits of a measure, given by index, with its accuracy."""
@@ -136,7 +164,11 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         entries = ca.SX.sym("poses", ENTRIES * len(nominal.parts))
         values = measured(nominal, poses_of(entries), d)
         place, observe = _place(nominal, d), _observe(nominal, entries, d, values)
-        groups = contact_groups(nominal, weighs_areas=method.is_exact)
+        bodies = elastic_bodies(nominal)
+        if bodies and not choice.bends:
+            able = ", ".join(name for name in usable_solvers() if SOLVERS[name].bends)
+            raise OptionError(f'solver "{choice.name}" has no elastic parts, and the model has; choose one of: {able}')
+        groups = [with_weights(group, nominal, bodies) for group in contact_groups(nominal, weighs_areas=method.is_exact)]
         if method.minimizes.presses:
             check_forces(nominal, groups)
         watch = _watch(nominal, draws, place)
@@ -144,7 +176,17 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         gaps = tuple(None if pair.round else gap_map(gap_matrix(pair), pair.offsets) for pair in nominal.pairs)
         rows = [_rows(pair, gaps[k], trials[k] if k in meetings else None, method) for k, pair in enumerate(nominal.pairs)]
         log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
-        qps = [(group, contact_qp(nominal, group, gaps, method, [rows[k] for k in group.pairs])) for group in groups]
+        standing = [[rows[k] for k in group.pairs] for group in groups]
+        elastic = part_flexibilities(nominal, bodies)
+        bending = Bending(nominal, elastic) if elastic else None
+        bent = [
+            group_flexibility(nominal, group, list(map(row_count, points)), elastic)
+            for group, points in zip(groups, standing, strict=True)
+        ]
+        qps = [
+            (group, contact_qp(nominal, group, gaps, method, points, flexibility=flexibility))
+            for group, points, flexibility in zip(groups, standing, bent, strict=True)
+        ]
         return Program(
             nominal=nominal,
             draws=draws,
@@ -153,10 +195,12 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             place=place,
             observe=observe,
             gaps=gaps,
-            round_gaps={k: _round_gaps(pair, pair.round, d) for k, pair in enumerate(nominal.pairs) if pair.round},
+            round_gaps={k: _round_gaps(nominal, pair, pair.round) for k, pair in enumerate(nominal.pairs) if pair.round},
             meetings=meetings,
             trials=trials,
             groups=tuple(ContactGroup(group, qp, ContactSolver(qp, choice)) for group, qp in qps),
+            bending=bending,
+            observe_bent=_observe_bent(nominal, entries, d, bending) if bending else None,
             accuracies=measure_accuracies(nominal, groups, draws, place, observe),
             watch=watch.allowing(allowed_depths(nominal, meetings, trials)),
             nominal_measures=_nominal_measures(nominal, observe),
@@ -186,9 +230,16 @@ def _observe(nominal: Nominal, entries: ca.SX, deviations: ca.SX, values: Sequen
     )
 
 
-def _round_gaps(pair: ContactPoints, points: RoundPoints, deviations: ca.SX) -> NamedFunction:
+def _observe_bent(nominal: Nominal, entries: ca.SX, deviations: ca.SX, bending: Bending) -> NamedFunction:
+    """Return the function of the measures of bent parts, see Program."""
+    values = ca.vertcat(*measured(nominal, poses_of(entries), deviations, bending))
+    inputs = {"poses": entries, "deviations": deviations, "loads": bending.loads}
+    return NamedFunction.dense(ca.Function("observe_bent", [*inputs.values()], [values], [*inputs], ["measured"]))
+
+
+def _round_gaps(nominal: Nominal, pair: ContactPoints, points: RoundPoints) -> NamedFunction:
     """Return the function of the gaps of round faces, see Program."""
-    X_RM = ca.SX.sym("X_RM", ENTRIES)
+    X_RM, deviations = ca.SX.sym("X_RM", ENTRIES), ca.SX.sym("deviations", nominal.input_count)
     results = round_gaps(points, X_RM, face_heights(pair, deviations), ca.SX(len(points), 1), ca.SX(ENTRIES, 0))
     outputs = {"gaps": results.gaps, "distances": results.distances}
     function = ca.Function("round_gaps", [X_RM, deviations], [*outputs.values()], ["X_RM", "deviations"], [*outputs])

@@ -64,7 +64,7 @@ def quadratic_terms(
     # The augmented Lagrangian term of the active rows does not change the answer, and restores convexity in most cases.
     penalty = (1 + 2 * load / goal.scale / system.group.length) * ca.if_else(reactions > 0, rows.filled, 0)
     curvature += congruent(ca.diag(penalty), rows.slopes)
-    row_values = rows.gaps + rows.compliance * reactions
+    row_values = rows.opened(reactions)
     proximal_hessian = system.curvature(proximity(system, motion.poses, moved)) / system.group.length if projects else nothing
     return QuadraticTerms(Q, gradient, curvature, rows.slopes.T @ (penalty * row_values), proximal_hessian, goal.scale)
 

@@ -38,6 +38,10 @@ class LinearStep:
         self._remembers = program.solver.remembers
         self._max_residual = MAX_RESIDUAL * group.group.length
         self.spans = group.qp.spans
+        # Reactions of contact push; those of two-sided locators at elastic parts pull, too.
+        flexibility = group.qp.flexibility
+        self.bends = flexibility is not None
+        self._least_reaction: float | np.ndarray = 0.0 if flexibility is None else np.where(flexibility.holds, -np.inf, 0.0)
         self._slots = {k: points for k, points in enumerate(group.qp.standing) if isinstance(points, int)}
         self.varying = list(self._slots)
         # The curvature of walls around round faces counts in every step, not in Newton's alone.
@@ -150,7 +154,7 @@ class LinearStep:
             residual = np.maximum(residual, depth.max(axis=1))
         state.kkt_residual[:] = np.where(solved, residual, np.inf)
         state.second_answers[:] += answer["second"][:, 0].astype(int)
-        multipliers = np.maximum(answer["multipliers"], 0)
+        multipliers = np.maximum(answer["multipliers"], self._least_reaction)
         results = {
             "poses": answer["corrected"].reshape(state.poses.shape),
             "relative": answer["relative"].reshape(state.relative.shape),
@@ -171,8 +175,8 @@ class LinearStep:
 
 def _cleared(multipliers: np.ndarray, spans: Sequence[slice]) -> np.ndarray:
     """Return multipliers (n, row of the QP), zero if they are negligible compared with the largest of their pair."""
-    of_pairs = (multipliers[:, span] for span in spans)
-    return np.concatenate([np.where(m > NEGLIGIBLE_SHARE * m.max(axis=1, keepdims=True), m, 0.0) for m in of_pairs], axis=1)
+    sizes = ((multipliers[:, span], np.abs(multipliers[:, span])) for span in spans)
+    return np.concatenate([np.where(a > NEGLIGIBLE_SHARE * a.max(axis=1, keepdims=True), m, 0.0) for m, a in sizes], axis=1)
 
 
 def _bend(scan: Scan, slots: Slots, deviations: np.ndarray) -> np.ndarray:

@@ -101,7 +101,7 @@ def repeat(
             is_short = free_steps.shorten(step, unsettled.task, before, unsettled.state, size) & (size > STEP_TOLERANCE)
             stays = limits.displacement(before.poses, unsettled.state.poses) <= STEP_TOLERANCE
             idle = np.where(is_short & stays, idle + 1, 0)
-        rounding_counts = phase.newton or step.knows_walls or start.balances
+        rounding_counts = phase.newton or step.knows_walls or step.bends or start.balances
         moves = is_short | (phase.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not rounding_counts)))
         if phase.width > 1:
             moves |= ~candidates.hold(unsettled.task, unsettled.state, start)

@@ -44,6 +44,8 @@ class ContactResolver:
         self._step = LinearStep(program, group, max_rounds)
         self._method = program.method
         self._candidates = Candidates(program, group)
+        self.flexibility = group.qp.flexibility
+        self._force = sum(float(np.linalg.norm(load.vector)) for load in group.group.loads) or 1.0
         self.contact_points = [program.nominal.pairs[index] for index in group.group.pairs]
         self._springy = [k for k, pair in enumerate(self.contact_points) if pair.is_springy]
         size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
@@ -145,10 +147,7 @@ class ContactResolver:
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
         if self._method.is_exact:
             depth = undone(task.scans, state.gap_min, state.relative, task.deviations, task.may_carry, state.slack)
-            for k in self._springy:
-                reactions = state.multipliers[:, self.spans[k]]
-                misfit = spring_misfit(self.contact_points[k], task.scans[k], state.relative[:, k], task.deviations, reactions)
-                depth[:, k] = misfit - state.slack[:, k]
+            self._check_springs(task, state, depth)
             state.kkt_residual[:] = checked_residual(state, depth.max(axis=1))
         state.doubtful[:] = self._limits.is_doubtful(task, state, self._candidates)
         certified = np.flatnonzero(state.certified)
@@ -158,6 +157,21 @@ class ContactResolver:
         state.doubtful[:] |= self._limits.lie_in_form(task, state)
         if not start.projected:
             self._doubt_rolled(task, state)
+
+    def _check_springs(self, task: Task, state: State, depth: Float[Array, "n pair"]) -> None:
+        """Write into `depth` [mm] how far compliant pairs miss their law, and the gaps between bent parts into the state."""
+        flexibility = self.flexibility
+        openings = None if flexibility is None else flexibility.openings(state.multipliers)
+        for k in self._springy:
+            pair, span = self.contact_points[k], self.spans[k]
+            gaps, reactions = point_gaps(pair, task.scans[k], state.relative[:, k], task.deviations), state.multipliers[:, span]
+            if flexibility is None or openings is None:
+                misfit = spring_misfit(pair, gaps, reactions)
+            else:
+                gaps += openings[:, span]
+                state.gap_min[:, k] = gaps.min(axis=1)
+                misfit = elastic_misfit(pair, gaps, reactions * np.diag(flexibility.C)[span])
+            depth[:, k] = misfit - state.slack[:, k]
 
     def _leave_adrift(self, task: Task, state: State) -> None:
         """Reset realizations to their raw poses if nothing holds a part against its forces."""
@@ -228,7 +242,11 @@ class ContactResolver:
         return rows[~state.certified[rows] & ~is_same_conflict(attempt, best)]
 
     def _energy_of(self, task: Task, state: State) -> Float[Array, " n"]:
-        return self._energy(poses=state.poses, raw=task.raw, moments=task.moments, deviations=task.deviations)
+        energy = self._energy(poses=state.poses, raw=task.raw, moments=task.moments, deviations=task.deviations)
+        if self.flexibility is None:
+            return energy
+        bent = self.flexibility.openings(state.multipliers) - self.flexibility.opening
+        return np.asarray(energy + (state.multipliers * bent).sum(axis=1) / 2 / self._force)
 
     def _at_nominal(self, task: Task) -> tuple[np.ndarray, np.ndarray]:
         """Return poses and X_RM with the free parts, and the parts located on them, in their nominal places."""
@@ -261,26 +279,36 @@ def is_same_conflict(state: State, best: State) -> Bool[Array, " n"]:
     return (state.outcome == Outcome.IN_CONFLICT) & (best.outcome == Outcome.IN_CONFLICT) & goes_as_deep
 
 
-def spring_misfit(
-    pair: ContactPoints,
-    scan: Scan,
-    relative: Float[Array, "n 12"],
-    deviations: Float[Array, "n contributor"],
-    reactions: Float[Array, "n point"],
-) -> Float[Array, " n"]:
-    """Return how far poses and reactions [N] of a pair miss the law of its springs (n,) [mm].
+def point_gaps(
+    pair: ContactPoints, scan: Scan, relative: Float[Array, "n 12"], deviations: Float[Array, "n contributor"]
+) -> Float[Array, "n point"]:
+    """Return the gaps (n, point) [mm] of all points of a pair between rigid bodies at X_RM `relative` (n, 12)."""
+    if isinstance(scan, RoundScan):
+        return scan.gaps(relative, deviations)
+    points = np.broadcast_to(np.arange(len(pair.P_m)), (len(relative), len(pair.P_m)))
+    return pair.nominal_gaps(relative) - pair.offsets.heights(deviations, points)
+
+
+def spring_misfit(pair: ContactPoints, gaps: Float[Array, "n point"], reactions: Float[Array, "n point"]) -> Float[Array, " n"]:
+    """Return how far gaps [mm] and reactions [N] of a pair miss the law of its springs (n,) [mm].
 
     A compliant contact pushes with its stiffness times its compression, and does not pull. A rigid support among them may not
-    be inside. `relative` (n, 12) are X_RM.
+    be inside.
     """
     assert pair.stiffness is not None
-    if isinstance(scan, RoundScan):
-        gaps = scan.gaps(relative, deviations)
-    else:
-        points = np.broadcast_to(np.arange(len(pair.P_m)), (len(relative), len(pair.P_m)))
-        gaps = pair.nominal_gaps(relative) - pair.offsets.heights(deviations, points)
     compression = reactions / pair.stiffness
     return np.asarray(np.abs(np.minimum(gaps + compression, compression)).max(axis=1))
+
+
+def elastic_misfit(
+    pair: ContactPoints, gaps: Float[Array, "n point"], compression: Float[Array, "n point"]
+) -> Float[Array, " n"]:
+    """Return how far gaps [mm] between bent parts miss the law of contact (n,) [mm].
+
+    A two-sided locator has no gap. Other points are open without a reaction, or closed: they do not penetrate, and the
+    `compression` [mm], which their own reaction alone would cause, is not negative.
+    """
+    return np.asarray(np.abs(gaps if pair.holds else np.minimum(gaps, compression)).max(axis=1))
 
 
 def checked_residual(state: State, depth: Float[Array, " n"]) -> Float[Array, " n"]:

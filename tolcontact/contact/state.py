@@ -73,7 +73,7 @@ class State(Record):
     relative    (n, pair of the group, 12): X_RM
     slack       (n, pair of the group) [mm]: penetration that no increment could remove
     astray      (n,) [mm]: distance of two-sided locators from the positions where they should hold
-    multipliers (n, row of the QP): reactions
+    multipliers (n, row of the QP): reactions, negative if a two-sided locator pulls at an elastic part
     gap_min     (n, pair of the group) [mm]: smallest true gap at `poses`, once they are an answer
     doubtful    (n,): whether the answer is further from the raw pose than the method accepts
     slots       of the pairs with changing points: the points that were active last
@@ -115,7 +115,8 @@ class State(Record):
     @property
     def loaded(self) -> Bool[Array, "n row"]:
         """(n, row of the QP): whether its point is under load."""
-        return self.multipliers > LOADED_SHARE * self.multipliers.max(axis=1, initial=0)[:, None]
+        sizes = np.abs(self.multipliers)
+        return np.asarray(sizes > LOADED_SHARE * sizes.max(axis=1, initial=0)[:, None])
 
     @classmethod
     def start(

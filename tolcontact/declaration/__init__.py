@@ -6,6 +6,7 @@
 from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overlap
 from tolcontact.declaration.dependence import Correlation, Population, Variable
+from tolcontact.declaration.elastic import Elastic
 from tolcontact.declaration.feature_tolerance import (
     Angularity,
     CircularRunout,
@@ -56,10 +57,10 @@ from tolcontact.declaration.values import degrees
 __all__ = [
     "OUTSIDE", "UNITS", "Angle", "Angularity", "Assembly", "AxisDistance", "Box", "Brep", "Chain", "CircularRunout",
     "Clearance", "Coaxiality", "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets",
-    "Difference", "Face", "Facing", "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance", "Geometry",
-    "Inside", "Joint", "Largest", "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean", "MeanGap", "Measure",
-    "Measurement", "Mesh", "Minimum", "Near", "Overlap", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked",
-    "Pin", "Point", "Population", "Position", "Profile", "Roundness", "Size", "Stack", "Station", "Straightness", "Sum",
-    "Symmetry", "ThreeTwoOne", "TitleBlock", "Tolerance", "TotalRunout", "Triangles", "Variable", "degrees", "stations",
-    "three_two_one",
+    "Difference", "Elastic", "Face", "Facing", "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance",
+    "Geometry", "Inside", "Joint", "Largest", "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean",
+    "MeanGap", "Measure", "Measurement", "Mesh", "Minimum", "Near", "Overlap", "Parallelism", "Part", "Pattern",
+    "Perpendicularity", "Picked", "Pin", "Point", "Population", "Position", "Profile", "Roundness", "Size", "Stack",
+    "Station", "Straightness", "Sum", "Symmetry", "ThreeTwoOne", "TitleBlock", "Tolerance", "TotalRunout", "Triangles",
+    "Variable", "degrees", "stations", "three_two_one",
 ]  # fmt: skip

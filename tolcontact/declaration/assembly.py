@@ -13,6 +13,7 @@ from tolcontact.declaration.dependence import (
     Population,
     Variable,
 )
+from tolcontact.declaration.elastic import gravity_faults
 from tolcontact.declaration.geometry import UNITS, Geometry
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
@@ -21,6 +22,7 @@ from tolcontact.declaration.sequence import Station, in_order, joined_before, pr
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.values import (
+    Vector,
     group_faults,
     key_faults,
     repetitions,
@@ -31,6 +33,7 @@ from tolcontact.declaration.values import (
 from tolcontact.declaration.widening import widened
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
+from tolcontact.user_functions import refuse_in_functions
 
 T = TypeVar("T")
 
@@ -95,6 +98,7 @@ class Assembly(Causes, Pictured, Checked):
         self.mu = mu
         self.standard = standard
         self.units = units
+        self.acceleration: Vector | None = None
         self._declared: dict[str, list[Any]] = {name: [] for name in MAX_COUNTS}
 
     @property
@@ -103,8 +107,9 @@ class Assembly(Causes, Pictured, Checked):
 
     @property
     def effective_method(self) -> Method:
-        """The method of the assembly; without one, the default, by which declared forces seat the parts."""
-        return self.method or Method(objective="seating" if self.forces else "")
+        """The method of the assembly; without one, the default, by which forces seat the parts, and bend elastic ones."""
+        presses = self.forces or any(part.elasticity for part in self.parts)
+        return self.method or Method(objective="seating" if presses else "")
 
     def widened(self, factor: float, *names: str) -> "Assembly":
         """Return a copy whose tolerances are `factor` times as wide, each about its centre, as if suppliers were worse.
@@ -120,7 +125,7 @@ class Assembly(Causes, Pictured, Checked):
     def replaced(self, **lists: Iterable[Any]) -> "Assembly":
         """Return a copy with other lists, as in replaced(parts=..., pairs=...). Raises TypeError for other names."""
         copy = Assembly(self.name, method=self.method, title_block=self.title_block, mu=self.mu, standard=self.standard)
-        copy.units = self.units
+        copy.units, copy.acceleration = self.units, self.acceleration
         copy._declared |= {name: list(lists.pop(name, things)) for name, things in self._declared.items()}
         if lists:
             raise TypeError(f"an assembly has no list {', '.join(lists)}; its lists are: {', '.join(MAX_COUNTS)}")
@@ -168,6 +173,14 @@ class Assembly(Causes, Pictured, Checked):
     def station(self, name: str) -> Station:
         """Declare the next station, of this `name`, of an assembly that is built in steps: `weld = line.station("weld")`."""
         return self._add("stations", Station(name, script_line()).belonging_to(self))
+
+    def gravity(self, acceleration: Any) -> None:
+        """Declare the `acceleration` (x, y, z) [m/s^2] by which elastic parts weigh: `model.gravity((0, 0, -9.81))`.
+
+        It acts in the assembly frame, in every station. The weight of a rigid part is a force.
+        """
+        refuse_in_functions()
+        self.acceleration = _vector(acceleration)
 
     def may_overlap(self, *parts: Part) -> Overlap:
         """Declare that parts, any two of them, are meant to overlap, as in `model.may_overlap(shaft, hub)` (see Overlap)."""
@@ -248,6 +261,7 @@ class Assembly(Causes, Pictured, Checked):
         yield from self.omissions()
         yield from (*text_faults("assembly", [self.name]), *Checked.faults(self))
         yield from (f"title block: {fault}" for fault in (self.title_block.faults() if self.title_block else ()))
+        yield from gravity_faults(self.acceleration, has_elastic=any(part.elasticity for part in self.parts))
         for name, most in MAX_COUNTS.items():
             if (count := len(self._declared[name])) > most:
                 yield f"it has {count} {name}; expected at most {most}"
@@ -334,7 +348,7 @@ class Assembly(Causes, Pictured, Checked):
 
     def __str__(self) -> str:
         causes = *self.variables, *self.correlations, *self.populations
-        declared = (row for part in self.parts for row in (*part.toleranced, *part.targets))
+        declared = (row for part in self.parts for row in (*part.toleranced, *part.targets, *filter(None, [part.elasticity])))
         rows = *self.parts, *declared, *causes, *self.locations, *self.pairs, *self.overlaps, *self.forces, *self.measures
         for scene, station in zip(self.scenes, self.stations, strict=False):
             settings = *scene.locations, *scene.pairs, *scene.forces, *scene.measures

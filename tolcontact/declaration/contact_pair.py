@@ -105,13 +105,25 @@ class Joint(Declaration):
 
     `members` are the joined parts. The pose of the joint is the pose of the first one. A joint that is joined
     again is stated by its parts.
+
+    Elastic parts are joined `at` points of one of them, to the last member. Guns of the station hold them there at their
+    nominal distance. Later stations keep the gaps that three points of each `pad` [mm] have then, or without a pad the point
+    itself.
     """
 
     name: str
     members: tuple[Part, ...]
     station: str
     declared_at: str = ""
+    at: tuple[Point, ...] = ()
+    pad: float | None = None
     noun: ClassVar[str] = "joint"
+    checks: ClassVar = {"pad": LENGTH}
+
+    @property
+    def welded(self) -> tuple[Part, Part]:
+        """The part of its points, and the other part that they join to it."""
+        return self.at[0].part, self.members[-1]
 
     @property
     def first(self) -> Part:
@@ -126,6 +138,18 @@ class Joint(Declaration):
                 yield f'station "{self.station}" joins part "{part.name}" {self.members.count(part)} times in it; name it once'
             if part.fixed:
                 yield f'part "{part.name}" is fixed, so no later station can move it; locate it in station "{self.station}"'
+        yield from super().faults()
+        elastic = [part.name for part in self.members if part.elasticity is not None]
+        if elastic and not self.at:
+            yield f'part "{elastic[0]}" is elastic, so parts are joined at points: join(..., at=[part.point(x, y, z), ...])'
+        if self.at and not elastic:
+            yield "it has points, but its parts are rigid and keep their relative pose; leave at out"
+        for point in self.at:
+            yield from point.faults()
+            if point.part is not self.at[0].part or point.part not in self.members[:-1] or point.position is None:
+                yield f"its point {point} is not on one of its parts; give points of one part, which the last one is joined to"
+        if self.pad is not None and not self.at:
+            yield "it has a pad without points; give points, as in at=[part.point(x, y, z)], or leave pad out"
 
     def __str__(self) -> str:
         return f"joint {self.name}: {', '.join(part.name for part in self.members)}, joined in station {self.station}"

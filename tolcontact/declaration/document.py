@@ -10,9 +10,9 @@ from msgspec import UNSET, UnsetType
 
 from tolcontact.declaration.assembly import MAX_COUNTS, Assembly
 from tolcontact.declaration.checks import NOT_NEGATIVE, text_type
-from tolcontact.declaration.codec import Document, Items, definitions
+from tolcontact.declaration.codec import Document, Items, Plain, definitions, floats
 from tolcontact.declaration.dependence import Variable
-from tolcontact.declaration.entries import CONTROL, METHOD, RECORDS, TARGETS, TITLE_BLOCK, TOLERANCED
+from tolcontact.declaration.entries import CONTROL, ELASTIC, METHOD, RECORDS, TARGETS, TITLE_BLOCK, TOLERANCED
 from tolcontact.declaration.face_entries import Writing
 from tolcontact.declaration.feature_tolerance import GeometricTolerance
 from tolcontact.declaration.measure import Tape
@@ -25,11 +25,12 @@ from tolcontact.poses import ENTRIES
 MAX_FREEDOMS = 7  # of a feature, with its size
 # Lists that a document leaves out if it has no items for them.
 GOES_WITH = {"stations": "stations", "joints": "stations", "overlaps": "overlaps"}
+GRAVITY = Plain(tuple[float, float, float], floats)
 CODECS_OF_LISTS = METHOD, TITLE_BLOCK, *RECORDS.values()
 DOCUMENT = msgspec.defstruct("Document", [
     ("name", str), ("parts", Items(RECORDS["parts"]).wire), ("measures", Items(RECORDS["measures"]).wire),
     ("schema", str | UnsetType, UNSET), ("method", METHOD.wire | None, None),
-    ("title_block", TITLE_BLOCK.wire | None, None), ("mu", NOT_NEGATIVE | None, None),
+    ("title_block", TITLE_BLOCK.wire | None, None), ("mu", NOT_NEGATIVE | None, None), ("gravity", GRAVITY.wire | None, None),
     ("standard", text_type(get_args(Standard)), ""),
     *((name, Items(record).wire, []) for name, record in RECORDS.items() if name not in ("parts", "measures")),
 ], forbid_unknown_fields=True, rename={"schema": "$schema"})  # fmt: skip
@@ -60,8 +61,9 @@ def to_document(
     titles = {} if assembly.title_block is None else {"title_block": TITLE_BLOCK.encode(assembly.title_block, writing)}
     friction = {} if assembly.mu is None else {"mu": float(assembly.mu)}
     standard = {"standard": assembly.standard} if assembly.standard else {}
+    gravity = {} if assembly.acceleration is None else {"gravity": GRAVITY.encode(assembly.acceleration, writing)}
     method = None if assembly.method is None else METHOD.encode(assembly.method, writing)
-    return {"name": assembly.name, "method": method, **titles, **friction, **standard, **lists}
+    return {"name": assembly.name, "method": method, **titles, **friction, **gravity, **standard, **lists}
 
 
 def tolerance_of_entry(entry: Any) -> Size | GeometricTolerance:
@@ -108,8 +110,9 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
         of_part = replace(place["parts"][k]["features"], part=part)
         for number, item in enumerate(of_part.converted(entry.get("features", []), list[Any])):
             part.add(TOLERANCED.decode(item, of_part[number], part=part))
-        for targets in Items(TARGETS).decode(entry.get("datum_targets", []), place["parts"][k]["datum_targets"]):
-            part.add(targets)
+        for key, record in (("datum_targets", TARGETS), ("elastic", ELASTIC)):
+            for declared in Items(record).decode(entry.get(key, []), place["parts"][k][key]):
+                part.add(declared)
 
     things: dict[str, Any] = {"parts": parts}
     for name in [name for name in RECORDS if name not in ("parts", "measures")]:
@@ -123,6 +126,7 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
     title_block = None if struct.title_block is None else TITLE_BLOCK.decode(struct.title_block, place["title_block"])
     settings: dict[str, Any] = {"method": method, "title_block": title_block, "mu": struct.mu, "standard": struct.standard}
     assembly = Assembly(struct.name, **settings).replaced(**things)
+    assembly.acceleration = None if struct.gravity is None else GRAVITY.decode(struct.gravity, place["gravity"])
     for station in assembly.stations:
         station.belonging_to(assembly)
     for fault in assembly.faults():  # a model with faults is never archived

@@ -15,6 +15,7 @@ from tolcontact.declaration.checks import NOT_NEGATIVE, POSITIVE, text_type
 from tolcontact.declaration.codec import CODECS, Choice, Document, Items, Plain, floats
 from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overlap
 from tolcontact.declaration.dependence import Correlation, Population, Variable
+from tolcontact.declaration.elastic import Elastic
 from tolcontact.declaration.face_entries import FREE_DIRECTION, MEASURED, UNIT_VECTOR, Writing, feature_named
 from tolcontact.declaration.feature_tolerance import KINDS, GeometricTolerance
 from tolcontact.declaration.geometry import Box, Mesh, Pin
@@ -111,6 +112,14 @@ def _mesh_source(values: Document, place: Place) -> Document:
     return {"source": place.sources.meshes[place.record.name]}
 
 
+def _matrix_name(source: Any, writing: Writing) -> str:
+    return str(source) if writing.folder is None else _file_name(source, writing)
+
+
+def _matrix_file(name: str, place: Place) -> Path:
+    return Path(name) if place.sources.folder is None else _file(name, place)
+
+
 def _file_name(source: Any, writing: Writing) -> str:
     path, folder = Path(source).resolve(), writing.folder or Path()
     return (path.relative_to(folder) if path.is_relative_to(folder) else path).as_posix()
@@ -201,6 +210,12 @@ METHOD = Record(Method, **{  # type: ignore[arg-type]
 TITLE_BLOCK = Record(TitleBlock, omitted=" ".join(TitleBlock().entries))
 
 
+MATRIX_FILE = Plain(Annotated[str, Meta(description="path, from the folder of this file")], _matrix_name, _matrix_file)
+ELASTIC = Record(
+    Elastic, omitted="E nu density stiffness nodes pad", floats="E nu density pad", stiffness=MATRIX_FILE, nodes=MATRIX_FILE
+)
+
+
 class OfPart(Items):
     """Features and datum targets, whose faces may refer to all parts: a document is read for them once it has all parts."""
 
@@ -209,8 +224,12 @@ class OfPart(Items):
 
 
 FEATURES = Field(
-    {"features": OfPart(TOLERANCED), "datum_targets": OfPart(TARGETS)},
-    lambda part, writing: {"features": part.toleranced} | ({"datum_targets": part.targets} if part.targets else {}),
+    {"features": OfPart(TOLERANCED), "datum_targets": OfPart(TARGETS), "elastic": OfPart(ELASTIC)},
+    lambda part, writing: {
+        "features": part.toleranced,
+        **({"datum_targets": part.targets} if part.targets else {}),
+        **({"elastic": [part.elasticity]} if part.elasticity else {}),
+    },
     lambda values, place: {},
 )
 RECORDS = {
@@ -233,6 +252,6 @@ RECORDS = {
     "correlations": Record(Correlation, omitted="kind"),
     "populations": Record(Population, fields="values columns source declared_at"),
     "stations": Record(Station),
-    "joints": Record(Joint),
+    "joints": Record(Joint, omitted="at pad"),
     "overlaps": Record(Overlap),
 }  # fmt: skip

@@ -230,10 +230,10 @@ class Location(Declaration):
         count = "1 locator" if len(scheme) == 1 else f"{len(scheme)} locators"
         if len(scheme) < 6 and not self.floating:
             yield (
-                f"it has {count}; a rigid part needs six independent ones (3-2-1, for example), or locate(..., floating=True) "
+                f"it has {count}; a part needs six independent ones (3-2-1, for example), or locate(..., floating=True) "
                 "if contact holds it in the other directions"
             )
-        elif len(two_sided) > 6 and self.placing != BEST_FIT:
+        elif len(two_sided) > 6 and self.placing != BEST_FIT and self.part.elasticity is None:
             idle = [locator.name for locator in _repeating(two_sided)]
             sufficient = ", ".join(locator.name for locator in two_sided if locator.name not in idle)
             verb = "is" if len(idle) == 1 else "are"

@@ -1,4 +1,4 @@
-"""Parts, their points and faces, and their toleranced geometry: features, patterns and datums."""
+"""Parts, their points and faces, their elasticity, and their toleranced geometry: features, patterns and datums."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import ClassVar, Literal, TypeVar, get_args
 
 from tolcontact.declaration.checks import Declaration, one_of
+from tolcontact.declaration.elastic import Deformable, Elastic
 from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
 from tolcontact.declaration.toleranced import Control, Toleranced, letter_faults
@@ -21,8 +22,8 @@ Standard = Literal["", "ISO", "ASME"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Part(Declaration):
-    """A rigid body: its shape, its place in the nominal assembly, and whether contact may move it.
+class Part(Deformable):
+    """A body: its shape, its place in the nominal assembly, and whether contact may move it. It is rigid unless `elastic`.
 
     A point `p` of the part lies at `rotation * p + at` in the nominal assembly frame; `rotation` is a rotation vector [rad],
     `at` a position [mm]. With `fixed=None` a part is free if it is the moving side of a contact pair, floats, or has
@@ -36,14 +37,13 @@ class Part(Declaration):
     fixed: bool | None = None
     standard: Standard = ""
     declared_at: str = field(default_factory=script_line)
-    noun: ClassVar[str] = "part"
     checks: ClassVar = {"standard": one_of(get_args(Standard))}
-    _declared: "list[Feature | Pattern | DatumTargets]" = field(default_factory=list, init=False)
+    _declared: "list[Feature | Pattern | DatumTargets | Elastic]" = field(default_factory=list, init=False)
 
     @property
     def toleranced(self) -> "tuple[Feature | Pattern, ...]":
         """The features and patterns in the order of the script."""
-        return tuple(declared for declared in self._declared if not isinstance(declared, DatumTargets))
+        return tuple(declared for declared in self._declared if isinstance(declared, Feature | Pattern))
 
     @property
     def features(self) -> "tuple[Feature, ...]":
@@ -135,6 +135,7 @@ class Part(Declaration):
         for label, value, example in (("at", self.at, "(0, 0, 10)"), ("rotation", self.rotation, "tc.degrees(0, 0, 90)")):
             if not is_finite(value):
                 yield f"{label} is {value!r}; expected three finite numbers, as in {label}={example}"
+        yield from self.elastic_faults()
 
     def __str__(self) -> str:
         place = "" if self.at == (0.0, 0.0, 0.0) else " at ({:g}, {:g}, {:g})".format(*self.at)

@@ -11,7 +11,7 @@ from tolcontact.declaration.checks import Declaration
 from tolcontact.declaration.contact_pair import Joint, parts_of
 from tolcontact.declaration.declarations import Declarations, expect
 from tolcontact.declaration.locator import Location
-from tolcontact.declaration.part import Part
+from tolcontact.declaration.part import Part, Point
 from tolcontact.declaration.values import group_faults, key_faults, repetitions, script_line
 
 SETTINGS = {"locations": "locate", "pairs": "contact", "measures": "measure", "forces": "force"}  # lists, and their methods
@@ -40,14 +40,17 @@ class Station(Declarations, Declaration):
         self._assembly = assembly
         return self
 
-    def join(self, name: str, *bodies: Part | Joint) -> Joint:
+    def join(self, name: str, *bodies: Part | Joint, at: Sequence[Point] = (), pad: float | None = None) -> Joint:
         """Declare that `bodies`, parts or joints of earlier stations, are joined at the end of this station; return the joint.
 
         `weld.join("rail", left, right)` has the `name` "rail". Later stations locate the joint by points of any of its parts.
+        Elastic parts are joined `at` points of one of them, each over a `pad` [mm] (see Joint).
         """
         for body in bodies:
             expect(f'join "{name}": a body', body, Part | Joint, "parts and joints, as in weld.join(name, left, right)")
-        return self._add("joints", Joint(name, parts_of(bodies), self.name, script_line()))
+        for point in at:
+            expect(f'join "{name}": a point', point, Point, "part.point(x, y, z)")
+        return self._add("joints", Joint(name, parts_of(bodies), self.name, script_line(), tuple(at), pad))
 
     @property
     def assembly(self) -> Any:

@@ -11,8 +11,9 @@ from tolcontact.discretization.measured_planes import MeasuredPlanes, measured_p
 from tolcontact.discretization.nominal import ContactPoints, Nominal
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_points import RoundPoint, RoundPoints
+from tolcontact.discretization.weld import Weld
 
 __all__ = [
     "FIRST_POINT", "ContactPoints", "Locators", "MeasuredPlanes", "Nominal", "NominalPart", "Offsets", "RoundPoint",
-    "RoundPoints", "coordinates_in_words", "discretize", "measured_planes", "raised_places", "rim_points",
+    "RoundPoints", "Weld", "coordinates_in_words", "discretize", "measured_planes", "raised_places", "rim_points",
 ]  # fmt: skip

@@ -22,6 +22,7 @@ from tolcontact.discretization.form_points import (
 from tolcontact.discretization.locators import Locators, NominalPart
 from tolcontact.discretization.nominal import ContactPoints
 from tolcontact.discretization.offsets import Offsets
+from tolcontact.discretization.retained_nodes import retained_nodes
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.scenes import Scene
@@ -38,6 +39,7 @@ from tolcontact.geometry.triangle_mesh import coordinate_error
 DEFAULT_REACH = 0.1  # of the moving part's size
 DEFAULT_POINTS = 200
 FORM_POINTS = 10_000  # with form, if that resolves it
+MIN_SHARE = 1e-3  # of the mean share of a point in the stiffness of a pair
 DEFAULT_SPRINGS = 40  # which may all be active at once, so that a QP has a row for each
 
 
@@ -69,6 +71,8 @@ def contact_points(
         P_m, P_r, n_r = (np.array(rows) for rows in zip(*(point.nominal() for point in balls_and_shafts), strict=True))
     else:
         candidates = coaxial_points(moving_face, reference_face, deviating) if _is_open(pair) and lengths else None
+        if candidates is None and _is_open(pair):
+            candidates = retained_nodes((moving, reference), moving_face)
         if candidates is None:
             faces = moving_face, reference_face
             candidates, undetected = _candidates(scene.assembly, pair, moving, unplaced.mesh, faces, reach, lengths)
@@ -88,6 +92,7 @@ def contact_points(
         sampling_error=undetected,
         round=RoundPoints.of(balls_and_shafts) if balls_and_shafts else None,
         deviating=deviating,
+        elastic=_bends(pair),
     )
     if pair.stiffness is not None:
         points = replace(points, stiffness=pair.stiffness * _spring_shares(points))
@@ -106,7 +111,16 @@ def _spring_shares(points: ContactPoints) -> np.ndarray:
         return np.where(points.round.points["axis"].any(axis=1), 0.5, 1.0)  # a shaft has two ends
     if not (points.moving_face.is_flat and points.reference_face.is_flat):
         raise GeometryFault("it has a stiffness, which needs flat faces, or a ball or shaft against walls; leave stiffness out")
-    return points.weights / len(points.P_m)
+    shares = points.weights / len(points.P_m)
+    if shares.min() >= MIN_SHARE / len(shares):
+        return shares
+    shares = np.maximum(shares, MIN_SHARE / len(shares))  # a corner may stand for no area
+    return shares / shares.sum()
+
+
+def _bends(pair: ContactPair) -> bool:
+    """Return whether one of the parts of a pair is elastic."""
+    return any(side.part.elasticity is not None for side in (pair.moving, pair.reference))
 
 
 def _is_open(pair: ContactPair) -> bool:
@@ -135,7 +149,7 @@ def _candidates(
     else:
         is_fine = lengths and _is_open(pair)
         spacing = affordable_spacing(lengths, float(mesh.area), FORM_POINTS) if is_fine else pair.spacing
-        open_count = DEFAULT_POINTS if pair.stiffness is None else DEFAULT_SPRINGS
+        open_count = DEFAULT_POINTS if pair.stiffness is None and not _bends(pair) else DEFAULT_SPRINGS
         count = open_count if _is_open(pair) else pair.points
         if spacing is not None:
             _check_number(mesh.area / spacing**2, f"a spacing of {spacing:g} mm gives")
@@ -233,10 +247,27 @@ def support_pairs(parts: tuple[NominalPart, ...], scenes: Sequence[Scene]) -> It
             name = scene.supports_name(parts[owner].part)
             stiffness = np.where(part.locators.springy, part.locators.stiffness, np.inf)[supports]
             numbers = start + supports
-            yield ContactPoints(name, int(owner), part.parent, P, P, n, offsets, locators=numbers, stiffness=stiffness)
-        for number in np.flatnonzero(part.locators.springy & ~part.locators.one_sided) if part.free else ():
+            yield ContactPoints(
+                name, int(owner), part.parent, P, P, n, offsets, locators=numbers, stiffness=stiffness,
+                elastic=bool(part.locators.elastic.any()),
+            )  # fmt: skip
+        for number in np.flatnonzero(part.locators.elastic & ~part.locators.one_sided) if part.free else ():
+            yield _holding_pair(part, int(owners[number]), start, int(number))
+        for number in (
+            np.flatnonzero(part.locators.springy & ~part.locators.one_sided & ~part.locators.elastic) if part.free else ()
+        ):
             yield _spring_pair(part, int(owners[number]), start, int(number))
         start += len(part.locators)
+
+
+def _holding_pair(part: NominalPart, owner: int, start: int, number: int) -> ContactPoints:
+    """Return a two-sided locator of an elastic part as a pair of one point, which pushes and pulls."""
+    locators, point = part.locators, np.array([number])
+    P, stiffness = locators.points[point], np.where(locators.springy, locators.stiffness, np.inf)[point]
+    return ContactPoints(
+        locators.labels[number], owner, part.parent, P, P, locators.directions[point], _support_offsets(locators, start, point),
+        locators=start + point, stiffness=stiffness, holds=True, elastic=True,
+    )  # fmt: skip
 
 
 def _spring_pair(part: NominalPart, owner: int, start: int, number: int) -> ContactPoints:

@@ -15,6 +15,7 @@ from tolcontact.discretization.measurements import nominal_measurements
 from tolcontact.discretization.nominal import ContactPoints, Nominal
 from tolcontact.discretization.scales import scale_faults
 from tolcontact.discretization.scenes import Scene, joint_indices, scenes_of
+from tolcontact.discretization.weld_pairs import welds_and_pairs
 from tolcontact.errors import Faults, designation
 from tolcontact.features import Features, Placement, datum_order
 from tolcontact.features.freedoms import DATUM
@@ -77,7 +78,9 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
             faults.extend(_contributor_faults(assembly, labels, shifts))
     faults.extend(fault for scene in scenes for fault in _reserved_names(scene))
     Faults(dict.fromkeys(faults)).refuse(assembly.name)
-    nominal = _nominal(assembly, scenes, nominal_parts, (*pairs, *support_pairs(nominal_parts, scenes)), features)
+    pairs += support_pairs(nominal_parts, scenes)
+    welds, pairs_of_welds = welds_and_pairs(assembly, scenes, nominal_parts, len(labels))
+    nominal = replace(_nominal(assembly, scenes, nominal_parts, (*pairs, *pairs_of_welds), features), welds=welds)
     Faults(scale_faults(nominal)).refuse(assembly.name)
     return nominal
 
@@ -258,6 +261,7 @@ def _locators(
         stiffness=np.array([float(locator.stiffness or USUAL_STIFFNESS) for locator in declared]),
         one_sided=np.array([locator.one_sided for locator in declared], dtype=bool),
         springy=np.array([locator.stiffness is not None for locator in declared], dtype=bool) & may_give,
+        elastic=np.full(len(declared), scene.is_elastic(part)),
         faces=(None,) * len(declared),
         grounds=(None,) * len(declared),
         placing=location.placing if location else FIRST_ORDER,

@@ -32,6 +32,7 @@ class Locators:
     stiffness    (locator,) [N/mm]
     one_sided    (locator,) bool: supports that the part may lift off
     springy      (locator,) bool: locators that are compliant, by their stiffness
+    elastic      (locator,) bool: locators at elastic parts, or on them
     faces        for each locator the face of a feature that it touches; None for a nominal face
     grounds      for each locator the feature of another part that it is on; None if it is on no feature
     floating     centre (3,) and size [mm] of a floating part; None for a part that its locators fix
@@ -45,6 +46,7 @@ class Locators:
     stiffness: np.ndarray
     one_sided: np.ndarray
     springy: np.ndarray
+    elastic: np.ndarray
     faces: tuple[FaceDeviation | None, ...]
     grounds: tuple[FaceDeviation | None, ...]
     floating: tuple[np.ndarray, float] | None = None
@@ -65,14 +67,15 @@ class Locators:
             stiffness=np.array([value for part in parts for value in part.stiffness], dtype=float),
             one_sided=np.array([value for part in parts for value in part.one_sided], dtype=bool),
             springy=np.array([value for part in parts for value in part.springy], dtype=bool),
+            elastic=np.array([value for part in parts for value in part.elastic], dtype=bool),
             faces=tuple(face for part in parts for face in part.faces),
             grounds=tuple(ground for part in parts for ground in part.grounds),
         )
 
     @property
     def exact(self) -> np.ndarray:
-        """Whether locators are two-sided and rigid (locator,)."""
-        return ~self.one_sided & ~self.springy
+        """Whether locators are two-sided and rigid, between rigid parts (locator,)."""
+        return ~self.one_sided & ~self.springy & ~self.elastic
 
     def pushes(self, locator: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the columns (k,) of the deviations of features that displace a locator, and its displacements (k,) per unit.
@@ -96,14 +99,14 @@ class Locators:
         """The matrix M (6, locator) of q = M d, and the centroid c (3,), the centre of rotation.
 
         A floating part moves as little as possible. Six locators give M = J^-1. With more than six the two-sided locators are
-        kept exactly, and the one-sided locators by least squares.
+        kept exactly, and the one-sided locators by least squares; all by least squares if the part is elastic.
         """
         J, centre = self.matrix
         if self.floating is not None:
             return self._least_motion(J, self.floating[1]), centre
         if len(J) == 6:
             return np.linalg.inv(J), centre
-        if self.placing == BEST_FIT:
+        if self.placing == BEST_FIT or self.elastic.any():
             return np.linalg.pinv(J), centre
         exact, supports = J[~self.one_sided], J[self.one_sided]
         kkt = np.block([[supports.T @ supports, exact.T], [exact, np.zeros((len(exact), len(exact)))]])
@@ -128,9 +131,12 @@ class Locators:
         return to_q @ M
 
     def _contradicting(self, J: np.ndarray) -> str:
-        """Return the names of two-sided locators whose rows J (locator, 6) depend on each other; "" if there are none."""
+        """Return the names of two-sided locators whose rows J (locator, 6) depend on each other; "" if there are none.
+
+        More than six, which hold an elastic part, always do, and name no culprit.
+        """
         U, S, _ = np.linalg.svd(J)
-        if not len(J) or S[-1] * MAX_CONDITION > S[0]:
+        if not 0 < len(J) <= J.shape[1] or S[-1] * MAX_CONDITION > S[0]:
             return ""
         share = np.abs(U[:, len(S) - 1])
         names = np.array(self.labels)[~self.one_sided]

@@ -16,6 +16,7 @@ from tolcontact.discretization.offsets import Offsets, PairForm
 from tolcontact.discretization.plane_minima import PlaneMinima
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
+from tolcontact.discretization.weld import ElasticInputs, Weld
 from tolcontact.features import FaceDeviation, Features, Freedom, NominalFeature, NominalPattern
 from tolcontact.features.freedoms import LOCATOR, VARIABLE
 from tolcontact.features.zone_kernel import sum_modes
@@ -47,6 +48,7 @@ class ContactPoints:
     locators    (point,) indices of the one-sided locators
     stiffness   (point,) [N/mm] of springs, infinite for rigid one-sided locators; None for rigid faces
     pulls       (point,): whether the spring of a two-sided locator pulls at a point; None if none does
+    holds, elastic   whether its point is a two-sided locator, which pushes and pulls; whether one of its parts is elastic
     """
 
     name: str
@@ -66,6 +68,8 @@ class ContactPoints:
     locators: np.ndarray | None = None
     stiffness: np.ndarray | None = None
     pulls: np.ndarray | None = None
+    holds: bool = False
+    elastic: bool = False
 
     @cached_property
     def facing(self) -> np.ndarray:
@@ -110,7 +114,7 @@ class ContactPoints:
     @cached_property
     def minima(self) -> PlaneMinima | None:
         """The gap between contact points of two rigid planes with form; None for other pairs."""
-        if not self.has_form or self.moving_face is None or self.reference_face is None or self.stiffness is not None:
+        if not self.has_form or self.moving_face is None or self.reference_face is None or self.is_springy:
             return None
         if not (self.moving_face.is_flat and self.reference_face.is_flat):
             return None
@@ -185,8 +189,8 @@ class ContactPoints:
 
     @property
     def is_springy(self) -> bool:
-        """Whether some of the points are compliant."""
-        return self.stiffness is not None and bool(np.isfinite(self.stiffness).any())
+        """Whether some of the points are compliant, by springs or by elastic parts."""
+        return self.elastic or (self.stiffness is not None and bool(np.isfinite(self.stiffness).any()))
 
     @property
     def is_supports(self) -> bool:
@@ -195,12 +199,13 @@ class ContactPoints:
 
 
 @dataclass(frozen=True, eq=False)
-class Nominal:
+class Nominal(ElasticInputs):
     """An assembly with numbers.
 
     measurements   of each measure; None if it measures points or an expression
     scenes         the models of the stations, which share the parts: each has its own measures; none without stations
     station        the name of the station, in the model of one
+    welds          of elastic parts; their gaps are inputs of a realization after its deviations
 
     With stations a part has an entry among the `parts` in each station that holds it, station by station.
     """
@@ -213,6 +218,7 @@ class Nominal:
     measurements: tuple[NominalMeasurement | None, ...] = ()
     scenes: "tuple[Nominal, ...]" = ()
     station: str = ""
+    welds: tuple[Weld, ...] = ()
     _face_pairs: dict[int, FacePair] = field(default_factory=dict, init=False)
 
     def face_pair(self, index: int) -> FacePair | None:

@@ -35,22 +35,31 @@ class Scene:
     def movers(self, part: Part) -> tuple[int, ...]:
         """Return the indices of the free parts whose corrections move a part: those it is located on, then the part itself.
 
-        A part of a joint is moved by the first part of the joint.
+        A part of a joint of rigid parts is moved by the first part of the joint.
         """
         chain = dict.fromkeys(self.assembly.support_chain(part))
+        if self.is_elastic(part):  # its body bends: its members move on their own
+            chain = dict.fromkeys([part, *list(chain)[1:]])
         return tuple(self.index(link) for link in reversed(chain) if self.is_free(link) and self._touches(link))
 
     def is_free(self, part: Part) -> bool:
         """Return whether contact may move the part.
 
-        Without a declared choice a part is free if it is a moving side, floats, or has supports.
+        Without a declared choice a part is free if it is a moving side, floats, has supports, or is elastic.
         """
         body = self.assembly.body_of(part)
         if any(member.fixed is not None for member in body):
             return any(member.fixed is False for member in body)
         location = self.assembly.location_of(part)
         floats = location is not None and location.floating
-        return floats or any(pair.moving.part in body for pair in self.assembly.pairs) or self.has_supports(part)
+        is_moving = any(pair.moving.part in body for pair in self.assembly.pairs)
+        return floats or is_moving or self.has_supports(part) or self.is_elastic(part)
+
+    def is_elastic(self, part: Part) -> bool:
+        """Return whether a part of its body is elastic, or the part that it is located on."""
+        location = self.assembly.location_of(part)
+        bodies = (*self.assembly.body_of(part), location.parent if location else None)
+        return any(body is not None and body.elasticity is not None for body in bodies)
 
     def has_supports(self, part: Part) -> bool:
         """Return whether a locator of the part is one-sided, or is compliant because forces press the parts."""
@@ -61,8 +70,10 @@ class Scene:
     def _touches(self, part: Part) -> bool:
         """Return whether something in the model holds or pushes the body of a part."""
         body = self.assembly.body_of(part)
-        return self.has_supports(part) or any(
-            side.part in body for pair in self.assembly.pairs for side in (pair.moving, pair.reference)
+        return (
+            self.has_supports(part)
+            or self.is_elastic(part)
+            or any(side.part in body for pair in self.assembly.pairs for side in (pair.moving, pair.reference))
         )
 
     def supports_name(self, part: Part) -> str:

@@ -150,7 +150,9 @@ class Watch:
         return MOTION_FACTOR * float(self._usual_motions[list(pair)].sum())
 
     def depth(self, pair: tuple[int, int]) -> float:
-        """Return the interference threshold of two bodies, a depth [mm]; infinite if any depth is allowed."""
+        """Return the interference threshold of two bodies, a depth [mm]; infinite if any is allowed, or if one is elastic."""
+        if any(self.nominal.parts[number].part.elasticity is not None for number in pair):  # only its contact points bend
+            return np.inf
         size = float(np.ptp(self._bounds[list(pair)], axis=1).max())
         return max(self._usual_depth, self.allowed.get(pair, 0.0), MIN_DEPTH, MIN_SHARE * size)
 

@@ -10,6 +10,7 @@ from tolcontact.declaration import Measure, Part, Point
 from tolcontact.declaration.measure import BINARY, MAX_STEPS, UNARY, Tape
 from tolcontact.discretization import Nominal
 from tolcontact.errors import Faults, designation
+from tolcontact.mechanics.flexibility import Bending
 from tolcontact.mechanics.group_equations import face_height, face_pose
 from tolcontact.mechanics.measurements import Observed, value_of
 from tolcontact.mechanics.pose import ENTRIES, Pose
@@ -82,25 +83,28 @@ def replay(tape: Tape, poses: Sequence[Pose], deviations: ca.SX) -> ca.SX:
 class SymbolicPoses:
     """The symbolic poses of the parts, by their declarations: the argument of a user-defined measure."""
 
-    def __init__(self, nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> None:
+    def __init__(self, nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX, bending: Bending | None = None) -> None:
         self._nominal = nominal
-        self._poses = poses
-        self._deviations = deviations
+        self.poses = poses
+        self.deviations = deviations
+        self._bending = bending
 
     def _pose(self, part: Part) -> Pose:
         if part not in self._nominal.assembly.parts:
             names = ", ".join(declared.name for declared in self._nominal.assembly.parts)
             raise LookupError(f'unknown part "{getattr(part, "name", part)}"; the parts are: {names}')
-        return self._poses[self._nominal.part_index(part)]
+        return self.poses[self._nominal.part_index(part)]
 
     def position(self, point: Point) -> ca.SX:
         """Return the position (3, 1) [mm] of a declared point in the assembly frame."""
         X, p, face = self._pose(point.part), ca.SX(ca.DM(self._nominal.position(point))), self._nominal.face_at(point)
+        if self._bending is not None:
+            p += self._bending.displacement(self._nominal.part_index(point.part), self._nominal.position(point))
         if face is None:
             return X.apply(p)
-        X_face = face_pose(face, self._deviations)
+        X_face = face_pose(face, self.deviations)
         if face.grows or face.form is not None:
-            height = face_height(face, self._deviations, self._nominal.position(point))
+            height = face_height(face, self.deviations, self._nominal.position(point))
             p = p + height * ca.DM(self._nominal.outward(point))
         return X.apply(p if X_face is None else X_face.apply(p))
 
@@ -113,13 +117,13 @@ class SymbolicPoses:
         return self._pose(part).t
 
 
-def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list[ca.SX]:
-    """Return one scalar expression per declared measure, of poses and deviations (contributor, 1).
+def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX, bending: Bending | None = None) -> list[ca.SX]:
+    """Return one scalar expression per declared measure, of poses and deviations (contributor, 1), of parts with a `bending`.
 
     Raises ModelError if a user's function fails or does not return a scalar.
     """
     if nominal.scenes:
-        return [expression for scene in nominal.scenes for expression in measured(scene, poses, deviations)]
+        return [expression for scene in nominal.scenes for expression in measured(scene, poses, deviations, bending)]
     faults = Faults()
     expressions: list[ca.SX] = []
     for measure, measurement in zip(nominal.measures, nominal.measurements, strict=True):
@@ -128,7 +132,7 @@ def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list
             expressions.append(value if measure.unit == 1 else value / measure.unit)
             continue
         try:
-            expressions.append(_expression(measure, nominal, poses, deviations))
+            expressions.append(_expression(measure, nominal, SymbolicPoses(nominal, poses, deviations, bending)))
         except FunctionError as error:
             faults.append(f"{designation(measure.noun, measure)}: its function {error}")
             expressions.append(ca.SX.nan(1))
@@ -136,8 +140,7 @@ def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list
     return expressions
 
 
-def _expression(measure: Measure, nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> ca.SX:
-    part_poses = SymbolicPoses(nominal, poses, deviations)
+def _expression(measure: Measure, nominal: Nominal, part_poses: SymbolicPoses) -> ca.SX:
     if isinstance(measure.of, Point):
         point, to = measure.of, measure.to
         if to is not None:
@@ -150,6 +153,7 @@ def _expression(measure: Measure, nominal: Nominal, poses: Sequence[Pose], devia
         return ca.dot(ca.DM(np.array(measure.along) / measure.unit), moved)
     function: Any = measure.of
     recorded = isinstance(function, tuple)
+    poses, deviations = part_poses.poses, part_poses.deviations
     expression = called(lambda: ca.SX(replay(function, poses, deviations) if recorded else function(part_poses)))
     if expression.shape != (1, 1):
         raise FunctionError(f"returned an expression of shape {expression.shape}; expected one number")

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 
 from tolcontact.compilation import Program
 from tolcontact.errors import NominalWarning
+from tolcontact.plausibility.bending import large_bending, unresolved_nominal
 from tolcontact.plausibility.bodies import body_overlaps, clashes, clashes_beyond_faces
 from tolcontact.plausibility.declared_points import doubtful_units, far_points, stored_coordinates, unfit_directions
 from tolcontact.plausibility.effects import unfollowed_by_locators, unfollowed_by_measures, unused_features, unvaried
@@ -42,6 +43,7 @@ KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
     "force": (unused_forces,),
     "friction": (unsure_seats,),
     "form": (measured_forms,),
+    "bending": (large_bending, unresolved_nominal),
     "effect": (unfollowed_by_measures, unfollowed_by_locators, unused_features, unvaried),
 }
 

@@ -74,6 +74,11 @@ class TrialDraws:
         return simulate_block(self.program, self.deviations)
 
     @cached_property
+    def nominally_resolved(self) -> Block:
+        """The nominal assembly with contact."""
+        return simulate_block(self.program, np.zeros((1, self.deviations.shape[1])))
+
+    @cached_property
     def pushes(self) -> list[float]:
         """The displacement [mm] of parts that contact of each pair, and forces, may cause."""
         presses = self.program.method.minimizes.presses

@@ -188,6 +188,8 @@ def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
     yield from offset_lines(summary)
     if shifted := summary.attrs["datum_shifts"]:
         yield f"datum shift of {shifted}: not drawn; contact of the datum features determines it"
+    if elastic := summary.attrs["elastic_parts"]:
+        yield f"elastic parts: {elastic}; certificates hold at their contact points, bent; fields show their rigid motion"
     if stored := summary.attrs["stored_coordinates"]:
         yield stored
     yield from summary.attrs["correlations"].splitlines()

@@ -30,6 +30,8 @@ class Block(Record, Readable):
     active        (n, pair): number of active contact points in the raw state
     carrying      (n, pair): number of contact points under load: with more than 1e-4 of the largest reaction
     reaction      (n, pair): sum of the reactions of these points, in the units of the objective
+    weld_gap      (n, weld row) [mm]: gaps that welds keep, from the station that joined their parts
+    load          (n, load) [N]: reactions at the contact points between elastic parts, see Nominal.loads
     clashes       (n,): number of pairs of parts without declared contact that lie in each other in the corrected state; -1 if
                   they were not tested
     clash_depth   (n,) [mm]: penetration of the deepest of these pairs, NaN if it is not measured; clash_part, clash_other (n,)
@@ -51,6 +53,8 @@ class Block(Record, Readable):
     active: Int[Array, "n pair"] = field(metadata={"variable": terms.ACTIVE})
     carrying: Int[Array, "n pair"] = field(metadata={"variable": terms.CARRYING})
     reaction: Float[Array, "n pair"] = field(metadata={"variable": terms.REACTION})
+    weld_gap: Float[Array, "n weld_row"] = field(metadata={"variable": terms.WELD_GAP})
+    load: Float[Array, "n load"] = field(metadata={"variable": terms.LOAD})
     clashes: Int[Array, " n"] = field(metadata={"variable": terms.CLASHES})
     clash_depth: Float[Array, " n"] = field(metadata={"variable": terms.CLASH_DEPTH})
     clash_part: Int[Array, " n"] = field(metadata={"variable": terms.CLASH_PART})
@@ -81,6 +85,8 @@ class Block(Record, Readable):
         measured: Float[Array, "n measure"],
         pairs: int,
         stations: int,
+        loads: int,
+        welds: int,
     ) -> "Block":
         """Return realizations at their raw poses (n, part, 12), with measures (n, measure), that contact does not change."""
         count, states = len(raw), len(terms.STATES)
@@ -94,6 +100,8 @@ class Block(Record, Readable):
             active=np.zeros((count, pairs), dtype=int),
             carrying=np.zeros((count, pairs), dtype=int),
             reaction=np.zeros((count, pairs)),
+            load=np.zeros((count, loads)),
+            weld_gap=np.zeros((count, welds)),
             clashes=np.full(count, -1),
             clash_depth=np.zeros(count),
             clash_part=np.full(count, -1),
@@ -129,12 +137,16 @@ def simulate_block(
     placed = program.place(deviations=deviations)["poses"]
     raw = placed.reshape(len(deviations), len(program.nominal.parts), ENTRIES)
     measured, relative = _observe(program, raw, deviations)
-    block = Block.untouched(start, deviations, raw, measured, len(program.nominal.pairs), len(program.stations))
+    nominal, stations = program.nominal, len(program.stations)
+    counts = {"pairs": len(nominal.pairs), "loads": len(nominal.loads), "welds": nominal.input_count - deviations.shape[1]}
+    block = Block.untouched(start, deviations, raw, measured, stations=stations, **counts)
     stages = program.stations or (None,)
     outcomes_by_stage = np.zeros((len(block), len(stages)), dtype=np.int8)
     # NaN gaps count as no contact, so realizations with NaN poses are marked as unsolved below.
     is_unknown = ~np.isfinite(raw).all(axis=(1, 2))
     raw_relative = relative.copy() if program.stations else relative
+    raw_inputs = np.concatenate([deviations, block.weld_gap], axis=1) if nominal.welds else deviations
+    inputs = raw_inputs.copy() if nominal.welds else deviations
     for position, station in enumerate(stages):
         worst = outcomes_by_stage[:, position]
         changed = np.flatnonzero(outcomes_by_stage.any(axis=1))
@@ -142,11 +154,14 @@ def simulate_block(
             station, changed, raw, relative, block.poses[:, CORRECTED], deviations
         )
         for resolver in resolvers if station is None else [resolvers[index] for index in station.groups]:
-            resolved = resolver.resolve(raw, relative, deviations)
+            resolved = resolver.resolve(raw, relative, inputs)
             _put(block, resolver, resolved)
             if is_placed_again:
-                _put_raw(block, resolver, changed, raw_relative)
+                _put_raw(block, resolver, changed, raw_relative, raw_inputs)
             worst[resolved.touched] = np.maximum(worst[resolved.touched], resolved.state.outcome)
+        for weld in nominal.welds:
+            if program.bending is not None and station is not None and weld.station == station.name:
+                inputs[:, weld.columns] = program.bending.weld_gaps(weld, block.poses[:, CORRECTED], block.load)
     if program.method.is_bounded:
         worst = outcomes_by_stage.max(axis=1)
         bodies = watched_bodies(
@@ -163,11 +178,16 @@ def simulate_block(
         for index, rows in bodies.withdrawn:
             worst = outcomes_by_stage[:, index]
             worst[rows] = np.where(worst[rows] <= Outcome.RESOLVED, Outcome.DOUBTFUL, worst[rows])
+    block.weld_gap[:] = inputs[:, deviations.shape[1] :]
     is_unknown |= ~np.isfinite(raw).all(axis=(1, 2))
     outcomes_by_stage[is_unknown], block.kkt_residual[is_unknown] = Outcome.UNSOLVED, np.inf
     worst = outcomes_by_stage.max(axis=1)
     touched = worst > Outcome.UNTOUCHED
     block.measured[touched, CORRECTED], _ = _observe(program, block.poses[touched, CORRECTED], deviations[touched])
+    if program.observe_bent is not None:
+        poses = block.poses[touched, CORRECTED].reshape(int(touched.sum()), -1)
+        bent = program.observe_bent(poses=poses, deviations=deviations[touched], loads=block.load[touched])
+        block.measured[touched, CORRECTED] = bent["measured"]
     block.locator_offset[touched] = locator_offsets(program.nominal, block.poses[touched])
     statuses = _statuses(program.method.is_exact)
     block.status[:], block.station_status[:] = statuses[worst], statuses[outcomes_by_stage[:, : len(program.stations)]]
@@ -205,11 +225,22 @@ def _put(block: Block, resolver: ContactResolver, resolved: Resolved) -> None:
     block.carrying[np.ix_(touched, pairs)] = resolved.carrying(resolver.spans)
     block.reaction[np.ix_(touched, pairs)] = resolved.reactions(resolver.spans, resolver.contact_points)
     join_groups(block, touched, state)
+    if resolver.flexibility is not None:
+        block.load[touched[:, None], resolver.flexibility.loads] = state.multipliers[:, resolver.flexibility.load_rows]
 
 
-def _put_raw(block: Block, resolver: ContactResolver, rows: np.ndarray, relative: Float[Array, "n pair 12"]) -> None:
-    """Write gaps and active points of the raw state for rows whose contact was resolved from handed-over poses."""
-    gaps, active = resolver.raw_contact(relative[rows], block.deviations[rows])
+def _put_raw(
+    block: Block,
+    resolver: ContactResolver,
+    rows: np.ndarray,
+    relative: Float[Array, "n pair 12"],
+    inputs: Float[Array, "n input"],
+) -> None:
+    """Write gaps and active points of the raw state for rows whose contact was resolved from handed-over poses.
+
+    inputs   deviations, and 0 for the gaps of welds, which keep none before contact
+    """
+    gaps, active = resolver.raw_contact(relative[rows], inputs[rows])
     block.gap_min[rows[:, None], RAW, resolver.pairs] = gaps
     block.active[rows[:, None], resolver.pairs] = active
 

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
+from tolcontact.arrays import Array, Bool
 from tolcontact.realizations import EXISTS, assembled, column, pieces
 from tolcontact.statistics import intervals
 from tolcontact.statistics.sample import Sample
@@ -61,10 +62,13 @@ def _unique_rows(masks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class TouchingShares:
-    """The share of realizations with contact at each contact point, accumulated over realizations."""
+    """The share of realizations with contact at each contact point, accumulated over realizations.
 
-    def __init__(self, points: int) -> None:
-        self._counts, self._realizations = np.zeros(points, dtype=np.int64), 0
+    is_counted   (point,): others have no share
+    """
+
+    def __init__(self, is_counted: Bool[Array, " point"]) -> None:
+        self._counts, self._realizations, self._is_counted = np.zeros(len(is_counted), dtype=np.int64), 0, is_counted
 
     def add(self, counts: np.ndarray, realizations: int) -> None:
         """Add the counts (point,) of contacts at each point in `realizations` further realizations."""
@@ -77,7 +81,7 @@ class TouchingShares:
             return np.full(len(self._counts), np.nan), np.full((len(self._counts), len(terms.BOUNDS)), np.nan), 0
         counts, place = np.unique(self._counts, return_inverse=True)
         estimates = np.array([intervals.proportion_of(int(count), self._realizations) for count in counts])
-        estimates = estimates.reshape(-1, len(terms.ESTIMATE))[place]
+        estimates = np.where(self._is_counted[:, None], estimates.reshape(-1, len(terms.ESTIMATE))[place], np.nan)
         return estimates[:, 0], estimates[:, 1:], self._realizations
 
 

@@ -117,6 +117,7 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
             terms.NOT_WATCHED: str(results.attrs.get(terms.NOT_WATCHED, "")),
             terms.STANDARD: str(results.attrs.get(terms.STANDARD, "")),
             terms.STORED_COORDINATES: str(results.attrs.get(terms.STORED_COORDINATES, "")),
+            terms.ELASTIC_PARTS: str(results.attrs.get(terms.ELASTIC_PARTS, "")),
             terms.CORRELATIONS: str(results.attrs.get(terms.CORRELATIONS, "")),
         },
     )

@@ -79,7 +79,8 @@ def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) ->
     moving or the reference part, and n the nominal normal rotated with the reference part; the deviation of the unilateral
     locator that a point represents is subtracted. The gap between a ball or a shaft and a wall is their distance, from their
     sizes and positions. Faces of features are first displaced in their parts, then offset outwards by their sizes and form
-    deviations. The two results may differ by `within` [mm], by default 1e-9.
+    deviations. Gaps between elastic parts are larger by their opening under constant forces, and by their flexibility times the
+    archived loads. The two results may differ by `within` [mm], by default 1e-9.
 
     Where faces end (pairs that the archive calls `bounded`), contact is searched again at the archived poses, between archived
     bodies. This is the simulation's own search, so it detects inconsistent poses and gaps, not an error of the search itself;
@@ -146,7 +147,7 @@ def assert_same_run(a: Results, b: Results, *, variables: Sequence[str] | None =
 
     Raises AssertionError with the number of variables that differ, and the first realization that differs in the first of them.
     """
-    names = [variable.name for variable in terms.BY_REALIZATION]
+    names = [variable.name for variable in (*terms.BY_REALIZATION, *terms.ELASTIC_ROWS)]
     if unknown := [name for name in variables or () if name not in names]:
         raise OptionError(f"no realization has {', '.join(map(repr, unknown))}; expected some of: {', '.join(names)}")
     with opened(a) as expected, opened(b) as actual:
@@ -168,7 +169,10 @@ def assert_same_run(a: Results, b: Results, *, variables: Sequence[str] | None =
 
 def _rows(tree: xr.DataTree) -> Rows:
     """Return the archived variables of realizations; names in stations include the paths of their groups."""
-    groups = [tree.to_dataset(), *(tree.children[name].to_dataset() for name in ("sample",) if name in tree.children)]
+    groups = [
+        tree.to_dataset(),
+        *(tree.children[name].to_dataset() for name in ("sample", terms.ELASTIC_GROUP) if name in tree.children),
+    ]
     stations = tree.children[terms.STATIONS_GROUP].children.values() if terms.STATIONS_GROUP in tree.children else ()
     rows = {str(name): values for group in groups for name, values in group.data_vars.items()}
     return rows | {

@@ -16,6 +16,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.discretization import ContactPoints, rim_points
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.geometry.surface import Surface
+from tolcontact.testing.archived_bending import ArchivedBending
 from tolcontact.testing.archived_form import ArchivedForm
 
 DIRECTIONS = 72  # initial samples
@@ -221,6 +222,7 @@ class ArchivedPair:
             float(contact[terms.COORDINATE_ERROR.name][pair]) if terms.COORDINATE_ERROR.name in contact else 0.0
         )
         self.facing = contact[terms.FACING.name][is_own] if terms.FACING.name in contact else None
+        self.bending = ArchivedBending(tree, np.flatnonzero(is_own)) if terms.ELASTIC_GROUP in tree.children else None
 
     @property
     def _needs_deviations(self) -> bool:
@@ -228,10 +230,18 @@ class ArchivedPair:
         return bool((self.locators >= 0).any()) or max(self.moving_face, self.reference_face) >= 0
 
     def gaps(self, rows: Rows, piece: slice) -> np.ndarray:
-        """Return the gaps (realization, state, point) [mm] of a piece of the realizations.
+        """Return the gaps (realization, state, point) [mm] of a piece of the realizations; parts bend in corrected states only.
 
         Raises MissingVariableError, with the name of a required variable that the archive does not have.
         """
+        gaps = self._rigid_gaps(rows, piece)
+        if self.bending is not None and self.bending.loads.size:
+            gaps[:, terms.CORRECTED] += self.bending.openings(_needed(rows, terms.LOAD.name, piece))
+            gaps[:, terms.CORRECTED] -= self.bending.kept(_needed(rows, terms.WELD_GAP.name, piece))
+        return gaps
+
+    def _rigid_gaps(self, rows: Rows, piece: slice) -> np.ndarray:
+        """Return the gaps (realization, state, point) [mm] between stress-free parts."""
         moving, reference = (_pose(rows, piece, part) for part in (self.moving_part, self.reference_part))
         deviations = _needed(rows, terms.DEVIATION.name, piece) if self._needs_deviations else np.zeros((1, 0))
         R_m, t_m = self.faces.placed(self.moving_face, deviations, *moving)

@@ -41,6 +41,8 @@ def count_touching(
     if len(poses) and counts:
         relative = program.observe(poses=poses, deviations=deviations)["relative"].reshape(len(poses), len(counts), -1)
         for k, (gaps, points) in enumerate(zip(program.gaps, counts, strict=True)):
+            if program.nominal.pairs[k].elastic:
+                continue
             X_RM = np.ascontiguousarray(relative[:, k])
             if k in program.meetings:
                 points[:] = _nearest_counts(program, k, relative[:, k], deviations)
@@ -93,7 +95,8 @@ class RunSums:
     def __init__(self, program: Program, run: Run) -> None:
         self._program, self._seed = program, run.seed
         self._fields = DisplacementFields(program.nominal, str(run.fields))
-        self._points = sum(len(pair.P_m) for pair in program.nominal.pairs)
+        pairs = program.nominal.pairs  # without those of elastic parts, which touch where they are bent
+        self._is_counted = np.concatenate([np.zeros(0, dtype=bool), *(np.full(len(p.P_m), not p.elastic) for p in pairs)])
 
     @property
     def sizes(self) -> list[int]:
@@ -115,7 +118,7 @@ class RunSums:
         counted = counted_realizations(self._program.nominal) if is_known else 0
         self.of_blocks = _BlockReduction(tuple(row.label for row in writer.kept), self._fields, counted)
         self._fields.resume_from(writer.sums)
-        self._touching = TouchingShares(self._points)
+        self._touching = TouchingShares(self._is_counted)
         if end := min(writer.rows, counted):
             rows, poses = writer.first_poses(end)
             self._touching.add(*count_touching(self._program, poses, self._program.draws.rows(rows, seed=self._seed)))

@@ -1,0 +1,113 @@
+"""Elastic parts: the material of a part, or a file with its stiffness matrix."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+from tolcontact.declaration.checks import LENGTH, POSITIVE, Check, Checked, Declaration
+from tolcontact.declaration.values import is_finite, script_line
+from tolcontact.user_functions import refuse_in_functions
+
+MIN_POISSON, MAX_POISSON = -1.0, 0.5
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+MODULUS = Check(lambda value: _is_number(value) and value > 0, "a modulus in MPa above 0, such as 70e3", POSITIVE)
+POISSON = Check(
+    lambda value: _is_number(value) and MIN_POISSON < value < MAX_POISSON, "a Poisson's ratio between -1 and 0.5", float
+)
+DENSITY = Check(lambda value: _is_number(value) and value > 0, "a density in kg/m^3 above 0, such as 2700", POSITIVE)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Elastic(Checked):
+    """The elasticity of a part, linear about its stress-free shape: from its own mesh, or from a stiffness matrix.
+
+    E          Young's modulus [MPa] of an isotropic material
+    nu         its Poisson's ratio
+    density    [kg/m^3], which `assembly.gravity` needs
+    stiffness  file with the stiffness matrix [N/mm] of a finite-element program, without supports, in place of E and nu
+    nodes      file with the nodes [mm] of that matrix, in the frame of the part
+    pad        [mm] radius over which a force at a point is spread; by default that of the body
+    """
+
+    E: float | None = None
+    nu: float | None = None
+    density: float | None = None
+    stiffness: str | Path | None = None
+    nodes: str | Path | None = None
+    pad: float | None = None
+    declared_at: str = ""
+    fault_prefix = "elastic "
+    checks: ClassVar = {"E": MODULUS, "nu": POISSON, "density": DENSITY, "pad": LENGTH}
+
+    def faults(self) -> Iterator[str]:
+        yield from super().faults()
+        has_material, has_matrix = self.E is not None or self.nu is not None, self.stiffness is not None
+        if has_material and has_matrix:
+            yield "elastic has E or nu and a stiffness; give the material, or the files of a matrix"
+        elif has_matrix and self.nodes is None:
+            yield 'elastic has a stiffness without nodes; give the file with the nodes of the matrix, as in nodes="nodes.csv"'
+        elif not has_matrix and (self.E is None or self.nu is None):
+            yield "elastic needs E and nu, as in elastic(E=70e3, nu=0.33), or stiffness and nodes"
+
+    def __str__(self) -> str:
+        if self.stiffness is not None:
+            return f"elastic, by {Path(self.stiffness).name}"
+        return f"elastic, E {self.E:g} MPa, nu {self.nu:g}"
+
+
+class Deformable(Declaration):
+    """A part that may be declared elastic."""
+
+    noun: ClassVar[str] = "part"
+    fixed: bool | None
+    _declared: list[Any]
+
+    def elastic(
+        self, E: float | None = None, nu: float | None = None, *, density: float | None = None,
+        stiffness: str | Path | None = None, nodes: str | Path | None = None, pad: float | None = None,
+    ) -> Elastic:  # fmt: skip
+        """Declare that forces bend this part: `part.elastic(E=70e3, nu=0.33)`, or by the files of a matrix (see Elastic).
+
+        E, nu             modulus [MPa] and Poisson's ratio of its material
+        density           [kg/m^3], which `assembly.gravity` needs
+        stiffness, nodes  files of a stiffness matrix [N/mm] without supports, and of its nodes [mm], in place of E and nu
+        pad               [mm] radius over which a force at a point is spread
+        """
+        refuse_in_functions()
+        elastic = Elastic(
+            E=E, nu=nu, density=density, stiffness=stiffness, nodes=nodes, pad=pad, declared_at=script_line()
+        )  # fmt: skip
+        self._declared.append(elastic)
+        return elastic
+
+    @property
+    def elasticity(self) -> Elastic | None:
+        """Its elasticity; None for a rigid part."""
+        return next((declared for declared in self._declared if isinstance(declared, Elastic)), None)
+
+    def elastic_faults(self) -> Iterator[str]:
+        """Yield the faults of its elasticity."""
+        declared = [elastic for elastic in self._declared if isinstance(elastic, Elastic)]
+        for elastic in declared:
+            yield from elastic.faults()
+        if len(declared) > 1:
+            yield f"it is declared elastic {len(declared)} times; declare it once"
+        if declared and self.fixed:
+            yield "it is elastic and fixed=True; leave fixed out, and hold it by its locators"
+
+
+def gravity_faults(acceleration: tuple[float, float, float] | None, *, has_elastic: bool) -> Iterator[str]:
+    """Yield the faults of an `acceleration` [m/s^2] of an assembly; it needs an elastic part, whose mass is known."""
+    if acceleration is None:
+        return
+    if not (is_finite(acceleration) and any(acceleration)):
+        yield f"gravity is {acceleration!r}; expected a nonzero acceleration [m/s^2], as in gravity((0, 0, -9.81))"
+    elif not has_elastic:
+        yield "it has gravity, which acts on elastic parts alone; declare the weights of rigid parts with assembly.force(...)"

@@ -1,0 +1,117 @@
+"""Welds: points at which a joint holds elastic parts together.
+
+The guns of the station that joins them hold the parts at their nominal distance. What gaps the pads then have, along their
+normals and across, each later station keeps: rows of two-sided locators between the parts. The kept gaps are inputs of a
+realization after its deviations.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import trimesh
+
+from tolcontact.declaration import Assembly, Joint
+from tolcontact.discretization.locators import NominalPart
+from tolcontact.discretization.nominal import ContactPoints
+from tolcontact.discretization.offsets import Offsets
+from tolcontact.discretization.scenes import Scene
+from tolcontact.discretization.weld import Weld
+from tolcontact.errors import Faults, GeometryFault, designation
+from tolcontact.geometry.tolerances import ROUNDING
+
+REACH = 0.1  # of the size of the other part: parts that are further apart are not welded
+PAD_POINTS = 3
+MAX_CONDITION = 1e6  # of the rows of a joint, with lengths in sizes of the part
+
+
+def welds_and_pairs(
+    line: Assembly, scenes: Sequence[Scene], parts: Sequence[NominalPart], inputs: int
+) -> tuple[tuple[Weld, ...], tuple[ContactPoints, ...]]:
+    """Return the welds of all joints at points, whose first input is number `inputs`, and their pairs in all stations.
+
+    Raises ModelError for points where the parts are too far apart.
+    """
+    faults, welds, pairs = Faults(), list[Weld](), list[ContactPoints]()
+    for joint in line.joints:
+        for number, scene in enumerate(scenes):
+            if not joint.at or scene.station != joint.station:
+                continue
+            made = faults.attempt(designation("joint", joint), _weld, joint, scene, parts, inputs)
+            if made is not None:
+                welds.append(made[0])
+                inputs += len(made[0].columns)
+                later = [other for other in scenes[number + 1 :] if joint.welded[0] in other.assembly.parts]
+                pairs += [made[1], *(_kept(joint, made[0], scene) for scene in later)]
+    faults.refuse(line.name)
+    return tuple(welds), tuple(pairs)
+
+
+def _weld(joint: Joint, scene: Scene, parts: Sequence[NominalPart], first: int) -> tuple[Weld, ContactPoints]:
+    """Return the weld of a joint, and the pair of its guns in the station that joins the parts."""
+    reference, moving = (scene.index(part) for part in joint.welded)
+    own, other = parts[reference].body, parts[moving].body
+    centres = parts[reference].placed(np.array([point.position for point in joint.at], dtype=float))
+    normals = np.array([_facing_normal(own, other, centre) for centre in centres])
+    rows = [row for centre, n in zip(centres, normals, strict=True) for row in _pad_rows(centre, n, joint.pad)]
+    P_r, n_r = (np.array(values) for values in zip(*rows, strict=True))
+    P_m = np.array([_nearest(other, point)[0] for point in np.concatenate([centres, P_r])])
+    distance = np.linalg.norm(P_m[: len(centres)] - centres, axis=1)
+    if distance.max() > REACH * parts[moving].mesh.scale:
+        k = int(distance.argmax())
+        raise GeometryFault(
+            f'its point {joint.at[k]} is {distance[k]:.3g} mm from part "{parts[moving].name}"; give points where both are'
+        )
+    arms = (P_r - P_r.mean(axis=0)) / parts[moving].mesh.scale
+    if not np.linalg.cond(np.hstack([n_r, np.cross(arms, n_r)])) < MAX_CONDITION:
+        raise GeometryFault(
+            f'at its points part "{parts[moving].name}" turns on part "{parts[reference].name}" as on a hinge; give points '
+            "that do not lie on one line, or a pad"
+        )
+    columns = first + np.arange(len(P_r))
+    weld = Weld(scene.station, moving, reference, P_m[len(centres) :], P_r, n_r, columns)
+    at_guns = P_m[: len(centres)]
+    none = Offsets.joined([], len(centres))
+    guns = ContactPoints(
+        f"guns of {scene.label(joint.name)}", moving, reference, at_guns, at_guns, normals, none, holds=True, elastic=True
+    )
+    return weld, guns
+
+
+def _pad_rows(centre: np.ndarray, n: np.ndarray, pad: float | None) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return points and directions that hold a pad of a radius [mm] as a rigid body, or a point without a pad."""
+    across = np.cross(n, np.eye(3)[np.abs(n).argmin()])
+    across /= np.linalg.norm(across)
+    along = np.cross(across, n)
+    if pad is None:
+        return [(centre, direction) for direction in (n, across, along)]
+    angles = 2 * np.pi * np.arange(PAD_POINTS) / PAD_POINTS
+    points = [centre + pad * (np.cos(angle) * along + np.sin(angle) * across) for angle in angles]
+    beside = np.cross(n, points[1] - points[0]) / np.linalg.norm(points[1] - points[0])
+    return [*((point, n) for point in points), (points[0], across), (points[0], along), (points[1], beside)]
+
+
+def _kept(joint: Joint, weld: Weld, scene: Scene) -> ContactPoints:
+    """Return the pair that keeps the gaps of a weld in a later station."""
+    reference, moving = (scene.index(part) for part in joint.welded)
+    gaps = Offsets(weld.columns, np.eye(len(weld.columns)))
+    return ContactPoints(
+        f"welds of {scene.label(joint.name)}", moving, reference, weld.P_m, weld.P_r, weld.n_r, gaps, holds=True, elastic=True
+    )
+
+
+def _facing_normal(own: trimesh.Trimesh, other: trimesh.Trimesh, point: np.ndarray) -> np.ndarray:
+    """Return the normal of a body at a point of its surface, towards another body; at an edge, of the face that faces it."""
+    normals = []
+    for body in (own, other):
+        _, distances = _nearest(body, point)
+        normals.append(np.asarray(body.face_normals)[distances <= distances.min() + ROUNDING * body.scale])
+    k, _ = np.unravel_index(np.argmin(normals[0] @ normals[1].T), (len(normals[0]), len(normals[1])))
+    return np.asarray(normals[0][k])
+
+
+def _nearest(body: trimesh.Trimesh, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the place (3,) [mm] of a body nearest to a point, and the distances (triangle,) [mm] of all triangles."""
+    triangles = np.asarray(body.triangles)
+    places = trimesh.triangles.closest_point(triangles, np.broadcast_to(point, (len(triangles), 3)))
+    distances = np.linalg.norm(places - point, axis=1)
+    return places[distances.argmin()], distances
