@@ -17,6 +17,7 @@ QUICK = (
     "beam_on_three_pegs", "beam_on_three_supports", "block_on_plane", "clutch_percentages", "hole_at_maximum_material",
     "ishigami", "linear_stack", "rectangular_pocket", "shaft_in_v", "worst_clutch",
 )  # fmt: skip
+MESHED = ("beam_on_three_supports", "heavy_beam", "heavy_strip", "low_middle_support")  # by the extra `elastic`
 REFERENCES = [sys.executable, "-m", "studies.benchmarks.references"]
 
 
@@ -24,6 +25,8 @@ REFERENCES = [sys.executable, "-m", "studies.benchmarks.references"]
 @pytest.mark.filterwarnings("ignore::tolcontact.errors.NominalWarning")
 @pytest.mark.parametrize("name", [*QUICK, *nightly(*(name for name in names() if name not in QUICK))])
 def test_expected_values_are_computed(name):
+    if name in MESHED:
+        pytest.importorskip("ngsolve")
     problem = read(name)
     verdicts = {figure.verdict for figure in benchmarks.solved(problem).figures}
     assert verdicts == {benchmarks.UNSUPPORTED if problem.unsupported else benchmarks.AGREES}
@@ -70,6 +73,8 @@ def test_the_table_of_the_readme_has_every_problem_with_a_whole_interval_around_
 @pytest.mark.filterwarnings("ignore::tolcontact.errors.NominalWarning")
 @pytest.mark.parametrize("name", QUICK)
 def test_the_table_of_the_readme_is_what_its_script_writes(name):
+    if name in MESHED:
+        pytest.importorskip("ngsolve")
     written = benchmarks.row(benchmarks.solved(read(name)))
     assert benchmarks.rows()[name].split("|")[:7] == written.split("|")[:7]
 

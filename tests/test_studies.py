@@ -32,6 +32,7 @@ STUDIES = {
     "cost/cluster.py": ["--samples", "20000", "--to", "."],
     "cost/measure.py": ["--scenes", "ra1", "ring", "--sizes", "3", "--seconds", "0.01", "--to", "."],
     "cost/solvers.py": ["--realizations", "2", "--to", "."],
+    "elastic/measure.py": ["--realizations", "5", "--rows", "38", "--to", "."],
     "exact/tables.py": ["--samples", "300", "--to", "."],
     "form/measure.py": ["--samples", "20", "--to", "."],
     "objectives/measure.py": ["--samples", "20", "--models", "ra1", "lid", "--to", "."],
@@ -52,8 +53,9 @@ STUDIES = {
     "verification/parts.py": ["--repetitions", "2", "--samples", "200"],
     "verification/rare.py": ["--seeds", "1", "--samples", "30000", "--only", "two ways", "does not fit"],
 }
-UNCOMPARED = ("cluster.py: cluster", "measure.py: cost", "solvers.py: solvers")  # times, and solvers of other packages
+UNCOMPARED = ("cluster.py: cluster", "measure.py: cost", "solvers.py: solvers")  # times, solvers of other packages
 EXTRAS = {
+    "elastic/measure.py": ["ngsolve"],
     "benchmarks/others.py": ["openturns", "otaf", "SALib"],
     "cost/solvers.py": ["qpsolvers"],
     "report/picture.py": ["playwright"],

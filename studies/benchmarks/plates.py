@@ -13,7 +13,8 @@ _FOLDER = tempfile.TemporaryDirectory(prefix="plates-")
 def plate_stiffness(side: float, thickness: float, young: float, poisson: float) -> tuple[np.ndarray, np.ndarray]:
     """Return points x, y (node, 2) [mm] of a free square plate, and the stiffness [N/mm] of their deflections.
 
-    The bending energy is D/2 times the integral of (xx + yy)² - 2 (1 - nu) (xx yy - xy²) in second differences: exact for a twist.
+    The bending energy is D/2 times the integral of (xx + yy)² - 2 (1 - nu) (xx yy - xy²) in second differences.
+    It is exact for a twist.
     """
     count, step = CELLS + 1, side / CELLS
     second, first = np.diff(np.eye(count), 2, axis=0) / step**2, np.diff(np.eye(count), axis=0) / step
@@ -33,7 +34,7 @@ def nodes_at(grid: np.ndarray, places: list[tuple[float, float]]) -> list[int]:
 
 
 def elastic_file(name: str, places: np.ndarray, stiffness: np.ndarray) -> dict[str, Path]:
-    """Return the keywords of `part.elastic` for nodes at `places` x, y in the plane z = 0, with the `stiffness` of their heights.
+    """Return the keywords of `part.elastic` for nodes at `places` x, y with z = 0, and the `stiffness` of their heights.
 
     In their plane they do not deform. The file lives as long as the process.
     """

@@ -119,6 +119,10 @@ PICTURES: dict[str, list[str]] = {
         "box 0 14 100 12 front", "box 88 26 100 12 rear", "box 191 26 24 12 bracket", "force 8 0 8 14", "force 80 0 80 14",
         "force 110 10 110 26", "force 180 10 180 26", "arrow 189 46 191 46 flush",
     ],
+    "beam": [
+        "box 0 14 180 8 rail", "box 4 0 12 14", "box 84 0 12 11", "box 164 0 12 14", "force 10 40 10 23 bolt",
+        "force 90 40 90 23", "force 170 40 170 23", "arrow 100 11 100 14 low",
+    ],
     "seal": [
         *curve([(x, 21.5 + bumps(x)) for x in FACE]), "box 0 -6 100 24 base, seat flat within 0.02",
         polygon([*((x, 22 + bumps(x)) for x in FACE), (100, 40), (0, 40)]), "text 50 32 lid, underside flat within 0.05",

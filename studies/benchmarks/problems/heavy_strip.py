@@ -29,6 +29,7 @@ def check():
     solution_on_length = integrate.solve_bvp(slopes, ends, x, start, p=[150.0], tol=1e-10)
     return solution_on_length.p[0], -BENDING * solution_on_length.y[3, -1]
 
+
 def assembly():
     """Return the strip, 240 mm of it, as a solid without Poisson's ratio on a table whose contact points are 6 mm apart."""
     model = tc.Assembly("heavy strip", method=tc.Method(objective="seating"))
