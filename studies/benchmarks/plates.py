@@ -2,12 +2,20 @@
 
 import tempfile
 from pathlib import Path
+from typing import TypedDict
 
 import numpy as np
 
 CELLS = 20  # along a side
 IN_PLANE = 1e7  # times the stiffness against bending
 _FOLDER = tempfile.TemporaryDirectory(prefix="plates-")
+
+
+class ElasticFiles(TypedDict):
+    """The files of `part.elastic`."""
+
+    stiffness: Path
+    nodes: Path
 
 
 def plate_stiffness(side: float, thickness: float, young: float, poisson: float) -> tuple[np.ndarray, np.ndarray]:
@@ -33,7 +41,7 @@ def nodes_at(grid: np.ndarray, places: list[tuple[float, float]]) -> list[int]:
     return [int(((grid - place) ** 2).sum(axis=1).argmin()) for place in places]
 
 
-def elastic_file(name: str, places: np.ndarray, stiffness: np.ndarray) -> dict[str, Path]:
+def elastic_file(name: str, places: np.ndarray, stiffness: np.ndarray) -> ElasticFiles:
     """Return the keywords of `part.elastic` for nodes at `places` x, y with z = 0, and the `stiffness` of their heights.
 
     In their plane they do not deform. The file lives as long as the process.
