@@ -179,14 +179,10 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         standing = [[rows[k] for k in group.pairs] for group in groups]
         elastic = part_flexibilities(nominal, bodies)
         bending = Bending(nominal, elastic) if elastic else None
-        bent = [
-            group_flexibility(nominal, group, list(map(row_count, points)), elastic)
-            for group, points in zip(groups, standing, strict=True)
-        ]
-        qps = [
-            (group, contact_qp(nominal, group, gaps, method, points, flexibility=flexibility))
-            for group, points, flexibility in zip(groups, standing, bent, strict=True)
-        ]
+        qps = []
+        for group, points in zip(groups, standing, strict=True):
+            flexibility = group_flexibility(nominal, group, list(map(row_count, points)), elastic)
+            qps.append((group, contact_qp(nominal, group, gaps, method, points, flexibility=flexibility)))
         return Program(
             nominal=nominal,
             draws=draws,
