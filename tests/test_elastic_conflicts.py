@@ -1,6 +1,7 @@
 """Elastic parts that cannot be as they are declared: locators that contradict each other, no pose, and nothing that holds."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 import tolcontact as tc
 from tests.cases import elastic as cases
 from tests.helpers import compiled, nightly, simulate
+from tests.test_elastic_parts import tips
 from tolcontact.errors import ModelError, NominalWarning
 from tolcontact.vocabulary import CERTIFIED, CORRECTED, Status
 
@@ -99,3 +101,23 @@ def test_the_check_states_sizes_and_bending_and_doubts_what_is_too_much(tmp_path
     largest = np.linalg.norm(u.reshape(-1, 3)[2])  # of the measured place, in the middle
     assert line.startswith("elastic part beam: 7 nodes, 21 freedoms, 7 reactions, mass unknown, bent by ")
     assert float(line.split("bent by ")[1].split()[0]) == pytest.approx(largest, rel=5e-3)
+
+
+def test_gravity_of_a_part_whose_mass_is_unknown_names_the_part(tmp_path):
+    model = beam(tmp_path)
+    model.gravity((0, 0, -9.81))
+    with pytest.raises(ModelError, match=r'part "beam" .*: its mass is unknown, so it has no weight; give a density'):
+        compiled(model)
+
+
+def test_locators_and_guns_at_both_tips_contradict_each_other_and_are_never_certified(tmp_path):
+    """Guns close the gap between two tips, and a locator holds each of them: their heights differ, whatever bends."""
+    model = tips(tmp_path)
+    held = [
+        replace(location, scheme=(*location.scheme, tc.Locator("D", place, "z", tolerance=0.1)))
+        for location, place in zip(model.locations[:2], ((92, 10, 1), (8, 10, 0)), strict=True)
+    ]
+    _, run = simulate(model.replaced(locations=[*held, *model.locations[2:]]), samples=6)
+    assert (run["status"] == Status.NOT_CONVERGED).all()
+    _, run = simulate(model.replaced(locations=[held[0], *model.locations[1:]]), samples=6)
+    assert (run["status"] == Status.RESOLVED).all()  # a single one bends the other tip

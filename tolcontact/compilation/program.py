@@ -26,6 +26,7 @@ from tolcontact.interference import Watch
 from tolcontact.limits import Limits
 from tolcontact.mechanics.flexibility import (
     Bending,
+    Bodies,
     elastic_bodies,
     group_flexibility,
     part_flexibilities,
@@ -149,6 +150,13 @@ class Program(Pictured):
         return f"{words}; they are fixed, and err by {trial.error:.2g} mm at most"
 
 
+def _check_bends(choice: SolverChoice, bodies: Bodies) -> None:
+    """Raise OptionError for elastic parts and a solver that has none."""
+    if bodies and not choice.bends:
+        able = ", ".join(name for name in usable_solvers() if SOLVERS[name].bends)
+        raise OptionError(f'solver "{choice.name}" has no elastic parts, and the model has; choose one of: {able}')
+
+
 def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     """Build all Functions of a model.
 
@@ -165,9 +173,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         values = measured(nominal, poses_of(entries), d)
         place, observe = _place(nominal, d), _observe(nominal, entries, d, values)
         bodies = elastic_bodies(nominal)
-        if bodies and not choice.bends:
-            able = ", ".join(name for name in usable_solvers() if SOLVERS[name].bends)
-            raise OptionError(f'solver "{choice.name}" has no elastic parts, and the model has; choose one of: {able}')
+        _check_bends(choice, bodies)
         groups = [with_weights(group, nominal, bodies) for group in contact_groups(nominal, weighs_areas=method.is_exact)]
         if method.minimizes.presses:
             check_forces(nominal, groups)
@@ -179,14 +185,10 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         standing = [[rows[k] for k in group.pairs] for group in groups]
         elastic = part_flexibilities(nominal, bodies)
         bending = Bending(nominal, elastic) if elastic else None
-        bent = [
-            group_flexibility(nominal, group, list(map(row_count, points)), elastic)
-            for group, points in zip(groups, standing, strict=True)
-        ]
-        qps = [
-            (group, contact_qp(nominal, group, gaps, method, points, flexibility=flexibility))
-            for group, points, flexibility in zip(groups, standing, bent, strict=True)
-        ]
+        qps = []
+        for group, points in zip(groups, standing, strict=True):
+            flexibility = group_flexibility(nominal, group, list(map(row_count, points)), elastic)
+            qps.append((group, contact_qp(nominal, group, gaps, method, points, flexibility=flexibility)))
         return Program(
             nominal=nominal,
             draws=draws,

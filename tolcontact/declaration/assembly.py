@@ -62,9 +62,8 @@ class Assembly(Causes, Pictured, Checked):
     run may state another one. `title_block` heads its reports. `mu` is the coefficient of friction of all contacts;
     `tc.analyses.seating` uses it. `standard` is that of the drawings, "ISO" or "ASME": under ISO the zones of a pattern are
     separate, and sizes do not limit form; under ASME zones are combined, and form is inside the envelope of sizes. Without
-    one, zones are combined, and sizes do not limit form. `units` are those of its measured lengths, as in
-    units="in"; all that is declared stays in mm, but for texts such as "±0.005 in". Raises TypeError for an argument of a wrong
-    type.
+    one, zones are combined, and sizes do not limit form. `units` are those of its measured lengths; all that is declared stays
+    in mm, but for texts such as "±0.005 in". Raises TypeError for an argument of a wrong type.
     """
 
     checks: ClassVar = {"mu": FRICTION, "standard": one_of(get_args(Standard))}
@@ -90,14 +89,10 @@ class Assembly(Causes, Pictured, Checked):
         standard: Standard = "",
         units: str = "mm",
     ) -> None:
-        expect(f'assembly "{name}": method', method, Method | None, "tc.Method(...)")
-        expect(f'assembly "{name}": title_block', title_block, TitleBlock | None, "tc.TitleBlock(...)")
-        self.name = name
-        self.method = method
-        self.title_block = title_block
-        self.mu = mu
-        self.standard = standard
-        self.units = units
+        for option, value, kind in (("method", method, Method), ("title_block", title_block, TitleBlock)):
+            expect(f'assembly "{name}": {option}', value, kind | None, f"tc.{kind.__name__}(...)")
+        self.name, self.method, self.title_block = name, method, title_block
+        self.mu, self.standard, self.units = mu, standard, units
         self.acceleration: Vector | None = None
         self._declared: dict[str, list[Any]] = {name: [] for name in MAX_COUNTS}
 
@@ -135,9 +130,11 @@ class Assembly(Causes, Pictured, Checked):
     def standards(self) -> str:
         """The standards of the drawings as archives state them: one for all parts, or by part; empty if none is stated."""
         stated = dict.fromkeys(part.standard for part in self.parts)
-        if len(stated) < 2:
-            return next(iter(stated), "")
-        return ", ".join(f"{part.name} {part.standard}" for part in self.parts if part.standard)
+        return (
+            next(iter(stated), "")
+            if len(stated) < 2
+            else ", ".join(f"{part.name} {part.standard}" for part in self.parts if part.standard)
+        )
 
     @property
     def features(self) -> tuple[Feature, ...]:

@@ -158,12 +158,18 @@ def _source(entry: NominalPart) -> MeshSource | MatrixSource:
 
 
 def with_weights(group: Group, nominal: Nominal, bodies: Bodies) -> Group:
-    """Return the group with the weights of its elastic parts among its loads."""
+    """Return the group with the weights of its elastic parts among its loads. Raises ModelError if a mass is unknown."""
     if nominal.assembly.acceleration is None:
         return group
     parts = ((position, nominal.parts[index]) for position, index in enumerate(group.parts))
-    weights = [_weight(position, part, bodies[part.part], nominal) for position, part in parts if part.part in bodies]
-    return replace(group, loads=(*group.loads, *weights))
+    faults = Faults()
+    weights = [
+        faults.attempt(designation("part", part.part), _weight, position, part, bodies[part.part], nominal)
+        for position, part in parts
+        if part.part in bodies
+    ]
+    faults.refuse(nominal.assembly.name)
+    return replace(group, loads=(*group.loads, *(weight for weight in weights if weight is not None)))
 
 
 def _weight(position: int, part: NominalPart, body: ElasticBody, nominal: Nominal) -> Load:
