@@ -109,11 +109,9 @@ class Assembly(Causes, Pictured, Checked):
     def widened(self, factor: float, *names: str) -> "Assembly":
         """Return a copy whose tolerances are `factor` times as wide, each about its centre, as if suppliers were worse.
 
-        `names` choose the tolerances of parts, of single locators and features ("part.feature"), and of variables; by default
-        all are widened. Rows of populations stay as measured, and capabilities keep their Cp and Cpk. Both models have the same
-        draws, so that tc.compare states the differences of two runs by pairs. Raises ValueError for an unknown name.
-
-        `tc.run(model.widened(1.2, "cover"), seed=1)`
+        `tc.run(model.widened(1.2, "cover"))`: `names` choose the tolerances of parts, of single locators and features
+        ("part.feature"), and of variables; by default all are widened. Populations stay as measured, and Cp and Cpk as they are.
+        Both models have the same draws, so that tc.compare is by pairs. Raises ValueError for an unknown name.
         """
         return widened(self, factor, names)  # type: ignore[no-any-return]
 
@@ -172,10 +170,7 @@ class Assembly(Causes, Pictured, Checked):
         return self._add("stations", Station(name, script_line()).belonging_to(self))
 
     def gravity(self, acceleration: Any) -> None:
-        """Declare the `acceleration` (x, y, z) [m/s^2] by which elastic parts weigh: `model.gravity((0, 0, -9.81))`.
-
-        It acts in the assembly frame, in every station. The weight of a rigid part is a force.
-        """
+        """Declare the `acceleration` [m/s^2] by which elastic parts weigh, in all stations: `model.gravity((0, 0, -9.81))`."""
         refuse_in_functions()
         self.acceleration = _vector(acceleration)
 
