@@ -163,21 +163,7 @@ def simulate_block(
             if program.bending is not None and station is not None and weld.station == station.name:
                 inputs[:, weld.columns] = program.bending.weld_gaps(weld, block.poses[:, CORRECTED], block.load)
     if program.method.is_bounded:
-        worst = outcomes_by_stage.max(axis=1)
-        bodies = watched_bodies(
-            program,
-            block.poses[:, CORRECTED],
-            deviations,
-            start=start,
-            tested=[pair for resolver in resolvers for pair in resolver.watched],
-            is_doubtful=worst == Outcome.DOUBTFUL,
-            is_certified=worst <= Outcome.RESOLVED,
-        )
-        block.clashes[:], block.clash_depth[:] = bodies.clashes, bodies.depth
-        block.clash_part[:], block.clash_other[:] = bodies.part, bodies.other
-        for index, rows in bodies.withdrawn:
-            worst = outcomes_by_stage[:, index]
-            worst[rows] = np.where(worst[rows] <= Outcome.RESOLVED, Outcome.DOUBTFUL, worst[rows])
+        _watch(program, block, resolvers, outcomes_by_stage)
     block.weld_gap[:] = inputs[:, deviations.shape[1] :]
     is_unknown |= ~np.isfinite(raw).all(axis=(1, 2))
     outcomes_by_stage[is_unknown], block.kkt_residual[is_unknown] = Outcome.UNSOLVED, np.inf
@@ -192,6 +178,25 @@ def simulate_block(
     statuses = _statuses(program.method.is_exact)
     block.status[:], block.station_status[:] = statuses[worst], statuses[outcomes_by_stage[:, : len(program.stations)]]
     return block
+
+
+def _watch(program: Program, block: Block, resolvers: list[ContactResolver], outcomes_by_stage: Int[Array, "n stage"]) -> None:
+    """Write the bodies that interfere into a block, and withdraw the certificates that they refute."""
+    worst = outcomes_by_stage.max(axis=1)
+    bodies = watched_bodies(
+        program,
+        block.poses[:, CORRECTED],
+        block.deviations,
+        start=block.start,
+        tested=[pair for resolver in resolvers for pair in resolver.watched],
+        is_doubtful=worst == Outcome.DOUBTFUL,
+        is_certified=worst <= Outcome.RESOLVED,
+    )
+    block.clashes[:], block.clash_depth[:] = bodies.clashes, bodies.depth
+    block.clash_part[:], block.clash_other[:] = bodies.part, bodies.other
+    for index, rows in bodies.withdrawn:
+        of_stage = outcomes_by_stage[:, index]
+        of_stage[rows] = np.where(of_stage[rows] <= Outcome.RESOLVED, Outcome.DOUBTFUL, of_stage[rows])
 
 
 def _hand_over(
