@@ -90,7 +90,7 @@ def test_coefficients_of_each_kind_have_the_copula_of_their_closed_form(distribu
     if distribution is LOGNORMAL and kind == "copula":
         assert PEARSON == pytest.approx(0.630, abs=5e-4)
         program = tc.build(two_supports(distribution, stated, kind), solver="daqp")
-        (line,) = program.draws.correlations_in_words
+        (line,) = program.draws.in_words
         assert line == 'correlation of "top.A1" and "top.A2": copula 0.700, Pearson 0.630, rank 0.683'
         console = Console(file=io.StringIO(), width=200)
         console.print(summary_text(tc.summarize(tc.run(program, samples=20, surfaces=0))))
