@@ -116,7 +116,7 @@ BAD = {
     "unlike units": (
         lambda m, a, b: m("x", tc.Sum("earlier", tc.Angle(a.face("+z"), b.face(ROUND)))), "mm and rad; expected the same units",
     ),
-    "other units": (lambda m, a, b: m("x", tc.Angle(a.face("+z"), b.face(ROUND)), units="deg"), "in rad; leave units out"),
+    "other units": (lambda m, a, b: m("x", tc.Angle(a.face("+z"), b.face(ROUND)), units="grad"), "in rad; leave units out"),
     "one part": (lambda m, a, b: m("x", tc.Angle(a.face("+z"), a.face("+x"))), 'within part "table"'),
     "no axis": (lambda m, a, b: m("x", tc.AxisDistance(a.face("+z"), b.face(ROUND))), "table +z is a plane, which has no axis"),
     "parallel plane": (

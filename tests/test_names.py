@@ -34,7 +34,11 @@ def model(name="fine", **names) -> tc.Assembly:
     labels = [said["locator"], *(f"L{k}" for k in range(1, 6))]
     a.locate(block, [tc.Locator(*one, 1) for one in zip(labels, points, "zzzyyx", strict=True)])
     a.contact(said["pair"], moving=block.face("-z"), reference=floor.face("+z"), points=4)
-    a.measure(said["measure"], block.point(0, 0, 0), along="z", units=said["units"])
+    corner = block.point(0, 0, 0)
+    if said["units"] == "mm":
+        a.measure(said["measure"], corner, along="z")
+    else:  # which only a function may have
+        a.measure(said["measure"], lambda poses: poses.position(corner)[2], units=said["units"])
     a.force(said["force"], at=block.point(0, 0, 0), vector=(0, 0, -1))
     return a
 

@@ -63,7 +63,7 @@ Every example in the guide is run by the tests.
 | choose faces, `tc.select` | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
 | analyse, `tc.analyses` | `stack_up`, `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate`, |
 | | `seating` |
-| read and write files, `tc.io` | `bodies_in`, `faces_in`, `parts_from`, `read_pmi`, `features_from_pmi`, |
+| read and write files, `tc.io` | `bodies_in`, `faces_in`, `parts_from`, `read_pmi`, `features_from_pmi`, `measured_planes`, |
 | | `write_model`, `model_of` |
 | test your models, `tc.testing` | `assert_resolved`, `assert_no_clashes`, `assert_gaps_recompute`, |
 | | `assert_datums_recompute`, `assert_same_run` |
