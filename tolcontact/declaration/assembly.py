@@ -128,11 +128,9 @@ class Assembly(Causes, Pictured, Checked):
     def standards(self) -> str:
         """The standards of the drawings as archives state them: one for all parts, or by part; empty if none is stated."""
         stated = dict.fromkeys(part.standard for part in self.parts)
-        return (
-            next(iter(stated), "")
-            if len(stated) < 2
-            else ", ".join(f"{part.name} {part.standard}" for part in self.parts if part.standard)
-        )
+        if len(stated) < 2:
+            return next(iter(stated), "")
+        return ", ".join(f"{part.name} {part.standard}" for part in self.parts if part.standard)
 
     @property
     def features(self) -> tuple[Feature, ...]:

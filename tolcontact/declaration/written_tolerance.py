@@ -58,8 +58,8 @@ def written(value: Any, *, units: str = "mm", nominal: float | None = None) -> A
     """Return Deviations for texts of limit deviations and for pairs, a number for the text of one; other values as they are.
 
     A tolerance class such as "H7" needs a `nominal` size [mm]. Degrees become radians if the `units` are "rad", and lengths in
-    other units, such as "±0.005 in", lengths in `units`. NumPy numbers become Python
-    numbers. Raises TextFault for other texts and pairs.
+    other units, such as "±0.005 in", lengths in `units`. NumPy numbers become Python numbers. Raises TextFault for other texts
+    and pairs.
     """
     if isinstance(value, list | tuple):
         return _pair(value)

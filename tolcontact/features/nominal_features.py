@@ -128,7 +128,7 @@ class Features:
         is_shared = tolerance.simultaneous
         is_shared = declared.part.standard == "ASME" if is_shared is None else is_shared
         owner = datum.label if is_shared else f"{declared.part.name}.{declared.name}"
-        label = f"{owner}.mobility of datum {datum.declared.datum} of {tolerance.datums}"
+        label = f"{owner}.mobility of datum {datum.declared.datum} of {tolerance.datums.replace(' ', '')}"
         if label not in self._gauges:
             start, k = self.first_column + len(self.freedoms), len(before)
             frame = datum_frame(before, datum.centre, datum.reach, start, tolerance.orientation_only[:k])

@@ -10,16 +10,6 @@ from tolcontact.pmi.modifiers import OF_DATUMS, OF_TOLERANCES
 from tolcontact.pmi.reading import read_pmi
 
 __all__ = [
-    "OF_DATUMS",
-    "OF_TOLERANCES",
-    "Datum",
-    "DatumReference",
-    "DatumTarget",
-    "DeclaredAnnotation",
-    "DeclaredPmi",
-    "Dimension",
-    "Pmi",
-    "Tolerance",
-    "features_from_pmi",
-    "read_pmi",
+    "OF_DATUMS", "OF_TOLERANCES", "Datum", "DatumReference", "DatumTarget", "DeclaredAnnotation", "DeclaredPmi", "Dimension",
+    "Pmi", "Tolerance", "features_from_pmi", "read_pmi",
 ]  # fmt: skip
