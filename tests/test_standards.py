@@ -150,7 +150,8 @@ def bored(tolerance, standard: str, *own, mated: bool = False, holes: int = 1) -
         part.feature(letter, part.face(*datum.faces[0].selections), datum=letter)
     bore = part.feature("bore", part.face(*faces[0].selections), tc.Size(8, 0.2, 0, distribution="uniform"), *own, datum="B")
     for number, face in enumerate(faces[1:]):
-        hole = part.feature(f"hole {number}", part.face(*face.selections), tolerance)
+        own_tolerance = tolerance[number] if isinstance(tolerance, tuple) else tolerance
+        hole = part.feature(f"hole {number}", part.face(*face.selections), own_tolerance)
         for end in (0, 1):
             a.measure(f"{hole.name} at {end}", hole.axis(end), to=bore.axis(end), along="x")
     if mated:
@@ -210,3 +211,10 @@ def test_holes_share_the_gauge_of_a_datum_in_a_simultaneous_requirement(standard
         assert (first - second).std() < 1e-4
     else:  # both depend on the size of the bore, and are uncorrelated
         assert (first - second).var() == pytest.approx(first.var() + second.var(), rel=0.1)
+
+
+def test_a_simultaneous_requirement_has_the_same_datums_however_they_are_spaced():
+    for second, count in (("A | B(M) | C", 1), ("A|B(M)", 2), ("A|B(L)|C", 2)):
+        model = bored((tc.Position(0.1, "A|B(M)|C"), tc.Position(0.1, second)), "ASME", holes=2)
+        play = [label for label in tc.build(model).nominal.contributors if "mobility" in label]
+        assert len({label.partition(":")[0] for label in play}) == count, second
