@@ -1,12 +1,16 @@
 """Elastic parts in contact: closed forms of beams, sheets and tips, the rigid limit, and what is refused."""
 
+import io
+
 import numpy as np
 import pytest
+import rich.console
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests.cases import elastic as cases
 from tests.helpers import compiled, nightly
+from tolcontact.report import summary_text, write_page
 from tolcontact.simulation import simulate_block
 from tolcontact.vocabulary import CORRECTED, Status
 
@@ -175,3 +179,12 @@ def test_a_heavy_beam_on_three_supports_rests_mostly_on_the_middle_one(tmp_path)
     loads = loads_of(program, block, "supports of beam")[0]
     assert loads.sum() == pytest.approx(weight, rel=1e-6)
     assert loads[2:4].sum() / weight == pytest.approx(0.62325, rel=1e-3)
+
+
+def test_the_page_and_the_summary_say_that_fields_leave_bending_out(tmp_path):
+    with tc.run(tips(tmp_path), samples=20, seed=1) as results:
+        write_page(results, tc.summarize(results), tmp_path / "page.html")
+        console = rich.console.Console(width=100, record=True, file=io.StringIO())
+        console.print(summary_text(tc.summarize(results)))
+    assert "of elastic parts the rigid motion alone" in console.export_text()
+    assert "are of elastic parts the rigid motion alone" in (tmp_path / "page.html").read_text(encoding="utf-8")

@@ -34,6 +34,7 @@ NEEDS = {  # realizations, of statistics that have no interval
     terms.SKEWNESS: f"skewness and kurtosis need {MIN_SHAPE} realizations, and a kurtosis below {MAX_KURTOSIS:g}",
     terms.PPK: f"Pp and Ppk need {grouped(MIN_TAIL)} realizations, {grouped(MIN_TAILS)} with two limits",
 }
+RIGID_FIELDS = "of elastic parts the rigid motion alone, without their bending, which measurements include"
 
 
 def summary_text(summary: xr.Dataset) -> Group:
@@ -56,6 +57,8 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
     yield Text("\n6 sigma of the displacement magnitude over the surface of each part (mm)", style="bold")
     if magnitudes < count:
         yield Text(f"of at least the first {grouped(magnitudes)} realizations" if magnitudes else "not summed up")
+    if summary.attrs["elastic_parts"]:
+        yield Text(RIGID_FIELDS)
     if magnitudes:
         yield _field_table(summary)
     yield Text("\ncontact", style="bold")
