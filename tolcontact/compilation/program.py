@@ -153,7 +153,8 @@ class Program(Pictured):
 def _check_bends(choice: SolverChoice, bodies: Bodies) -> None:
     """Raise OptionError for elastic parts and a solver that has none."""
     if bodies and not choice.bends:
-        able = ", ".join(name for name in usable_solvers() if SOLVERS[name].bends)
+        with quiet():  # each solves a small problem
+            able = ", ".join(name for name in usable_solvers() if SOLVERS[name].bends)
         raise OptionError(f'solver "{choice.name}" has no elastic parts, and the model has; choose one of: {able}')
 
 
