@@ -13,6 +13,7 @@ from tolcontact.declaration.dependence import (
 )
 from tolcontact.declaration.geometry import Unit
 from tolcontact.declaration.measured_table import population as _population
+from tolcontact.declaration.part import Part
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import script_line
 
@@ -22,21 +23,23 @@ class Causes(Declarations):
 
     def variable(
         self, name: str, tolerance: Any, *, drives: Mapping[str, float] | None = None, units: str = "mm",
-        nominal: float | None = None,
+        nominal: float | None = None, expands: Mapping[Part | str, float] | None = None,
     ) -> Variable:  # fmt: skip
-        """Declare a cause that drives several contributors, or a dimension that chains measure (see Variable).
+        """Declare a cause that drives several contributors or expands parts, or a dimension that chains measure (see Variable).
 
         name        of the cause
         tolerance   full width of its range in its `units`, or a tc.Tolerance
         drives      factor [mm per unit] of each contributor, by its label
         units       of the cause, by default mm
         nominal     value of a dimension in its `units`, which may drive nothing
+        expands     coefficient of thermal expansion [1/K] of each part, or of its name; deviations are from the temperature
+                    at which dimensions hold
 
         `model.variable("warmth", 20, drives={"cover.width.size": 0.0007}, units="K")`
         """
         variable = Variable(
             name=name, tolerance=_tolerance(tolerance), drives=dict(drives or {}), units=units, nominal=nominal,
-            declared_at=script_line(),
+            declared_at=script_line(), expands={getattr(part, "name", part): alpha for part, alpha in (expands or {}).items()},
         )  # fmt: skip
         return self._add("variables", variable)
 

@@ -18,6 +18,7 @@ from tolcontact.tables import MAX_NUMBER
 
 CorrelationKind = Literal["copula", "pearson", "rank"]
 MAX_LISTED = 6  # coefficients in a row of the model
+MAX_EXPANSION = 1e-3  # 1/K
 MIN_EIGENVALUE = 1e-12  # of a correlation matrix; of a smaller absolute value it is zero
 
 
@@ -26,7 +27,8 @@ class Variable(Declaration):
     """A cause that drives several contributors: `drives[label]` times its deviation is added to the draw of each.
 
     The variable is in `units`; a factor converts them to the units of its contributor. A variable with a `nominal` value is a
-    dimension, the link of a chain, and may drive nothing.
+    dimension, the link of a chain, and may drive nothing. A temperature `expands` parts, by their names: all dimensions of a
+    part grow by the factor [1/K] times the deviation, about the origin of its frame.
     """
 
     tolerance: Tolerance
@@ -35,14 +37,21 @@ class Variable(Declaration):
     units: str = "mm"
     declared_at: str = ""
     nominal: float | None = None
+    expands: Mapping[str, float] = field(default_factory=dict)
     noun: ClassVar[str] = "variable"
 
     def faults(self) -> Iterator[str]:
         yield from self.tolerance.faults()
         if self.nominal is not None and not is_length(self.nominal):
             yield f"nominal is {self.nominal!r}; expected a number in {self.units}"
-        if not self.drives and self.nominal is None:
-            yield 'it drives nothing; give drives={"part.locator": factor, ...}'
+        if not (self.drives or self.expands) and self.nominal is None:
+            yield 'it drives nothing; give drives={"part.locator": factor, ...}, or expands={"part": factor per K, ...}'
+        for part, factor in self.expands.items():
+            if not (is_length(factor) and abs(factor) <= MAX_EXPANSION):
+                yield (
+                    f'expands has "{part}": {factor!r}; expected a coefficient of expansion in 1/K, up to {MAX_EXPANSION:g}, '
+                    "such as 23.5e-6 for aluminium"
+                )
         for label, factor in self.drives.items():
             if not (isinstance(label, str) and is_length(factor)):
                 yield f"drives has {label!r}: {factor!r}; expected the label of a contributor, and a number"
@@ -56,7 +65,8 @@ class Variable(Declaration):
 
     def __str__(self) -> str:
         drives = ", ".join(f"{label} by {factor:g}" for label, factor in self.drives.items())
-        driven = f"; drives {drives}" if drives else ""
+        expands = ", ".join(f"{part} by {factor:g} per {self.units}" for part, factor in self.expands.items())
+        driven = (f"; drives {drives}" if drives else "") + (f"; expands {expands}" if expands else "")
         if self.limits is None:
             return f"variable {self.name} [{self.units}]: {self.tolerance.in_units(self.units)}{driven}"
         centred = f", centred {self.centred}" if self.limits.middle else ""

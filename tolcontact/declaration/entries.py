@@ -248,7 +248,7 @@ RECORDS = {
         tolerance=Plain(POSITIVE | tuple[float, float] | str),
     ),
     "forces": Record(Force, omitted="station"),
-    "variables": Record(Variable, floats="drives nominal", omitted="nominal"),
+    "variables": Record(Variable, floats="drives nominal expands", omitted="nominal expands"),
     "correlations": Record(Correlation, omitted="kind"),
     "populations": Record(Population, fields="values columns source declared_at"),
     "stations": Record(Station),

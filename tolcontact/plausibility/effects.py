@@ -11,7 +11,7 @@ from tolcontact.declaration import Feature, Measure, Pattern, Point
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.discretization.measured_geometry import Combined, Heights, NominalMeasurement
 from tolcontact.features import FaceDeviation, NominalFeature
-from tolcontact.features.freedoms import FEATURE, FORM
+from tolcontact.features.freedoms import FEATURE, FORM, VARIABLE
 from tolcontact.geometry.tolerances import ON_FACE
 from tolcontact.plausibility.declared_points import location_designation
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws
@@ -200,7 +200,10 @@ def _unfollowed(draws: TrialDraws, uses: Sequence[Use]) -> list[tuple[int, Nomin
 
 def _motion(draws: TrialDraws, deviation: FaceDeviation, use: Use, direction: np.ndarray) -> float:
     """Return how far a face moves along a direction (3,) at a point, at three sigma [mm]; 0 if that is rounding."""
-    motions = draws.deviations[:, deviation.columns] @ deviation.outward(use.point[None], direction[None])[0]
+    outward = deviation.outward(use.point[None], direction[None])[0]
+    freedoms = [draws.program.nominal.freedoms[column] for column in deviation.columns]
+    outward[[freedom.source == VARIABLE for freedom in freedoms]] = 0.0  # a part that expands follows none of its features
+    motions = draws.deviations[:, deviation.columns] @ outward
     motion = SIGMAS * float(motions.std())
     return motion if motion > MIN_MOTION else 0.0
 
