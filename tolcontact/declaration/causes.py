@@ -24,6 +24,7 @@ class Causes(Declarations):
     def variable(
         self, name: str, tolerance: Any, *, drives: Mapping[str, float] | None = None, units: str = "mm",
         nominal: float | None = None, expands: Mapping[Part | str, float] | None = None,
+        loads: Mapping[str, float] | None = None,
     ) -> Variable:  # fmt: skip
         """Declare a cause that drives several contributors or expands parts, or a dimension that chains measure (see Variable).
 
@@ -34,12 +35,14 @@ class Causes(Declarations):
         nominal     value of a dimension in its `units`, which may drive nothing
         expands     coefficient of thermal expansion [1/K] of each part, or of its name; deviations are from the temperature
                     at which dimensions hold
+        loads       factor [N per unit] on the magnitude of each force, by its name
 
         `model.variable("warmth", 20, drives={"cover.width.size": 0.0007}, units="K")`
         """
         variable = Variable(
             name=name, tolerance=_tolerance(tolerance), drives=dict(drives or {}), units=units, nominal=nominal,
             declared_at=script_line(), expands={getattr(part, "name", part): alpha for part, alpha in (expands or {}).items()},
+            loads=dict(loads or {}),
         )  # fmt: skip
         return self._add("variables", variable)
 

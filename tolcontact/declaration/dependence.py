@@ -28,7 +28,8 @@ class Variable(Declaration):
 
     The variable is in `units`; a factor converts them to the units of its contributor. A variable with a `nominal` value is a
     dimension, the link of a chain, and may drive nothing. A temperature `expands` parts, by their names: all dimensions of a
-    part grow by the factor [1/K] times the deviation, about the origin of its frame.
+    part grow by the factor [1/K] times the deviation, about the origin of its frame. A variable `loads` forces, by their names:
+    the factor [N per unit] times the deviation is added to their magnitude.
     """
 
     tolerance: Tolerance
@@ -38,20 +39,24 @@ class Variable(Declaration):
     declared_at: str = ""
     nominal: float | None = None
     expands: Mapping[str, float] = field(default_factory=dict)
+    loads: Mapping[str, float] = field(default_factory=dict)
     noun: ClassVar[str] = "variable"
 
     def faults(self) -> Iterator[str]:
         yield from self.tolerance.faults()
         if self.nominal is not None and not is_length(self.nominal):
             yield f"nominal is {self.nominal!r}; expected a number in {self.units}"
-        if not (self.drives or self.expands) and self.nominal is None:
-            yield 'it drives nothing; give drives={"part.locator": factor, ...}, or expands={"part": factor per K, ...}'
+        if not (self.drives or self.expands or self.loads) and self.nominal is None:
+            yield 'it drives nothing; give drives={"part.locator": factor, ...}, expands={"part": ...} or loads={"force": ...}'
         for part, factor in self.expands.items():
             if not (is_length(factor) and abs(factor) <= MAX_EXPANSION):
                 yield (
                     f'expands has "{part}": {factor!r}; expected a coefficient of expansion in 1/K, up to {MAX_EXPANSION:g}, '
                     "such as 23.5e-6 for aluminium"
                 )
+        for force, factor in self.loads.items():
+            if not is_length(factor):
+                yield f'loads has "{force}": {factor!r}; expected a number in N per {self.units}'
         for label, factor in self.drives.items():
             if not (isinstance(label, str) and is_length(factor)):
                 yield f"drives has {label!r}: {factor!r}; expected the label of a contributor, and a number"
@@ -66,7 +71,9 @@ class Variable(Declaration):
     def __str__(self) -> str:
         drives = ", ".join(f"{label} by {factor:g}" for label, factor in self.drives.items())
         expands = ", ".join(f"{part} by {factor:g} per {self.units}" for part, factor in self.expands.items())
-        driven = (f"; drives {drives}" if drives else "") + (f"; expands {expands}" if expands else "")
+        loads = ", ".join(f"{force} by {factor:g} N per {self.units}" for force, factor in self.loads.items())
+        effects = {"drives": drives, "expands": expands, "loads": loads}
+        driven = "".join(f"; {verb} {things}" for verb, things in effects.items() if things)
         if self.limits is None:
             return f"variable {self.name} [{self.units}]: {self.tolerance.in_units(self.units)}{driven}"
         centred = f", centred {self.centred}" if self.limits.middle else ""

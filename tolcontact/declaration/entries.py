@@ -248,7 +248,7 @@ RECORDS = {
         tolerance=Plain(POSITIVE | tuple[float, float] | str),
     ),
     "forces": Record(Force, omitted="station"),
-    "variables": Record(Variable, floats="drives nominal expands", omitted="nominal expands"),
+    "variables": Record(Variable, floats="drives nominal expands loads", omitted="nominal expands loads"),
     "correlations": Record(Correlation, omitted="kind"),
     "populations": Record(Population, fields="values columns source declared_at"),
     "stations": Record(Station),

@@ -203,12 +203,16 @@ def _contributor_faults(assembly: Assembly, labels: Sequence[str], shifts: Set[s
                 sources[label] = place
     for cause in assembly.variables:
         parts = {part.name: part for part in assembly.parts}
-        for name in cause.expands:
-            place = f"{designation('variable', cause)}: it expands part"
-            if name not in parts:
-                yield f'{place} "{name}", which is unknown{nearest_name(name, parts)}; parts are: {", ".join(parts) or "none"}'
-            elif parts[name].elasticity is not None:
-                yield f'{place} "{name}", which is elastic; rigid parts expand, so leave one of the two out'
+        forces = {force.name: force.at.part for force in assembly.forces}
+        for verb, kind, names, owners in (("expands", "part", cause.expands, parts), ("loads", "force", cause.loads, forces)):
+            for name in names:
+                place = f"{designation('variable', cause)}: it {verb} {kind} "
+                if name not in owners:
+                    listed = ", ".join(owners) or "none"
+                    yield f'{place}"{name}", which is unknown{nearest_name(name, owners)}; expected one of: {listed}'
+                elif owners[name].elasticity is not None:
+                    what = f'"{name}", and part "{owners[name].name}"' if kind == "force" else f'"{name}", which'
+                    yield f"{place}{what} is elastic; it does so with rigid parts alone, so leave one of the two out"
 
 
 def _reserved_names(scene: Scene) -> Iterator[str]:
