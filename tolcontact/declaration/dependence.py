@@ -14,7 +14,6 @@ from tolcontact.declaration.geometry import UNITS
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import is_length, is_line
 from tolcontact.declaration.written_tolerance import DIGITS, Deviations
-from tolcontact.tables import MAX_NUMBER
 
 CorrelationKind = Literal["copula", "pearson", "rank"]
 MAX_LISTED = 6  # coefficients in a row of the model
@@ -149,42 +148,6 @@ class Correlation(Declaration):
         numbers = [f"{self.matrix[row][column]:g}" for row in range(len(self.matrix)) for column in range(row)]
         listed = ", ".join(numbers) if len(numbers) <= MAX_LISTED else f"{len(numbers)} coefficients"
         return f"correlation of {self.name}: {listed} ({self.kind})"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Population(Declaration):
-    """Measured parts: whole rows of deviations are drawn with replacement, which preserves their correlation.
-
-    columns   labels of the contributors
-    values    (row, column), in the units of the contributors
-    source    the file or the kind of table
-    """
-
-    columns: tuple[str, ...]
-    values: np.ndarray
-    source: str = "given"
-    declared_at: str = ""
-    noun: ClassVar[str] = "population"
-
-    @property
-    def name(self) -> str:  # type: ignore[override]
-        return self.source
-
-    def faults(self) -> Iterator[str]:
-        if not self.columns or len(set(self.columns)) < len(self.columns):
-            yield 'it names no contributors, or one twice; give columns={"part.locator": "column of the table", ...}'
-        elif self.values.ndim != 2 or self.values.shape[1] != len(self.columns):
-            yield f"its values have the shape {self.values.shape}; expected a row for each part, a column for each contributor"
-        elif len(self.values) < 2:
-            yield f"it has {len(self.values)} row(s); a population needs two or more"
-        for column, label in enumerate(self.columns[: self.values.shape[1]] if self.values.ndim == 2 else ()):
-            gaps = [row for row, value in enumerate(self.values[:, column]) if not abs(value) <= MAX_NUMBER]
-            if gaps:
-                where = f"row {gaps[0] + 1} of the column for {label}"
-                yield f"{where} is no number up to {MAX_NUMBER:g}; mend it, or leave out the row"
-
-    def __str__(self) -> str:
-        return f"population {self.source}: {len(self.values)} rows of {', '.join(self.columns)}"
 
 
 def correlation(labels: Sequence[str], matrix: Any, declared_at: str, kind: Any = "copula") -> Correlation:
