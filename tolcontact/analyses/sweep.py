@@ -62,8 +62,8 @@ def sweep(
         if progress is not None:
             analysis.progress = partial(_shifted, progress, number * samples, len(points) * samples)
         engine = analysis.engine(samples)
-        values, status = engine.simulate(samples, seed=seed)
-        measured.append(values)
+        of_measures, status = engine.simulate(samples, seed=seed)
+        measured.append(of_measures)
         statuses.append(status)
         counts.append(engine.statuses)
     swept = np.array(measured)  # (position, realization, state, measure)

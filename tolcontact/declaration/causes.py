@@ -39,9 +39,10 @@ class Causes(Declarations):
 
         `model.variable("warmth", 20, drives={"cover.width.size": 0.0007}, units="K")`
         """
+        by_name = {part.name if isinstance(part, Part) else part: alpha for part, alpha in (expands or {}).items()}
         variable = Variable(
             name=name, tolerance=_tolerance(tolerance), drives=dict(drives or {}), units=units, nominal=nominal,
-            declared_at=script_line(), expands={getattr(part, "name", part): alpha for part, alpha in (expands or {}).items()},
+            declared_at=script_line(), expands=by_name,
             loads=dict(loads or {}),
         )  # fmt: skip
         return self._add("variables", variable)

@@ -37,7 +37,7 @@ def population(
     is_file = isinstance(source, str | Path)
     measured = (_of_file if is_file else _of_memory)(source, columns, units, lots, gaps)
     title, labels, values = measured.title, measured.labels, measured.values
-    kept = ~measured.gaps.any(axis=1) if gaps != "refused" else np.ones(len(values), dtype=bool)
+    kept = np.asarray(~measured.gaps.any(axis=1) | (gaps == "refused"))
     if not kept.any() and len(kept):
         raise ValueError(f'population "{title}": each of its {len(kept)} rows has a gap; leave out the column that is empty')
     values, row_lots = values[kept], np.array(measured.lots)[kept[: len(measured.lots)]]

@@ -205,9 +205,11 @@ class Features:
 
     def of_point(self, point: Point, placement: Placement) -> FaceDeviation | None:
         """Return how a declared point moves with the face of its feature, or the median of two, and expands; else None."""
-        feature, expansion = point.on and self.features[point.on], self.expansion(point.part)
-        number = None if feature is None or point.position is None else feature.face_with(np.array(point.position))
-        deviation = None if feature is None else feature.deviation(number, placement)
+        deviation, expansion = None, self.expansion(point.part)
+        if point.on is not None:
+            feature = self.features[point.on]
+            number = None if point.position is None else feature.face_with(np.array(point.position))
+            deviation = feature.deviation(number, placement)
         return expansion.of_point(str(point), deviation, self.position(point), placement) if expansion else deviation
 
     def at_point(

@@ -176,7 +176,9 @@ def _located_points(nominal: Nominal, part: NominalPart) -> Iterator[tuple[str, 
         yield label, "give the locator on={}", Use(owner, point, direction, locators.faces[number])
         if part.parent is not None:
             ground = locators.grounds[number]
-            advice = "locate the part with on={}" if ground is None else "add this to the tolerance of the locator"
+            columns = () if ground is None else ground.columns
+            is_on_feature = any(nominal.freedoms[column].source != VARIABLE for column in columns)
+            advice = "add this to the tolerance of the locator" if is_on_feature else "locate the part with on={}"
             yield label, advice, Use(nominal.parts[part.parent], point, direction, ground)
 
 

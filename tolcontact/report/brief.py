@@ -38,7 +38,7 @@ def brief_measures(summary: xr.Dataset) -> tuple[xr.Dataset, str]:
     return summary.isel(measure=shown), f"{others}; {EVERYTHING}"
 
 
-def brief_table(table: Table, weights: Sequence[float], others: str, rows_of_each: int = 1) -> Table:
+def brief_table(table: Table, weights: Sequence[float] | np.ndarray, others: str, rows_of_each: int = 1) -> Table:
     """Return a table of the items with the largest weights (item,), each of several rows, and a remark about all others."""
     if len(weights) <= MOST_LISTED:
         return table
@@ -47,6 +47,6 @@ def brief_table(table: Table, weights: Sequence[float], others: str, rows_of_eac
     return replace(table, rows=rows, remarks=[*table.remarks, f"{len(weights) - len(shown)} more {others}; {EVERYTHING}"])
 
 
-def _largest(weights: Sequence[float], count: int) -> list[int]:
+def _largest(weights: Sequence[float] | np.ndarray, count: int) -> list[int]:
     """Return the indices of the largest weights in ascending order."""
     return sorted(np.argsort(-np.asarray(weights, dtype=float), kind="stable")[:count].tolist())

@@ -174,7 +174,7 @@ def verdict_lines(summary: xr.Dataset, *, states_once: bool = False) -> Iterator
             remarks = f"{_kept(measure)}{'' if states_once else doubts}"
             yield f"{full_name(measure)}: {text}{' its limits' * is_about_limits}{remarks}"
     if states_once and doubts:
-        yield f"all verdicts{doubts}"
+        yield f"all verdicts{doubts.replace('; ', ': ', 1) if doubts.startswith('; ') else doubts}"
 
 
 def _rounded_share(share: float) -> str:
