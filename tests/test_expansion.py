@@ -114,6 +114,20 @@ def test_archives_and_models_as_data_hold_the_expansion(tmp_path):
         assert again.variables[0].expands == {"low": 23e-6, "high": 9e-6}
 
 
+def test_searches_reach_the_bound_of_an_expanding_pair_in_contact():
+    """Two methods that share no code: searches on the engine, and a mixed-integer program; 2e-5 mm are of second order."""
+    a = tc.Assembly("pair", method=tc.Method(objective="all points", resolution="exact"))
+    base, top = a.part("base", tc.Box(100, 50, 10)), a.part("top", tc.Box(50, 25, 10), at=(50, 12.5, 10))
+    for part, side in ((base, "-y"), (top, "+y")):
+        a.locate(part, tc.three_two_one(part.face("-z"), part.face(side), part.face("-x"), inset=5), tolerance=0.02)
+    a.contact("interface", moving=top.face("-z"), reference=base.face("+z"))
+    a.measure("corner", top.point(50, 0, 10), along="z")
+    a.variable("warmth", tc.Tolerance(40, "uniform"), units="K", expands={"base": 12e-6, "top": 80e-6})
+    found = tc.analyses.worst_case(a, samples=256, solver="daqp").isel(measure=0).sel(state="corrected")
+    assert found["worst"].values == pytest.approx(found["bound"].values, abs=3e-5)
+    assert found["worst"].values[1] > 0.03 + 20 * 80e-6 * 10 / 2
+
+
 def test_what_cannot_expand_is_refused_by_name():
     a = tower()
     a.parts[0].elastic(E=70e3, nu=0.33)

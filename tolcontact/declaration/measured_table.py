@@ -35,7 +35,7 @@ def population(
         if value not in choices:
             raise ValueError(f"population: {option} is {value!r}; expected one of: {', '.join(choices)}")
     is_file = isinstance(source, str | Path)
-    measured = (_of_file if is_file else _of_memory)(source, columns, units, lots, gaps)
+    measured = _of_file(source, columns, units, lots, gaps) if is_file else _of_memory(source, columns, units, lots)
     title, labels, values = measured.title, measured.labels, measured.values
     kept = np.asarray(~measured.gaps.any(axis=1) | (gaps == "refused"))
     if not kept.any() and len(kept):
@@ -69,7 +69,7 @@ class MeasuredTable(NamedTuple):
     lots: list[str]
 
 
-def _of_memory(source: Any, columns: Mapping[str, str] | None, units: str, lots: str | None, gaps: Gaps) -> MeasuredTable:
+def _of_memory(source: Any, columns: Mapping[str, str] | None, units: str, lots: str | None) -> MeasuredTable:
     """Return a table in memory."""
     pd = importlib.import_module("pandas")
     try:
@@ -107,15 +107,14 @@ def _of_file(source: str | Path, columns: Mapping[str, str] | None, units: str, 
     # In a table of one column a blank line is a row without an entry.
     rows = [(line, cells or [""]) for line, cells in table.rows if cells or len(table.heading) == 1]
     faults, values = list[str](), np.full((len(rows), len(indices)), np.nan)
-    is_gap, has_gaps = np.zeros(values.shape, dtype=bool), False
+    is_gap = np.zeros(values.shape, dtype=bool)
     for row, (line, cells) in enumerate(rows):
         if len(cells) != len(table.heading):
             faults.append(f"line {line} has {len(cells)} entries, and the heading {len(table.heading)}; expected as many")
             continue
         for column, index in enumerate(indices):
             is_gap[row, column] = not cells[index]
-            has_gaps |= not cells[index]
-            if gaps != "refused" and not cells[index]:
+            if gaps != "refused" and is_gap[row, column]:
                 continue
             try:
                 values[row, column] = number(cells[index], has_decimal_commas=table.has_decimal_commas)
@@ -123,7 +122,7 @@ def _of_file(source: str | Path, columns: Mapping[str, str] | None, units: str, 
                 faults.append(f'line {line}, column "{shown(table.heading[index])}" {fault}')
     if faults:
         others = f"; and {len(faults) - MAX_LISTED} more" if len(faults) > MAX_LISTED else ""
-        remedy = '; gaps="left out" leaves out the rows with empty cells' if has_gaps and gaps == "refused" else ""
+        remedy = '; gaps="left out" leaves out the rows with empty cells' if gaps == "refused" and is_gap.any() else ""
         raise ValueError(
             f'population "{title}": {"; ".join(faults[:MAX_LISTED])}{others}; mend the table, or leave out the rows{remedy}'
         )
