@@ -67,8 +67,9 @@ class Population(Declaration):
 
     def _gauge_faults(self) -> Iterator[str]:
         """Yield a sentence if the scatter of the gauge is larger than the spread of the measured values."""
-        spread = self.within
-        for label, u, s in zip(self.columns, self.gauge, spread, strict=False):
+        if not any(self.gauge):
+            return
+        for label, u, s in zip(self.columns, self.gauge, self.within, strict=True):
             if u > s:
                 yield (
                     f"gauge is {u:g}, and the measured values of {label} scatter by {s:.3g} (standard deviation"
@@ -76,7 +77,7 @@ class Population(Declaration):
                     "a finer gauge, or leave gauge out"
                 )
                 return
-        if any(self.gauge) and self._true_variances.min() < -ROUNDING:
+        if self._true_variances.min() < -ROUNDING:
             yield (
                 "gauge is larger than the spread of some combination of the columns, which correlate more than its scatter "
                 "allows; check its units, or leave gauge out"
@@ -85,7 +86,10 @@ class Population(Declaration):
     @cached_property
     def members(self) -> list[np.ndarray]:
         """The rows (part,) of each lot; all rows without lots."""
-        return [np.flatnonzero(np.array(self.lots) == lot) for lot in dict.fromkeys(self.lots)] or [np.arange(len(self.values))]
+        if not self.lots:
+            return [np.arange(len(self.values))]
+        _, numbers, counts = np.unique(self.lots, return_inverse=True, return_counts=True)
+        return np.split(np.argsort(numbers, kind="stable"), np.cumsum(counts)[:-1])
 
     @property
     def centres(self) -> np.ndarray:
