@@ -1,6 +1,7 @@
 """A mechanism over its positions: the envelope of each measurement in each realization, from the same draws everywhere."""
 
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -21,6 +22,7 @@ from tolcontact.statistics.capability import PERCENTS
 from tolcontact.statistics.sample import Sample
 from tolcontact.workflow.models import Choice, is_archive
 
+OF_ALL_POSITIONS = "[limits]", "[effect]"  # kinds of doubts that a single position does not justify
 Mechanism = Callable[..., Assembly] | str | Path  # a function of parameters that returns an assembly, or a script with one
 
 
@@ -50,13 +52,16 @@ def sweep(
     `solver`, `method`, `client` and `progress` are as in all analyses (see tolcontact.analyses).
     """
     points = _points(over)
-    analyses = list[Analysis]()
-    for point in points:
-        analysis = Analysis(
-            terms.SWEEP, _at(model, point), samples=samples, seed=seed, solver=solver, method=method, client=client
-        )
-        analyses.append(analysis)
-        _check_same(analyses[0], analysis, point)
+    with warnings.catch_warnings(record=True) as doubts:
+        warnings.simplefilter("always")
+        analyses = [
+            Analysis(terms.SWEEP, _at(model, point), samples=samples, seed=seed, solver=solver, method=method, client=client)
+            for point in points
+        ]
+    for text, doubt in {str(doubt.message): doubt for doubt in doubts}.items():
+        if not text.startswith(OF_ALL_POSITIONS):
+            warnings.warn(text, doubt.category, stacklevel=2)
+    _check_same(analyses, points)
     measured, statuses, counts = [], [], []
     for number, analysis in enumerate(analyses):
         if progress is not None:
@@ -80,8 +85,7 @@ def sweep(
         "parameter": [[point[name] for point in points] for name in over],
         "by_status": counts,
     }
-    labels = {terms.PARAMETER_NAME: list(over)}
-    return analyses[0].dataset(values, labels, realizations=samples, positions=len(points))
+    return analyses[0].dataset(values, {terms.PARAMETER_NAME: list(over)}, realizations=samples, positions=len(points))
 
 
 def _points(over: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
@@ -113,20 +117,21 @@ def _at(model: Mechanism, point: Mapping[str, float]) -> Callable[[], Assembly]:
     return partial(model, **point)
 
 
-def _check_same(first: Analysis, other: Analysis, point: Mapping[str, float]) -> None:
-    """Raise OptionError unless the contributors and the measures at a position are those at the first one."""
-    programs = first.program, other.program
-    for kind, (expected, actual) in {
-        "contributors": [program.draws.labels for program in programs],
-        "measurements": [[measure.name for measure in program.nominal.measures] for program in programs],
-    }.items():
-        if expected != actual:
-            different = sorted(set(expected) ^ set(actual)) or expected
-            where = ", ".join(f"{name}={value:g}" for name, value in point.items())
-            raise OptionError(
-                f"at {where} the {kind} are others than at the first position, such as {different[0]}; declare the same at "
-                "all positions, so that a realization has the same parts there"
-            )
+def _check_same(analyses: Sequence[Analysis], points: Sequence[Mapping[str, float]]) -> None:
+    """Raise OptionError unless the contributors and the measures are the same at all positions."""
+    names = {
+        "contributors": [analysis.program.draws.labels for analysis in analyses],
+        "measurements": [[measure.name for measure in analysis.program.nominal.measures] for analysis in analyses],
+    }
+    for kind, names_at in names.items():
+        for point, actual in zip(points, names_at, strict=True):
+            if actual != names_at[0]:
+                different = sorted(set(actual) ^ set(names_at[0])) or actual
+                where = ", ".join(f"{name}={value:g}" for name, value in point.items())
+                raise OptionError(
+                    f"at {where} the {kind} are others than at the first position, such as {different[0]}; declare the same "
+                    "at all positions, so that a realization has the same parts there"
+                )
 
 
 def _shifted(progress: Progress, before: int, total: int, done: int, _: int) -> None:

@@ -49,8 +49,9 @@ def _place(dataset: xr.Dataset, shares: np.ndarray) -> str:
 
 
 def _position(dataset: xr.Dataset, index: int) -> str:
-    values = dataset["parameter"].isel(position=index).values
-    return ", ".join(f"{name} {value:.4g}" for name, value in zip(dataset["parameter_name"].values, values, strict=True))
+    names, values = dataset["parameter_name"].values, dataset["parameter"].values
+    moved = [k for k in range(len(names)) if np.ptp(values[k]) > 0] or [0]
+    return ", ".join(f"{names[k]} {values[k, index]:.4g}" for k in moved)
 
 
 def _means(dataset: xr.Dataset) -> Table:
