@@ -119,3 +119,26 @@ def test_positions_with_other_contributors_are_refused():
 
     with pytest.raises(tc.OptionError, match=r"at angle=1 the contributors are others .*, such as play"):
         tc.analyses.sweep(other, {"angle": [0, 1]}, samples=10)
+
+
+def test_a_mechanism_that_cannot_be_assembled_at_a_position_is_outside_there():
+    """A key of 10 mm in a slot of 10.1 and 9.9 mm: at the second place none fits, so that no envelope with contact is left."""
+
+    def key(place):
+        a = tc.Assembly("key", method=tc.Method(resolution="exact"))
+        b = a.part("key", tc.Box(10, 20, 10), fixed=False)
+        walls = [
+            a.part(name, tc.Box(10, 20, 10), at=(x, 0, 0), fixed=True)
+            for name, x in (("left", -10), ("right", 10.1 - 0.2 * place))
+        ]
+        feet = {"Z1": ((2, 2, 0), "z"), "Z2": ((8, 2, 0), "z"), "Z3": ((5, 18, 0), "z"), "Y": ((5, 0, 5), "y")}
+        a.locate(b, [tc.Locator(name, p, along, 0) for name, (p, along) in feet.items()], floating=True)
+        a.contact("a", moving=b.face("-x"), reference=walls[0].face("+x"), points=4)
+        a.contact("b", moving=b.face("+x"), reference=walls[1].face("-x"), points=4)
+        a.variable("lift", 0.1, drives={"key.Z1": 1, "key.Z2": 1, "key.Z3": 1})
+        a.measure("lift", b.point(5, 10, 0), along="z", limits=(-1, 1))
+        return a
+
+    found = tc.analyses.sweep(key, {"place": [0, 1]}, samples=20).sel(measure="lift", state="corrected")
+    assert found["outside"].values[0] == 1 and np.isnan(found["envelope"]).all()
+    assert np.isfinite(found["mean"].isel(position=0)).all() and np.isnan(found["mean"].isel(position=1)).all()

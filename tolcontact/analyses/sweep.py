@@ -19,6 +19,7 @@ from tolcontact.limits import Limits
 from tolcontact.method import Solver
 from tolcontact.statistics import intervals
 from tolcontact.statistics.capability import PERCENTS
+from tolcontact.statistics.measure_statistics import MIN_VALUES
 from tolcontact.statistics.sample import Sample
 from tolcontact.workflow.models import Choice, is_archive
 
@@ -151,10 +152,18 @@ def _envelope(x: np.ndarray, fails: np.ndarray, limits: Sequence[Limits]) -> tup
         (whole.min(axis=0), whole.argmin(axis=0), PERCENTS[0]),
         (whole.max(axis=0), whole.argmax(axis=0), PERCENTS[-1]),
     ):
-        sample = Sample.of(extremes)
-        (outer,) = intervals.percentiles(sample, [percent])
-        ends.append([intervals.mean(sample), intervals.standard_deviation(sample, times=6), outer])
+        ends.append(_estimates(extremes, percent))
         shares.append(np.bincount(places, minlength=len(x)) / max(len(extremes), 1))
-    means = [intervals.mean(row[~failed]) for row, failed in zip(x, fails, strict=True)]
+    means = [_estimates(row[~failed], PERCENTS[0])[0] for row, failed in zip(x, fails, strict=True)]
     outside = intervals.UNDEFINED if all(limit.are_open for limit in limits) else intervals.proportion(is_outside)
     return ends, outside, np.array(shares), means
+
+
+def _estimates(x: np.ndarray, percent: float) -> list[Any]:
+    """Return mean, 6 sigma and a percentile of values (n,); undefined if there are too few, or one is not a number."""
+    if len(x) < MIN_VALUES or not np.isfinite(x).all():
+        return [intervals.UNDEFINED] * len(terms.ENVELOPE)
+    sample = Sample.of(x)
+    return [
+        intervals.mean(sample), intervals.standard_deviation(sample, times=6), *intervals.percentiles(sample, [percent])
+    ]  # fmt: skip
