@@ -146,11 +146,11 @@ def _envelope(x: np.ndarray, fails: np.ndarray, limits: Sequence[Limits]) -> tup
     fails  (position, realization) whether parts cannot be assembled
     """
     is_outside = (fails | np.array([limit.outside(row) for limit, row in zip(limits, x, strict=True)])).any(axis=0)
-    whole = x[:, ~fails.any(axis=0)]
+    assembled = x[:, ~fails.any(axis=0)]
     ends, shares = [], []
     for extremes, places, percent in (
-        (whole.min(axis=0), whole.argmin(axis=0), PERCENTS[0]),
-        (whole.max(axis=0), whole.argmax(axis=0), PERCENTS[-1]),
+        (assembled.min(axis=0), assembled.argmin(axis=0), PERCENTS[0]),
+        (assembled.max(axis=0), assembled.argmax(axis=0), PERCENTS[-1]),
     ):
         ends.append(_estimates(extremes, percent))
         shares.append(np.bincount(places, minlength=len(x)) / max(len(extremes), 1))

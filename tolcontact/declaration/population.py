@@ -107,7 +107,7 @@ class Population(Declaration):
 
     @property
     def between(self) -> np.ndarray:
-        """The standard deviations (column,) between lots: of their means, less what so many parts of each explain."""
+        """The standard deviations (column,) between lots: of their means, less what the spread within lots explains."""
         means = np.array([self.values[rows].mean(axis=0) for rows in self.members])
         explained = self.within**2 * np.mean([1 / len(rows) for rows in self.members])
         return np.asarray(np.sqrt(np.maximum(means.var(axis=0, ddof=1) - explained, 0.0)))

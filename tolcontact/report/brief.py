@@ -17,7 +17,7 @@ URGENCY = {FAILS: 2.0, UNDECIDED: 1.0, "": 0.0, CONSTANT: -1.0, MEETS: -1.0}
 
 
 def brief_measures(summary: xr.Dataset) -> tuple[xr.Dataset, str]:
-    """Return the summary of the measurements that fall short of their limits, and what is said about the others.
+    """Return the summary of the measurements that fall short of their limits, and a remark about all others.
 
     All measurements are kept if there are few. If none falls short, the first ones are kept.
     """
@@ -26,25 +26,29 @@ def brief_measures(summary: xr.Dataset) -> tuple[xr.Dataset, str]:
         return summary, ""
     measures = [summary.isel(measure=index) for index in range(count)]
     opinions = [verdict_of(measure, summary.attrs["realizations"]) for measure in measures]
-    words = ["" if opinion is None else opinion.word for opinion in opinions]
+    verdicts = ["" if opinion is None else opinion.word for opinion in opinions]
     shares = [float(m["statistic_value"].sel(state=terms.STATES[1], statistic=terms.OUTSIDE)[0]) for m in measures]
-    urgencies = [URGENCY[word] + float(np.nan_to_num(share)) / 2 for word, share in zip(words, shares, strict=True)]
-    short = [index for index in _largest(urgencies, MOST_LISTED) if words[index] in (FAILS, UNDECIDED)]
-    shown = short or list(range(MOST_LISTED))
-    left_out = [word for index, word in enumerate(words) if index not in shown]
-    named = {"fall short, too": (FAILS, UNDECIDED), "without limits": ("",), "meet their limits": (MEETS, CONSTANT)}
-    counts = {text: sum(word in group for word in left_out) for text, group in named.items()}
-    others = ", ".join(f"{number} more {text}" for text, number in counts.items() if number)
-    return summary.isel(measure=shown), f"{others}; {EVERYTHING}"
+    urgencies = [URGENCY[verdict] + float(np.nan_to_num(share)) / 2 for verdict, share in zip(verdicts, shares, strict=True)]
+    failing = [index for index in _largest(urgencies, MOST_LISTED) if verdicts[index] in (FAILS, UNDECIDED)]
+    selection = failing or list(range(MOST_LISTED))
+    remainder = [verdict for index, verdict in enumerate(verdicts) if index not in selection]
+    phrases = {"fall short, too": (FAILS, UNDECIDED), "without limits": ("",), "meet their limits": (MEETS, CONSTANT)}
+    counts = {phrase: sum(verdict in group for verdict in remainder) for phrase, group in phrases.items()}
+    remark = ", ".join(f"{number} more {phrase}" for phrase, number in counts.items() if number)
+    return summary.isel(measure=selection), f"{remark}; {EVERYTHING}"
 
 
-def brief_table(table: Table, weights: Sequence[float] | np.ndarray, others: str, rows_of_each: int = 1) -> Table:
-    """Return a table of the items with the largest weights (item,), each of several rows, and a remark about all others."""
+def brief_table(table: Table, weights: Sequence[float] | np.ndarray, phrase: str, rows_of_each: int = 1) -> Table:
+    """Return a table of the items with the largest weights (item,), each of several rows.
+
+    A remark has the number of the other items, and a `phrase` about them.
+    """
     if len(weights) <= MOST_LISTED:
         return table
-    shown = [index for index in _largest(weights, MOST_LISTED) if weights[index] > 0]
-    rows = [row for index in shown for row in table.rows[index * rows_of_each : (index + 1) * rows_of_each]]
-    return replace(table, rows=rows, remarks=[*table.remarks, f"{len(weights) - len(shown)} more {others}; {EVERYTHING}"])
+    selection = [index for index in _largest(weights, MOST_LISTED) if weights[index] > 0]
+    rows = [row for index in selection for row in table.rows[index * rows_of_each : (index + 1) * rows_of_each]]
+    remark = f"{len(weights) - len(selection)} more {phrase}; {EVERYTHING}"
+    return replace(table, rows=rows, remarks=[*table.remarks, remark])
 
 
 def _largest(weights: Sequence[float] | np.ndarray, count: int) -> list[int]:

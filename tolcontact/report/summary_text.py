@@ -52,14 +52,14 @@ def _sections(summary: xr.Dataset, *, is_whole: bool) -> Iterator[Text | Table |
     if summary.attrs["samples"] > count:
         yield Text(f"{grouped(count)} of {grouped(summary.attrs['samples'])} realizations are done; continue with --resume")
     yield Text(f"{terms.ESTIMATES_NOTE}.\nChanges are from the same draws.\n")
-    shown, others = (summary, "") if is_whole else brief_measures(summary)
-    yield overview_table(shown)
+    brief, remark = (summary, "") if is_whole else brief_measures(summary)
+    yield overview_table(brief)
     has_details = is_whole or summary.sizes["measure"] <= MOST_DETAILED
-    yield from map(Text, verdict_lines(shown, states_once=not has_details))
+    yield from map(Text, verdict_lines(brief, states_once=not has_details))
     if has_details:
         yield from (measure_table(summary.sel(measure=name), summary.sizes["measure"]) for name in summary["measure"].values)
     else:
-        yield Text(others or f"percentiles and capability of each: {EVERYTHING}")
+        yield Text(remark or f"percentiles and capability of each: {EVERYTHING}")
     if not summary.sizes["part"]:
         return
     magnitudes = int(summary["magnitude_realizations"])
