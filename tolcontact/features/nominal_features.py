@@ -1,8 +1,9 @@
 """The features of a model with numbers: their freedoms, made once, and how faces deviate with everything that varies."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,15 @@ class Features:
     _gauges: dict[str, NominalFeature] = field(default_factory=dict)
     _targets: dict[tuple[int, str], tuple[NominalFeature, ...]] = field(default_factory=dict)
     _used_faces: dict[tuple[Any, ...], FaceDeviation] = field(default_factory=dict)
+
+    @cached_property
+    def _coefficients(self) -> dict[str, list[tuple[int, float]]]:
+        """The numbers of the causes that expand each part, by its name, with their coefficients."""
+        coefficients = defaultdict[str, list[tuple[int, float]]](list)
+        for number, cause in enumerate(self.causes):
+            for part, coefficient in cause.expands.items():
+                coefficients[part].append((number, coefficient))
+        return dict(coefficients)
 
     @property
     def faces(self) -> tuple[FaceDeviation, ...]:
@@ -174,8 +184,8 @@ class Features:
 
     def expansion(self, part: Part) -> Expansion | None:
         """Return the expansion of a part by temperatures, once all features have been added; None if none expands it."""
-        causes = [(number, cause.expands[part.name]) for number, cause in enumerate(self.causes) if part.name in cause.expands]
-        if not causes:
+        causes = self._coefficients.get(part.name)
+        if causes is None:
             return None
         numbers, coefficients = zip(*causes, strict=True)
         return Expansion(self.first_column + len(self.freedoms) + np.array(numbers), np.array(coefficients, dtype=float))
