@@ -88,7 +88,8 @@ def _entries(declared: DeclaredFile) -> dict[str, Any]:
     """Return everything for JSON: the statements of the file, its faces, and the outcome."""
     faces = {record: asdict(face) for record, face in declared.faces.items()}
     declarations = {
-        entry.annotation.record: {"features": entry.features, "reason": entry.reason} for entry in declared.annotations
+        entry.annotation.record: {"features": entry.features, "reason": entry.reason, "remark": entry.remark}
+        for entry in declared.annotations
     }
     return asdict(declared.pmi) | {"faces": faces, "declared": declarations}
 
@@ -143,13 +144,18 @@ def _sections(declared: DeclaredFile) -> Iterator[RenderableType]:
 
 
 def _undeclared_lines(declared: DeclaredFile) -> Iterator[RenderableType]:
-    """Yield the annotations that are not declared, or only partly, with the reasons."""
+    """Yield the annotations that are not declared, or only partly, with the reasons, and those with remarks."""
     numbers: dict[tuple[str, str], list[str]] = defaultdict(list)
+    remarks: dict[str, list[str]] = defaultdict(list)
     for kind, noun in ((Tolerance, "tolerance"), (Dimension, "dimension"), (Datum, "datum")):
         for entry in declared.annotations:
             if isinstance(entry.annotation, kind) and entry.reason:
                 reason = f"only in part, {entry.reason}" if entry.features else entry.reason
                 numbers[noun, reason].append(_number(entry.annotation))
+            if entry.remark:
+                remarks[entry.remark].append(_number(entry.annotation))
+    for remark, group in remarks.items():
+        yield Text(shown(f"\ntolerance{'s' if len(group) > 1 else ''} {', '.join(group[:MAX_ROWS])}: {remark}"))
     if numbers:
         yield Text("\nnot declared", style="bold")
     for (noun, reason), group in numbers.items():

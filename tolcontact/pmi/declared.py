@@ -37,7 +37,7 @@ class DeclaredPmi(Readable):
             if (entries := [entry for entry in self.annotations if isinstance(entry.annotation, kind)])
         ]
         title = f"{len(self.features)} features, patterns and datum targets, which state {', '.join(counts)}"
-        return "\n".join([title, *(f"  {annotation}" for annotation in self.undeclared)])
+        return "\n".join([title, *(f"  {entry}" for entry in self.annotations if entry.reason or entry.remark)])
 
 
 @dataclass(frozen=True, repr=False)

@@ -217,8 +217,10 @@ class _Trial:
                 return None
             draft = replace(draft, datum=None)
             datum, name = None, draft.name
-        for claim, constituent in sorted(stated, key=lambda statement: not isinstance(statement[1], Size)):
-            if reason := self._fault(self._feature(draft, (*tolerances, constituent))):
+        for claim, constituent in _sizes_first(stated):
+            if any(_implies(known, constituent) for known in tolerances):
+                claim.names.append(name)
+            elif reason := self._fault(self._feature(draft, (*tolerances, constituent))):
                 claim.refuse(reason, name)
             else:
                 claim.names.append(name)
@@ -254,6 +256,24 @@ class _Trial:
         except GeometryFault as error:
             return str(error)
         return ""
+
+
+def _sizes_first(stated: Sequence[Statement]) -> list[Statement]:
+    """Return statements with the sizes first, and those that narrower tolerances of the same kind imply last."""
+
+    def place(statement: Statement) -> int:
+        _, constituent = statement
+        is_implied = any(_implies(known, constituent) and not _implies(constituent, known) for _, known in stated)
+        return 0 if isinstance(constituent, Size) else 2 if is_implied else 1
+
+    return sorted(stated, key=place)
+
+
+def _implies(known: Control, stated: Control) -> bool:
+    """Return whether a tolerance implies a stated one: all but the widths are equal, and it is not wider."""
+    if isinstance(known, Size) or isinstance(stated, Size):
+        return False
+    return known.width <= stated.width and replace(stated, width=known.width) == known
 
 
 def _following(draft: Draft, stated: Sequence[Statement], letters: Set[str | None], reason: str) -> tuple[Statement, ...]:
