@@ -55,7 +55,7 @@ def pmi(file: StepFile, as_json: AsJson = False, as_csv: AsCsv = False, as_scrip
         information = read_pmi(file)
         declared = _declared(file, information)
     if as_script and information.is_empty:
-        raise OptionError(f"{_reason(information, file)}, so there is nothing to declare")
+        raise OptionError(f"{without_annotations(information, file)}, so there is nothing to declare")
     if as_script and not declared.parts:
         raise OptionError(f'"{file}": none of its tolerances, dimensions and datums applies to a face that is listed')
     if as_script:
@@ -63,7 +63,7 @@ def pmi(file: StepFile, as_json: AsJson = False, as_csv: AsCsv = False, as_scrip
     elif as_csv:
         echo(_csv(declared), nl=False)
     elif information.is_empty and not as_json:
-        echo(_reason(information, file))
+        echo(without_annotations(information, file))
     elif as_json:
         echo(json.dumps(_entries(declared), allow_nan=False))
     else:
@@ -94,7 +94,7 @@ def _entries(declared: DeclaredFile) -> dict[str, Any]:
     return asdict(declared.pmi) | {"faces": faces, "declared": declarations}
 
 
-def _reason(information: Pmi, name: Path) -> str:
+def without_annotations(information: Pmi, name: Path) -> str:
     """Return a sentence about a file without annotations, with the reason if it is known."""
     if not information.is_ap242:
         schema = clipped(information.schema, 100) or "not stated"
