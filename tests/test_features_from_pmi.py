@@ -1,7 +1,6 @@
 """Features and patterns that the PMI of a STEP file states: what is declared, and the reason for what is not."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,10 +11,7 @@ from tests.pmi_records import Annotated
 from tests.test_cad import COVER
 from tolcontact.discretization import discretize
 from tolcontact.errors import OptionError
-from tolcontact.geometry.shapes import shape
-from tolcontact.pmi import OF_DATUMS, OF_TOLERANCES
-from tolcontact.pmi.drafts import declare_features
-from tolcontact.pmi.reading import read_pmi
+from tolcontact.pmi import OF_DATUMS
 from tolcontact.variation import Draws
 
 ROUND = "cylindrical or circular"
@@ -239,35 +235,6 @@ def test_limits_of_a_fit_are_about_the_nominal_size_of_the_drawing(tmp_path):
     """A shape is modelled at 8.1, and its drawing says 8.09 H7."""
     (feature,) = tc.io.features_from_pmi(cover(lambda file: file.fit(file.aspect(*HOLE), 8.09, "H", "7"), tmp_path)).features
     assert str(feature.tolerances[0]) == "size 8.1 +0.005 -0.01 mm"
-
-
-def test_each_modifier_is_declared_or_refused_with_its_standard_as_the_table_of_the_guide_has_it(tmp_path):
-    """One hole for each modifier; what the table calls declared has the option, and what it does not has the reason."""
-    guide = (Path(tc.__file__).parent / "guide" / "pmi.md").read_text()
-    for table in (OF_TOLERANCES, OF_DATUMS):
-        for word, entry in table.items():
-            assert f"| {entry.sign} | {word} | {entry.standard} | {entry.outcome} |" in guide
-    read = shape(cover(datums, tmp_path).geometry)  # once: the annotations alone differ
-    for word, entry in OF_TOLERANCES.items():
-        modifier, datum = word.upper().replace(" ", "_"), "(M)" if "simultaneous" in entry.declared else ""
-
-        def annotate(file, modifier=modifier, datum=datum):
-            datums(file)
-            file.size(file.aspect(*HOLE), 8.1, (0, 0.03))
-            kind, place = ("parallelism", TOP) if "TANGENT" in modifier else ("position", *HOLE)
-            file.tolerance(
-                kind, 0.2, file.aspect(place), f"A|B{datum}|C" if place != TOP else "A", zone=ROUND, modifier=modifier
-            )
-
-        part = cover(annotate, tmp_path)
-        features, claims = declare_features(part, read_pmi(part.geometry.source), read)
-        reasons = [claim.result.reason for claim in claims if claim.result.reason]
-        if isinstance(entry.declared, str):
-            assert reasons == [f"its modifier, {word} ({entry.sign}, {entry.standard}): {entry.declared}"]
-        else:
-            assert not reasons
-            (stated,) = [tolerance for feature in features for tolerance in feature.geometric]
-            assert {name: getattr(stated, name) for name in entry.declared} == entry.declared
 
 
 @pytest.mark.parametrize(("word", "reads"), [("FREE_STATE", "A|B|C"), ("ORIENTATION", "A|B><|C"), ("TRANSLATION", None)])
