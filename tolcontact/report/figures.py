@@ -30,6 +30,13 @@ def plain(value: float, scale: float | None = None) -> str:
     return f"{value:.6g}" if decimals is None else f"{_rounded(value, decimals):.{decimals}f}"
 
 
+def nominal_and_limits(nominal: float, lower: float, upper: float) -> tuple[str, str, str]:
+    """Return a nominal value and its limits, which may be infinite, with decimals that suit the width of the limits."""
+    known = [abs(value) for value in (nominal, lower, upper) if math.isfinite(value)]
+    scale = upper - lower if math.isfinite(upper - lower) else max(known, default=None)
+    return plain(nominal, scale), plain(lower, scale), plain(upper, scale)
+
+
 def settled(penetration: float) -> float:
     """Return a penetration [mm], or 0 where it is rounding."""
     return penetration if penetration > GAP_ACCURACY else 0.0

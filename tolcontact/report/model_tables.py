@@ -12,7 +12,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.declaration import Chain, Tolerance, Variable
 from tolcontact.declaration.document import tolerance_of_entry, variable_of_entry
 from tolcontact.errors import ArchiveError
-from tolcontact.report.figures import plain
+from tolcontact.report.figures import nominal_and_limits, plain
 from tolcontact.report.table import Cell, Table
 
 Entry = dict[str, Any]
@@ -153,13 +153,12 @@ def _measurements(document: Entry, results: xr.DataTree) -> Table:
     rows: list[list[Cell]] = []
     for k, measure in enumerate(document["measures"]):
         lower, upper = (float(root[variable.name].values[k]) for variable in (terms.LOWER_LIMIT, terms.UPPER_LIMIT))
-        scale = upper - lower if math.isfinite(upper - lower) else None
         along = "" if measure.get("along") is None else _triple(measure["along"])
-        nominal = plain(float(root[terms.MEASURE_NOMINAL.name].values[k]), scale)
+        texts = nominal_and_limits(float(root[terms.MEASURE_NOMINAL.name].values[k]), lower, upper)
         rows.append(
             [
                 measure["name"], _quantity(measure), _end(measure.get("to")), along, str(measure["units"]),
-                *(float(text) if text else None for text in (nominal, plain(lower, scale), plain(upper, scale))),
+                *(float(text) if text else None for text in texts),
             ]
         )  # fmt: skip
     columns = [terms.MEASUREMENT, "of", "to", "along", "units", "nominal", "lower limit", "upper limit"]

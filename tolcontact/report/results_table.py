@@ -9,7 +9,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.report.convention_text import unexplained_offsets
-from tolcontact.report.figures import grouped, limits_text, number, percent, plain
+from tolcontact.report.figures import grouped, limits_text, nominal_and_limits, number, percent
 from tolcontact.report.table import Table
 from tolcontact.statistics.capability import CONSTANT, FAILS, KEPT, UNDECIDED, Verdict, verdict
 
@@ -80,7 +80,6 @@ def result_rows(summary: xr.Dataset) -> list[ResultRow]:
 def _row(measure: xr.Dataset, summary: xr.Dataset) -> ResultRow:
     opinion = verdict_of(measure, summary.attrs["realizations"])
     nominal, lower, upper = (float(measure[name].values) for name in (terms.MEASURE_NOMINAL.name, *terms.MEASURE_LIMITS[:2]))
-    scale = upper - lower if math.isfinite(upper - lower) else None
     return ResultRow(
         full_name(measure),
         str(measure["measure_units"].values),
@@ -92,7 +91,7 @@ def _row(measure: xr.Dataset, summary: xr.Dataset) -> ResultRow:
         nominal,
         lower,
         upper,
-        (plain(nominal, scale), plain(lower, scale), plain(upper, scale)),
+        nominal_and_limits(nominal, lower, upper),
         [_state_figures(measure.sel(state=state), share_units(summary)) for state in reversed(terms.STATES)],
     )
 

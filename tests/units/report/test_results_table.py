@@ -6,7 +6,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tolcontact.report.figures import plain
+from tolcontact.report.figures import nominal_and_limits, plain
 from tolcontact.report.results_table import result_rows, share_heading, share_in, share_units, verdict_lines, verdict_text
 from tolcontact.statistics import intervals
 from tolcontact.statistics.capability import ALLOWED_SHARE, FAILS, MEETS, UNDECIDED, verdict
@@ -117,3 +117,9 @@ def test_sides_without_a_limit_have_no_noise_either():
     assert isinstance(summary, xr.Dataset)
     (row,) = [row for row in result_rows(summary) if row.name == "one"]
     assert row.limits == ("0", "", "0.5") and row.states[0].cells[3] == "-" and "[" in row.states[0].cells[4]
+
+
+def test_a_nominal_value_of_rounding_is_nothing_beside_its_limits():
+    assert nominal_and_limits(2.04281e-14, -np.inf, 0.15) == ("0", "", "0.15")
+    assert nominal_and_limits(42.0000000000001, 41.9, 42.1) == ("42", "41.9", "42.1")
+    assert nominal_and_limits(0.0, -np.inf, np.inf) == ("0", "", "")

@@ -256,12 +256,12 @@ def _missing(scene: dict[str, Any]) -> list[str]:
         remarks.append("The archive has no displacement fields.")
     if "motions" not in scene["realizations"]:
         remarks.append("The archive has no poses: single realizations have figures only.")
-    remarks += [
-        f"Part {part['name']} is drawn with {grouped(part['faces']['shape'][0])} of its {grouped(part['triangles'])} triangles."
+    coarse = [
+        f"{part['name']} {grouped(part['faces']['shape'][0])} of {grouped(part['triangles'])}"
         for part in scene["parts"]
         if part["faces"]["shape"][0] < part["triangles"]
     ]
-    return remarks
+    return [*remarks, f"Parts are drawn with fewer triangles than they have: {', '.join(coarse)}."] if coarse else remarks
 
 
 def contributions_of(results: xr.DataTree) -> list[dict[str, Any]]:
