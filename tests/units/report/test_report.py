@@ -23,7 +23,7 @@ def test_bodies_of_many_triangles_are_drawn_with_fewer(tmp_path):
     part = data_of(page)["scene"]["parts"][0]
     count = part["faces"]["shape"][0]
     assert count <= scene.MAX_TRIANGLES < part["triangles"] == 81_920
-    assert f"fewer triangles than they have: ball {grouped(count)} of {grouped(81_920)}." in page
+    assert f"fewer triangles than they have: ball {grouped(count)} of {grouped(81_920)}" in page
     vertices = unpacked(part["vertices"])
     assert np.abs(np.linalg.norm(vertices, axis=1) - 50).max() < 0.5
     field = unpacked(part["sixSigma"])
