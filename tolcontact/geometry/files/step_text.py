@@ -44,6 +44,7 @@ _DOCUMENTS = ("DOCUMENT_FILE", "APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT")
 FACES = ("ADVANCED_FACE", "FACE_SURFACE")
 SOLIDS = ("MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "FACETED_BREP")
 USAGES = ("GEOMETRIC_ITEM_SPECIFIC_USAGE", "ITEM_IDENTIFIED_REPRESENTATION_USAGE")  # link PMI and faces
+OPERATOR = "CARTESIAN_TRANSFORMATION_OPERATOR_3D"  # places a shape, maybe mirrored
 SHAPE_SUFFIXES = (".step", ".stp", ".p21", ".stpz", ".stpx", ".stpnc")
 # Shapes are most of a file, and nobody asks for their records.
 _SHAPES = frozenset(
