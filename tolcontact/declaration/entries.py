@@ -234,7 +234,7 @@ FEATURES = Field(
 )
 RECORDS = {
     "parts": Record(
-        Part, fields="geometry name at rotation fixed standard declared_at features", omitted="standard", geometry=SHAPE,
+        Part, fields="geometry name at rotation fixed standard mirror declared_at features", omitted="standard mirror", geometry=SHAPE,
         features=FEATURES,
     ),
     "locations": Record(

@@ -19,6 +19,7 @@ D = TypeVar("D", bound=Declaration)
 Association = Literal["outside", "least squares"]  # from a plane to a datum, ISO 5459
 OUTSIDE, LEAST_SQUARES = ASSOCIATIONS = get_args(Association)
 Standard = Literal["", "ISO", "ASME"]
+Mirror = Literal["", "x", "y", "z"]  # the axis of a part's frame that is reversed
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -27,7 +28,8 @@ class Part(Deformable):
 
     A point `p` of the part lies at `rotation * p + at` in the nominal assembly frame; `rotation` is a rotation vector [rad],
     `at` a position [mm]. With `fixed=None` a part is free if it is the moving side of a contact pair, floats, or has
-    one-sided locators; otherwise it is fixed. The `standard` of its drawing is explained by Assembly.
+    one-sided locators; otherwise it is fixed. The `standard` of its drawing is explained by Assembly. With `mirror="x"` the x
+    axis of its frame is reversed before: the part is the mirror image of its geometry, and its frame is left-handed.
     """
 
     name: str
@@ -37,7 +39,8 @@ class Part(Deformable):
     fixed: bool | None = None
     standard: Standard = ""
     declared_at: str = field(default_factory=script_line)
-    checks: ClassVar = {"standard": one_of(get_args(Standard))}
+    mirror: Mirror = ""
+    checks: ClassVar = {"standard": one_of(get_args(Standard)), "mirror": one_of(get_args(Mirror))}
     _declared: "list[Feature | Pattern | DatumTargets | Elastic]" = field(default_factory=list, init=False)
 
     @property
@@ -72,8 +75,7 @@ class Part(Deformable):
                     f'feature "{name}": {type(constituent).__name__} is neither a face nor a tolerance; expected '
                     "part.face(...), tc.Size(...), tc.Position(...) or another tolerance of a feature"
                 )
-        faces = tuple(constituent for constituent in constituents if isinstance(constituent, Face))
-        tolerances = tuple(constituent for constituent in constituents if not isinstance(constituent, Face))
+        faces, tolerances = (tuple(c for c in constituents if isinstance(c, kind)) for kind in (Face, Control))
         return self.add(Feature(name, self, faces, tolerances, datum, script_line(), association))
 
     def pattern(
@@ -89,12 +91,10 @@ class Part(Deformable):
         """
         members: list[tuple[Face, ...] | Feature] = []
         for constituent in constituents:
-            if isinstance(constituent, Face):
-                members.append((constituent,))
-            elif isinstance(constituent, list | tuple) and all(isinstance(face, Face) for face in constituent):
+            if isinstance(constituent, list | tuple) and all(isinstance(face, Face) for face in constituent):
                 members.append(tuple(constituent))
-            elif isinstance(constituent, Feature):
-                members.append(constituent)
+            elif isinstance(constituent, Face | Feature):
+                members.append((constituent,) if isinstance(constituent, Face) else constituent)
             elif not isinstance(constituent, Control):
                 raise TypeError(
                     f'pattern "{name}": {type(constituent).__name__} is neither a member nor a tolerance; expected '
@@ -139,7 +139,7 @@ class Part(Deformable):
 
     def __str__(self) -> str:
         place = "" if self.at == (0.0, 0.0, 0.0) else " at ({:g}, {:g}, {:g})".format(*self.at)
-        choice = {None: "", True: ", fixed", False: ", free"}[self.fixed]
+        choice = (", mirrored" if self.mirror else "") + {None: "", True: ", fixed", False: ", free"}[self.fixed]
         return f"part {self.name}: {self.geometry}{place}{choice}"
 
 
