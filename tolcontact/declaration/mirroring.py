@@ -78,7 +78,7 @@ class Mirror:
                     for member in declared.constituents
                 )
                 image = replace(declared, part=self.parts[declared.part], constituents=members, declared_at=self.line)
-                self.features |= dict(zip(declared.members, image.members, strict=True))
+                self.features.update(zip(declared.members, image.members, strict=True))
             case DatumTargets():
                 image = replace(declared, points=tuple(map(self.point, declared.points)), declared_at=self.line)
             case Elastic():
