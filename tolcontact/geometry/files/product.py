@@ -164,7 +164,7 @@ def product(path: Path, content: Mapping[str, Any], text: StepText, chord: float
     bodies = [_body(path, entry, shapes[entry[0]], is_alone=len(entries) == 1) for entry in entries]
     face_count = sum(len(entry["surfaces"]) for entry in content["shapes"])
     drawn = tuple(shape for shape in shapes if len(shape.triangles))
-    return Product(path, drawn, tuple(uniquely_named(bodies)), face_count, text.units)
+    return Product(path, drawn, tuple(uniquely_named(bodies)), face_count, ", ".join(text.units))
 
 
 def _body(path: Path, entry: Sequence[Any], shape: StepShape, *, is_alone: bool) -> Body:
