@@ -37,7 +37,7 @@ def test_names_in_the_codes_of_the_norm_are_read(written, tmp_path):
 
 @pytest.mark.parametrize(("angle", "around"), [(0.0, (1, 1)), (0.7, (1, 1)), (0.7, (-1, 1))])
 def test_a_mirrored_node_is_a_body_with_its_normals_outward(angle, around, tmp_path):
-    """A wedge without a mirror plane is the wedge mirrored before, or rotated, if a node around the mirroring one mirrors, too."""
+    """A wedge without a mirror plane is the wedge mirrored before; two mirrors, one around the other, are a rotation."""
     wedge = trimesh.convex.convex_hull([(0, 0, 0), (40, 0, 0), (0, 20, 0), (0, 0, 10), (5, 5, 8)])
     mirror = trimesh.transformations.rotation_matrix(angle, [1, 2, 3]) @ np.diag([-1.0, 1, 1, 1])
     scene = trimesh.Scene()

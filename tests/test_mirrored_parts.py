@@ -10,8 +10,7 @@ from tests.helpers import assembly_of, compiled, nightly, simulate
 from tests.test_cad import COVER
 from tests.test_json_models import written
 from tolcontact.errors import ModelError
-from tolcontact.features.freedoms import DATUM
-from tolcontact.geometry.shapes import placement_of
+from tolcontact.geometry import preview
 
 TURN = (0.3, -0.2, 0.5)
 SEATED = tc.Method(objective="seating")
@@ -61,12 +60,14 @@ class Fastened:
 
     def __init__(self, model, folder):
         block = model.part("left block", tc.Box(60, 50, 10), at=(-20, -30, -10), fixed=True)
-        ring = model.part("left ring", tc.Mesh(trimesh.creation.annulus(5, 15, 8, sections=48)), at=(0, 0, 4), rotation=(0, 0, 0.4))
+        annulus = tc.Mesh(trimesh.creation.annulus(5, 15, 8, sections=48))
+        ring = model.part("left ring", annulus, at=(0, 0, 4), rotation=(0, 0, 0.4))
         ring.feature("bore", ring.face(tc.select.Cylinder(5, inner=True)), tc.Size(10, 0.1, 0.02))
         pin = model.part("left pin", tc.Pin(9.9, 20), at=(0, 0, 12), fixed=True)
         supports = locators(("s1", (12, 0, -4), "z"), ("s2", (-6, 11, -4), "z"), ("s3", (-6, -11, -4), "z"), one_sided=True)
         model.locate(ring, [*supports, *locators(("turn", (12, 0, 0), "y"))], floating=True)
-        model.contact("left bore", moving=ring.features[0], reference=pin.face(lambda centres, normals: np.abs(normals[:, 2]) < 0.5))
+        shank = pin.face(lambda centres, normals: np.abs(normals[:, 2]) < 0.5)
+        model.contact("left bore", moving=ring.features[0], reference=shank)
         near = ring.face("-z", tc.select.Near(block, 1), tc.select.Inside((-20, -20, -5), (20, 20, 0)))
         model.contact("left seat", moving=near, reference=block.face("+z"), points=20)
         model.force("left push", at=ring.point(3, 2, 0), vector=(6, 3, -20))
@@ -120,8 +121,7 @@ class Bent:
 
 
 def placed(part, point):
-    R, t = placement_of(part)
-    return R @ point + t
+    return preview(part).rotation @ point + part.at
 
 
 def twins(group, plane, folder):
@@ -132,7 +132,7 @@ def twins(group, plane, folder):
     images = images if isinstance(images, tuple) else (images,)
     own.measure(model, "left", np.eye(3), *own.parts)
     own.measure(model, "right", np.diag([-1.0 if axis == plane else 1.0 for axis in "xyz"]), *images)
-    freedoms = {freedom.label: freedom for freedom in compiled(model).draws.contributors if freedom.source != DATUM}
+    freedoms = {freedom.label: freedom for freedom in compiled(model).draws.contributors if freedom.source != "datum"}
     left = [label for label in freedoms if label.startswith("left")]
     right = [label.replace("left", "right") for label in left]
     assert sorted([*left, *right]) == sorted(freedoms)
@@ -215,14 +215,14 @@ def test_a_model_with_mirrored_parts_is_the_same_as_data(tmp_path):
     ],
 )
 def test_wrong_arguments_are_refused(arguments, fault):
-    model, hinge, door = doors()
+    model, _, door = doors()
     with pytest.raises(ValueError, match=fault):
         model.mirrored(door, **{"plane": "x", "names": ("left", "right")} | arguments)
     with pytest.raises(ValueError, match='part "left door" is no part of "other"'):
         tc.Assembly("other").mirrored(door, plane="x", names=("left", "right"))
     with pytest.raises(TypeError, match="expected parts"):
         model.mirrored("left door", plane="x", names=("left", "right"))
-    with pytest.raises(ModelError, match='mirror is \'w\'; expected one of'):
+    with pytest.raises(ModelError, match="mirror is 'w'; expected one of"):
         part = tc.Assembly("part")
         part.part("part", tc.Box(1, 1, 1), mirror="w")
         tc.build(part)

@@ -168,7 +168,8 @@ def test_components_of_an_assembly_have_units_of_their_own(tmp_path):
     inner, whole = made.product("inner", (), inches), made.product("whole")
     made.place(inch_block, whole, "in mm", (10, 0, 0))
     made.place(block, inner, "in inches", (2, 0, 0))
-    made.place(block, inner, "mirrored", operator=made.operator(np.array([[-1, 0, 0, 4], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])))
+    mirror = np.array([[-1, 0, 0, 4], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    made.place(block, inner, "mirrored", operator=made.operator(mirror))
     made.place(inner, whole, "inner", (0, 100, 0))
     path.write_text(str(made))
     boxes = {body.name: np.array([body.lower, body.upper]) for body in tc.io.bodies_in(path)}

@@ -10,7 +10,7 @@ from tests.shapes import shape
 from tests.step_files import WEDGE, Step
 from tests.test_features_from_pmi import COVER, DECLARED, drawing
 from tolcontact.errors import ModelError
-from tolcontact.geometry.shapes import placement_of
+from tolcontact.geometry import preview
 
 FACES = ("foot", "front", "slope", "side")
 TURNED = trimesh.transformations.rotation_matrix(0.7, [1, 2, 3], [30.0, 10, 20])
@@ -58,10 +58,11 @@ def test_an_image_is_a_mirrored_shape_in_its_place(path):
     own, bodies = sorted_rows(shape(original.geometry).vertices), tc.io.bodies_in(path)
     for image, body, chain in zip(images, bodies[1:], [*CHAINS.values(), [MIRRORS["a turned plane"]]], strict=True):
         transform = np.linalg.multi_dot([np.eye(4), *reversed(chain)])
-        mesh, (R, t) = shape(image.geometry), placement_of(image)
+        mesh, seen = shape(image.geometry), preview(image)
+        R = seen.rotation
         assert mesh.is_watertight and mesh.volume == pytest.approx(40 * 20 * 10 / 6) and np.linalg.det(R) == pytest.approx(1)
         expected = trimesh.transform_points(WEDGE, transform)
-        np.testing.assert_allclose(sorted_rows(mesh.vertices @ R.T + t), sorted_rows(expected), atol=1e-6)
+        np.testing.assert_allclose(sorted_rows(seen.vertices), sorted_rows(expected), atol=1e-6)
         np.testing.assert_allclose([body.lower, body.upper], [expected.min(axis=0), expected.max(axis=0)], atol=1e-6)
         assert (sorted_rows(mesh.vertices).tolist() == own.tolist()) == (np.linalg.det(transform) > 0)
         faces = {face.name: R @ face.direction for face in tc.io.faces_in(path, body.number)}

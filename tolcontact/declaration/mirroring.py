@@ -1,7 +1,7 @@
-"""Mirror images of parts: left and right doors. What is declared of the parts alone, and between them, is mirrored with them."""
+"""Mirror images of parts, such as left and right doors, with all that is declared of these parts alone."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, overload
 
 from scipy.spatial.transform import Rotation
@@ -17,128 +17,105 @@ from tolcontact.declaration.values import Vector, is_length, script_line
 
 Plane = Literal["x", "y", "z"]
 PLANES: tuple[Plane, ...] = ("x", "y", "z")
+HALF_TURN = 180.0  # degrees
+COMPOSED = (  # declarations that refer to parts and features, and what they consist of
+    Feature, Pattern, DatumTargets, Elastic, Location, ThreeTwoOne, Locator, ContactPair, Force, Overlap, Face, Near, Point,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Mirror:
+class MirrorPlane:
     """A mirror plane of the nominal assembly, and the images that it has made.
 
-    plane      axis that is normal to it
+    axis       axis of the assembly that is normal to it
     at         [mm] its coordinate on this axis
     names      a text in names, and the text in its place in names of images
-    parts      images of parts
-    features   images of features, of members of patterns, too
     line       of the script
+    parts      images of parts
+    features   images of features, also of members of patterns
     """
 
-    plane: Plane
+    axis: Plane
     at: float
-    names: tuple[str, str]
+    names: Sequence[str]
+    line: str
     parts: dict[Part, Part]
     features: dict[Feature, Feature]
-    line: str
 
     def name(self, name: str) -> str:
         """Return the name of an image: with the text replaced, or added if the name lacks it."""
         old, new = self.names
         return name.replace(old, new) if old in name else f"{name} {new}"
 
-    def vector(self, vector: Vector) -> Vector:
-        """Return the image of a direction of the nominal assembly."""
-        x, y, z = (-c + 0.0 if axis == self.plane else c for axis, c in zip(PLANES, vector, strict=True))
+    def vector(self, vector: Vector, shift: float = 0.0) -> Vector:
+        """Return a vector with its component along the axis reversed, and shifted [mm]."""
+        x, y, z = (shift - c if axis == self.axis else c for axis, c in zip(PLANES, vector, strict=True))
         return x, y, z
 
-    def part(self, part: Part) -> Part:
-        """Return the image of a part without its features: coordinates in its frame are the same, and the frame is mirrored."""
-        x, y, z = (2 * self.at - c if axis == self.plane else c for axis, c in zip(PLANES, part.at, strict=True))
-        rotation, mirror = tuple(0.0 - c for c in self.vector(part.rotation)), self.plane if not part.mirror else ""
-        if part.mirror not in ("", self.plane):  # two mirrors are half a turn about the third axis
-            half = [180.0 * (axis not in (part.mirror, self.plane)) for axis in PLANES]
-            turned = Rotation.from_rotvec(rotation) * Rotation.from_euler("xyz", half, degrees=True)
-            rotation = tuple(float(c) for c in turned.as_rotvec())
-        image = replace(part, name=self.name(part.name), at=(x, y, z), rotation=rotation, mirror=mirror, declared_at=self.line)
+    def add_part(self, part: Part) -> Part:
+        """Add the image of a part without its features, and return it."""
+        rotation = self.vector(part.rotation)
+        rotation = (0.0 - rotation[0], 0.0 - rotation[1], 0.0 - rotation[2])
+        if part.mirror not in ("", self.axis):  # two mirrors are half a turn about the third axis
+            turn = [HALF_TURN * (axis not in (part.mirror, self.axis)) for axis in PLANES]
+            x, y, z = (Rotation.from_rotvec(rotation) * Rotation.from_rotvec(turn, degrees=True)).as_rotvec().tolist()
+            rotation = x, y, z
+        at, mirror = self.vector(part.at, 2 * self.at), "" if part.mirror else self.axis
+        image = replace(
+            part, name=self.name(part.name), at=at, rotation=rotation, mirror=mirror, declared_at=self.line
+        )  # fmt: skip
         self.parts[part] = image
         return image
 
-    def declare_features(self, part: Part) -> None:
-        """Declare the features, datum targets and elasticity of the image of a part."""
+    def add_features(self, part: Part) -> None:
+        """Add the images of features, datum targets and the elasticity of a part."""
         for declared in part._declared:
-            self.parts[part].add(self.declared(declared))
-
-    def declared(self, declared: Any) -> Any:
-        """Return the image of a feature, a pattern, datum targets or an elasticity."""
-        image: Any
-        match declared:
-            case Feature():
-                image = replace(declared, part=self.parts[declared.part], faces=self.faces(declared.faces), declared_at=self.line)
-                self.features[declared] = image
-            case Pattern():
-                members = tuple(
-                    self.features[member] if isinstance(member, Feature) else self.faces(member)
-                    for member in declared.constituents
-                )
-                image = replace(declared, part=self.parts[declared.part], constituents=members, declared_at=self.line)
+            image = self.parts[part].add(self.composed(declared))
+            if isinstance(declared, Feature | Pattern):
                 self.features.update(zip(declared.members, image.members, strict=True))
-            case DatumTargets():
-                image = replace(declared, points=tuple(map(self.point, declared.points)), declared_at=self.line)
-            case Elastic():
-                image = replace(declared, declared_at=self.line)
-        return image
 
-    def face(self, face: Face) -> Face:
-        """Return the image of a face."""
-        selections = tuple(
-            replace(selection, part=self.parts.get(selection.part, selection.part)) if isinstance(selection, Near) else selection
-            for selection in face.selections
-        )
-        return Face(self.parts[face.part], selections)
+    def image(self, value: Any) -> Any:
+        """Return the image of a value of a declaration; None for a feature without an image."""
+        if isinstance(value, Part):
+            return self.parts.get(value, value)
+        if isinstance(value, Feature):
+            return self.features.get(value)
+        if type(value) is tuple:
+            return tuple(map(self.image, value))
+        return self.composed(value) if isinstance(value, COMPOSED) else value
 
-    def faces(self, faces: Sequence[Face]) -> tuple[Face, ...]:
-        """Return the images of faces."""
-        return tuple(map(self.face, faces))
+    def composed(self, declared: Any) -> Any:
+        """Return the image of a declaration. Coordinates in the frame of its part are the same."""
+        values = {field.name: self.image(getattr(declared, field.name)) for field in fields(declared)}
+        if "declared_at" in values:
+            values["declared_at"] = self.line
+        if isinstance(declared, ContactPair | Force):
+            values["name"] = self.name(declared.name)
+        if isinstance(declared, Force):
+            values["vector"] = self.vector(declared.vector)
+        return replace(declared, **values)
 
-    def point(self, point: Point) -> Point:
-        """Return the image of a point."""
-        return replace(point, part=self.parts[point.part], on=point.on and self.features[point.on])
-
-    def location(self, location: Location) -> Location | None:
-        """Return the image of the location of a part; None for a joint, and for a location on a feature without an image."""
-        on: Any = location.on
-        on = self.features.get(on) if isinstance(on, Feature) else self.parts.get(on, on)
-        if location.joint or (on is None and location.on is not None):
-            return None
-        scheme: Any = location.scheme
-        if isinstance(scheme, ThreeTwoOne):
-            scheme = ThreeTwoOne(*self.faces(scheme.faces), scheme.inset)
-        else:
-            scheme = tuple(map(self.locator, scheme))
-        return replace(location, part=self.parts[location.part], on=on, scheme=scheme, declared_at=self.line)
-
-    def locator(self, locator: Locator) -> Locator:
-        """Return the image of a locator of a part: in the frame of the part, its point and direction are the same."""
-        return replace(locator, part=locator.part and self.parts[locator.part], on=locator.on and self.features[locator.on])
-
-    def pair(self, pair: ContactPair) -> ContactPair:
-        """Return the image of a contact pair."""
-        moving, reference = self.face(pair.moving), self.face(pair.reference)
-        return replace(pair, moving=moving, reference=reference, name=self.name(pair.name), declared_at=self.line)
-
-    def force(self, force: Force) -> Force:
-        """Return the image of a force."""
-        name, vector = self.name(force.name), self.vector(force.vector)
-        return replace(force, at=self.point(force.at), name=name, vector=vector, declared_at=self.line)
+    def settings(self, declared: Mapping[str, Sequence[Any]]) -> Iterator[tuple[str, Any]]:
+        """Yield the images of locations, contact pairs, forces and overlaps of the parts alone, by the names of their lists."""
+        for location in declared["locations"]:
+            is_on_image = not isinstance(location.on, Feature) or location.on in self.features
+            if location.part in self.parts and is_on_image and not location.joint:
+                yield "locations", self.composed(location)
+        for name, kind in (("pairs", ContactPair), ("forces", Force), ("overlaps", Overlap)):
+            for thing in declared[name]:
+                parts = (thing.moving.part, thing.reference.part) if kind is ContactPair else thing.parts
+                if all(part in self.parts for part in parts):
+                    yield name, self.composed(thing)
 
 
 class Mirroring(Causes):
     """The method that declares mirror images of parts."""
 
     @overload
-    def mirrored(self, part: Part, /, *, plane: Plane, names: tuple[str, str], at: float = 0.0) -> Part: ...
+    def mirrored(self, part: Part, /, *, plane: Plane, names: Sequence[str], at: float = 0.0) -> Part: ...
     @overload
-    def mirrored(self, *parts: Part, plane: Plane, names: tuple[str, str], at: float = 0.0) -> tuple[Part, ...]: ...
-    def mirrored(
-        self, *parts: Part, plane: Plane, names: tuple[str, str], at: float = 0.0
-    ) -> Part | tuple[Part, ...]:  # fmt: skip
+    def mirrored(self, *parts: Part, plane: Plane, names: Sequence[str], at: float = 0.0) -> tuple[Part, ...]: ...
+    def mirrored(self, *parts: Part, plane: Plane, names: Sequence[str], at: float = 0.0) -> Part | tuple[Part, ...]:
         """Declare the mirror images of parts, and return them: a part for one, a tuple for several.
 
         plane   axis of the nominal assembly that is normal to the mirror plane: "x", "y" or "z"
@@ -148,31 +125,30 @@ class Mirroring(Causes):
 
         `right = model.mirrored(left, plane="y", names=("left", "right"))`
 
-        Features, patterns, datums, tolerances, forms and elasticity of the parts come with them, and so do their locators, on
-        the ground, on another part or on the image of a feature; forces on them; and contact pairs and meant overlaps between
-        them. Coordinates, directions and faces in the frame of an image are the same as in the frame of its part, which the
-        mirror turns into a left-handed frame. All deviations of an image are drawn independently, and equal deviations give
-        mirrored parts. Contact with other parts, measures and joints are to be declared. Raises ValueError or TypeError for
-        wrong arguments.
+        Features, datums, tolerances, forms and elasticity of the parts come with them, and so do their locators on the ground,
+        on a part, or on a feature that is mirrored, too; forces on them; contact pairs and meant overlaps between them. Contact
+        with other parts, measures, joints, and causes of deviations do not.
+        Coordinates, directions and faces in the frame of an image are the same as in the frame of its part; the mirror makes
+        this frame left-handed. Images have draws of their own; equal deviations give mirrored parts.
+        Raises ValueError or TypeError for wrong arguments.
         """
-        mirror = _mirror(self.assembly, parts, plane, names, at)
-        images = tuple(self._add("parts", mirror.part(part)) for part in parts)
+        mirror = _mirror_plane(self.assembly, parts, plane, names, at)
+        images = tuple(self._add("parts", mirror.add_part(part)) for part in parts)
         for part in parts:
-            mirror.declare_features(part)
-        for name, thing in _images(mirror, self.assembly._declared):
+            mirror.add_features(part)
+        for name, thing in list(mirror.settings(self.assembly._declared)):
             self._add(name, thing)
         return images[0] if len(images) == 1 else images
 
 
-def _mirror(assembly: Any, parts: Sequence[Part], plane: Plane, names: tuple[str, str], at: float) -> Mirror:
-    """Return a mirror for parts. Raises ValueError or TypeError for wrong arguments."""
+def _mirror_plane(assembly: Any, parts: Sequence[Part], plane: Plane, names: Sequence[str], at: float) -> MirrorPlane:
+    """Return the mirror plane for parts. Raises ValueError or TypeError for wrong arguments."""
     for part in parts:
         expect("mirrored: an argument", part, Part, "parts, as in mirrored(left, plane=..., names=...)")
-        if parts.count(part) > 1 or part not in assembly.parts:
-            fault = "is given twice; give it once" if parts.count(part) > 1 else f'is no part of "{assembly.name}"; take one of it'
-            raise ValueError(f'mirrored: part "{part.name}" {fault}')
-    if not parts:
-        raise ValueError("mirrored: no part is given; expected one or more, as in mirrored(left, plane=..., names=...)")
+        if part not in assembly.parts:
+            raise ValueError(f'mirrored: part "{part.name}" is no part of "{assembly.name}"; take one of it')
+    if not parts or len(set(parts)) < len(parts):
+        raise ValueError("mirrored: expected one part or more, each once, as in mirrored(left, plane=..., names=...)")
     if plane not in PLANES:
         raise ValueError(f'mirrored: plane is {plane!r}; expected the axis that is normal to it, "x", "y" or "z"')
     if not is_length(at):
@@ -180,20 +156,4 @@ def _mirror(assembly: Any, parts: Sequence[Part], plane: Plane, names: tuple[str
     is_pair = isinstance(names, tuple | list) and len(names) == 2 and all(isinstance(text, str) and text for text in names)
     if not is_pair or names[0] == names[1]:
         raise ValueError(f'mirrored: names is {names!r}; expected two different texts, as in names=("left", "right")')
-    return Mirror(plane, float(at), (names[0], names[1]), {}, {}, script_line())
-
-
-def _images(mirror: Mirror, declared: Mapping[str, Sequence[Any]]) -> list[tuple[str, Any]]:
-    """Return the images of locations, contact pairs, forces and overlaps of the mirrored parts, with the names of their lists."""
-    parts = mirror.parts
-    images: list[tuple[str, Any]] = [
-        ("locations", mirror.location(location)) for location in declared["locations"] if location.part in parts
-    ]
-    for pair in declared["pairs"]:
-        if pair.moving.part in parts and pair.reference.part in parts:
-            images.append(("pairs", mirror.pair(pair)))
-    images += [("forces", mirror.force(force)) for force in declared["forces"] if force.at.part in parts]
-    for overlap in declared["overlaps"]:
-        if all(part in parts for part in overlap.parts):
-            images.append(("overlaps", Overlap(tuple(parts[part] for part in overlap.parts), mirror.line)))
-    return [(name, image) for name, image in images if image is not None]
+    return MirrorPlane(plane, float(at), names, script_line(), {}, {})

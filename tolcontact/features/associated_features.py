@@ -33,7 +33,7 @@ Places = tuple[np.ndarray, np.ndarray]  # places (place, 3) [mm] of a face, and 
 
 
 def placed_twist(twist: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """Return displacements (6, n), tau [mm] and rho [rad], in a frame to which R (3, 3) rotates; where it mirrors, rho turns over."""
+    """Return displacements (6, n), tau [mm] and rho [rad], rotated by R (3, 3). A mirror reverses the sense of rotations."""
     return np.vstack([R @ twist[:3], np.sign(np.linalg.det(R)) * (R @ twist[3:])])
 
 

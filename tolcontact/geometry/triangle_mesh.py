@@ -30,7 +30,7 @@ def edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def oriented(faces: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """Return the corners of `faces` (face, 3, ...) in the order that makes normals point outward at R (3, 3), which may mirror."""
+    """Return `faces` (face, 3, ...) with the order of corners in which normals point outward at R (3, 3), which may mirror."""
     return faces[:, [0, 2, 1]] if np.linalg.det(R) < 0 else faces
 
 

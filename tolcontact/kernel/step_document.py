@@ -53,7 +53,7 @@ class BodyShape:
 def read(
     path: Path, chord: float, angle: float, *, encoding: str, has_face_names: bool, has_solids: bool, has_pmi: bool,
     operators: int,
-) -> dict[str, Any]:
+) -> dict[str, Any]:  # fmt: skip
     """Return the shapes of a STEP file, each in the frame of its product, and the bodies in their places.
 
     shapes         a dictionary for each: `triangulation`, and of each B-rep face of it the surface, None if it is not simple,
@@ -122,7 +122,9 @@ class Place(NamedTuple):
 class Document:
     """A STEP file in the kernel's document. It owns all that is taken from it."""
 
-    def __init__(self, path: Path, encoding: str, operators: int, *, has_face_names: bool, has_solids: bool, has_pmi: bool) -> None:
+    def __init__(
+        self, path: Path, encoding: str, operators: int, *, has_face_names: bool, has_solids: bool, has_pmi: bool
+    ) -> None:
         self.document = TDocStd_Document(TCollection_ExtendedString("STEP"))
         self.reader = STEPCAFControl_Reader()
         self.reader.SetNameMode(True)
