@@ -17,11 +17,12 @@ from tolcontact.declaration.geometry import UNITS, Geometry
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.mirroring import Mirroring
-from tolcontact.declaration.part import Feature, Mirror, Part, Standard
+from tolcontact.declaration.part import Feature, Part, Standard
 from tolcontact.declaration.sequence import Station, in_order, joined_before, present_parts, sequence_faults, settings_of
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.values import (
+    Mirror,
     Vector,
     group_faults,
     key_faults,

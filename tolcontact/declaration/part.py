@@ -10,7 +10,7 @@ from tolcontact.declaration.elastic import Deformable, Elastic
 from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
 from tolcontact.declaration.toleranced import Control, Toleranced, letter_faults
-from tolcontact.declaration.values import Side, Vector, is_finite, script_line, vector
+from tolcontact.declaration.values import Mirror, Side, Vector, is_finite, script_line, vector
 from tolcontact.readable import Readable
 from tolcontact.user_functions import refuse_in_functions
 
@@ -19,7 +19,6 @@ D = TypeVar("D", bound=Declaration)
 Association = Literal["outside", "least squares"]  # from a plane to a datum, ISO 5459
 OUTSIDE, LEAST_SQUARES = ASSOCIATIONS = get_args(Association)
 Standard = Literal["", "ISO", "ASME"]
-Mirror = Literal["", "x", "y", "z"]  # the axis of a part's frame that is reversed
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -27,9 +26,9 @@ class Part(Deformable):
     """A body: its shape, its place in the nominal assembly, and whether contact may move it. It is rigid unless `elastic`.
 
     A point `p` of the part lies at `rotation * p + at` in the nominal assembly frame; `rotation` is a rotation vector [rad],
-    `at` a position [mm]. With `fixed=None` a part is free if it is the moving side of a contact pair, floats, or has
-    one-sided locators; otherwise it is fixed. The `standard` of its drawing is explained by Assembly. With `mirror="x"` the x
-    axis of its frame is reversed before: the part is the mirror image of its geometry, and its frame is left-handed.
+    `at` a position [mm]. With `mirror="x"` the x axis of its frame is reversed before, so that it is a mirror image. With
+    `fixed=None` a part is free if it is the moving side of a contact pair, floats, or has one-sided locators; otherwise it is
+    fixed. The `standard` of its drawing is explained by Assembly.
     """
 
     name: str
@@ -75,7 +74,8 @@ class Part(Deformable):
                     f'feature "{name}": {type(constituent).__name__} is neither a face nor a tolerance; expected '
                     "part.face(...), tc.Size(...), tc.Position(...) or another tolerance of a feature"
                 )
-        faces, tolerances = (tuple(c for c in constituents if isinstance(c, kind)) for kind in (Face, Control))
+        faces = tuple(constituent for constituent in constituents if isinstance(constituent, Face))
+        tolerances = tuple(constituent for constituent in constituents if not isinstance(constituent, Face))
         return self.add(Feature(name, self, faces, tolerances, datum, script_line(), association))
 
     def pattern(

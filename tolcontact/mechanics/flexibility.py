@@ -155,8 +155,8 @@ def _source(entry: NominalPart) -> MeshSource | MatrixSource:
         return MatrixSource(Path(elastic.stiffness), Path(elastic.nodes), mesh.vertices, mesh.faces)
     assert elastic.E is not None and elastic.nu is not None
     R, _ = mesh.metadata.get(FROM_PRODUCT, (np.eye(3), None))
-    is_in_file = isinstance(geometry, Mesh) and geometry.is_step and np.linalg.det(R) > 0  # a mirrored body is no solid of it
-    step = geometry.source if is_in_file else None
+    is_mirrored = np.linalg.det(R) < 0  # which is no solid of its file
+    step = geometry.source if isinstance(geometry, Mesh) and geometry.is_step and not is_mirrored else None
     return MeshSource(mesh.vertices, mesh.faces, elastic.E, elastic.nu, elastic.density, step)
 
 
