@@ -31,7 +31,7 @@ CHAINS = {name: [mirror] for name, mirror in MIRRORS.items()} | {
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
-    """A file with a wedge in its place, and its images by the chains; the last image is a mapped item."""
+    """A file with a wedge in its place, and its images by the chains; the last one but one scales by -1, the last is mapped."""
     made = Step()
     wedge, whole = made.product("wedge", [made.wedge(FACES)]), made.product("whole")
     made.place(wedge, whole, "original")
@@ -42,6 +42,7 @@ def path(tmp_path_factory):
             made.place(image, outer, f"inner {level}", operator=made.operator(transform))
             image = outer
         made.place(image, whole, name, operator=made.operator(last))
+    made.place(wedge, whole, "as the kernel writes it", operator=made.operator(-MIRRORS["z at 5"], "-1."))
     made.image(wedge, MIRRORS["a turned plane"])
     path = tmp_path_factory.mktemp("mirrors") / "wedges.step"
     path.write_text(str(made))
@@ -56,7 +57,8 @@ def test_an_image_is_a_mirrored_shape_in_its_place(path):
     """Two mirrors are a rotation, and three a mirror."""
     original, *images = tc.io.parts_from(tc.Assembly("wedges"), path).values()
     own, bodies = sorted_rows(shape(original.geometry).vertices), tc.io.bodies_in(path)
-    for image, body, chain in zip(images, bodies[1:], [*CHAINS.values(), [MIRRORS["a turned plane"]]], strict=True):
+    chains = [*CHAINS.values(), [MIRRORS["z at 5"]], [MIRRORS["a turned plane"]]]
+    for image, body, chain in zip(images, bodies[1:], chains, strict=True):
         transform = np.linalg.multi_dot([np.eye(4), *reversed(chain)])
         mesh, seen = shape(image.geometry), preview(image)
         R = seen.rotation

@@ -29,7 +29,10 @@ def correct_operators(model: Any, count: int) -> None:
 
 
 def _correct(operator: Any) -> None:
-    if operator.HasScale() and abs(operator.Scale() - 1) > SCALE_TOLERANCE:
+    scale = operator.Scale() if operator.HasScale() else 1.0
+    if abs(scale + 1) <= SCALE_TOLERANCE and np.linalg.det(_motion(operator)[:, :3]) < 0:
+        return  # a mirror as the kernel itself writes and reads it, against the norm, which permits no scale below 0
+    if abs(scale - 1) > SCALE_TOLERANCE:
         raise Refusal("places a body scaled, which bodies of a rigid assembly are not; export it as it is")
     axes, origin = _axes(operator), np.array([operator.LocalOrigin().CoordinatesValue(k) for k in (1, 2, 3)])
     sense = np.sign(np.linalg.det(axes))
@@ -39,12 +42,16 @@ def _correct(operator: Any) -> None:
     operator.SetAxis3(_direction(sense * axes[:, 2]))
     for local_origin in (origin, sense * origin):  # some releases of the kernel scale it, too
         operator.SetLocalOrigin(GeomToStep_MakeCartesianPoint(gp_Pnt(*local_origin), 1.0).Value())
-        motion = gp_Trsf()
-        is_read = StepToGeom.MakeTransformation3d_s(operator, motion)
-        rows = np.array([[motion.Value(row, column) for column in range(1, 5)] for row in range(1, 4)])
-        if is_read and np.abs(rows - np.column_stack([axes, origin])).max() <= CLOSE * max(1.0, np.abs(origin).max()):
+        if np.abs(_motion(operator) - np.column_stack([axes, origin])).max() <= CLOSE * max(1.0, np.abs(origin).max()):
             return
     raise Refusal("places a body mirrored, which this release of the CAD kernel cannot read; export the body itself")
+
+
+def _motion(operator: Any) -> np.ndarray:
+    """Return the motion (3, 4) of an operator as the kernel reads it."""
+    motion = gp_Trsf()
+    StepToGeom.MakeTransformation3d_s(operator, motion)
+    return np.array([[motion.Value(row, column) for column in range(1, 5)] for row in range(1, 4)])
 
 
 def _axes(operator: Any) -> np.ndarray:
