@@ -119,8 +119,8 @@ class Mirroring(Causes):
         """Declare the mirror images of parts, and return them: a part for one, a tuple for several.
 
         plane   axis of the nominal assembly that is normal to the mirror plane: "x", "y" or "z"
-        names   a text in names, and the text in its place: ("left", "right") makes "right door" of "left door". A name without
-                the first text gets the second one at its end
+        names   a text in names of parts, pairs and forces, and the text in its place: ("left", "right") makes "right door" of
+                "left door". A name without the first text gets the second one at its end
         at      coordinate of the plane on this axis [mm], by default 0
 
         `right = model.mirrored(left, plane="y", names=("left", "right"))`
