@@ -1,5 +1,7 @@
 """Fixtures of several test modules; and the shapes of arrays, which are checked in the tests of some modules."""
 
+import contextlib
+import ctypes
 import gc
 import json
 import shutil
@@ -38,6 +40,15 @@ def pytest_collection_finish():
     """Take the modules and the tests out of the garbage collector's sight: nothing frees them before the end."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _freed_memory():
+    """After a module, give the memory of what it made back to the system: hundreds of modules share a process."""
+    yield
+    gc.collect()
+    with contextlib.suppress(OSError, AttributeError):  # the C library may be another one
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def pytest_addoption(parser):

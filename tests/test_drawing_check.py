@@ -1,14 +1,16 @@
 """The check of drawings: each of these has one mistake, or none, that a senior checker would mark."""
 
 import re
-import subprocess
 
 import pytest
 import trimesh
 
 import tolcontact as tc
 from tests.cases.toleranced import plate_with_holes
-from tests.helpers import COMMAND, compiled
+from tests.helpers import call
+from tests.pmi_records import Annotated
+from tests.test_cad import COVER
+from tolcontact.discretization import discretize
 from tolcontact.plausibility import drawing_remarks
 
 FLAT, SQUARE = tc.Flatness(0.01), tc.Perpendicularity(0.05, "A")
@@ -23,6 +25,14 @@ def block(*far, side=(SQUARE,), end=(BOTH,), form=(FLAT,)) -> tc.Assembly:
     b.feature("side", b.face("-y"), FLAT, *side, datum="B")
     b.feature("end", b.face("-x"), FLAT, *end, datum="C")
     a.measure("x", b.feature("far", b.face("+x"), *far).point(100, 25, 5), along="x")
+    return a
+
+
+def turned_about() -> tc.Assembly:
+    """A block whose datum B is square to A, and comes before A in one system."""
+    a = block(PLACED)
+    (b,) = a.parts
+    b.feature("top", b.face("+z"), tc.Profile(0.2, "B|A"))
     return a
 
 
@@ -76,11 +86,13 @@ DRAWINGS = {
     "square datum": (block(PLACED, side=()), 'feature "side" .*no tolerance limits tilt z to the datums before B.*tc.Perpend'),
     "third datum": (block(PLACED, end=()), 'feature "end" .*limits tilt y, tilt z to the datums before C'),
     "third datum half": (block(PLACED, end=(SQUARE,)), 'feature "end" .*limits tilt y to the datums before C'),
+    "each datum first once": (turned_about(), None),
     "location": (block(tc.Perpendicularity(0.2, "A|B|C")), 'feature "far" .*limits offset: .*add tc.Position or tc.Profile'),
     "rough seat": (block(PLACED, form=()), 'part "block": datum A: no tolerance of form'),
     "forgotten": (block(tc.Flatness(0.1), tc.Profile(0.3, "A|B|C"), side=(SQUARE,)), None),
     "open": (drilled(*SIZED), "H.*no tolerance limits common shift x"),
     "open, separate": (drilled(*SIZED, standard="ISO"), "H.*no tolerance limits shift x, shift x"),
+    "exact, with a profile": (drilled(tc.Profile(0.2, "A|B")), "H.*exactly 8 mm, although its profile limits the size, too"),
     "exact holes": (drilled(tc.Position(0.2, "A|B")), "H.*it is a cylinder of exactly 8 mm, without limits of size.*tc.Size.8"),
     "moot form": (pin("ASME", 0.03), r'"shank".*no finer than the size .\+0 -0.02., whose envelope limits'),
     "moot form of a datum with play": (
@@ -99,9 +111,26 @@ DRAWINGS = {
 
 @pytest.mark.parametrize(("model", "found"), DRAWINGS.values(), ids=DRAWINGS)
 def test_what_a_drawing_leaves_open_is_named(model, found):
-    sentences = list(drawing_remarks(compiled(model).nominal))
+    sentences = list(drawing_remarks(discretize(model)))
     assert bool(sentences) == bool(found), sentences
     assert found is None or sum(bool(re.search(found, sentence)) for sentence in sentences) == 1, sentences
+
+
+def test_drawings_are_checked_before_anything_is_located_or_measured(tmp_path):
+    """A STEP file and the script that it makes: the same remarks, with equal ones of several features in one line."""
+    file = Annotated(COVER.read_text())
+    file.datum("A", 5)
+    for face in (3, 4):
+        file.size(file.aspect(face), 6, (-0.05, 0.05), "radius")
+    file.write(tmp_path / "cover.stp")
+    (tmp_path / "part.py").write_text(call(tmp_path, "pmi", "cover.stp", "--script").stdout)
+    read, written = (call(tmp_path, "check", name, "--drawing") for name in ("cover.stp", "part.py"))
+    remarks = [line for line in read.stdout.splitlines() if line.startswith("drawing:")]
+    assert 'features "cylinder 3", "cylinder 4": no geometric tolerance limits its place in the part' in remarks[0]
+    assert [re.sub(r" \(part.py:\d+\)", "", line) for line in written.stdout.splitlines()] == remarks
+    assert read.returncode == 0 and written.returncode == 2 and "it measures nothing" in written.stderr
+    (tmp_path / "plain.stp").write_text(COVER.read_text())
+    assert '"plain.stp" is not an AP242 file' in call(tmp_path, "check", "plain.stp", "--drawing").stderr
 
 
 def test_the_command_prints_it_when_it_is_asked(tmp_path):
@@ -111,9 +140,6 @@ def test_the_command_prints_it_when_it_is_asked(tmp_path):
         "    a.measure('x', b.feature('f', b.face('+x'), tc.Flatness(0.1)).point(9, 4, 4), along='x')", "    return a",
     ]  # fmt: skip
     (tmp_path / "m.py").write_text("\n".join(lines))
-    silent, asked = (
-        subprocess.run([*COMMAND, "check", "m.py", *more], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
-        for more in ([], ["--drawing"])
-    )
+    silent, asked = (call(tmp_path, "check", "m.py", *more).stdout for more in ([], ["--drawing"]))
     assert "drawing:" not in silent
     assert 'drawing: part "b": feature "f"' in asked and "no tolerance limits" in asked

@@ -1,7 +1,6 @@
 """Features and patterns that the PMI of a STEP file states: what is declared, and the reason for what is not."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from tests.pmi_records import Annotated
 from tests.test_cad import COVER
 from tolcontact.discretization import discretize
 from tolcontact.errors import OptionError
-from tolcontact.pmi import OF_DATUMS, OF_TOLERANCES
+from tolcontact.pmi import OF_DATUMS
 from tolcontact.variation import Draws
 
 ROUND = "cylindrical or circular"
@@ -187,10 +186,12 @@ def nothing(file):
     file.tolerance("perpendicularity", 0.1, file.aspect(SIDE), "A")
 
 
-def twice(file):
+def bounded(file):
+    """A bonus, and a wider zone that has none: it limits the bonus, which is not declared."""
     datums(file)
-    for width in (0.4, 0.6):
-        file.tolerance("position", width, file.aspect(*HOLE), "A|B|C", zone=ROUND)
+    file.size(file.aspect(*HOLE), 8.1, (0, 0.3))
+    file.tolerance("position", 0.4, file.aspect(*HOLE), "A|B|C", zone=ROUND, modifier="M")
+    file.tolerance("position", 0.6, file.aspect(*HOLE), "A|B|C", zone=ROUND)
 
 
 def one_letter(file):
@@ -236,34 +237,6 @@ def test_limits_of_a_fit_are_about_the_nominal_size_of_the_drawing(tmp_path):
     assert str(feature.tolerances[0]) == "size 8.1 +0.005 -0.01 mm"
 
 
-def test_each_modifier_is_declared_or_refused_with_its_standard_as_the_table_of_the_guide_has_it(tmp_path):
-    """One hole for each modifier; what the table calls declared has the option, and what it does not has the reason."""
-    guide = (Path(tc.__file__).parent / "guide" / "pmi.md").read_text()
-    for table in (OF_TOLERANCES, OF_DATUMS):
-        for word, entry in table.items():
-            assert f"| {entry.sign} | {word} | {entry.standard} | {entry.outcome} |" in guide
-    (tmp_path / "of_tolerance").mkdir()
-    for word, entry in OF_TOLERANCES.items():
-        modifier, datum = word.upper().replace(" ", "_"), "(M)" if "simultaneous" in entry.declared else ""
-
-        def annotate(file, modifier=modifier, datum=datum):
-            datums(file)
-            file.size(file.aspect(*HOLE), 8.1, (0, 0.03))
-            kind, place = ("parallelism", TOP) if "TANGENT" in modifier else ("position", *HOLE)
-            file.tolerance(
-                kind, 0.2, file.aspect(place), f"A|B{datum}|C" if place != TOP else "A", zone=ROUND, modifier=modifier
-            )
-
-        declared = tc.io.features_from_pmi(cover(annotate, tmp_path / "of_tolerance"))
-        reasons = [outcome.reason for outcome in declared.undeclared]
-        if isinstance(entry.declared, str):
-            assert reasons == [f"its modifier, {word} ({entry.sign}, {entry.standard}): {entry.declared}"]
-        else:
-            assert not reasons
-            (stated,) = [tolerance for feature in declared.features for tolerance in feature.geometric]
-            assert {name: getattr(stated, name) for name in entry.declared} == entry.declared
-
-
 @pytest.mark.parametrize(("word", "reads"), [("FREE_STATE", "A|B|C"), ("ORIENTATION", "A|B><|C"), ("TRANSLATION", None)])
 def test_modifiers_of_datums_are_marks_or_reasons(word, reads, tmp_path):
     def annotate(file):
@@ -285,10 +258,6 @@ REASONS = {
     "another body": (other_body, ["none of its faces is on the part", "1 of its 2 faces are not on the part"]),
     "one letter for two datums": (one_letter, ["the part has a datum A already"]),
     "two letters for one datum": (two_letters, ["its surfaces are datum A already"]),
-    "free state": (
-        of_one("flatness", 0.1, (UNDER,), modifier="F"),
-        ["its modifier, free state (F, ISO 10579): it is for the part in its free state, and parts are rigid here"],
-    ),
     "an unequal profile of a hole": (
         unequal, ["profile is for planes, if it says how much of it is outside, and it is a cylinder"],
     ),
@@ -303,7 +272,7 @@ REASONS = {
         of_one("position", 0.2, HOLE, "A|B|C", zone=ROUND, modifier="M"),
         ["position: a bonus (material 'M') needs the tolerance of a size; add tc.Size(...)"],
     ),
-    "the same zone twice": (twice, ["position 0.6 controls nothing that others do not; leave one of them out"]),
+    "a wider zone without the bonus": (bounded, ["position 0.6 controls nothing that others do not; leave one of them out"]),
     "fits": (
         fits,
         [
@@ -327,6 +296,24 @@ def test_what_features_cannot_state_has_its_reason(name, tmp_path):
     annotate, reasons = REASONS[name]
     declared = tc.io.features_from_pmi(cover(annotate, tmp_path))
     assert [one.reason for one in declared.undeclared] == reasons
+
+
+def test_a_narrower_tolerance_implies_the_same_with_more_width(tmp_path):
+    def annotate(file):
+        datums(file)
+        for width in (0.6, 0.4, 0.4):
+            file.tolerance("position", width, file.aspect(*HOLE), "A|B|C", zone=ROUND)
+
+    declared = tc.io.features_from_pmi(cover(annotate, tmp_path))
+    assert [str(tolerance) for feature in declared.features for tolerance in feature.geometric] == ["position 0.4 A B C"]
+    assert [one.features for one in declared.annotations[-3:]] == [("cylinder 11",)] * 3 and not declared.undeclared
+
+
+def test_the_free_state_is_declared_with_a_remark(tmp_path):
+    declared = tc.io.features_from_pmi(cover(of_one("flatness", 0.1, (UNDER,), modifier="F"), tmp_path))
+    remark = "it is for the part in its free state; here the part is rigid and stays so when it is assembled"
+    assert [one.remark for one in declared.annotations if one.remark] == [remark] and not declared.undeclared
+    assert f"flatness 0.1 mm (F), 1 faces: declared as A ({remark})" in str(declared)
 
 
 def test_a_tolerance_of_several_surfaces_is_declared_in_part(tmp_path):

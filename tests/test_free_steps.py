@@ -5,6 +5,7 @@ import pytest
 
 from studies.certificates.coincidences import judged, quick_builds
 from studies.certificates.placements import scene
+from tests.helpers import nightly
 
 SAMPLES = 12
 # Shape checks take several times as long as the rest, so that only two realizations of some scenes have them.
@@ -17,7 +18,7 @@ LONG = [("keys", 66, SAMPLES), ("combs", 39, SAMPLES), ("keys", 110344, 20)]
     [
         ("combs", 39, CHECKED_SAMPLES),
         ("keys", 110344, CHECKED_SAMPLES),
-        *(pytest.param(*one, marks=pytest.mark.slow) for one in LONG),
+        *nightly(*LONG),
     ],
 )
 def test_bodies_that_are_free_nearby_have_an_answer(family, seed, samples):

@@ -53,7 +53,7 @@ def test_files_may_be_closed_by_any_thread_while_rows_are_written(tmp_path, left
     def drop(rows):
         del left[:20]
 
-    run = tc.run(cases.ra1(), samples=30_000, solver="daqp", out=tmp_path / "ra1.nc", surfaces=256, progress=drop)
+    run = tc.run(cases.ra1(), samples=12_000, solver="daqp", out=tmp_path / "ra1.nc", surfaces=256, progress=drop)
     run.close()
     assert_gaps_recompute(tmp_path / "ra1.nc")
 

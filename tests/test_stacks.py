@@ -220,6 +220,25 @@ def test_links_from_a_table_are_those_of_a_script(kind, tmp_path):
     assert dict(stack.measures[0].of.sensitivities) == {"A": -1, "B": 1}
 
 
+def test_measured_links_of_a_table_have_the_intervals_of_their_parts(tmp_path):
+    rows = (
+        "name;nominal;tolerance;sensitivity;mean;sd;parts", "groove;52,1;±0,04;;;;", "washer;12;;-1;11,9820;0,0075;30",
+        "rod;40;;-1;40,01;0,0080;",
+    )  # fmt: skip
+    (tmp_path / "links.csv").write_text("\n".join(rows), encoding="utf-8")
+    stack, scripted = tc.Stack("play"), tc.Stack("play")
+    stack.read(tmp_path / "links.csv")
+    scripted.link("groove", 52.1, "±0.04")
+    scripted.link("washer", 12, tc.Tolerance(distribution=stats.norm(-0.018, 0.0075), parts=30), sensitivity=-1)
+    scripted.link("rod", 40, tc.Tolerance(distribution=stats.norm(0.01, 0.008)), sensitivity=-1)
+    summaries = []
+    for model in (stack, scripted):
+        model.gap("play")
+        summaries.append(tc.summarize(tc.run(model, samples=2000, seed=1)).statistic_value.values)
+    assert np.allclose(*summaries, rtol=1e-9, atol=1e-12, equal_nan=True)
+    assert tc.build(stack).draws.in_words == tc.build(scripted).draws.in_words != []
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -243,6 +262,10 @@ def test_links_from_a_table_are_those_of_a_script(kind, tmp_path):
         ("name,nominal,tolerance,distribution\nA,1,0.1,gauss\n", 'row 2: unknown distribution "gauss"'),
         ("name,nominal,tolerance,cp,cpk\nA,1,0.1,,1\n", "row 2: cpk is 1.0 with cp None; expected cp"),
         ("name,nominal,tolerance,sensitivity\nA,1,0.1,minus\n", 'row 2: sensitivity is "minus"; expected a number'),
+        ("name,nominal,tolerance,mean,sd\nA,1,0.1,1.01,0.02\n", "row 2: it has mean and sd, and tolerance, which they replace"),
+        ("name,nominal,mean,sd,parts\nA,1,1.01,0.02,30.5\n", "row 2: parts is 30.5; expected a whole number, 5 or more"),
+        ("name,nominal,mean,sd\nA,1,1.01,0\n", "row 2: sd is 0; expected a standard deviation above 0"),
+        ("name,nominal,tolerance,parts\nA,1,0.1,30\n", "row 2: mean and sd are empty"),
     ],
 )  # fmt: skip
 def test_a_fault_of_a_table_is_one_message(text, message, tmp_path):

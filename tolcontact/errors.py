@@ -30,7 +30,7 @@ def nearest_name(name: str, names: Iterable[str]) -> str:
 
 def designation(kind: str, thing: NamedDeclaration) -> str:
     """Return how a message names a declared thing: its kind, its name and the line of the script."""
-    return f'{kind} "{thing.name}" ({thing.declared_at})'
+    return f'{kind} "{thing.name}"' + (f" ({thing.declared_at})" if thing.declared_at else "")
 
 
 class TolcontactError(Exception):

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 
 from tolcontact import vocabulary as terms
@@ -97,6 +98,24 @@ def _corner(text: str, option: str) -> tuple[float, ...]:
         return tuple(float(coordinate) for coordinate in text.split(","))
     except ValueError:
         raise OptionError(f'{option} is "{text}"; expected three numbers, such as 5,20,0') from None
+
+
+def _with_points(options: dict[str, Any]) -> dict[str, Any]:
+    """Return the arguments of `sweep`."""
+    return options | {"over": dict(map(_values, options["over"]))}
+
+
+def _values(text: str) -> tuple[str, list[float]]:
+    name, _, value = text.partition("=")
+    try:
+        if ":" not in value:
+            return name, [float(number) for number in value.split(",")]
+        first, last, count = value.split(":")
+        return name, np.linspace(float(first), float(last), int(count)).tolist()
+    except ValueError:
+        raise OptionError(
+            f'--over is "{text}"; expected --over angle=0:1.5:7 (from, to, number) or --over angle=0,0.5,1'
+        ) from None
 
 
 COMMANDS = (
@@ -219,5 +238,24 @@ COMMANDS = (
         "",
         ("seating model.py", "seating model.py --csv > friction.csv"),
         lambda dataset: dataset[["critical", "reserve"]].to_dataframe(),
+    ),
+    AnalysisCommand(
+        "sweep",
+        "Print the envelope of each measurement over the positions of a mechanism: the script's assembly(...) has parameters.",
+        "sweep",
+        terms.SWEEP,
+        "Number of realizations, the same at all positions.",
+        ("sweep hinge.py --over angle=0:1.5:7", "sweep slider.py --over slide=0,10,25 --over load=5,5,8 --csv > envelope.csv"),
+        _intervals("envelope"),
+        options={
+            "over": (
+                Annotated[
+                    list[str],
+                    typer.Option(metavar="NAME=VALUES", help="Values of a parameter: 0:1.5:7 (from, to, number) or 0,0.5,1."),
+                ],
+                REQUIRED,
+            )
+        },
+        arguments=_with_points,
     ),
 )

@@ -26,15 +26,18 @@ from tolcontact.declaration.title_block import title_block_of
 from tolcontact.vocabulary import ESTIMATE, MEASURE_UNITS, STATISTIC, units_of
 
 
-@app.command(epilog=examples("summary run.nc", "summary run.nc --limits", "summary run.nc --csv > run.csv"))
+@app.command(
+    epilog=examples("summary run.nc", "summary run.nc --limits", "summary run.nc --all", "summary run.nc --csv > run.csv")
+)
 def summary(
     archive: Archive,
     as_json: AsJson = False,
     as_csv: AsCsv = False,
     limits: Annotated[bool, flag("--limits", "Print only shares out of specification, and capability.")] = False,
+    whole: Annotated[bool, flag("--all", "Print all figures of all measurements, parts and pairs, also of many.")] = False,
 ) -> None:
     """Print the statistics of an archive."""
-    only_one(json=as_json, csv=as_csv, limits=limits)
+    only_one(json=as_json, csv=as_csv, limits=limits, all=whole)
     estimates = workflow.summarize(archive)
     if as_csv:
         values = estimates["statistic_value"].to_dataset("interval").to_dataframe()
@@ -46,7 +49,7 @@ def summary(
     elif limits:
         console().print(reports.capability_text(estimates))
     else:
-        print_summary(estimates)
+        print_summary(estimates, is_whole=whole)
 
 
 @app.command(epilog=examples("report run.nc", "report run.nc --out page.html", "report run.nc --xlsx tables.xlsx"))

@@ -13,14 +13,17 @@ from tolcontact.archive import open_archive
 from tolcontact.cli import app as common
 from tolcontact.cli.output import check_outputs
 from tolcontact.cli.progress import waiting
+from tolcontact.cli.step_files import without_annotations
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.geometry import STEP
 from tolcontact.declaration.script import load_model
 from tolcontact.declaration.values import key_faults
-from tolcontact.discretization import Nominal
+from tolcontact.discretization import Nominal, discretize
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.geometry import parts_from
 from tolcontact.plausibility import drawing_remarks
+from tolcontact.pmi import read_pmi
+from tolcontact.pmi.declared import declared_file
 from tolcontact.report import nominal_and_faults, write_guide, write_page, write_view
 from tolcontact.workflow.accessor import summarize
 from tolcontact.workflow.models import DEFAULT_SOLVER, build
@@ -59,7 +62,7 @@ def new(
     common.echo(f"model: {path}\nnext: tolcontact check {path}")
 
 
-@common.app.command(epilog=common.examples("check model.py", "check model.py --view"))
+@common.app.command(epilog=common.examples("check model.py", "check model.py --view", "check part.stp --drawing"))
 def check(
     model: common.Model,
     solver: common.Solver = DEFAULT_SOLVER,
@@ -68,16 +71,24 @@ def check(
     drawing: Annotated[bool, common.flag("--drawing", "Also say what the drawings leave open or take as perfect.")] = False,
     view: Annotated[bool, common.flag("--view", "Also open the page of `tolcontact view`, with marked faults.")] = False,
 ) -> None:
-    """Check a model and its options without a run; list all faults and probable mistakes."""
+    """Check a model and its options without a run; list all faults and probable mistakes.
+
+    With --drawing, MODEL may also be a STEP file of AP242, or a model that nothing locates or measures yet.
+    """
     assembly, doubts = None, list[warnings.WarningMessage]()
     try:
         with waiting(f"checking {model}"), warnings.catch_warnings(record=True) as doubts:
+            if drawing and model.suffix.lower() in STEP:
+                _check_annotations(model)
+                return
             assembly = load_model(model)
             program = build(assembly, solver=solver, method=common.method_choices(resolution=resolution, objective=objective))
     except ModelError as error:
         common.show_warnings(doubts)
         if view and assembly is not None:
             _open_view(assembly, None, error.faults, temporary_page(model))
+        if drawing and assembly is not None and (nominal := nominal_and_faults(assembly)[0]):
+            _print_remarks(nominal)
         raise
     if view:
         _open_view(assembly, program.nominal, (), temporary_page(model))
@@ -95,11 +106,28 @@ def check(
         common.echo(f"  {program.stored_coordinates}")
     if not program.nominal.assembly.forces and any(pair.round and not pair.round.are_beside for pair in program.nominal.pairs):
         common.echo(f"  {PRESS}")
-    for remark in drawing_remarks(program.nominal) if drawing else ():
-        common.echo(f"drawing: {remark}")
+    if drawing:
+        _print_remarks(program.nominal)
     common.show_warnings(doubts)
     count = {0: "", 1: ", 1 warning"}.get(len(doubts), f", {len(doubts)} warnings")
     common.echo(f"no faults found{count}")
+
+
+def _check_annotations(file: Path) -> None:
+    """Print what the tolerances of a STEP file leave open, and those among them that no feature states."""
+    information = read_pmi(file)
+    if information.is_empty:
+        raise OptionError(without_annotations(information, file))
+    declared = declared_file(file, information)
+    common.echo(declared)
+    _print_remarks(discretize(declared.assembly, incomplete=True))
+
+
+def _print_remarks(nominal: Nominal) -> None:
+    """Print what the check of the drawings says of the parts."""
+    remarks = list(drawing_remarks(nominal))
+    for remark in remarks or ["nothing that the tolerances leave open"]:
+        common.echo(f"drawing: {remark}")
 
 
 def _open_view(model: Assembly, nominal: Nominal | None, faults: Sequence[str], path: Path) -> None:

@@ -55,7 +55,7 @@ def pmi(file: StepFile, as_json: AsJson = False, as_csv: AsCsv = False, as_scrip
         information = read_pmi(file)
         declared = _declared(file, information)
     if as_script and information.is_empty:
-        raise OptionError(f"{_reason(information, file)}, so there is nothing to declare")
+        raise OptionError(f"{without_annotations(information, file)}, so there is nothing to declare")
     if as_script and not declared.parts:
         raise OptionError(f'"{file}": none of its tolerances, dimensions and datums applies to a face that is listed')
     if as_script:
@@ -63,7 +63,7 @@ def pmi(file: StepFile, as_json: AsJson = False, as_csv: AsCsv = False, as_scrip
     elif as_csv:
         echo(_csv(declared), nl=False)
     elif information.is_empty and not as_json:
-        echo(_reason(information, file))
+        echo(without_annotations(information, file))
     elif as_json:
         echo(json.dumps(_entries(declared), allow_nan=False))
     else:
@@ -88,12 +88,13 @@ def _entries(declared: DeclaredFile) -> dict[str, Any]:
     """Return everything for JSON: the statements of the file, its faces, and the outcome."""
     faces = {record: asdict(face) for record, face in declared.faces.items()}
     declarations = {
-        entry.annotation.record: {"features": entry.features, "reason": entry.reason} for entry in declared.annotations
+        entry.annotation.record: {"features": entry.features, "reason": entry.reason, "remark": entry.remark}
+        for entry in declared.annotations
     }
     return asdict(declared.pmi) | {"faces": faces, "declared": declarations}
 
 
-def _reason(information: Pmi, name: Path) -> str:
+def without_annotations(information: Pmi, name: Path) -> str:
     """Return a sentence about a file without annotations, with the reason if it is known."""
     if not information.is_ap242:
         schema = clipped(information.schema, 100) or "not stated"
@@ -143,13 +144,18 @@ def _sections(declared: DeclaredFile) -> Iterator[RenderableType]:
 
 
 def _undeclared_lines(declared: DeclaredFile) -> Iterator[RenderableType]:
-    """Yield the annotations that are not declared, or only partly, with the reasons."""
+    """Yield the annotations that are not declared, or only partly, with the reasons, and those with remarks."""
     numbers: dict[tuple[str, str], list[str]] = defaultdict(list)
+    remarks: dict[str, list[str]] = defaultdict(list)
     for kind, noun in ((Tolerance, "tolerance"), (Dimension, "dimension"), (Datum, "datum")):
         for entry in declared.annotations:
             if isinstance(entry.annotation, kind) and entry.reason:
                 reason = f"only in part, {entry.reason}" if entry.features else entry.reason
                 numbers[noun, reason].append(_number(entry.annotation))
+            if entry.remark:
+                remarks[entry.remark].append(_number(entry.annotation))
+    for remark, group in remarks.items():
+        yield Text(shown(f"\ntolerance{'s' if len(group) > 1 else ''} {', '.join(group[:MAX_ROWS])}: {remark}"))
     if numbers:
         yield Text("\nnot declared", style="bold")
     for (noun, reason), group in numbers.items():

@@ -5,7 +5,7 @@
 
 from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overlap
-from tolcontact.declaration.dependence import Correlation, Population, Variable
+from tolcontact.declaration.dependence import Correlation, Variable
 from tolcontact.declaration.elastic import Elastic
 from tolcontact.declaration.feature_tolerance import (
     Angularity,
@@ -45,6 +45,7 @@ from tolcontact.declaration.measurement import (
     Sum,
 )
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
+from tolcontact.declaration.population import Population
 from tolcontact.declaration.seam import stations
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.sequence import Station

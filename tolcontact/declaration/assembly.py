@@ -7,17 +7,14 @@ from typing import Any, ClassVar, Generic, TypeVar, get_args
 from tolcontact.declaration.checks import FRICTION, Checked, one_of
 from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overlap
 from tolcontact.declaration.declarations import expect
-from tolcontact.declaration.dependence import (
-    Correlation,
-    Population,
-    Variable,
-)
+from tolcontact.declaration.dependence import Correlation, Variable
 from tolcontact.declaration.elastic import gravity_faults
 from tolcontact.declaration.geometry import UNITS, Geometry
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.mirroring import Mirroring
 from tolcontact.declaration.part import Feature, Part, Standard
+from tolcontact.declaration.population import Population
 from tolcontact.declaration.sequence import Station, in_order, joined_before, present_parts, sequence_faults, settings_of
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.title_block import TitleBlock

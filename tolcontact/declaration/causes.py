@@ -7,12 +7,13 @@ from tolcontact.declaration.declarations import Declarations, expect
 from tolcontact.declaration.dependence import (
     Correlation,
     CorrelationKind,
-    Population,
     Variable,
     correlation as _correlation,
 )
 from tolcontact.declaration.geometry import Unit
-from tolcontact.declaration.measured_table import population as _population
+from tolcontact.declaration.measured_table import Gaps, population as _population
+from tolcontact.declaration.part import Part
+from tolcontact.declaration.population import Population
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import script_line
 
@@ -22,21 +23,27 @@ class Causes(Declarations):
 
     def variable(
         self, name: str, tolerance: Any, *, drives: Mapping[str, float] | None = None, units: str = "mm",
-        nominal: float | None = None,
+        nominal: float | None = None, expands: Mapping[Part | str, float] | None = None,
+        loads: Mapping[str, float] | None = None,
     ) -> Variable:  # fmt: skip
-        """Declare a cause that drives several contributors, or a dimension that chains measure (see Variable).
+        """Declare a cause that drives several contributors or expands parts, or a dimension that chains measure (see Variable).
 
         name        of the cause
         tolerance   full width of its range in its `units`, or a tc.Tolerance
         drives      factor [mm per unit] of each contributor, by its label
         units       of the cause, by default mm
         nominal     value of a dimension in its `units`, which may drive nothing
+        expands     coefficient of thermal expansion [1/K] of each part, or of its name; deviations are from the temperature
+                    at which dimensions hold
+        loads       factor [N per unit] on the magnitude of each force, by its name
 
         `model.variable("warmth", 20, drives={"cover.width.size": 0.0007}, units="K")`
         """
+        by_name = {part.name if isinstance(part, Part) else part: alpha for part, alpha in (expands or {}).items()}
         variable = Variable(
             name=name, tolerance=_tolerance(tolerance), drives=dict(drives or {}), units=units, nominal=nominal,
-            declared_at=script_line(),
+            declared_at=script_line(), expands=by_name,
+            loads=dict(loads or {}),
         )  # fmt: skip
         return self._add("variables", variable)
 
@@ -49,14 +56,19 @@ class Causes(Declarations):
         return self._add("correlations", _correlation(labels, matrix, script_line(), kind))
 
     def population(
-        self, source: Any, columns: Mapping[str, str] | None = None, *, absolute: bool = False, units: Unit = "mm"
-    ) -> Population:
+        self, source: Any, columns: Mapping[str, str] | None = None, *, absolute: bool = False, units: Unit = "mm",
+        gauge: float | Mapping[str, float] = 0.0, lots: str | None = None, gaps: Gaps = "refused",
+    ) -> Population:  # fmt: skip
         """Declare that contributors are drawn from measured rows (see Population).
 
         source    a CSV file, a DataFrame, a Dataset or a mapping of columns, with deviations from nominal values
         columns   label of the contributor of each column; by default the names of the columns are labels
         absolute  True: columns of sizes, of features declared before, hold sizes in place of deviations
         units     of the numbers, by default mm: "um", "in", ...
+        gauge     standard uncertainty of measurement in `units`, or one for each label: its variance is taken off the spread of
+                  the parts; by default it stays in it
+        lots      column with the lot of each row: realizations draw a lot, then a part of it; by default they draw any row
+        gaps      "left out": rows with an empty cell are left out, as a whole; by default they are refused
 
         `model.population("batch.csv", columns={"block.top.offset": "height"}, units="um")`
         """
@@ -66,5 +78,8 @@ class Causes(Declarations):
             for feature in self.assembly.features
             if feature.size
         }
-        table = _population(source, columns, script_line(), units=units, sizes=sizes if absolute else None)
+        expect("population: gauge", gauge, int | float | Mapping, "a standard uncertainty, or one for each label")
+        table = _population(
+            source, columns, script_line(), units=units, sizes=sizes if absolute else None, gauge=gauge, lots=lots, gaps=gaps
+        )
         return self._add("populations", table)

@@ -76,7 +76,10 @@ class ContactPair(Declaration):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Force(Declaration):
-    """A force `vector` [N] at a point of a part, constant in the assembly frame. The objective "seating" uses it."""
+    """A force `vector` [N] at a point of a part, constant in the assembly frame. The objective "seating" uses it.
+
+    Its magnitude varies by variables that load it.
+    """
 
     at: Point
     name: str

@@ -103,12 +103,19 @@ class Declarations:
         )  # fmt: skip
         return self._add("pairs", pair)
 
-    def force(self, name: str, *, at: Point, vector: Any) -> Force:
-        """Declare a force of a `name`: its `vector` [N], in the assembly frame, `at` a point of a part (see Force).
+    def force(self, name: str, *, at: Point, vector: Any, tolerance: Any = None) -> Force:
+        """Declare a force, which acts with the objective "seating" (see Force).
 
-        It acts with the objective "seating": `model.force("weight", at=lid.point(50, 30, 4), vector=(0, 0, -20))`.
+        name       of the force
+        at         point of a part at which it acts
+        vector     (x, y, z) [N] in the assembly frame
+        tolerance  of its magnitude [N], which is then a variable of this name; by default the force is constant
+
+        `model.force("weight", at=lid.point(50, 30, 4), vector=(0, 0, -20))`
         """
         expect(f'force "{name}": at', at, Point, "part.point(x, y, z)")
+        if tolerance is not None:
+            self.assembly.variable(name, tolerance, units="N", loads={name: 1.0})
         line, station = script_line(), self._station
         return self._add("forces", Force(name=name, at=at, vector=_vector(vector), declared_at=line, station=station))
 

@@ -14,10 +14,10 @@ from tolcontact.declaration.geometry import UNITS
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import is_length, is_line
 from tolcontact.declaration.written_tolerance import DIGITS, Deviations
-from tolcontact.tables import MAX_NUMBER
 
 CorrelationKind = Literal["copula", "pearson", "rank"]
 MAX_LISTED = 6  # coefficients in a row of the model
+MAX_EXPANSION = 1e-3  # 1/K
 MIN_EIGENVALUE = 1e-12  # of a correlation matrix; of a smaller absolute value it is zero
 
 
@@ -26,7 +26,9 @@ class Variable(Declaration):
     """A cause that drives several contributors: `drives[label]` times its deviation is added to the draw of each.
 
     The variable is in `units`; a factor converts them to the units of its contributor. A variable with a `nominal` value is a
-    dimension, the link of a chain, and may drive nothing.
+    dimension, the link of a chain, and may drive nothing. A temperature `expands` parts, by their names: all dimensions of a
+    part grow by the factor [1/K] times the deviation, about the origin of its frame. A variable `loads` forces, by their names:
+    the factor [N per unit] times the deviation is added to their magnitude.
     """
 
     tolerance: Tolerance
@@ -35,14 +37,25 @@ class Variable(Declaration):
     units: str = "mm"
     declared_at: str = ""
     nominal: float | None = None
+    expands: Mapping[str, float] = field(default_factory=dict)
+    loads: Mapping[str, float] = field(default_factory=dict)
     noun: ClassVar[str] = "variable"
 
     def faults(self) -> Iterator[str]:
         yield from self.tolerance.faults()
         if self.nominal is not None and not is_length(self.nominal):
             yield f"nominal is {self.nominal!r}; expected a number in {self.units}"
-        if not self.drives and self.nominal is None:
-            yield 'it drives nothing; give drives={"part.locator": factor, ...}'
+        if not (self.drives or self.expands or self.loads) and self.nominal is None:
+            yield 'it drives nothing; give drives={"part.locator": factor, ...}, expands={"part": ...} or loads={"force": ...}'
+        for part, factor in self.expands.items():
+            if not (is_length(factor) and abs(factor) <= MAX_EXPANSION):
+                yield (
+                    f'expands has "{part}": {factor!r}; expected a coefficient of expansion in 1/K, up to {MAX_EXPANSION:g}, '
+                    "such as 23.5e-6 for aluminium"
+                )
+        for force, factor in self.loads.items():
+            if not is_length(factor):
+                yield f'loads has "{force}": {factor!r}; expected a number in N per {self.units}'
         for label, factor in self.drives.items():
             if not (isinstance(label, str) and is_length(factor)):
                 yield f"drives has {label!r}: {factor!r}; expected the label of a contributor, and a number"
@@ -56,7 +69,10 @@ class Variable(Declaration):
 
     def __str__(self) -> str:
         drives = ", ".join(f"{label} by {factor:g}" for label, factor in self.drives.items())
-        driven = f"; drives {drives}" if drives else ""
+        expands = ", ".join(f"{part} by {factor:g} per {self.units}" for part, factor in self.expands.items())
+        loads = ", ".join(f"{force} by {factor:g} N per {self.units}" for force, factor in self.loads.items())
+        effects = {"drives": drives, "expands": expands, "loads": loads}
+        driven = "".join(f"; {verb} {things}" for verb, things in effects.items() if things)
         if self.limits is None:
             return f"variable {self.name} [{self.units}]: {self.tolerance.in_units(self.units)}{driven}"
         centred = f", centred {self.centred}" if self.limits.middle else ""
@@ -132,42 +148,6 @@ class Correlation(Declaration):
         numbers = [f"{self.matrix[row][column]:g}" for row in range(len(self.matrix)) for column in range(row)]
         listed = ", ".join(numbers) if len(numbers) <= MAX_LISTED else f"{len(numbers)} coefficients"
         return f"correlation of {self.name}: {listed} ({self.kind})"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Population(Declaration):
-    """Measured parts: whole rows of deviations are drawn with replacement, which preserves their correlation.
-
-    columns   labels of the contributors
-    values    (row, column), in the units of the contributors
-    source    the file or the kind of table
-    """
-
-    columns: tuple[str, ...]
-    values: np.ndarray
-    source: str = "given"
-    declared_at: str = ""
-    noun: ClassVar[str] = "population"
-
-    @property
-    def name(self) -> str:  # type: ignore[override]
-        return self.source
-
-    def faults(self) -> Iterator[str]:
-        if not self.columns or len(set(self.columns)) < len(self.columns):
-            yield 'it names no contributors, or one twice; give columns={"part.locator": "column of the table", ...}'
-        elif self.values.ndim != 2 or self.values.shape[1] != len(self.columns):
-            yield f"its values have the shape {self.values.shape}; expected a row for each part, a column for each contributor"
-        elif len(self.values) < 2:
-            yield f"it has {len(self.values)} row(s); a population needs two or more"
-        for column, label in enumerate(self.columns[: self.values.shape[1]] if self.values.ndim == 2 else ()):
-            gaps = [row for row, value in enumerate(self.values[:, column]) if not abs(value) <= MAX_NUMBER]
-            if gaps:
-                where = f"row {gaps[0] + 1} of the column for {label}"
-                yield f"{where} is no number up to {MAX_NUMBER:g}; mend it, or leave out the row"
-
-    def __str__(self) -> str:
-        return f"population {self.source}: {len(self.values)} rows of {', '.join(self.columns)}"
 
 
 def correlation(labels: Sequence[str], matrix: Any, declared_at: str, kind: Any = "copula") -> Correlation:

@@ -14,7 +14,7 @@ from msgspec import Meta
 from tolcontact.declaration.checks import NOT_NEGATIVE, POSITIVE, text_type
 from tolcontact.declaration.codec import CODECS, Choice, Document, Items, Plain, floats
 from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overlap
-from tolcontact.declaration.dependence import Correlation, Population, Variable
+from tolcontact.declaration.dependence import Correlation, Variable
 from tolcontact.declaration.elastic import Elastic
 from tolcontact.declaration.face_entries import FREE_DIRECTION, MEASURED, UNIT_VECTOR, Writing, feature_named
 from tolcontact.declaration.feature_tolerance import KINDS, GeometricTolerance
@@ -23,6 +23,7 @@ from tolcontact.declaration.locator import USUAL_STIFFNESS, Location, Locator, T
 from tolcontact.declaration.measure import Measure, tape_of
 from tolcontact.declaration.part import DatumTargets, Face, Feature, Part, Pattern
 from tolcontact.declaration.place import Place
+from tolcontact.declaration.population import Population
 from tolcontact.declaration.record import Field, Record
 from tolcontact.declaration.sequence import Station
 from tolcontact.declaration.size import Form, Size
@@ -248,9 +249,12 @@ RECORDS = {
         tolerance=Plain(POSITIVE | tuple[float, float] | str),
     ),
     "forces": Record(Force, omitted="station"),
-    "variables": Record(Variable, floats="drives nominal", omitted="nominal"),
+    "variables": Record(Variable, floats="drives nominal expands loads", omitted="nominal expands loads"),
     "correlations": Record(Correlation, omitted="kind"),
-    "populations": Record(Population, fields="values columns source declared_at"),
+    "populations": Record(
+        Population, fields="values columns source declared_at gauge lots left_out", floats="gauge",
+        omitted="gauge lots left_out",
+    ),
     "stations": Record(Station),
     "joints": Record(Joint, omitted="at pad"),
     "overlaps": Record(Overlap),

@@ -4,15 +4,16 @@ import importlib  # pandas takes longer to import than all the rest: only if it 
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from tolcontact.declaration.dependence import Population
 from tolcontact.declaration.geometry import UNITS
+from tolcontact.declaration.population import Population
 from tolcontact.tables import number, read_table
 from tolcontact.texts import shown
 
+Gaps = Literal["refused", "left out"]  # rows with empty cells
 MAX_LISTED = 3  # cells in a message
 _HEADING = re.compile(r"(.*\S)\s*[\[(]\s*([^\])]*?)\s*[\])]")  # a name, and its unit in brackets
 _MICRO = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u"})
@@ -20,19 +21,26 @@ _MICRO = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u"}
 
 def population(
     source: Any, columns: Mapping[str, str] | None, declared_at: str, *, units: str = "mm",
-    sizes: Mapping[str, float] | None = None,
+    sizes: Mapping[str, float] | None = None, gauge: float | Mapping[str, float] = 0.0, lots: str | None = None,
+    gaps: Gaps = "refused",
 ) -> Population:  # fmt: skip
     """Return the Population of a CSV file, a DataFrame, an xarray Dataset of one dimension, or a mapping of columns.
 
     `columns` maps the label of each contributor to the name of its column; by default the two are equal. `units` are the
-    units of the numbers. `sizes` are the nominal sizes [mm] by label, if columns of sizes hold absolute values. Entries of a
-    table in memory that are not numbers become NaN, and a fault of the population. Raises ValueError for an unreadable table, a
-    cell of a file that is no number, or a missing column.
+    units of the numbers. `sizes` are the nominal sizes [mm] by label, if columns of sizes hold absolute values. `gauge`, `lots`
+    and `gaps` are explained by Causes.population. Entries of a table in memory that are not numbers become NaN, and a fault of
+    the population. Raises ValueError for an unreadable table, a cell of a file that is no number, or a missing column.
     """
-    if units not in UNITS:
-        raise ValueError(f"population: units is {units!r}; expected one of: {', '.join(UNITS)}")
+    for option, value, choices in (("units", units, tuple(UNITS)), ("gaps", gaps, get_args(Gaps))):
+        if value not in choices:
+            raise ValueError(f"population: {option} is {value!r}; expected one of: {', '.join(choices)}")
     is_file = isinstance(source, str | Path)
-    title, labels, values = (_of_file if is_file else _of_memory)(source, columns, units)
+    measured = _of_file(source, columns, units, lots, gaps) if is_file else _of_memory(source, columns, units, lots)
+    title, labels, values = measured.title, measured.labels, measured.values
+    kept = np.asarray(~measured.gaps.any(axis=1) | (gaps == "refused"))
+    if not kept.any() and len(kept):
+        raise ValueError(f'population "{title}": each of its {len(kept)} rows has a gap; leave out the column that is empty')
+    values, row_lots = values[kept], np.array(measured.lots)[kept[: len(measured.lots)]]
     if units != "mm":
         values = UNITS[units] * values
     if sizes is not None:
@@ -43,11 +51,26 @@ def population(
                 "and it has no such column; subtract the nominal values"
             )
         values = values - nominal
-    return Population(tuple(labels), values, title, declared_at)
+    if isinstance(gauge, Mapping) and (unknown := [label for label in gauge if label not in labels]):
+        raise ValueError(f'population "{title}": gauge has "{unknown[0]}"; its contributors are: {", ".join(labels)}')
+    uncertainties = [gauge.get(label, 0.0) for label in labels] if isinstance(gauge, Mapping) else [gauge] * len(labels)
+    stated = tuple(UNITS[units] * u for u in uncertainties) if any(uncertainties) else ()
+    left_out = int((~kept).sum())
+    return Population(tuple(labels), values, title, declared_at, stated, tuple(map(str, row_lots)), left_out)
 
 
-def _of_memory(source: Any, columns: Mapping[str, str] | None, units: str) -> tuple[str, list[str], np.ndarray]:
-    """Return the title, the labels and the values (row, column) of a table in memory."""
+class MeasuredTable(NamedTuple):
+    """A table of measured parts: its title, the labels of its columns, values (row, column), their gaps, lots of its rows."""
+
+    title: str
+    labels: list[str]
+    values: np.ndarray
+    gaps: np.ndarray
+    lots: list[str]
+
+
+def _of_memory(source: Any, columns: Mapping[str, str] | None, units: str, lots: str | None) -> MeasuredTable:
+    """Return a table in memory."""
     pd = importlib.import_module("pandas")
     try:
         table = source.to_dataframe() if hasattr(source, "to_dataframe") else pd.DataFrame(source)
@@ -57,47 +80,76 @@ def _of_memory(source: Any, columns: Mapping[str, str] | None, units: str) -> tu
             "Dataset, or columns of equal length by name"
         ) from error
     title = f"of {len(table)} rows"
-    labels, indices = _columns(title, list(map(str, table.columns)), columns, units)
+    labels, indices, lot_index = _columns(title, list(map(str, table.columns)), columns, units, lots)
     entries = [table.iloc[:, index].astype(object) for index in indices]
+    is_gap = [column.isna().to_numpy() for column in entries]
     entries = [column.mask(column.map(type).isin([bool, np.bool_])) for column in entries]
     numbers = [pd.to_numeric(column, errors="coerce").to_numpy(dtype=float) for column in entries]
-    return title, labels, np.column_stack(numbers) if numbers else np.empty((len(table), 0))
+    nothing = np.empty((len(table), 0))
+    cells = [] if lot_index is None else ["" if pd.isna(cell) else str(cell) for cell in table.iloc[:, lot_index]]
+    return MeasuredTable(
+        title,
+        labels,
+        np.column_stack(numbers) if numbers else nothing,
+        np.column_stack(is_gap) if is_gap else nothing.astype(bool),
+        _lots(title, cells, range(1, len(table) + 1), "row"),
+    )
 
 
-def _of_file(source: str | Path, columns: Mapping[str, str] | None, units: str) -> tuple[str, list[str], np.ndarray]:
-    """Return the title, the labels and the values (row, column) of a CSV file."""
+def _of_file(source: str | Path, columns: Mapping[str, str] | None, units: str, lots: str | None, gaps: Gaps) -> MeasuredTable:
+    """Return the table of a CSV file."""
     title = shown(Path(source).name)
     try:
         table = read_table(Path(source), (columns or {}).values())
     except (OSError, ValueError) as error:
         raise ValueError(f'population "{title}" cannot be read as CSV: {error}') from error
-    labels, indices = _columns(title, table.heading, columns, units)
+    labels, indices, lot_index = _columns(title, table.heading, columns, units, lots)
     # In a table of one column a blank line is a row without an entry.
     rows = [(line, cells or [""]) for line, cells in table.rows if cells or len(table.heading) == 1]
     faults, values = list[str](), np.full((len(rows), len(indices)), np.nan)
+    is_gap = np.zeros(values.shape, dtype=bool)
     for row, (line, cells) in enumerate(rows):
         if len(cells) != len(table.heading):
             faults.append(f"line {line} has {len(cells)} entries, and the heading {len(table.heading)}; expected as many")
             continue
         for column, index in enumerate(indices):
+            is_gap[row, column] = not cells[index]
+            if gaps != "refused" and is_gap[row, column]:
+                continue
             try:
                 values[row, column] = number(cells[index], has_decimal_commas=table.has_decimal_commas)
             except ValueError as fault:
                 faults.append(f'line {line}, column "{shown(table.heading[index])}" {fault}')
     if faults:
         others = f"; and {len(faults) - MAX_LISTED} more" if len(faults) > MAX_LISTED else ""
+        remedy = '; gaps="left out" leaves out the rows with empty cells' if gaps == "refused" and is_gap.any() else ""
         raise ValueError(
-            f'population "{title}": {"; ".join(faults[:MAX_LISTED])}{others}; mend the table, or leave out the rows'
+            f'population "{title}": {"; ".join(faults[:MAX_LISTED])}{others}; mend the table, or leave out the rows{remedy}'
         )
-    return title, labels, values
+    cells_of_lots = [] if lot_index is None else [cells[lot_index] for _, cells in rows]
+    return MeasuredTable(title, labels, values, is_gap, _lots(title, cells_of_lots, [line for line, _ in rows], "line"))
 
 
-def _columns(title: str, heading: Sequence[str], columns: Mapping[str, str] | None, units: str) -> tuple[list[str], list[int]]:
-    """Return labels and the indices of their columns. A heading may state its unit in brackets, which has to be `units`."""
+def _lots(title: str, cells: list[str], numbers: Sequence[int], kind: str) -> list[str]:
+    """Return the lots of rows. Raises ValueError, with the number of a row or line, for a row without one."""
+    lots = [cell.strip() for cell in cells]
+    if "" in lots:
+        raise ValueError(f'population "{title}": {kind} {numbers[lots.index("")]} has no lot; name it, or leave out the row')
+    return lots
+
+
+def _columns(
+    title: str, heading: Sequence[str], columns: Mapping[str, str] | None, units: str, lots: str | None
+) -> tuple[list[str], list[int], int | None]:
+    """Return labels and the indices of their columns, and the index of the column of lots, if there is one.
+
+    A heading may state its unit in brackets, which has to be `units`.
+    """
     stated = [match.groups() if (match := _HEADING.fullmatch(name)) else (name, "") for name in heading]
-    labels = list(columns) if columns is not None else [name for name, _ in stated]
+    labels = list(columns) if columns is not None else [name for name, _ in stated if name != lots]
+    names = list(map(str, labels if columns is None else columns.values()))
     indices = list[int]()
-    for name in map(str, labels if columns is None else columns.values()):
+    for name in [*names, *([] if lots is None else [lots])]:
         matching = [k for k, (short, _) in enumerate(stated) if heading[k] == name or short == name]
         if not matching or not name.strip():
             listed = ", ".join(map(shown, heading))
@@ -110,4 +162,4 @@ def _columns(title: str, heading: Sequence[str], columns: Mapping[str, str] | No
         if unit in UNITS and unit != units:
             raise ValueError(f'population "{title}": column "{heading[matching[0]]}" is in {unit}; give units="{unit}"')
         indices.append(matching[0])
-    return labels, indices
+    return labels, indices[: len(names)], None if lots is None else indices[-1]

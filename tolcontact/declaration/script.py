@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import FrozenInstanceError
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from tolcontact.declaration import Assembly
@@ -28,6 +29,7 @@ from tolcontact.texts import clipped
 UNEXPECTED = re.compile(r"([\w.]+)\(\) got an unexpected keyword argument '(\w+)'")  # a TypeError of Python
 PACKAGES = ("tolcontact.declaration", "tolcontact.geometry", "tolcontact.fasteners")  # whose functions scripts call
 MAX_BYTES = 1 << 26  # of a file
+NO_ARGUMENTS: Mapping[str, Any] = MappingProxyType({})
 SCHEMA_NAME = "model.schema.json"
 
 
@@ -80,8 +82,8 @@ if __name__ == "__main__":
 _PACKAGE = Path(__file__).resolve().parent
 
 
-def load_model(path: Path) -> Assembly:
-    """Return the assembly that a script or a JSON file declares.
+def load_model(path: Path, arguments: Mapping[str, Any] = NO_ARGUMENTS) -> Assembly:
+    """Return the assembly that a script or a JSON file declares; the script's function `assembly` takes the `arguments`.
 
     Raises ScriptError if the file is missing, fails, or has no function `assembly()` that returns an Assembly.
     """
@@ -104,7 +106,7 @@ def load_model(path: Path) -> Assembly:
             raise ScriptError(
                 f'model script "{path}" has no function assembly(); define one that returns a tolcontact.Assembly'
             )
-        declared = declare()
+        declared = declare(**arguments)
     except ScriptError:
         raise
     except SystemExit as ended:

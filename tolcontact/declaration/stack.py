@@ -5,6 +5,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import scipy
+
 from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.dependence import Variable
 from tolcontact.declaration.measure import Measure
@@ -19,8 +21,11 @@ from tolcontact.tables import EMPTY, Table, number, read_table
 from tolcontact.texts import shown
 
 GAP = "gap "  # heading of a column with the sensitivities of a gap
-COLUMNS = "name", "nominal", "tolerance", "upper", "lower", "sensitivity", "distribution", "cp", "cpk", "description"
-NUMBERS = "nominal", "upper", "lower", "sensitivity", "cp", "cpk"  # columns of numbers
+MEASURED = "mean", "sd", "parts"  # of a dimension, and the number of parts that they are from
+NUMBERS = "nominal", "upper", "lower", "sensitivity", "cp", "cpk", *MEASURED  # columns of numbers
+COLUMNS = (
+    "name", "nominal", "tolerance", "upper", "lower", "sensitivity", "distribution", "cp", "cpk", *MEASURED, "description",
+)  # fmt: skip
 MAX_BYTES = 1 << 24  # of a table
 
 
@@ -79,7 +84,8 @@ class Stack(Assembly):
         """Declare the links of a table, the CSV file or .xlsx workbook at a `path`, as in `stack.read("links.csv")`.
 
         Its columns are name, nominal, and tolerance, or upper and lower; others may be left out: sensitivity, distribution, cp,
-        cpk, description. A column "gap NAME" has the sensitivities of a gap, which is declared without limits. Raises
+        cpk, description. A row with mean and sd, of the measured dimension, needs no tolerance, and may state the number of
+        parts that they are from. A column "gap NAME" has the sensitivities of a gap, which is declared without limits. Raises
         ModelError with all faults of the table.
         """
         heading, rows, has_decimal_commas = _table(Path(path), self.name)
@@ -143,8 +149,9 @@ def _heading_faults(heading: Sequence[str]) -> Iterator[str]:
     for name in ("name", "nominal"):
         if name not in heading:
             yield f'it has no column "{name}"; its columns are: {", ".join(map(shown, heading))}'
-    if ("tolerance" in heading) == ("upper" in heading) or ("upper" in heading) != ("lower" in heading):
-        yield 'expected either a column "tolerance", or two, "upper" and "lower"'
+    limits = [name for name in ("tolerance", "upper", "lower") if name in heading]
+    if limits not in (["tolerance"], ["upper", "lower"]) and (limits or not {"mean", "sd"} <= set(heading)):
+        yield 'expected either a column "tolerance", or two, "upper" and "lower"; or "mean" and "sd" of measured links'
 
 
 def _numbers(row: Mapping[str, str], has_decimal_commas: bool) -> dict[str, float]:
@@ -167,12 +174,30 @@ def _limits(text: str, nominal: float) -> Any:
         raise ValueError(f'tolerance is "{shown(text)}"; {fault}') from fault
 
 
+def _measured(row: Mapping[str, str], numbers: Mapping[str, float]) -> Tolerance:
+    """Return the normal distribution of a row with the mean and the standard deviation of measured parts."""
+    if stated := [name for name in ("tolerance", "upper", "lower", "distribution", "cp", "cpk") if row.get(name)]:
+        raise ValueError(f"it has mean and sd, and {stated[0]}, which they replace; leave one of the two out")
+    if not numbers["sd"] > 0:
+        raise ValueError(f"sd is {numbers['sd']:g}; expected a standard deviation above 0")
+    parts = numbers.get("parts")
+    whole = int(parts) if parts is not None and parts.is_integer() else parts
+    measured = scipy.stats.norm(numbers["mean"] - numbers["nominal"], numbers["sd"])
+    tolerance = Tolerance(distribution=measured, parts=whole)  # type: ignore[arg-type]
+    if reason := next(tolerance.faults(), ""):
+        raise ValueError(reason)
+    return tolerance
+
+
 def _zone(row: Mapping[str, str], numbers: Mapping[str, float]) -> tuple[float, Any]:
     """Return the nominal value and the tolerance of a row. Raises ValueError for a cell that is empty or states neither."""
-    needed = ("name", "nominal", *(("tolerance",) if "tolerance" in row else ("upper", "lower")))
-    if empty := [name for name in needed if not row.get(name)]:
+    is_measured = any(name in numbers for name in MEASURED)
+    limits = ("mean", "sd") if is_measured else ("tolerance",) if "tolerance" in row else ("upper", "lower")
+    if empty := [name for name in ("name", "nominal", *limits) if not row.get(name)]:
         raise ValueError(f"{' and '.join(empty)} {'is' if len(empty) == 1 else 'are'} empty")
     nominal = numbers["nominal"]
+    if is_measured:
+        return nominal, _measured(row, numbers)
     zone = _limits(row["tolerance"], nominal) if "tolerance" in row else written((numbers["lower"], numbers["upper"]))
     options: dict[str, Any] = {name: numbers[name] for name in ("cp", "cpk") if name in numbers}
     tolerance = Tolerance(zone, row.get("distribution") or "normal", **options)

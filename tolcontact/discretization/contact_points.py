@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 
-from tolcontact.declaration import Assembly, ContactPair, Face, Part
+from tolcontact.declaration import Assembly, ContactPair, Part
 from tolcontact.declaration.contact_pair import MAX_POINTS
 from tolcontact.discretization.form_points import (
     affordable_spacing,
@@ -27,7 +27,7 @@ from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.scenes import Scene
 from tolcontact.errors import GeometryFault
-from tolcontact.features import FaceDeviation, Features
+from tolcontact.features import Features
 from tolcontact.geometry.curvature import CHORD_SHARE, curvature_points, distinct, facet_error, sampling_error
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.overlap import overlap_corners, rim_points
@@ -55,7 +55,10 @@ def contact_points(
     moving_face = unplaced.placed(*moving.placement)
     reference_face = patch(pair.reference, meshes).placed(*reference.placement)
     reach = pair.within if pair.within is not None else DEFAULT_REACH * moving.mesh.scale
-    deviating = _deviation(pair.moving, moving, meshes, features), _deviation(pair.reference, reference, meshes, features)
+    deviating = (
+        features.deviation(pair.moving, meshes, moving.placement),
+        features.deviation(pair.reference, meshes, reference.placement),
+    )
     lengths = form_lengths(deviating)
     if lengths:
         triangles = facing_triangles(moving_face, reference_face, deviating[1])
@@ -192,11 +195,6 @@ def _touching(
         )
     _check_number(int(is_touching.sum()), "its faces have")
     return P_m[is_touching], P_r[is_touching], n_r[is_touching]
-
-
-def _deviation(face: Face, part: NominalPart, meshes: Meshes, features: Features) -> FaceDeviation | None:
-    """Return the deviation of a face; None if it belongs to no feature."""
-    return features.face_at(face, meshes, part.placement) if part.part.features else None
 
 
 def _height_offsets(points: ContactPoints) -> Offsets:

@@ -4,6 +4,7 @@ import difflib
 import logging
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import replace
+from itertools import starmap
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from tolcontact.discretization.nominal import ContactPoints, Nominal
 from tolcontact.discretization.scales import scale_faults
 from tolcontact.discretization.scenes import Scene, joint_indices, scenes_of
 from tolcontact.discretization.weld_pairs import welds_and_pairs
-from tolcontact.errors import Faults, designation
+from tolcontact.errors import Faults, designation, nearest_name
 from tolcontact.features import Features, Placement, datum_order
 from tolcontact.features.freedoms import DATUM
 from tolcontact.geometry.faces import Meshes
@@ -46,7 +47,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
     entries = [(scene, part) for scene in scenes for part in scene.assembly.parts]
     parts = [_nominal_part(scene, part, meshes, faults) for scene, part in entries]
     mated = frozenset(face for pair in assembly.pairs for face in (pair.moving, pair.reference))
-    features = Features(sum(len(part.locators) for part in parts if part is not None), mated)
+    features = Features(sum(len(part.locators) for part in parts if part is not None), mated, assembly.variables)
     if is_sound and None not in parts:
         _add_features(assembly, {part: number for number, (_, part) in enumerate(entries)}, meshes, features, faults)
         features.use_touched([part.placement for part in parts if part is not None])
@@ -155,6 +156,19 @@ def _on_features(
     if location is not None and isinstance(location.on, Feature):
         grounds = features.grounds(location.on, locators.points, locators.directions, placements[location.on.part])
         locators = replace(locators, grounds=grounds)
+    if features.causes:
+        owners = [side.part or part.part for side in sides]
+        if isinstance(scheme, ThreeTwoOne):
+            owners = [owners[k] for k in FACES_OF_SCHEME]
+        locators = replace(
+            locators,
+            faces=tuple(map(features.at_point, locators.faces, owners, locators.points, map(placement_of, owners))),
+        )
+        if location is not None and (ground := location.parent) is not None:
+            at_ground = (
+                (face, ground, point, placements[ground]) for face, point in zip(locators.grounds, locators.points, strict=True)
+            )
+            locators = replace(locators, grounds=tuple(starmap(features.at_point, at_ground)))
     return replace(part, locators=locators)
 
 
@@ -188,6 +202,18 @@ def _contributor_faults(assembly: Assembly, labels: Sequence[str], shifts: Set[s
                 yield f'{place}: contributor "{label}" is drawn by {sources[label]} already; leave it out of one of them'
             elif kind != "variable":
                 sources[label] = place
+    for cause in assembly.variables:
+        parts = {part.name: part for part in assembly.parts}
+        forces = {force.name: force.at.part for force in assembly.forces}
+        for verb, kind, names, owners in (("expands", "part", cause.expands, parts), ("loads", "force", cause.loads, forces)):
+            for name in names:
+                place = f"{designation('variable', cause)}: it {verb} {kind} "
+                if name not in owners:
+                    listed = ", ".join(owners) or "none"
+                    yield f'{place}"{name}", which is unknown{nearest_name(name, owners)}; expected one of: {listed}'
+                elif owners[name].elasticity is not None:
+                    what = f'"{name}", and part "{owners[name].name}"' if kind == "force" else f'"{name}", which'
+                    yield f"{place}{what} is elastic; it does so with rigid parts alone, so leave one of the two out"
 
 
 def _reserved_names(scene: Scene) -> Iterator[str]:

@@ -17,7 +17,7 @@ from tolcontact.discretization.plane_minima import PlaneMinima
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.weld import ElasticInputs, Weld
-from tolcontact.features import FaceDeviation, Features, Freedom, NominalFeature, NominalPattern
+from tolcontact.features import Expansion, FaceDeviation, Features, Freedom, NominalFeature, NominalPattern
 from tolcontact.features.freedoms import LOCATOR, VARIABLE
 from tolcontact.features.zone_kernel import sum_modes
 from tolcontact.geometry.face_pair import FacePair, body_face
@@ -321,24 +321,20 @@ class Nominal(ElasticInputs):
         return [int(k) for k in triangles(face, self.meshes)]
 
     def deviation(self, face: Face) -> FaceDeviation | None:
-        """Return how a face deviates; None if it belongs to no feature. Raises GeometryFault if it does in part."""
-        return self._features.face_at(face, self.meshes, self.parts[self.part_index(face.part)].placement)
+        """Return how a face deviates; None if it neither belongs to a feature nor expands. Raises GeometryFault."""
+        return self._features.deviation(face, self.meshes, self.parts[self.part_index(face.part)].placement)
 
     def position(self, point: Point) -> np.ndarray:
         """Return the nominal assembly coordinates (3,) [mm] of a declared point."""
-        if point.end is not None and point.on is not None:
-            position = self._features.features[point.on].geometry.end(point.end)
-        else:
-            position = np.array(point.position)
-        return self.parts[self.part_index(point.part)].placed(position)
+        return self.parts[self.part_index(point.part)].placed(self._features.position(point))
 
     def face_at(self, point: Point) -> FaceDeviation | None:
-        """Return the face of a feature that a declared point moves with, or the median of two; None for other points."""
-        if point.on is None:
-            return None
-        feature = self._features.features[point.on]
-        number = None if point.position is None else feature.face_with(np.array(point.position))
-        return feature.deviation(number, self.parts[feature.part].placement)
+        """Return how a declared point moves with the face of its feature, or the median of two, and expands; else None."""
+        return self._features.of_point(point, self.parts[self.part_index(point.part)].placement)
+
+    def expansion(self, index: int) -> Expansion | None:
+        """Return the expansion of a part by temperatures; None if none expands it."""
+        return self._features.expansion(self.parts[index].part)
 
     def outward(self, point: Point) -> np.ndarray:
         """Return the outward normal (3,) of the face at a point on a feature, in the nominal assembly frame."""

@@ -4,6 +4,7 @@
 """
 
 from tolcontact.features.datum_frames import DatumShift, datum_frame, datum_order
+from tolcontact.features.expansion import Expansion
 from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, PlaneFeature
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.form_field import FormField
@@ -14,7 +15,7 @@ from tolcontact.features.nominal_pattern import Layer, NominalPattern
 from tolcontact.features.tolerance_layers import uncontrolled
 
 __all__ = [
-    "AxisFeature", "DatumShift", "FaceDeviation", "FeatureGeometry", "FeatureOfSize", "Features", "FormField", "Freedom",
-    "Layer", "NominalFeature", "NominalPattern", "Placement", "PlaneFeature", "datum_frame", "datum_order", "feature_geometry",
-    "uncontrolled",
+    "AxisFeature", "DatumShift", "Expansion", "FaceDeviation", "FeatureGeometry", "FeatureOfSize", "Features", "FormField",
+    "Freedom", "Layer", "NominalFeature", "NominalPattern", "Placement", "PlaneFeature", "datum_frame", "datum_order",
+    "feature_geometry", "uncontrolled",
 ]  # fmt: skip

@@ -169,6 +169,12 @@ class ConeFeature(AxisFeature):
     def surface_probes(self) -> Probes:
         return self.walls
 
+    @property
+    def apex(self) -> np.ndarray:
+        """The apex (3,) [mm], where the axis meets the tangent planes of the wall."""
+        place, normal = self.walls[0][0], self.walls[1][0, 0]
+        return np.asarray(self.centre + ((place - self.centre) @ normal) / (self.axis @ normal) * self.axis)
+
 
 @dataclass(frozen=True, eq=False)
 class SphereFeature(FeatureOfSize):

@@ -1,15 +1,18 @@
 """The features of a model with numbers: their freedoms, made once, and how faces deviate with everything that varies."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from tolcontact.declaration import DatumTargets, Face, Feature, GeometricTolerance, Pattern
+from tolcontact.declaration import DatumTargets, Face, Feature, GeometricTolerance, Part, Pattern, Point, Variable
 from tolcontact.errors import GeometryFault
 from tolcontact.features.datum_frames import DatumShift, Declared, datum_frame, padded
 from tolcontact.features.datum_mobility import mobile
+from tolcontact.features.expansion import Expansion
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.freedoms import DATUM, FEATURE, FORM, Freedom
@@ -29,19 +32,30 @@ class Features:
 
     first_column  of the freedoms of features
     mated         faces of contact pairs: contact decides where such a datum at its material boundary lies
+    causes        variables, whose columns follow those of features
     """
 
     first_column: int
     mated: frozenset[Face] = frozenset()
+    causes: Sequence[Variable] = ()
     patterns: list[NominalPattern] = field(default_factory=list)
     features: dict[Feature, NominalFeature] = field(default_factory=dict)
     _gauges: dict[str, NominalFeature] = field(default_factory=dict)
     _targets: dict[tuple[int, str], tuple[NominalFeature, ...]] = field(default_factory=dict)
-    _used_faces: dict[tuple[Feature, int | None], FaceDeviation] = field(default_factory=dict)
+    _used_faces: dict[tuple[Any, ...], FaceDeviation] = field(default_factory=dict)
+
+    @cached_property
+    def _coefficients(self) -> dict[str, list[tuple[int, float]]]:
+        """The numbers of the causes that expand each part, by its name, with their coefficients."""
+        coefficients = defaultdict[str, list[tuple[int, float]]](list)
+        for number, cause in enumerate(self.causes):
+            for part, coefficient in cause.expands.items():
+                coefficients[part].append((number, coefficient))
+        return dict(coefficients)
 
     @property
     def faces(self) -> tuple[FaceDeviation, ...]:
-        """The faces of features that belong to pairs and locators."""
+        """The faces of features, and of parts that expand, that belong to pairs and locators."""
         return tuple(self._used_faces.values())
 
     @property
@@ -167,6 +181,60 @@ class Features:
                 _check_disjoint(feature, areas, earlier, meshes)
         geometry = feature_geometry(surfaces)
         return NominalFeature(feature, part, geometry, surfaces, areas, np.zeros((len(geometry.names), 0)))
+
+    def expansion(self, part: Part) -> Expansion | None:
+        """Return the expansion of a part by temperatures, once all features have been added; None if none expands it."""
+        causes = self._coefficients.get(part.name)
+        if causes is None:
+            return None
+        numbers, coefficients = zip(*causes, strict=True)
+        return Expansion(self.first_column + len(self.freedoms) + np.array(numbers), np.array(coefficients, dtype=float))
+
+    def deviation(self, face: Face, meshes: Meshes, placement: Placement) -> FaceDeviation | None:
+        """Return how a face deviates with its feature, and expands with its part; None for neither. Raises GeometryFault."""
+        deviation, expansion, key = (
+            self.face_at(face, meshes, placement),
+            self.expansion(face.part),
+            (face.part, *face.selections),
+        )
+        if expansion is None:
+            return deviation
+        if key not in self._used_faces:
+            try:
+                geometry = feature_geometry([patch(face, meshes)])
+                self._used_faces[key] = expansion.of_face(str(face), deviation, geometry, placement)
+            except GeometryFault as fault:
+                raise GeometryFault(f'face {face} of part "{face.part.name}", which expands: {fault}') from fault
+        return self._used_faces[key]
+
+    def position(self, point: Point) -> np.ndarray:
+        """Return the position (3,) [mm] of a declared point in its part."""
+        if point.end is not None and point.on is not None:
+            return self.features[point.on].geometry.end(point.end)
+        return np.array(point.position)
+
+    def of_point(self, point: Point, placement: Placement) -> FaceDeviation | None:
+        """Return how a declared point moves with the face of its feature, or the median of two, and expands; else None."""
+        deviation, expansion = None, self.expansion(point.part)
+        if point.on is not None:
+            feature = self.features[point.on]
+            number = None if point.position is None else feature.face_with(np.array(point.position))
+            deviation = feature.deviation(number, placement)
+        return expansion.of_point(str(point), deviation, self.position(point), placement) if expansion else deviation
+
+    def at_point(
+        self, deviation: FaceDeviation | None, part: Part, point: np.ndarray, placement: Placement
+    ) -> FaceDeviation | None:
+        """Return how a point (3,) [mm] of the nominal assembly expands with its part, in addition to its `deviation`."""
+        expansion, (R, t) = self.expansion(part), placement
+        if expansion is None:
+            return deviation
+        key = (part, deviation, *point)
+        if key not in self._used_faces:
+            position = (point - t) @ R
+            name = "{} ({:g}, {:g}, {:g})".format(part.name, *position)
+            self._used_faces[key] = expansion.of_point(name, deviation, position, placement)
+        return self._used_faces[key]
 
     def face_at(self, face: Face, meshes: Meshes, placement: Placement) -> FaceDeviation | None:
         """Return how a face deviates; None if no part of it belongs to a feature.

@@ -35,7 +35,10 @@ def _deviating_faces(
     nominal: Nominal, index: int, body: Solid, surface_of_body: Surface
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Yield triangles (m,) of each face that deviates, columns (k,), and how its corners move (m, 3, 3, k)."""
-    part = nominal.parts[index]
+    part, expansion = nominal.parts[index], nominal.expansion(index)
+    if expansion is not None:
+        motion = np.multiply.outer(body.vertices[body.faces] - part.placement[1], expansion.coefficients)
+        yield np.arange(len(body.faces)), expansion.columns, motion
     for feature in nominal.features:
         if nominal.parts[feature.part].part is not part.part or not feature.varies:
             continue

@@ -52,11 +52,14 @@ class Load:
     part     its position in the group
     point    (3,) [mm], nominal
     vector   (3,) [N]
+    columns  (cause,) of the deviations that vary its magnitude, by these `factors` (cause,) [N per unit]
     """
 
     part: int
     point: Vector
     vector: Vector
+    columns: tuple[int, ...] = ()
+    factors: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +195,10 @@ def _loads(nominal: Nominal, parts: tuple[int, ...], moved: Sequence[int]) -> It
     for force in nominal.assembly.forces:
         part = nominal.part_index(force.at.part, force.station)
         if part in moved:
-            yield Load(parts.index(part), nominal.position(force.at), np.array(force.vector))
+            causes = [cause for cause in nominal.assembly.variables if force.name in cause.loads]
+            columns = tuple(nominal.contributors.index(cause.name) for cause in causes)
+            factors = tuple(float(cause.loads[force.name]) for cause in causes)
+            yield Load(parts.index(part), nominal.position(force.at), np.array(force.vector), columns, factors)
 
 
 def _bilateral_locators(nominal: Nominal, part: int, parts: tuple[int, ...]) -> BilateralLocators:

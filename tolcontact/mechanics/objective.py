@@ -84,8 +84,11 @@ def _forces(system: GroupEquations, poses: Sequence[Pose], scale: ca.SX) -> ca.S
     """Return the negative work of the declared forces [N mm], divided by the sum of their magnitudes [N]."""
     work = ca.SX(0)
     for load in system.group.loads:
-        p = constant(load.point)
-        work += ca.dot(constant(load.vector), poses[load.part].apply(p) - system.raw[load.part].apply(p))
+        p, vector = constant(load.point), constant(load.vector)
+        if load.columns:
+            added = ca.dot(ca.DM(load.factors), system.deviations[list(load.columns)])
+            vector = vector * (1 + added / float(np.linalg.norm(load.vector)))
+        work += ca.dot(vector, poses[load.part].apply(p) - system.raw[load.part].apply(p))
     quadratic = system.regularization_factor * SEATING_SHARE * proximity(system, system.raw, poses) / system.group.length
     return quadratic - work / scale
 

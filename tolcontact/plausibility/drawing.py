@@ -1,10 +1,13 @@
 """The check of drawings: what tolerances leave open, what has no effect, and what the simulation takes as perfect."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
 from tolcontact.declaration import GeometricTolerance, Pattern
+from tolcontact.declaration.feature_tolerance import LineProfile, Profile
 from tolcontact.discretization import Nominal
 from tolcontact.features import FeatureOfSize, NominalFeature, NominalPattern, PlaneFeature, datum_frame, uncontrolled
 
@@ -16,15 +19,28 @@ ADVICE = {
 }  # fmt: skip
 
 
+class Remark(NamedTuple):
+    """A sentence on the feature with a `name` of the drawing of a `part`; without a part, on all drawings."""
+
+    text: str
+    part: str = ""
+    noun: str = ""
+    name: str = ""
+
+
 def drawing_remarks(nominal: Nominal) -> Iterator[str]:
     """Yield a sentence for everything that a checker would ask about the drawings of the parts."""
     makers = open_freedoms, missing_sizes, perfect_datums, unused_datums, ineffective_tolerances, perfect_faces
-    for make in makers:
-        yield from make(nominal)
+    subjects: dict[tuple[str, str, str], list[str]] = {}
+    for text, part, noun, name in chain.from_iterable(make(nominal) for make in makers):
+        subjects.setdefault((part, noun, text), []).append(name)
+    for (part, noun, text), names in subjects.items():
+        owner = f'part "{part}": ' if part else ""
+        yield owner + (f"{noun}{'s' if len(names) > 1 else ''} {_listed(names)}: " if noun else "") + text
 
 
-def open_freedoms(nominal: Nominal) -> Iterator[str]:
-    """Yield a sentence for each feature with freedoms that no tolerance limits; of a datum, those that it does not define."""
+def open_freedoms(nominal: Nominal) -> Iterator[Remark]:
+    """Yield a remark for each feature with freedoms that no tolerance limits; of a datum, those that it does not define."""
     for pattern in _stated(nominal):
         if isinstance(pattern.declared, Pattern) and pattern.declared.borrowed:
             continue  # these have tolerances of their own
@@ -33,27 +49,27 @@ def open_freedoms(nominal: Nominal) -> Iterator[str]:
             continue
         declared, datum = pattern.declared, pattern.declared.datum
         if not declared.geometric and datum is None:
-            yield f"{_place(pattern)}: no geometric tolerance limits its place in the part: taken as perfect"
+            yield _remark(pattern, "no geometric tolerance limits its place in the part: taken as perfect")
             continue
         earlier = f" to the datums before {datum}" if datum else ""
         kinds = dict.fromkeys(name.split()[0] for name in names)
         advice = "; ".join(ADVICE[kind] for kind in kinds if kind in ADVICE) or ADVICE["relative"]
-        yield f"{_place(pattern)}: no tolerance limits {_listed(names)}{earlier}: taken as perfect; add {advice}"
+        yield _remark(pattern, f"no tolerance limits {_listed(names)}{earlier}: taken as perfect; add {advice}")
 
 
-def missing_sizes(nominal: Nominal) -> Iterator[str]:
-    """Yield a sentence for each toleranced hole, shaft, slot or tab whose size has no limits."""
+def missing_sizes(nominal: Nominal) -> Iterator[Remark]:
+    """Yield a remark for each toleranced hole, shaft, slot or tab whose size has no limits."""
     for pattern in _stated(nominal):
         geometry = pattern.geometries[0]
         if isinstance(geometry, FeatureOfSize) and pattern.declared.size is None and pattern.declared.tolerances:
-            yield (
-                f"{_place(pattern)}: it is {geometry.in_words} of exactly {geometry.size:.6g} mm, without limits of size; "
-                f"add tc.Size({geometry.size:.6g}, ...)"
-            )
+            exact = f"it is {geometry.in_words} of exactly {geometry.size:.6g} mm"
+            has_profile = any(tolerance.of in (Profile, LineProfile) for tolerance in pattern.declared.geometric)
+            reason = "although its profile limits the size, too" if has_profile else "without limits of size"
+            yield _remark(pattern, f"{exact}, {reason}; add tc.Size({geometry.size:.6g}, ...)")
 
 
-def perfect_datums(nominal: Nominal) -> Iterator[str]:
-    """Yield a sentence for each part whose datum planes have no form: parts that stand on them do not rock."""
+def perfect_datums(nominal: Nominal) -> Iterator[Remark]:
+    """Yield a remark for each part whose datum planes have no form: parts that stand on them do not rock."""
     for part in nominal.last_parts:
         flat = [
             str(pattern.declared.datum)
@@ -62,33 +78,31 @@ def perfect_datums(nominal: Nominal) -> Iterator[str]:
             and isinstance(pattern.geometries[0], PlaneFeature) and not isinstance(pattern.geometries[0], FeatureOfSize)
         ]  # fmt: skip
         if flat:
-            yield f'part "{part.name}": datum {_listed(flat)}: no tolerance of form: taken as flat; add tc.Flatness'
+            yield Remark("no tolerance of form: taken as flat; add tc.Flatness", part.name, "datum", _listed(flat))
 
 
-def unused_datums(nominal: Nominal) -> Iterator[str]:
-    """Yield a sentence for each datum letter that no tolerance refers to."""
+def unused_datums(nominal: Nominal) -> Iterator[Remark]:
+    """Yield a remark for each datum letter that no tolerance refers to."""
     for part in nominal.last_parts:
         used = {letter for declared in part.part.toleranced for tolerance in declared.geometric for letter in tolerance.letters}
         letters = [declared.datum for declared in part.part.toleranced if declared.datum]
         if idle := [letter for letter in letters if letter not in used]:
-            yield f'part "{part.name}": datum {_listed(idle)}: no tolerance refers to it; refer to it, or leave the letter out'
+            yield Remark("no tolerance refers to it; refer to it, or leave the letter out", part.name, "datum", _listed(idle))
 
 
-def ineffective_tolerances(nominal: Nominal) -> Iterator[str]:
-    """Yield a sentence for each tolerance or modifier that cannot change a part."""
+def ineffective_tolerances(nominal: Nominal) -> Iterator[Remark]:
+    """Yield a remark for each tolerance or modifier that cannot change a part."""
     for pattern in _stated(nominal):
         size = pattern.declared.size
         for tolerance in pattern.declared.geometric:
             if tolerance.is_form and size and pattern.declared.is_enveloped and size.upper - size.lower <= tolerance.width:
-                yield (
-                    f"{_place(pattern)}: {tolerance} is no finer than the size ({size.upper:+g} {size.lower:+g}), whose "
-                    "envelope limits the form already; make it finer, or leave it out"
-                )
-            yield from (f"{_place(pattern)}: {text}" for text in _moot_modifiers(nominal, pattern, tolerance))
+                limits = f"the size ({size.upper:+g} {size.lower:+g}), whose envelope limits the form already"
+                yield _remark(pattern, f"{tolerance} is no finer than {limits}; make it finer, or leave it out")
+            yield from (_remark(pattern, text) for text in _moot_modifiers(nominal, pattern, tolerance))
 
 
-def perfect_faces(nominal: Nominal) -> Iterator[str]:
-    """Yield one sentence on the faces in contact pairs that no tolerance of a feature moves or shapes."""
+def perfect_faces(nominal: Nominal) -> Iterator[Remark]:
+    """Yield one remark on the faces in contact pairs that no tolerance of a feature moves or shapes."""
     perfect: dict[str, list[str]] = {}
     for pair in nominal.pairs:
         for index, face in zip((pair.moving, pair.reference), pair.deviating, strict=True):
@@ -96,10 +110,8 @@ def perfect_faces(nominal: Nominal) -> Iterator[str]:
                 perfect.setdefault(nominal.parts[index].name, []).append(pair.name)
     if perfect:
         faces = [f"{part} ({_listed(list(dict.fromkeys(pairs)))})" for part, pairs in perfect.items()]
-        yield (
-            f"no tolerance touches the faces in contact of {_listed(faces)}: taken as perfect; if this is not meant, declare "
-            "them as features with tolerances"
-        )
+        touched = f"no tolerance touches the faces in contact of {_listed(faces)}: taken as perfect"
+        yield Remark(f"{touched}; if this is not meant, declare them as features with tolerances")
 
 
 def _moot_modifiers(nominal: Nominal, pattern: NominalPattern, tolerance: GeometricTolerance) -> Iterator[str]:
@@ -118,18 +130,29 @@ def _stated(nominal: Nominal) -> list[NominalPattern]:
 
 
 def _followed(nominal: Nominal, pattern: NominalPattern) -> np.ndarray:
-    """Return the directions (coordinate, n) of a datum that its frame follows: what the datums before it leave free."""
+    """Return the directions (coordinate, n) of a datum that its frame follows: what the datums before it leave free.
+
+    Datums whose own tolerances refer to it are left out: these limit them to it.
+    """
     datums, letter = nominal.datums(pattern.part), pattern.declared.datum
+    if not letter:
+        return np.zeros((pattern.count, 0))
+    stated = [(declared.datum, one) for declared in pattern.declared.part.toleranced for one in declared.geometric]
+    following = {datum for datum, tolerance in stated if letter in tolerance.letters}
     before = [
-        (tolerance.system[:k], tolerance.orientation_only[:k])
-        for declared in pattern.declared.part.toleranced
-        for tolerance in declared.geometric
-        for k, letters in enumerate(tolerance.system)
-        if letter in letters
+        [
+            (letters, orientation_only)
+            for letters, orientation_only in zip(tolerance.system[:k], tolerance.orientation_only, strict=False)
+            if not following & {*letters}
+        ]
+        for _, tolerance in stated
+        for k, named in enumerate(tolerance.system)
+        if letter in named
     ]
-    if not before:
-        return pattern.values if letter else np.zeros((pattern.count, 0))
-    system, orientation_only = max(before, key=lambda entry: len(entry[0]))
+    places = max(before, key=len, default=[])
+    if not places:
+        return pattern.values
+    system, orientation_only = zip(*places, strict=True)
     frame = datum_frame(_features(system, datums), pattern.centre, pattern.reach, len(nominal.contributors), orientation_only)
     return pattern.values @ frame.free
 
@@ -140,8 +163,9 @@ def _features(
     return [[datum for letter in letters for datum in datums[letter]] for letters in system]
 
 
-def _place(pattern: NominalPattern) -> str:
-    return f'part "{pattern.declared.part.name}": {pattern.declared.designation}'
+def _remark(pattern: NominalPattern, text: str) -> Remark:
+    declared = pattern.declared
+    return Remark(text, declared.part.name, declared.noun, declared.designation.removeprefix(f"{declared.noun} "))
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -11,7 +11,7 @@ from tolcontact.declaration import Feature, Measure, Pattern, Point
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.discretization.measured_geometry import Combined, Heights, NominalMeasurement
 from tolcontact.features import FaceDeviation, NominalFeature
-from tolcontact.features.freedoms import FEATURE, FORM
+from tolcontact.features.freedoms import FEATURE, FORM, VARIABLE
 from tolcontact.geometry.tolerances import ON_FACE
 from tolcontact.plausibility.declared_points import location_designation
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws
@@ -176,7 +176,9 @@ def _located_points(nominal: Nominal, part: NominalPart) -> Iterator[tuple[str, 
         yield label, "give the locator on={}", Use(owner, point, direction, locators.faces[number])
         if part.parent is not None:
             ground = locators.grounds[number]
-            advice = "locate the part with on={}" if ground is None else "add this to the tolerance of the locator"
+            columns = () if ground is None else ground.columns
+            is_on_feature = any(nominal.freedoms[column].source != VARIABLE for column in columns)
+            advice = "add this to the tolerance of the locator" if is_on_feature else "locate the part with on={}"
             yield label, advice, Use(nominal.parts[part.parent], point, direction, ground)
 
 
@@ -200,7 +202,10 @@ def _unfollowed(draws: TrialDraws, uses: Sequence[Use]) -> list[tuple[int, Nomin
 
 def _motion(draws: TrialDraws, deviation: FaceDeviation, use: Use, direction: np.ndarray) -> float:
     """Return how far a face moves along a direction (3,) at a point, at three sigma [mm]; 0 if that is rounding."""
-    motions = draws.deviations[:, deviation.columns] @ deviation.outward(use.point[None], direction[None])[0]
+    outward = deviation.outward(use.point[None], direction[None])[0]
+    freedoms = [draws.program.nominal.freedoms[column] for column in deviation.columns]
+    outward[[freedom.source == VARIABLE for freedom in freedoms]] = 0.0  # a part that expands follows none of its features
+    motions = draws.deviations[:, deviation.columns] @ outward
     motion = SIGMAS * float(motions.std())
     return motion if motion > MIN_MOTION else 0.0
 

@@ -19,6 +19,7 @@ from tolcontact.geometry.face_in_file import FaceInFile
 from tolcontact.geometry.files import FROM_PRODUCT, STATED_FACES, Shape
 from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
 from tolcontact.pmi.declarable import Undeclared
+from tolcontact.pmi.modifiers import OF_TOLERANCES
 from tolcontact.readable import Readable
 
 MAX_ANGLE = 0.01  # [rad] between directions of faces that may be parts of one surface: fitted ones differ by much less
@@ -114,9 +115,16 @@ class DeclaredAnnotation(Readable):
     features: tuple[str, ...]
     reason: str = ""
 
+    @property
+    def remark(self) -> str:
+        """What to know about the features that state it; "" for most."""
+        modifiers = self.annotation.modifiers if self.features and isinstance(self.annotation, Tolerance) else ()
+        return "; ".join(filter(None, (OF_TOLERANCES[word].remark for word in modifiers if word in OF_TOLERANCES)))
+
     def __str__(self) -> str:
         names = f"declared as {', '.join(self.features)}" if self.features else "not declared"
-        return f"{self.annotation}: {names}{f' ({self.reason})' if self.reason else ''}"
+        details = "; ".join(filter(None, (self.reason, self.remark)))
+        return f"{self.annotation}: {names}{f' ({details})' if details else ''}"
 
 
 @dataclass(eq=False)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tolcontact.declaration import Assembly, Mesh, Part
+from tolcontact.declaration.values import script_line
 from tolcontact.errors import GeometryFault, OptionError
 from tolcontact.features.datum_frames import Declared
 from tolcontact.geometry.brep_face import describe_faces
@@ -37,7 +38,7 @@ class DeclaredPmi(Readable):
             if (entries := [entry for entry in self.annotations if isinstance(entry.annotation, kind)])
         ]
         title = f"{len(self.features)} features, patterns and datum targets, which state {', '.join(counts)}"
-        return "\n".join([title, *(f"  {annotation}" for annotation in self.undeclared)])
+        return "\n".join([title, *(f"  {entry}" for entry in self.annotations if entry.reason or entry.remark)])
 
 
 @dataclass(frozen=True, repr=False)
@@ -53,6 +54,11 @@ class DeclaredFile(Readable):
     annotations: tuple[DeclaredAnnotation, ...]
     faces: FacesOfRecords
     faults: tuple[str, ...] = ()
+
+    @property
+    def assembly(self) -> Assembly:
+        """An assembly of the parts, which nothing locates or measures yet."""
+        return Assembly("drawings").replaced(parts=self.parts)
 
     def __str__(self) -> str:
         features = tuple(declared for part in self.parts for declared in (*part.toleranced, *part.targets))
@@ -80,7 +86,7 @@ def features_from_pmi(part: Part) -> DeclaredPmi:
         raise OptionError(f"{name}: {error}") from error
     if pmi.is_empty:
         raise OptionError(f"{name}: its file states no tolerances, dimensions or datums as AP242 does")
-    features, claims = declare_features(part, pmi, read)
+    features, claims = declare_features(part, pmi, read, script_line())
     return DeclaredPmi(features, tuple(claim.result for claim in claims))
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from tolcontact.declaration import Brep, DatumTargets, Face, Feature, Part, Pattern
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.toleranced import Control
-from tolcontact.declaration.values import Vector, script_line
+from tolcontact.declaration.values import Vector
 from tolcontact.errors import GeometryFault
 from tolcontact.features import Features, datum_order
 from tolcontact.features.datum_frames import Declared
@@ -54,13 +54,13 @@ class Draft:
         return self.datum.annotation.letter if self.datum and isinstance(self.datum.annotation, Datum) else None
 
 
-def declare_features(part: Part, pmi: Pmi, read: Shape) -> tuple[tuple[Declared, ...], list[Claim]]:
-    """Declare the features that PMI states of a part with a shape; return them and all claims."""
+def declare_features(part: Part, pmi: Pmi, read: Shape, line: str = "") -> tuple[tuple[Declared, ...], list[Claim]]:
+    """Declare the features that PMI states of a part with a shape, by a line of a script; return them and all claims."""
     surfaces = TolerancedSurfaces(read)
     claims = claims_of(pmi, surfaces)
     meshes = {part: read}
     drafts = _drafts(part, meshes, claims, surfaces)
-    declared = _Trial(part, meshes).features(drafts)
+    declared = _Trial(part, meshes, line).features(drafts)
     return tuple(declared[draft] for draft in drafts if draft in declared), claims
 
 
@@ -169,8 +169,8 @@ def _common_datum(claim: Claim, drafts: Mapping[Place, Draft]) -> Draft:
 class _Trial:
     """The features of a part as numbers, and the drafts that become features one after the other."""
 
-    def __init__(self, part: Part, meshes: Meshes) -> None:
-        self._part, self._meshes = part, meshes
+    def __init__(self, part: Part, meshes: Meshes, line: str) -> None:
+        self._part, self._meshes, self._line = part, meshes, line
         self._numbers = Features(0)
         self._declared: dict[Draft, Declared] = {}
         for earlier in datum_order(part)[0]:
@@ -217,8 +217,10 @@ class _Trial:
                 return None
             draft = replace(draft, datum=None)
             datum, name = None, draft.name
-        for claim, constituent in sorted(stated, key=lambda statement: not isinstance(statement[1], Size)):
-            if reason := self._fault(self._feature(draft, (*tolerances, constituent))):
+        for claim, constituent in _sizes_first(stated):
+            if any(_implies(known, constituent) for known in tolerances):
+                claim.names.append(name)
+            elif reason := self._fault(self._feature(draft, (*tolerances, constituent))):
                 claim.refuse(reason, name)
             else:
                 claim.names.append(name)
@@ -237,13 +239,13 @@ class _Trial:
         """Return what a draft declares with some tolerances."""
         name, letter, part = draft.letter or draft.name, draft.letter, self._part
         if len(draft.faces) == 1:
-            return Feature(name, part, draft.faces[0], tolerances, letter, script_line())
+            return Feature(name, part, draft.faces[0], tolerances, letter, self._line)
         members = [self._declared.get(member) for member in draft.borrowed]
         borrowed = tuple(member for member in members if isinstance(member, Feature))
         if draft.targets:
             points = zip(borrowed, draft.targets, strict=True) if len(borrowed) == len(draft.targets) else ()
-            return DatumTargets(name, tuple(feature.point(*point) for feature, point in points), script_line())
-        return Pattern(name, part, borrowed or draft.faces, tolerances, letter, script_line())
+            return DatumTargets(name, tuple(feature.point(*point) for feature, point in points), self._line)
+        return Pattern(name, part, borrowed or draft.faces, tolerances, letter, self._line)
 
     def _fault(self, declared: Declared) -> str:
         """Return why something cannot be added to what is declared before it; "" if it can."""
@@ -254,6 +256,24 @@ class _Trial:
         except GeometryFault as error:
             return str(error)
         return ""
+
+
+def _sizes_first(stated: Sequence[Statement]) -> list[Statement]:
+    """Return statements with the sizes first, and those that narrower tolerances of the same kind imply last."""
+
+    def place(statement: Statement) -> int:
+        _, constituent = statement
+        is_implied = any(_implies(known, constituent) and not _implies(constituent, known) for _, known in stated)
+        return 0 if isinstance(constituent, Size) else 2 if is_implied else 1
+
+    return sorted(stated, key=place)
+
+
+def _implies(known: Control, stated: Control) -> bool:
+    """Return whether a tolerance implies a stated one: all but the widths are equal, and it is not wider."""
+    if isinstance(known, Size) or isinstance(stated, Size):
+        return False
+    return known.width <= stated.width and replace(stated, width=known.width) == known
 
 
 def _following(draft: Draft, stated: Sequence[Statement], letters: Set[str | None], reason: str) -> tuple[Statement, ...]:

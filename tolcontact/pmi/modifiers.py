@@ -10,12 +10,14 @@ class Modifier(NamedTuple):
     standard  that defines it
     declared  options of a tolerance (see GeometricTolerance) or the mark of a datum; or the reason why it is not declared
     meaning   of a modifier without options or mark
+    remark    on what is declared with it
     """
 
     sign: str
     standard: str
     declared: dict[str, Any] | str
     meaning: str = "declared; it changes nothing here"
+    remark: str = ""
 
     @property
     def outcome(self) -> str:
@@ -29,6 +31,7 @@ class Modifier(NamedTuple):
 
 THREADS = "threads have no such surface here"
 FITTED = "zones are for surfaces as they are, and for their axes by least squares"
+RIGID = "it is for the part in its free state; here the part is rigid and stays so when it is assembled"
 CUSTOMIZED = "a datum locks all the freedoms that it can here, and not some of them alone"
 
 # By their words in AP242.
@@ -42,7 +45,7 @@ OF_TOLERANCES = {
     "separate requirement": Modifier("SEP REQT", "ASME Y14.5", {"simultaneous": False}),
     "statistical tolerance": Modifier("ST", "ASME Y14.5", {}),  # all draws are statistical
     "tangent plane": Modifier("T", "ASME Y14.5", {"tangent": True}),
-    "free state": Modifier("F", "ISO 10579", "it is for the part in its free state, and parts are rigid here"),
+    "free state": Modifier("F", "ISO 10579", {}, "declared, with a remark: parts are rigid here", RIGID),
     "unequally disposed": Modifier("UZ", "ISO 1660", "its displacement is not stated"),
     "offset zone": Modifier("OZ", "ISO 1660", "the offset of its zone is not stated, so that no displacement can be drawn"),
     "variable angle": Modifier("VA", "ISO 1660", "the angle of its zone is not stated, so that no displacement can be drawn"),

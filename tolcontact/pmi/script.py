@@ -21,7 +21,8 @@ _DIGITS = 9  # of lengths: more than a shape resolves
 
 def script(path: Path, declared: DeclaredFile) -> str:
     """Return a model script that declares the parts of a file with their features."""
-    comments = [str(entry) for entry in declared.annotations if entry.reason and isinstance(entry.annotation, Tolerance)]
+    tolerances = [entry for entry in declared.annotations if isinstance(entry.annotation, Tolerance)]
+    comments = [str(entry) for entry in tolerances if entry.reason or entry.remark]
     comments = [f"- {comment}" for comment in [*comments, *declared.faults]]
     return "\n".join([
         f'""{literal(f"Parts of {path.name}, with the tolerances that it states; add locators, contact and measures.")}""',
@@ -32,7 +33,7 @@ def script(path: Path, declared: DeclaredFile) -> str:
         "def assembly() -> tc.Assembly:",
         f"    model = tc.Assembly({literal(path.stem)})",
         *(line for part in declared.parts for line in _part_lines(part)),
-        *(["    # Not declared, or not wholly:"] if comments else []),
+        *(["    # Not declared, not wholly, or with a remark:"] if comments else []),
         *(line for comment in comments for line in textwrap.wrap(shown(comment), MAX_WIDTH, **COMMENT)),
         "    return model",
         "",

@@ -13,6 +13,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.limits import GAP_ACCURACY
 from tolcontact.report.figures import grouped, number, percent, share
 from tolcontact.report.stack_tables import stack_up_report
+from tolcontact.report.sweep_tables import sweep_report
 from tolcontact.report.table import Table
 
 SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are only counted
@@ -334,4 +335,5 @@ _REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {
     terms.ALLOCATION.name: _allocation,
     terms.RELOCATION.name: _relocation,
     terms.SEATING.name: _seating,
+    terms.SWEEP.name: lambda dataset: AnalysisReport(*sweep_report(dataset, _lost(_unresolved(dataset.sum("position"))))),
 }

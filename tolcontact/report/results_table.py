@@ -85,7 +85,7 @@ def _row(measure: xr.Dataset, summary: xr.Dataset) -> ResultRow:
         full_name(measure),
         str(measure["measure_units"].values),
         str(measure["measure_quantity"].values),
-        verdict_text(opinion) + (_remarks(measure, summary) if opinion else ""),
+        verdict_text(opinion) + (f"{_kept(measure)}{doubts_of_all(summary)}" if opinion else ""),
         None
         if opinion is None or opinion.word in (UNDECIDED, CONSTANT) or _kept(measure) or reservation(summary)
         else opinion.word != FAILS,
@@ -131,11 +131,11 @@ def reservation(summary: xr.Dataset) -> str:
     return "".join(texts)
 
 
-def _remarks(measure: xr.Dataset, summary: xr.Dataset) -> str:
-    """Return the text after a verdict: what contact keeps within the limits, what cannot be assembled, and the reservation."""
+def doubts_of_all(summary: xr.Dataset) -> str:
+    """Return the text after each verdict: what cannot be assembled, and the reservation."""
     share = summary["not_assemblable"].values
     failures = f" (out of specification: {percent(share)} that cannot be assembled)" if share[0] > 0 else ""
-    return f"{_kept(measure)}{failures}{reservation(summary)}"
+    return f"{failures}{reservation(summary)}"
 
 
 def _kept(measure: xr.Dataset) -> str:
@@ -157,8 +157,12 @@ def full_name(measure: xr.Dataset) -> str:
     return f"{name}, station {measure[station].values}" if station in measure.coords else name
 
 
-def verdict_lines(summary: xr.Dataset) -> Iterator[str]:
-    """Yield the verdict on each measurement that has limits, and why a measurement has none of its figures."""
+def verdict_lines(summary: xr.Dataset, *, states_once: bool = False) -> Iterator[str]:
+    """Yield the verdict on each measurement that has limits, and why a measurement has none of its figures.
+
+    What makes all verdicts doubtful follows each of them, or is stated once, in the last line.
+    """
+    doubts = doubts_of_all(summary)
     for name in summary["measure"].values:
         measure = summary.sel(measure=name)
         if share := int(measure[terms.NOT_A_NUMBER].values) / summary.attrs["realizations"]:
@@ -167,7 +171,10 @@ def verdict_lines(summary: xr.Dataset) -> Iterator[str]:
             )
         if text := verdict_text(verdict_of(measure, summary.attrs["realizations"])):
             is_about_limits = not text.startswith((UNDECIDED, CONSTANT))
-            yield f"{full_name(measure)}: {text}{' its limits' * is_about_limits}{_remarks(measure, summary)}"
+            remarks = f"{_kept(measure)}{'' if states_once else doubts}"
+            yield f"{full_name(measure)}: {text}{' its limits' * is_about_limits}{remarks}"
+    if states_once and doubts:
+        yield f"all verdicts{doubts.replace('; ', ': ', 1) if doubts.startswith('; ') else doubts}"
 
 
 def _rounded_share(share: float) -> str:

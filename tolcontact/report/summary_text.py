@@ -12,6 +12,7 @@ from rich.text import Text
 from scipy import special
 
 from tolcontact import vocabulary as terms
+from tolcontact.report.brief import EVERYTHING, MOST_DETAILED, brief_measures, brief_table
 from tolcontact.report.convention_text import convention_lines, offset_lines, offset_table
 from tolcontact.report.figures import NO_INTERVAL, grouped, limits_text, number, percent, settled, share
 from tolcontact.report.results_table import full_name, overview_table, verdict_lines
@@ -37,20 +38,28 @@ NEEDS = {  # realizations, of statistics that have no interval
 RIGID_FIELDS = "of elastic parts the rigid motion alone, without their bending, which measurements include"
 
 
-def summary_text(summary: xr.Dataset) -> Group:
-    """Return a summary (see summarize) for rich to print."""
-    return Group(*_sections(summary))
+def summary_text(summary: xr.Dataset, *, is_whole: bool = False) -> Group:
+    """Return a summary (see summarize) for rich to print: of many measurements, parts or pairs those that fall short.
+
+    A summary that `is_whole` has all of them, with all figures.
+    """
+    return Group(*_sections(summary, is_whole=is_whole))
 
 
-def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
+def _sections(summary: xr.Dataset, *, is_whole: bool) -> Iterator[Text | Table | Padding]:
     count = summary.attrs["realizations"]
     yield Text(f"{summary.attrs['title']}: {count} realizations", style="bold")
     if summary.attrs["samples"] > count:
         yield Text(f"{grouped(count)} of {grouped(summary.attrs['samples'])} realizations are done; continue with --resume")
     yield Text(f"{terms.ESTIMATES_NOTE}.\nChanges are from the same draws.\n")
-    yield overview_table(summary)
-    yield from map(Text, verdict_lines(summary))
-    yield from (measure_table(summary.sel(measure=measure), summary.sizes["measure"]) for measure in summary["measure"].values)
+    brief, remark = (summary, "") if is_whole else brief_measures(summary)
+    yield overview_table(brief)
+    has_details = is_whole or summary.sizes["measure"] <= MOST_DETAILED
+    yield from map(Text, verdict_lines(brief, states_once=not has_details))
+    if has_details:
+        yield from (measure_table(summary.sel(measure=name), summary.sizes["measure"]) for name in summary["measure"].values)
+    else:
+        yield Text(remark or f"percentiles and capability of each: {EVERYTHING}")
     if not summary.sizes["part"]:
         return
     magnitudes = int(summary["magnitude_realizations"])
@@ -60,12 +69,19 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
     if summary.attrs["elastic_parts"]:
         yield Text(RIGID_FIELDS)
     if magnitudes:
-        yield _field_table(summary)
+        yield _field_table(summary, is_whole=is_whole)
     yield Text("\ncontact", style="bold")
     for line in contact_lines(summary, count):
         yield Padding(Text(line), (0, 0, 0, 2), expand=False)
-    tables = [pair_table(summary) if summary.sizes["pair"] else None, offset_table(summary)]
-    for table in filter(None, tables):
+    pairs, offsets = pair_table(summary) if summary.sizes["pair"] else None, offset_table(summary)
+    if pairs is not None and not is_whole:
+        pairs = brief_table(pairs, summary["carried"].sel(interval="estimate").values, "are in contact less often, or never")
+    if offsets is not None and not is_whole:
+        moved = summary.isel(part=[k for k, part in enumerate(summary["part"].values) if part in offsets.names])
+        offsets = brief_table(
+            offsets, moved["offset_beyond"].sel(interval="estimate").values, "are moved so far less often, or never"
+        )
+    for table in filter(None, (pairs, offsets)):
         yield Text()
         yield table
 
@@ -146,7 +162,7 @@ def _measure_rows(measure: xr.Dataset, measures: int) -> list[list[str]]:
     return rows
 
 
-def _field_table(summary: xr.Dataset) -> Table:
+def _field_table(summary: xr.Dataset, *, is_whole: bool) -> Table:
     """Return the table of the displacement fields of the parts that move."""
     rows = []
     is_moving = (summary["field_extreme"].values != 0).any(axis=(1, 2, 3))
@@ -155,7 +171,9 @@ def _field_table(summary: xr.Dataset) -> Table:
             field = summary["field_extreme"].sel(part=part, state=state)
             extremes = [number(field.sel(extreme=extreme).values) for extreme in ("least", "largest")]
             rows.append([str(part), terms.WORD_OF_STATE[state], *extremes])
-    return Table("", ["part", "", "smallest", "largest"], rows)
+    table = Table("", ["part", "", "smallest", "largest"], rows)
+    largest = summary["field_extreme"].sel(state=CORRECTED, extreme="largest", interval="estimate").values[is_moving]
+    return table if is_whole else brief_table(table, largest, "move less", len(terms.STATES))
 
 
 def pair_table(summary: xr.Dataset) -> Table:

@@ -22,7 +22,8 @@ BETWEEN = 2  # characters between columns
 class Table:
     """A table with its title, and remarks below it; numbers stay numbers. A detail is left out of the page.
 
-    In a terminal, columns are as wide as their cells. If they do not fit, each interval is printed below its estimate.
+    Columns are as wide as their cells. If they do not fit, each interval is printed below its estimate, in a terminal on two
+    lines where even that is too wide.
     """
 
     title: str
@@ -37,6 +38,11 @@ class Table:
         return [["" if cell is None else plain(cell) if isinstance(cell, float) else cell for cell in row] for row in self.rows]
 
     @property
+    def names(self) -> list[str]:
+        """The first cell of each row."""
+        return [row[0] for row in self.texts]
+
+    @property
     def is_number(self) -> list[bool]:
         """Whether each column has numbers."""
         return [any(isinstance(row[k], float) for row in self.rows) for k in range(len(self.columns))]
@@ -49,13 +55,15 @@ class Table:
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         if self.title:
             yield Text(f"\n{self.title}", style="bold")
-        yield self._figures(options.max_width if console.is_terminal else FILE_WIDTH)
+        yield self._figures(options.max_width if console.is_terminal else FILE_WIDTH, is_cut=console.is_terminal)
         yield from map(Text, self.remarks)
 
-    def _figures(self, width: int) -> rich.table.Table:
+    def _figures(self, width: int, *, is_cut: bool) -> rich.table.Table:
         rows, headings = self.texts, [column.split("\n") for column in self.columns]
         if self._width(rows) > width:
             rows = [[cell.replace(" [", "\n[") for cell in row] for row in rows]
+        if is_cut:
+            rows = self._split(rows, width)
         fits, height = self._width(rows) <= width, max(map(len, headings), default=0)
         table = rich.table.Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), collapse_padding=fits, show_edge=False)
         for k, lines in enumerate(headings):
@@ -65,6 +73,17 @@ class Table:
         for row in rows:
             table.add_row(*row)
         return table
+
+    def _split(self, rows: list[list[str]], width: int) -> list[list[str]]:
+        """Return rows with intervals split at their comma, from the widest column on, until they fit: no column may be cut."""
+        widths = self._widths(rows)
+        for k in sorted(range(1, len(widths)), key=lambda k: -widths[k]):
+            if self._width(rows) <= width:
+                break
+            rows = [
+                [cell.replace(", ", ",\n ") if j == k and "\n[" in cell else cell for j, cell in enumerate(row)] for row in rows
+            ]
+        return rows
 
     def _widths(self, rows: Sequence[Sequence[str]]) -> list[int]:
         """Return the width of each column, for cells of several lines."""

@@ -14,7 +14,8 @@ a limit, y is also moved along b, and the larger share bounds the interval.
 
 Measured rows of a population are weighted by a flat Dirichlet distribution (Rubin, The Bayesian Bootstrap, 1981), which assumes
 no shape. Parts that were not measured are one more row of that distribution, outside of all limits in upper bounds of shares,
-and inside in lower ones: with one population this is the interval of Clopper and Pearson for that many parts.
+and inside in lower ones: with one population this is the interval of Clopper and Pearson for that many parts. Where lots are
+drawn first, the weights of lots are drawn, too, and the parts not measured are lots.
 
 The spread over the worlds adds to the interval of the run like an independent error, on the log scale for spreads.
 """
@@ -30,6 +31,7 @@ import scipy
 import xarray as xr
 
 from tolcontact import vocabulary as terms
+from tolcontact.declaration import Population
 from tolcontact.statistics.intervals import CONFIDENCE
 from tolcontact.statistics.linear_shares import required_realizations
 
@@ -48,11 +50,29 @@ class MeasuredRows(NamedTuple):
     columns         of the deviations
     of_realization  (realization,) the row that each realization has
     counts          (row,) how often each row occurs
+    by_lot          (lot, row) how often in each lot, if realizations draw a lot first
     """
 
     columns: np.ndarray
     of_realization: np.ndarray
     counts: np.ndarray
+    by_lot: np.ndarray | None = None
+
+    @property
+    def known(self) -> int:
+        """The number of independent draws that the population is known from: parts, or lots."""
+        return int(self.counts.sum()) if self.by_lot is None else len(self.by_lot)
+
+    def weights(self, rng: np.random.Generator) -> np.ndarray:
+        """Return weights (world, row) of the rows: of the parts in each lot, and of the lots."""
+        if self.by_lot is None:
+            return np.asarray(rng.dirichlet(self.counts, WORLDS) * self.counts.sum() / self.counts)
+        shares = rng.dirichlet(np.ones(len(self.by_lot)), WORLDS)
+        drawn = np.zeros((WORLDS, len(self.counts)))
+        for lot, counts in enumerate(self.by_lot):
+            rows = np.flatnonzero(counts)
+            drawn[:, rows] += shares[:, lot, None] * rng.dirichlet(counts[rows], WORLDS)
+        return np.asarray(drawn / (self.by_lot / self.by_lot.sum(axis=1, keepdims=True)).mean(axis=0))
 
 
 class Worlds:
@@ -74,7 +94,7 @@ class Worlds:
         self._mean_changes = self._spreads * scale * scipy.special.ndtri(u[:, 2 + len(n) :]) / np.sqrt(n)
         self._scale = scale
         self._correlation = np.atleast_2d(np.corrcoef(x.T)) if len(n) else np.zeros((0, 0))
-        self._row_weights = [rng.dirichlet(rows.counts, WORLDS) * rows.counts.sum() / rows.counts for rows in populations]
+        self._row_weights = [rows.weights(rng) for rows in populations]
         self.luck, self._unseen = u[:, 0], u[:, 1]
 
     @property
@@ -84,7 +104,7 @@ class Worlds:
 
     def unseen(self, index: "Index") -> np.ndarray:
         """Return the share (world,) of parts not measured, in the smallest population that a measurement depends on."""
-        fewest = min((rows.counts.sum() for rows in compress(self._populations, index.depends)), default=math.inf)
+        fewest = min((rows.known for rows in compress(self._populations, index.depends)), default=math.inf)
         return np.asarray(-np.expm1(np.log(self._unseen) / fewest))  # quantiles of a beta distribution
 
     def index(self, y: np.ndarray) -> "Index":
@@ -162,7 +182,13 @@ def worlds_of(results: xr.DataTree, count: int) -> Worlds | None:
 
 
 def _measured_rows(population: Mapping[str, Any], labels: list[str], x: np.ndarray) -> MeasuredRows:
-    values, counts = np.unique(np.array(population["values"], dtype=float), axis=0, return_counts=True)
+    columns, gauge, lots = (tuple(population.get(name, ())) for name in ("columns", "gauge", "lots"))
+    drawn = Population(columns, np.array(population["values"], dtype=float), gauge=gauge, lots=lots).drawn
+    values, row, counts = np.unique(drawn, axis=0, return_inverse=True, return_counts=True)
+    by_lot = np.zeros((len(set(lots)), len(values)), dtype=int)
+    if lots:
+        np.add.at(by_lot, (np.unique(lots, return_inverse=True)[1], row.ravel()), 1)
     scale = np.where(np.ptp(values, axis=0) > 0, np.ptp(values, axis=0), 1.0)
-    columns = [labels.index(label) for label in population["columns"]]
-    return MeasuredRows(np.array(columns), scipy.spatial.cKDTree(values / scale).query(x[:, columns] / scale)[1], counts)
+    indices = [labels.index(label) for label in columns]
+    of_realization = scipy.spatial.cKDTree(values / scale).query(x[:, indices] / scale)[1]
+    return MeasuredRows(np.array(indices), of_realization, counts, by_lot if lots else None)

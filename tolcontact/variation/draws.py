@@ -33,7 +33,7 @@ class Draws:
     mean_widths   [mm] of the minimum zones of forms, by feature
     shifts        of datum planes, which follow from other deviations
     correlated    for each correlation its labels, and the lower factor of its matrix (Cholesky)
-    populations   columns of measured parts, and their values (row, column)
+    populations   columns of measured parts, and the values (row, column) that are drawn
     """
 
     def __init__(self, nominal: Nominal) -> None:
@@ -51,7 +51,7 @@ class Draws:
             (list(correlation.labels), np.linalg.cholesky(self._copula(correlation))) for correlation in assembly.correlations
         ]
         self.populations = [
-            (np.array([self._column[label] for label in population.columns]), population.values)
+            (np.array([self._column[label] for label in population.columns]), population.drawn)
             for population in assembly.populations
         ]
 
@@ -61,22 +61,27 @@ class Draws:
 
     @property
     def in_words(self) -> list[str]:
-        """A line for each correlation: its coefficient of the copula, of deviations and of ranks; and one on means by cpk."""
+        """A line for each correlation: its coefficient of the copula, of deviations and of ranks; and others on measured parts.
+
+        These are on lots, gaps and gauges of populations, on few parts, and on means by cpk.
+        """
         lines = [
             in_words(correlation, self._copula(correlation), [self.contributors[self._column[k]] for k in correlation.labels])
             for correlation in self._assembly.correlations
         ]
+        lines += [population.in_words for population in self._assembly.populations]
         sides: dict[str, list[str]] = {}
         for freedom in self.contributors:
             if freedom.side_in_words:
                 sides.setdefault(freedom.side_in_words, []).append(freedom.label)
         means = [f"{_shortened(labels)} {side.rstrip(',')}" for side, labels in sides.items()]
-        few: dict[int, list[str]] = {}
+        few: dict[str, list[str]] = {}
         for freedom in (freedom for freedom in self.contributors if freedom.parts):
-            few.setdefault(freedom.parts, []).append(freedom.label)
-        for (_, values), label in zip(self.populations, self.population_labels, strict=True):
-            few.setdefault(len(values), []).append(label)
-        known = [f"{_shortened(labels)} from {parts} parts" for parts, labels in few.items()]
+            few.setdefault(f"{freedom.parts} parts", []).append(freedom.label)
+        for population, label in zip(self._assembly.populations, self.population_labels, strict=True):
+            count = f"{len(population.members)} lots" if population.lots else f"{len(population.values)} parts"
+            few.setdefault(count, []).append(label)
+        known = [f"{_shortened(labels)} from {count}" for count, labels in few.items()]
         lines += [f"known from few parts, which intervals of measurements include: {'; '.join(known)}"] * bool(known)
         return lines + [f"means off centre by cpk: {'; '.join(means)}"] * bool(means)
 
@@ -126,8 +131,9 @@ class Draws:
         deviations = self._single_draws(numbers, count)
         if not (self._scale == 1.0).all():
             deviations = self._middle + self._scale * (deviations - self._middle)
-        for label, (columns, values) in zip(self.population_labels, self.populations, strict=True):
-            deviations[:, columns] = values[(numbers(label) * len(values)).astype(int)]
+        measured = zip(self._assembly.populations, self.population_labels, self.populations, strict=True)
+        for population, label, (columns, values) in measured:
+            deviations[:, columns] = values[population.rows(numbers(label))]
         self._add_causes_and_bonuses(deviations)
         self.add_shifts(deviations)
         self._check_finite(deviations)

@@ -29,10 +29,12 @@ SEAT, HOLDER = "seat", "holder"  # contacts: one that a part may not reach, and 
 STAGE, STAGES = "stage", ("before", "after")
 APPROACH, APPROACHES = "approach", ("worst case", "RSS", "MRSS", "1.5 RSS")  # to a stack, by linear sensitivities
 OF_EFFECT, EFFECTS = "of_effect", ("6 sigma", OUTSIDE)
+OF_ENVELOPE, ENVELOPE = "of_envelope", ("mean", "6 sigma", "outer percentile")  # of extremes over the positions of a mechanism
+PARAMETER_NAME = "parameter_name"
 FIXED_LABELS = {
     STATE: STATES, INTERVAL: ESTIMATE, STATUS_MEANING: STATUS_MEANINGS, AXIS: AXES, BODY_AXIS: AXES,
     CONTACT: CONTACT_STATES, END: ENDS, STAGE: STAGES, OF_EFFECT: EFFECTS,
-    APPROACH: APPROACHES,
+    APPROACH: APPROACHES, OF_ENVELOPE: ENVELOPE,
 }  # fmt: skip
 
 
@@ -189,7 +191,23 @@ STACK_UP = AnalysisRecord(
         _by_status(),
     ),
 )
-_RECORDS = STACK_UP, CONTRIBUTIONS, SENSITIVITIES, WORST_CASE, TAILS, ALLOCATION, RELOCATION, SEATING
+SWEEP = AnalysisRecord(
+    "sweep",
+    "envelope of the measurements of {assembly}",
+    (
+        variable(
+            "f8 envelope(measure, state, end, of_envelope, interval)",
+            "mean, 6 sigma and outer percentile of the least and of the largest value over all positions",
+        ),
+        variable("f8 outside(measure, state, interval)", "share of realizations out of specification at any position", "1"),
+        variable("f8 extreme_share(measure, state, end, position)", "share of realizations with this extreme there", "1"),
+        variable("f8 mean(measure, state, position, interval)", "mean at each position"),
+        variable("f8 swept(position, realization, state, measure)", "values at each position"),
+        variable("f8 parameter(parameter_name, position)", "parameters of the mechanism", "1"),
+        _by_status("position"),
+    ),
+)
+_RECORDS = STACK_UP, CONTRIBUTIONS, SENSITIVITIES, WORST_CASE, TAILS, ALLOCATION, RELOCATION, SEATING, SWEEP
 ANALYSES = {record.name: record for record in _RECORDS}
 
 

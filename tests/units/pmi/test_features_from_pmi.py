@@ -1,13 +1,19 @@
 """Insides of `pmi` under the claims of `tests/test_features_from_pmi.py`."""
 
+from pathlib import Path
+
 import pytest
 
 import tolcontact as tc
 from tests.pmi_records import Annotated
 from tests.step_files import Step
 from tests.test_cad import COVER
-from tests.test_features_from_pmi import cover, drawing, spreads, spreads_of
+from tests.test_features_from_pmi import HOLE, ROUND, TOP, cover, datums, drawing, spreads, spreads_of
+from tolcontact.geometry.shapes import shape
+from tolcontact.pmi import OF_DATUMS, OF_TOLERANCES
 from tolcontact.pmi.declared import declared_file
+from tolcontact.pmi.drafts import declare_features
+from tolcontact.pmi.reading import read_pmi
 from tolcontact.pmi.script import script
 
 
@@ -76,3 +82,32 @@ def test_a_file_whose_annotations_have_no_faces_has_a_reason_for_each(tmp_path):
     path = file.write(tmp_path / "cover.stp")
     declared = declared_file(path, tc.io.read_pmi(path))
     assert declared.parts == () and [one.reason for one in declared.annotations] == ["the file states no face for it"] * 2
+
+
+def test_each_modifier_is_declared_or_refused_with_its_standard_as_the_table_of_the_guide_has_it(tmp_path):
+    """One hole for each modifier; what the table calls declared has the option, and what it does not has the reason."""
+    guide = (Path(tc.__file__).parent / "guide" / "pmi.md").read_text()
+    for table in (OF_TOLERANCES, OF_DATUMS):
+        for word, entry in table.items():
+            assert f"| {entry.sign} | {word} | {entry.standard} | {entry.outcome} |" in guide
+    read = shape(cover(datums, tmp_path).geometry)  # once: the annotations alone differ
+    for word, entry in OF_TOLERANCES.items():
+        modifier, datum = word.upper().replace(" ", "_"), "(M)" if "simultaneous" in entry.declared else ""
+
+        def annotate(file, modifier=modifier, datum=datum):
+            datums(file)
+            file.size(file.aspect(*HOLE), 8.1, (0, 0.03))
+            kind, place = ("parallelism", TOP) if "TANGENT" in modifier else ("position", *HOLE)
+            file.tolerance(
+                kind, 0.2, file.aspect(place), f"A|B{datum}|C" if place != TOP else "A", zone=ROUND, modifier=modifier
+            )
+
+        part = cover(annotate, tmp_path)
+        features, claims = declare_features(part, read_pmi(part.geometry.source), read)
+        reasons = [claim.result.reason for claim in claims if claim.result.reason]
+        if isinstance(entry.declared, str):
+            assert reasons == [f"its modifier, {word} ({entry.sign}, {entry.standard}): {entry.declared}"]
+        else:
+            assert not reasons
+            (stated,) = [tolerance for feature in features for tolerance in feature.geometric]
+            assert {name: getattr(stated, name) for name in entry.declared} == entry.declared

@@ -1,0 +1,56 @@
+"""The brief summary: of many measurements, parts and pairs those that fall short, and how many others there are."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as terms
+from tolcontact.report.results_table import verdict_of
+from tolcontact.report.table import Table
+from tolcontact.statistics.capability import CONSTANT, FAILS, MEETS, UNDECIDED
+
+MOST_DETAILED, MOST_LISTED = 3, 6  # measurements with all their figures; measurements, parts or pairs in a table
+EVERYTHING = "the page has all, and so has tolcontact summary --all"
+URGENCY = {FAILS: 2.0, UNDECIDED: 1.0, "": 0.0, CONSTANT: -1.0, MEETS: -1.0}
+
+
+def brief_measures(summary: xr.Dataset) -> tuple[xr.Dataset, str]:
+    """Return the summary of the measurements that fall short of their limits, and a remark about all others.
+
+    All measurements are kept if there are few. If none falls short, the first ones are kept.
+    """
+    count = summary.sizes[terms.MEASURE]
+    if count <= MOST_LISTED:
+        return summary, ""
+    measures = [summary.isel(measure=index) for index in range(count)]
+    opinions = [verdict_of(measure, summary.attrs["realizations"]) for measure in measures]
+    verdicts = ["" if opinion is None else opinion.word for opinion in opinions]
+    shares = [float(m["statistic_value"].sel(state=terms.STATES[1], statistic=terms.OUTSIDE)[0]) for m in measures]
+    urgencies = [URGENCY[verdict] + float(np.nan_to_num(share)) / 2 for verdict, share in zip(verdicts, shares, strict=True)]
+    failing = [index for index in _largest(urgencies, MOST_LISTED) if verdicts[index] in (FAILS, UNDECIDED)]
+    selection = failing or list(range(MOST_LISTED))
+    remainder = [verdict for index, verdict in enumerate(verdicts) if index not in selection]
+    phrases = {"fall short, too": (FAILS, UNDECIDED), "without limits": ("",), "meet their limits": (MEETS, CONSTANT)}
+    counts = {phrase: sum(verdict in group for verdict in remainder) for phrase, group in phrases.items()}
+    remark = ", ".join(f"{number} more {phrase}" for phrase, number in counts.items() if number)
+    return summary.isel(measure=selection), f"{remark}; {EVERYTHING}"
+
+
+def brief_table(table: Table, weights: Sequence[float] | np.ndarray, phrase: str, rows_of_each: int = 1) -> Table:
+    """Return a table of the items with the largest weights (item,), each of several rows.
+
+    A remark has the number of the other items, and a `phrase` about them.
+    """
+    if len(weights) <= MOST_LISTED:
+        return table
+    selection = [index for index in _largest(weights, MOST_LISTED) if weights[index] > 0]
+    rows = [row for index in selection for row in table.rows[index * rows_of_each : (index + 1) * rows_of_each]]
+    remark = f"{len(weights) - len(selection)} more {phrase}; {EVERYTHING}"
+    return replace(table, rows=rows, remarks=[*table.remarks, remark])
+
+
+def _largest(weights: Sequence[float] | np.ndarray, count: int) -> list[int]:
+    """Return the indices of the largest weights in ascending order."""
+    return sorted(np.argsort(-np.asarray(weights, dtype=float), kind="stable")[:count].tolist())
