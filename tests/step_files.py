@@ -12,6 +12,8 @@ FACES = (
     (2, 3, 7, 6),
     (3, 0, 4, 7),
 )  # corners of a block, seen from outside
+WEDGE = ((0, 0, 0), (40, 0, 0), (0, 20, 0), (0, 0, 10))
+WEDGE_FACES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
 HEADER = """ISO-10303-21;
 HEADER;
 FILE_DESCRIPTION((''),'2;1');
@@ -23,24 +25,37 @@ DATA;
 
 
 class Step:
-    """A STEP file in the making: `add` gives an entity its number."""
+    """A STEP file in the making: `add` gives an entity its number, after the `first` ones of another file."""
 
-    def __init__(self):
-        self.lines = []
+    def __init__(self, first=0):
+        self.lines, self.first = [""] * first, first
         self.application = self.add("APPLICATION_CONTEXT('automotive design')")
         self.add(f"APPLICATION_PROTOCOL_DEFINITION('international standard','automotive_design',2000,#{self.application})")
-        millimetre = self.add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))")
-        radian = self.add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))")
-        steradian = self.add("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())")
-        accuracy = self.add(f"UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-7),#{millimetre},'distance_accuracy_value','')")
-        self.context = self.add(
-            f"(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#{accuracy}))"
-            f"GLOBAL_UNIT_ASSIGNED_CONTEXT((#{millimetre},#{radian},#{steradian}))REPRESENTATION_CONTEXT('',''))"
-        )
+        self.millimetre = self.add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))")
+        self.angles = [
+            self.add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))"),
+            self.add("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())"),
+        ]
+        self.context = self.context_in(self.millimetre)
 
     def add(self, entity):
         self.lines.append(entity)
         return len(self.lines)
+
+    def context_in(self, unit):
+        """The context of shapes in a unit of length."""
+        accuracy = self.add(f"UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-7),#{unit},'distance_accuracy_value','')")
+        units = ",".join(f"#{k}" for k in (unit, *self.angles))
+        return self.add(
+            f"(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#{accuracy}))"
+            f"GLOBAL_UNIT_ASSIGNED_CONTEXT(({units}))REPRESENTATION_CONTEXT('',''))"
+        )
+
+    def inch(self):
+        """The unit of an inch."""
+        size = self.add("DIMENSIONAL_EXPONENTS(1.,0.,0.,0.,0.,0.,0.)")
+        length = self.add(f"LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4),#{self.millimetre})")
+        return self.add(f"(CONVERSION_BASED_UNIT('INCH',#{length})LENGTH_UNIT()NAMED_UNIT(#{size}))")
 
     def point(self, at):
         return self.add(f"CARTESIAN_POINT('',({','.join(f'{float(x)!r}' for x in at)}))")
@@ -74,6 +89,13 @@ class Step:
             bound = self.add(f"FACE_OUTER_BOUND('',#{loop},.T.)")
             own.append(self.add(f"ADVANCED_FACE('',(#{bound}),#{plane},.T.)"))
         return self.add(f"{kind}('',({','.join(f'#{k}' for k in own)}))")
+
+    def wedge(self, faces=()):
+        """A solid without a mirror plane, WEDGE, whose faces have names."""
+        shell = self.shell(WEDGE, faces=WEDGE_FACES)
+        for face, name in zip(re.findall(r"#(\d+)", self.lines[shell - 1]), faces, strict=False):
+            self.lines[int(face) - 1] = self.lines[int(face) - 1].replace("('',", f"('{name}',", 1)
+        return self.add(f"MANIFOLD_SOLID_BREP('wedge',#{shell})")
 
     def solid(self, lower, upper, name="", void=None):
         outer = self.shell(corners(lower, upper))
@@ -120,8 +142,8 @@ class Step:
         styled = self.add(f"STYLED_ITEM('color',(#{style}),#{face})")
         self.add(f"MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',(#{styled}),#{self.context})")
 
-    def product(self, name, items: Sequence[int] = ()):
-        """A product whose shape has some items. Returns its definition and its representation."""
+    def product(self, name, items: Sequence[int] = (), units=None):
+        """A product whose shape has some items, in a context of units. Returns its definition and its representation."""
         context = self.add(f"PRODUCT_CONTEXT('',#{self.application},'mechanical')")
         product = self.add(f"PRODUCT('{name}','{name}','',(#{context}))")
         formation = self.add(f"PRODUCT_DEFINITION_FORMATION('','',#{product})")
@@ -130,24 +152,41 @@ class Step:
         shape = self.add(f"PRODUCT_DEFINITION_SHAPE('','',#{definition})")
         placed = ",".join(f"#{k}" for k in (self.placement(), *items))
         kind = "ADVANCED_BREP_SHAPE_REPRESENTATION" if items else "SHAPE_REPRESENTATION"
-        representation = self.add(f"{kind}('',({placed}),#{self.context})")
+        representation = self.add(f"{kind}('',({placed}),#{units or self.context})")
         self.add(f"SHAPE_DEFINITION_REPRESENTATION(#{shape},#{representation})")
         return definition, representation
 
-    def place(self, child, parent, name, at=(0, 0, 0)):
-        """Put one product into another one, both as `product` gives them."""
+    def operator(self, transform, scale="$"):
+        """The operator that places a copy by a transform (4, 4), which may mirror."""
+        x, y, z, at = (transform[:3, k] for k in range(4))
+        axes = [self.direction(axis) for axis in (x, y, z)]
+        return self.add(
+            f"CARTESIAN_TRANSFORMATION_OPERATOR_3D('','','',#{axes[0]},#{axes[1]},#{self.point(at)},{scale},#{axes[2]})"
+        )
+
+    def place(self, child, parent, name, at=(0, 0, 0), operator=None):
+        """Put one product into another one, both as `product` gives them, at a point or by an operator."""
         use = self.add(f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('{name}','{name}','',#{parent[0]},#{child[0]},$)")
         shape = self.add(f"PRODUCT_DEFINITION_SHAPE('','',#{use})")
-        moved = self.add(f"ITEM_DEFINED_TRANSFORMATION('','',#{self.placement()},#{self.placement(at)})")
+        moved = operator or self.add(f"ITEM_DEFINED_TRANSFORMATION('','',#{self.placement()},#{self.placement(at)})")
         related = self.add(
             f"(REPRESENTATION_RELATIONSHIP('','',#{child[1]},#{parent[1]})"
             f"REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#{moved})SHAPE_REPRESENTATION_RELATIONSHIP())"
         )
         self.add(f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{related},#{shape})")
 
+    def image(self, child, transform):
+        """A product that consists of the image of another one by a transform (4, 4)."""
+        source = self.add(f"REPRESENTATION_MAP(#{self.placement()},#{child[1]})")
+        return self.product("image", [self.add(f"MAPPED_ITEM('',#{source},#{self.operator(transform)})")])
+
+    @property
+    def records(self):
+        """The records, as they stand in the file."""
+        return "".join(f"#{k}={self.lines[k - 1]};\n" for k in range(self.first + 1, len(self.lines) + 1))
+
     def __str__(self):
-        lines = "".join(f"#{k}={entity};\n" for k, entity in enumerate(self.lines, start=1))
-        return f"{HEADER}{lines}ENDSEC;\nEND-ISO-10303-21;\n"
+        return f"{HEADER}{self.records}ENDSEC;\nEND-ISO-10303-21;\n"
 
 
 def corners(lower, upper):

@@ -35,18 +35,20 @@ def test_names_in_the_codes_of_the_norm_are_read(written, tmp_path):
     assert [body.name for body in tc.io.bodies_in(renamed(tmp_path / "part.step", written))] == ["Tür"]
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.7])
-def test_a_mirrored_node_is_a_body_with_its_normals_outward(angle, tmp_path):
-    """A wedge without a mirror plane, in a node that mirrors it, is the wedge that was mirrored before."""
+@pytest.mark.parametrize(("angle", "around"), [(0.0, (1, 1)), (0.7, (1, 1)), (0.7, (-1, 1))])
+def test_a_mirrored_node_is_a_body_with_its_normals_outward(angle, around, tmp_path):
+    """A wedge without a mirror plane is the wedge mirrored before; two mirrors, one around the other, are a rotation."""
     wedge = trimesh.convex.convex_hull([(0, 0, 0), (40, 0, 0), (0, 20, 0), (0, 0, 10), (5, 5, 8)])
     mirror = trimesh.transformations.rotation_matrix(angle, [1, 2, 3]) @ np.diag([-1.0, 1, 1, 1])
     scene = trimesh.Scene()
-    scene.add_geometry(wedge, node_name="left", geom_name="door", transform=mirror)
+    outer = np.diag([1.0, *around, 1])
+    scene.graph.update(frame_to="around", matrix=outer)
+    scene.add_geometry(wedge, node_name="left", geom_name="door", parent_node_name="around", transform=mirror)
     scene.export(tmp_path / "left.glb")
     a = tc.Assembly("door")
     part = a.part("left", tc.Mesh(tmp_path / "left.glb", units="mm"), fixed=True)
     a.measure("x", part.point(0, 0, 0), along="x")
     body = tc.build(a).nominal.parts[0].body
-    corners = trimesh.transform_points(wedge.vertices, mirror)
+    corners = trimesh.transform_points(wedge.vertices, outer @ mirror)
     assert body.volume == pytest.approx(wedge.volume, rel=1e-6)
     np.testing.assert_allclose(np.sort(body.vertices, axis=0), np.sort(corners, axis=0), atol=1e-5)

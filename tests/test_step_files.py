@@ -2,9 +2,11 @@
 
 import re
 
+import numpy as np
 import pytest
 
 import tolcontact as tc
+from tests.helpers import simulate
 from tests.shapes import patch, refusal, shape
 from tests.step_files import Step, assembly, corners, step_block, step_of
 
@@ -155,3 +157,30 @@ def test_a_face_that_stands_twice_counts_once(tmp_path, caplog):
         mesh = shape(tc.Mesh(tmp_path / "twice.step"))
     assert mesh.is_watertight and mesh.volume == pytest.approx(6000) and len(tc.io.faces_in(tmp_path / "twice.step")) == 6
     assert "2 triangles that stand twice are left out" in caplog.text
+
+
+def test_components_of_an_assembly_have_units_of_their_own(tmp_path):
+    """A block in inches in an assembly in mm, one in mm in an assembly in inches, and an image by an operator in inches."""
+    made, path = Step(), tmp_path / "mixed.step"
+    inches = made.context_in(made.inch())
+    inch_block = made.product("inch block", [made.solid((0, 0, 0), (1, 2, 3))], inches)
+    block = made.product("block", [made.solid((0, 0, 0), (1, 2, 3))])
+    inner, whole = made.product("inner", (), inches), made.product("whole")
+    made.place(inch_block, whole, "in mm", (10, 0, 0))
+    made.place(block, inner, "in inches", (2, 0, 0))
+    mirror = np.array([[-1, 0, 0, 4], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    made.place(block, inner, "mirrored", operator=made.operator(mirror))
+    made.place(inner, whole, "inner", (0, 100, 0))
+    path.write_text(str(made))
+    boxes = {body.name: np.array([body.lower, body.upper]) for body in tc.io.bodies_in(path)}
+    expected = {
+        "in mm": [(10, 0, 0), (35.4, 50.8, 76.2)],
+        "in inches": [(50.8, 100, 0), (51.8, 102, 3)],
+        "mirrored": [(100.6, 100, 0), (101.6, 102, 3)],
+    }
+    assert boxes == {name: pytest.approx(np.array(box), abs=1e-9) for name, box in expected.items()}
+    assert {body.units for body in tc.io.bodies_in(path)} == {"inch, millimetre"}
+    model = tc.Assembly("mixed", units="in")
+    parts = tc.io.parts_from(model, path, fixed=True)
+    model.measure("end", parts["in mm"].point(25.4, 0, 0), to=parts["mirrored"].point(0, 0, 0), along="x")
+    assert simulate(model, samples=1)[1]["measured"][0, 1, 0] == pytest.approx((101.6 - 35.4) / 25.4, abs=1e-9)

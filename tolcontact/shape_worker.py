@@ -39,7 +39,7 @@ class Job:
     """A file to read, its kind ("stl", ..., "step"), and the limits: processor seconds, memory [byte], number of triangles.
 
     chord, angle    largest distance [mm] and angle [rad] between triangles and true faces of a STEP file
-    has_...         what the text of a STEP file states
+    has_..., operators   what the text of a STEP file states, and how many operators may mirror its shapes
     """
 
     path: str
@@ -53,6 +53,7 @@ class Job:
     has_face_names: bool = False
     has_solids: bool = False
     has_pmi: bool = False
+    operators: int = 0
 
     @property
     def memory_fault(self) -> str:

@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import Any, ClassVar, Generic, TypeVar, get_args
 
-from tolcontact.declaration.causes import Causes
 from tolcontact.declaration.checks import FRICTION, Checked, one_of
 from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overlap
 from tolcontact.declaration.declarations import expect
@@ -13,12 +12,14 @@ from tolcontact.declaration.elastic import gravity_faults
 from tolcontact.declaration.geometry import UNITS, Geometry
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
+from tolcontact.declaration.mirroring import Mirroring
 from tolcontact.declaration.part import Feature, Part, Standard
 from tolcontact.declaration.population import Population
 from tolcontact.declaration.sequence import Station, in_order, joined_before, present_parts, sequence_faults, settings_of
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.values import (
+    Mirror,
     Vector,
     group_faults,
     key_faults,
@@ -51,7 +52,7 @@ class Declared(Generic[T]):
         return self if assembly is None else tuple(assembly._declared[self._name])  # type: ignore[return-value]
 
 
-class Assembly(Causes, Pictured, Checked):
+class Assembly(Mirroring, Pictured, Checked):
     """Parts, how they are located, which faces may touch, and what is measured. Lengths in mm, angles in rad.
 
     `tc.Assembly("clamp", mu=0.15)` has the `name` "clamp", which reports and archives show. The methods only record
@@ -143,6 +144,7 @@ class Assembly(Causes, Pictured, Checked):
         rotation: Any = (0, 0, 0),
         fixed: bool | None = None,
         standard: Standard = "",
+        mirror: Mirror = "",
     ) -> Part:
         """Declare a part (see Part).
 
@@ -152,13 +154,14 @@ class Assembly(Causes, Pictured, Checked):
         rotation   rotation vector [rad], by default 0; tc.degrees(0, 0, 90) is a quarter turn about z
         fixed      True: contact does not move it; None (default): it is free if it is the moving side of a pair (see Part)
         standard   of its drawing, "ISO" or "ASME"; by default that of the assembly
+        mirror     axis of its frame that is reversed, "x", "y" or "z": the part is a mirror image (see `mirrored`)
 
         `block = model.part("block", tc.Box(60, 40, 20), at=(30, 20, 10))`
         """
         expect(f'part "{name}": geometry', geometry, Geometry, "tc.Box(x, y, z) or tc.Mesh(file)")
         expect(f'part "{name}": fixed', fixed, bool | None, "True, False or None")
         standard = standard or self.standard
-        return self._add("parts", Part(name, geometry, _vector(at), _vector(rotation), fixed, standard, script_line()))
+        return self._add("parts", Part(name, geometry, _vector(at), _vector(rotation), fixed, standard, script_line(), mirror))
 
     def station(self, name: str) -> Station:
         """Declare the next station, of this `name`, of an assembly that is built in steps: `weld = line.station("weld")`."""

@@ -235,8 +235,8 @@ FEATURES = Field(
 )
 RECORDS = {
     "parts": Record(
-        Part, fields="geometry name at rotation fixed standard declared_at features", omitted="standard", geometry=SHAPE,
-        features=FEATURES,
+        Part, fields="geometry name at rotation fixed standard mirror declared_at features", omitted="standard mirror",
+        geometry=SHAPE, features=FEATURES,
     ),
     "locations": Record(
         Location, omitted="floating station joint placing", scheme=SCHEME,

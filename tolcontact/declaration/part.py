@@ -10,7 +10,7 @@ from tolcontact.declaration.elastic import Deformable, Elastic
 from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
 from tolcontact.declaration.toleranced import Control, Toleranced, letter_faults
-from tolcontact.declaration.values import Side, Vector, is_finite, script_line, vector
+from tolcontact.declaration.values import Mirror, Side, Vector, is_finite, script_line, vector
 from tolcontact.readable import Readable
 from tolcontact.user_functions import refuse_in_functions
 
@@ -26,8 +26,9 @@ class Part(Deformable):
     """A body: its shape, its place in the nominal assembly, and whether contact may move it. It is rigid unless `elastic`.
 
     A point `p` of the part lies at `rotation * p + at` in the nominal assembly frame; `rotation` is a rotation vector [rad],
-    `at` a position [mm]. With `fixed=None` a part is free if it is the moving side of a contact pair, floats, or has
-    one-sided locators; otherwise it is fixed. The `standard` of its drawing is explained by Assembly.
+    `at` a position [mm]. With `mirror="x"` the x axis of its frame is reversed before, so that it is a mirror image. With
+    `fixed=None` a part is free if it is the moving side of a contact pair, floats, or has one-sided locators; otherwise it is
+    fixed. The `standard` of its drawing is explained by Assembly.
     """
 
     name: str
@@ -37,7 +38,8 @@ class Part(Deformable):
     fixed: bool | None = None
     standard: Standard = ""
     declared_at: str = field(default_factory=script_line)
-    checks: ClassVar = {"standard": one_of(get_args(Standard))}
+    mirror: Mirror = ""
+    checks: ClassVar = {"standard": one_of(get_args(Standard)), "mirror": one_of(get_args(Mirror))}
     _declared: "list[Feature | Pattern | DatumTargets | Elastic]" = field(default_factory=list, init=False)
 
     @property
@@ -89,12 +91,10 @@ class Part(Deformable):
         """
         members: list[tuple[Face, ...] | Feature] = []
         for constituent in constituents:
-            if isinstance(constituent, Face):
-                members.append((constituent,))
-            elif isinstance(constituent, list | tuple) and all(isinstance(face, Face) for face in constituent):
+            if isinstance(constituent, list | tuple) and all(isinstance(face, Face) for face in constituent):
                 members.append(tuple(constituent))
-            elif isinstance(constituent, Feature):
-                members.append(constituent)
+            elif isinstance(constituent, Face | Feature):
+                members.append((constituent,) if isinstance(constituent, Face) else constituent)
             elif not isinstance(constituent, Control):
                 raise TypeError(
                     f'pattern "{name}": {type(constituent).__name__} is neither a member nor a tolerance; expected '
@@ -139,7 +139,7 @@ class Part(Deformable):
 
     def __str__(self) -> str:
         place = "" if self.at == (0.0, 0.0, 0.0) else " at ({:g}, {:g}, {:g})".format(*self.at)
-        choice = {None: "", True: ", fixed", False: ", free"}[self.fixed]
+        choice = (", mirrored" if self.mirror else "") + {None: "", True: ", fixed", False: ", free"}[self.fixed]
         return f"part {self.name}: {self.geometry}{place}{choice}"
 
 

@@ -66,6 +66,7 @@ def is_line(text: Any) -> bool:
 
 
 Vector = tuple[float, float, float]
+Mirror = Literal["", "x", "y", "z"]  # the axis of a part's frame that is reversed
 Side = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Direction = Side | Literal["x", "y", "z"] | str | Sequence[float] | np.ndarray  # texts from elsewhere are checked later
 

@@ -23,6 +23,7 @@ from tolcontact.features.freedoms import DATUM
 from tolcontact.geometry.faces import Meshes
 from tolcontact.geometry.files.reading import Shape, read_files
 from tolcontact.geometry.shapes import field_surface, placement_of, shape
+from tolcontact.geometry.triangle_mesh import oriented
 
 log = logging.getLogger(__name__)
 
@@ -256,7 +257,7 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: Faults) -> N
         placement=(R_WP, t_WP),
         mesh=mesh,
         vertices=vertices @ R_WP.T + t_WP,
-        faces=faces,
+        faces=oriented(faces, R_WP),
         locators=nominal,
         scheme=location.scheme if len(nominal) and location is not None else None,
         parent=scene.parent(part),

@@ -13,7 +13,7 @@ from tolcontact.discretization.locating_faces import LocatingFace
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation, Placement
 from tolcontact.geometry.faces import Meshes
-from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING
+from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING, placed_mesh
 
 MAX_CONDITION = 1e8
 MIN_DETERMINANT = 0.1  # of the normals of three faces that count as independent
@@ -266,7 +266,7 @@ class NominalPart:
     @cached_property
     def body(self) -> trimesh.Trimesh:
         """The mesh in its nominal pose."""
-        body = trimesh.Trimesh(self.placed(np.asarray(self.mesh.vertices)), self.mesh.faces, process=False)
+        body = placed_mesh(self.mesh.vertices, self.mesh.faces, *self.placement)
         body.metadata |= {name: self.mesh.metadata[name] for name in (COORDINATE_SPACING,) if name in self.mesh.metadata}
         return body
 

@@ -32,6 +32,11 @@ TERMS = 7  # of the displacement of a surface: its growth, then a translation an
 Places = tuple[np.ndarray, np.ndarray]  # places (place, 3) [mm] of a face, and their areas (place,) as weights
 
 
+def placed_twist(twist: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """Return displacements (6, n), tau [mm] and rho [rad], rotated by R (3, 3). A mirror reverses the sense of rotations."""
+    return np.vstack([R @ twist[:3], np.sign(np.linalg.det(R)) * (R @ twist[3:])])
+
+
 def displacement_terms(normals: np.ndarray, arms: np.ndarray) -> np.ndarray:
     """Return heights (place, 7) of a surface with `normals` (place, 3) for a unit growth, unit translations and rotations.
 

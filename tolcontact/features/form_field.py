@@ -13,7 +13,7 @@ import numpy as np
 
 from tolcontact.declaration.size import Form
 from tolcontact.errors import GeometryFault
-from tolcontact.features.associated_features import TERMS, AssociatedSurface, displacement_terms
+from tolcontact.features.associated_features import TERMS, AssociatedSurface, displacement_terms, placed_twist
 from tolcontact.features.covariances import Lengths, covariance
 from tolcontact.features.minimum_zone import ZoneMember
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder
@@ -115,7 +115,7 @@ class FormField:
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "FormField":
         """Return the field of a face in a part at R (3, 3), t (3,) [mm]."""
-        removed = displaced_about_origin(np.vstack([self.removed[:1], R @ self.removed[1:4], R @ self.removed[4:]]), t)
+        removed = displaced_about_origin(np.vstack([self.removed[:1], placed_twist(self.removed[1:], R)]), t)
         places, stations = self.places @ R.T + t, self.stations @ R.T + t
         return replace(self, associated=self.associated.placed(R, t), places=places, stations=stations, removed=removed)
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from tolcontact.declaration import Feature
 from tolcontact.errors import GeometryFault
+from tolcontact.features.associated_features import placed_twist
 from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, SlabFeature, target_point
 from tolcontact.features.form_field import FormField
 from tolcontact.geometry.faces import FaceArea
@@ -159,7 +160,7 @@ class NominalFeature:
         modes = np.arange(len(columns), len(columns) + (len(self.form_columns) if form else 0))
         columns = np.concatenate([columns, np.array(self.form_columns if form else (), dtype=int)])
         R, t = placement
-        turned = np.vstack([R @ twist[:3, columns], R @ twist[3:, columns]])
+        turned = placed_twist(twist[:, columns], R)
         placed = None if form is None else form.placed(R, t)
         return FaceDeviation(self.label, columns, R @ geometry.centre + t, turned, height[columns], placed, modes)
 

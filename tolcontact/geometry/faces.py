@@ -18,7 +18,7 @@ from tolcontact.geometry.files import BREP, STATED_FACES
 from tolcontact.geometry.shapes import placement_of
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.tolerances import OPPOSING_COSINE, ROUNDING, SAME_SIZE
-from tolcontact.geometry.triangle_mesh import have_area, overlaps, subdivided
+from tolcontact.geometry.triangle_mesh import have_area, overlaps, placed_mesh, subdivided
 from tolcontact.texts import shown_name
 from tolcontact.user_functions import FunctionError, called
 
@@ -228,7 +228,7 @@ def _by_nearness(face: Face, meshes: Meshes, selection: Near) -> np.ndarray:
     """Return the mask of a selection. A model needs it several times, so it is cached for the lifetime of both meshes."""
     parts = face.part, selection.part
     masks = _NEARNESS.setdefault(meshes[face.part], WeakKeyDictionary()).setdefault(meshes[selection.part], {})
-    key = (*((part.at, part.rotation) for part in parts), selection.within)
+    key = (*((part.at, part.rotation, part.mirror) for part in parts), selection.within)
     if key not in masks:
         mesh, neighbour = (_in_place(part, meshes[part]) for part in parts)
         masks[key] = _near_mask(mesh, neighbour, selection.within)
@@ -307,8 +307,7 @@ def _facing_pieces(
 
 
 def _in_place(part: Part, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    R, t = placement_of(part)
-    return trimesh.Trimesh(np.asarray(mesh.vertices) @ R.T + t, mesh.faces, process=False)
+    return placed_mesh(mesh.vertices, mesh.faces, *placement_of(part))
 
 
 def _cut(surface: Surface, box: Inside, margin: float) -> Surface:

@@ -13,13 +13,14 @@ from tolcontact.geometry.face_in_file import FaceInFile
 from tolcontact.geometry.files import BREP
 from tolcontact.geometry.shapes import placement_of, shape
 from tolcontact.geometry.tolerances import SAME_DIRECTION, SAME_PLACE
+from tolcontact.geometry.triangle_mesh import placed_mesh
 
 
 class PartPreview(NamedTuple):
     """The triangles of a part in the nominal assembly: vertices (vertex, 3) [mm] and faces (triangle, 3).
 
     mesh          the same triangles in the part's own frame
-    rotation      (3, 3) of the part
+    rotation      (3, 3) of the part, with the determinant -1 for a mirror image
     face_of       (triangle,) face indices: of the B-rep faces of a STEP file, or of smooth pieces
     descriptions  of the faces
     snippets      Python code that selects each face
@@ -45,14 +46,14 @@ def preview(part: Part) -> PartPreview | None:
     except GeometryFault:
         return None
     R, t = placement_of(part)
-    vertices = np.asarray(mesh.vertices) @ R.T + t
+    placed = placed_mesh(mesh.vertices, mesh.faces, R, t)
     face_of, _ = number_faces(mesh)
     faces = describe_faces(mesh)
     snippets = tuple(_snippet(mesh, face_of, face) for face in faces)
     groups = tuple(
         tuple(_brep_snippet(face, f'whole="{word}"') for word in FACE_GROUPS if getattr(face, word)) for face in faces
     )
-    return PartPreview(mesh, R, vertices, np.asarray(mesh.faces), face_of, faces, snippets, groups)
+    return PartPreview(mesh, R, np.asarray(placed.vertices), np.asarray(placed.faces), face_of, faces, snippets, groups)
 
 
 def _snippet(mesh: trimesh.Trimesh, face_of: np.ndarray, face: FaceInFile) -> str:

@@ -110,8 +110,13 @@ def _per_body(limit: np.ufunc, corners: np.ndarray, body: np.ndarray, count: int
 
 
 def placement_of(part: Part) -> tuple[np.ndarray, np.ndarray]:
-    """Return R (3, 3) and t (3,) [mm] of a part in the nominal assembly."""
-    return Rotation.from_rotvec(part.rotation).as_matrix(), np.array(part.at)
+    """Return R (3, 3) and t (3,) [mm] of a part in the nominal assembly; the determinant of R is -1 for a mirror image."""
+    return reflected(Rotation.from_rotvec(part.rotation).as_matrix(), part.mirror), np.array(part.at)
+
+
+def reflected(R: np.ndarray, mirror: str) -> np.ndarray:
+    """Return R (3, 3) for a frame whose axis `mirror`, "x", "y" or "z", is reversed before; for "" the same."""
+    return R * [-1.0 if axis == mirror else 1.0 for axis in "xyz"] if mirror else R
 
 
 def field_surface(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:

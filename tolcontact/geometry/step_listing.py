@@ -37,7 +37,7 @@ class BodyInFile(Readable):
     at, rotation   pose of its own frame, as for a Part [mm, rad]
     faces          number of its B-rep faces
     is_open        whether its faces do not form a closed body
-    units          unit of length in the file, as named there; empty if it states none. All lengths here are in mm
+    units          units of length in the file, as named there; empty if it states none. All lengths here are in mm
     """
 
     number: int

@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, axes_across
 from tolcontact.geometry.region_kernel import Region
 from tolcontact.geometry.tolerances import SAME_DIRECTION, SAME_PLACE
-from tolcontact.geometry.triangle_mesh import CREASE, on_rim, rim, triangle_tree
+from tolcontact.geometry.triangle_mesh import CREASE, on_rim, oriented, placed_mesh, rim, triangle_tree
 
 EVERY = slice(None)
 MAX_TURN = 0.3  # rad: between the normals of a triangle and of the analytic surface that it approximates
@@ -194,10 +194,10 @@ class Surface:
         return normals
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "Surface":
-        """Return the surface rotated by R (3, 3), then translated by t (3,) [mm]."""
-        mesh = trimesh.Trimesh(self.vertices @ R.T + t, self.mesh.faces, process=False)
+        """Return the surface rotated or mirrored by R (3, 3), then translated by t (3,) [mm]."""
+        mesh = placed_mesh(self.vertices, self.mesh.faces, R, t)
         surfaces = [surface.placed(R, t) for surface in self.surfaces]
-        return Surface(mesh, self.corner_normals @ R.T, surfaces, self.surface_numbers)
+        return Surface(mesh, oriented(self.corner_normals, R) @ R.T, surfaces, self.surface_numbers)
 
     def _barycentric(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
         return trimesh.triangles.points_to_barycentric(self.mesh.triangles[triangle], points)

@@ -29,6 +29,16 @@ def edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return ends, edge, triangles
 
 
+def oriented(faces: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """Return `faces` (face, 3, ...) with the order of corners in which normals point outward at R (3, 3), which may mirror."""
+    return faces[:, [0, 2, 1]] if np.linalg.det(R) < 0 else faces
+
+
+def placed_mesh(vertices: np.ndarray, faces: np.ndarray, R: np.ndarray, t: np.ndarray) -> trimesh.Trimesh:
+    """Return a mesh rotated or mirrored by R (3, 3), then translated by t (3,) [mm]."""
+    return trimesh.Trimesh(np.asarray(vertices) @ R.T + t, oriented(np.asarray(faces), R), process=False)
+
+
 def into_facets(ends: np.ndarray, normals: np.ndarray, centres: np.ndarray) -> np.ndarray:
     """Return unit vectors (edge, 2, 3) across edges with ends (edge, 2, 3), into the two facets that meet at each.
 

@@ -28,6 +28,7 @@ from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from tolcontact.child import Refusal
 from tolcontact.kernel.brep_faces import box, explore, matrix, surface, triangulation
+from tolcontact.kernel.operators import correct_operators
 
 try:
     from OCP.collections import Sequence_TDF_Label as LabelSequence
@@ -50,8 +51,9 @@ class BodyShape:
 
 
 def read(
-    path: Path, chord: float, angle: float, *, encoding: str, has_face_names: bool, has_solids: bool, has_pmi: bool
-) -> dict[str, Any]:
+    path: Path, chord: float, angle: float, *, encoding: str, has_face_names: bool, has_solids: bool, has_pmi: bool,
+    operators: int,
+) -> dict[str, Any]:  # fmt: skip
     """Return the shapes of a STEP file, each in the frame of its product, and the bodies in their places.
 
     shapes         a dictionary for each: `triangulation`, and of each B-rep face of it the surface, None if it is not simple,
@@ -60,8 +62,10 @@ def read(
     bodies         of each body the index of its shape, its motion (4, 4), the corners (2, 3) of the box around it in its
                    place, the names of the products that contain it, and its own name
     record_count   number of records in the file, if it has PMI
+
+    `operators` is the number of records that may place a shape mirrored (see `kernel.operators`).
     """
-    document = Document(path, encoding, has_face_names=has_face_names, has_solids=has_solids, has_pmi=has_pmi)
+    document = Document(path, encoding, operators, has_face_names=has_face_names, has_solids=has_solids, has_pmi=has_pmi)
     indices: dict[str, list[int]] = {}  # of shapes, by the label
     shapes: list[tuple[BodyShape, dict[str, Any]]] = []
     placed: list[tuple[int, Place]] = []
@@ -118,7 +122,9 @@ class Place(NamedTuple):
 class Document:
     """A STEP file in the kernel's document. It owns all that is taken from it."""
 
-    def __init__(self, path: Path, encoding: str, *, has_face_names: bool, has_solids: bool, has_pmi: bool) -> None:
+    def __init__(
+        self, path: Path, encoding: str, operators: int, *, has_face_names: bool, has_solids: bool, has_pmi: bool
+    ) -> None:
         self.document = TDocStd_Document(TCollection_ExtendedString("STEP"))
         self.reader = STEPCAFControl_Reader()
         self.reader.SetNameMode(True)
@@ -126,11 +132,14 @@ class Document:
             getattr(self.reader, f"Set{content}Mode")(False)
         Interface_Static.SetIVal_s("read.stepcaf.subshapes.name", 1)  # names of solids and faces
         Interface_Static.SetCVal_s("read.step.codepage", CODE_PAGES[encoding])
-        if self.reader.ReadFile(str(path)) != IFSelect_RetDone or not self.reader.Transfer(self.document):
+        is_legible = self.reader.ReadFile(str(path)) == IFSelect_RetDone
+        model = self.reader.Reader().WS().Model()
+        if is_legible and operators:
+            correct_operators(model, operators)
+        if not (is_legible and self.reader.Transfer(self.document)):
             raise Refusal("cannot be read as STEP: it is cut off, damaged, or holds no shape; export it again")
         self.transfer = self.reader.Reader().WS().TransferReader()
         self.has_face_names, self.has_solids = has_face_names, has_solids
-        model = self.reader.Reader().WS().Model()
         # The records in the order of the file. The kernel itself finds no number, but has one object for each.
         self.entities = {model.Value(number): number for number in range(1, model.NbEntities() + 1)} if has_pmi else {}
 

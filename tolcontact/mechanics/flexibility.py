@@ -22,6 +22,7 @@ from tolcontact.declaration import Mesh, Part, Point
 from tolcontact.discretization import Nominal, NominalPart, Weld
 from tolcontact.elasticity import ElasticBody, MatrixSource, MeshSource, elastic_body, flexibility
 from tolcontact.errors import Faults, GeometryFault, designation
+from tolcontact.geometry.files import FROM_PRODUCT
 from tolcontact.mechanics.groups import Group, Load
 
 NULL = 1e-14  # of the largest eigenvalue of C, scaled to a unit diagonal: smaller ones are rounding
@@ -153,7 +154,9 @@ def _source(entry: NominalPart) -> MeshSource | MatrixSource:
     if elastic.stiffness is not None and elastic.nodes is not None:
         return MatrixSource(Path(elastic.stiffness), Path(elastic.nodes), mesh.vertices, mesh.faces)
     assert elastic.E is not None and elastic.nu is not None
-    step = geometry.source if isinstance(geometry, Mesh) and geometry.is_step else None
+    R, _ = mesh.metadata.get(FROM_PRODUCT, (np.eye(3), None))
+    is_mirrored = np.linalg.det(R) < 0  # which is no solid of its file
+    step = geometry.source if isinstance(geometry, Mesh) and geometry.is_step and not is_mirrored else None
     return MeshSource(mesh.vertices, mesh.faces, elastic.E, elastic.nu, elastic.density, step)
 
 

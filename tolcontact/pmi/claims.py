@@ -12,10 +12,11 @@ from tolcontact.geometry.brep_face import (
     describe_faces,
     faces_at,
     faces_on_surfaces,
+    plain_vector,
 )
 from tolcontact.geometry.face_groups import FaceOnSurface
 from tolcontact.geometry.face_in_file import FaceInFile
-from tolcontact.geometry.files import STATED_FACES, Shape
+from tolcontact.geometry.files import FROM_PRODUCT, STATED_FACES, Shape
 from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
 from tolcontact.pmi.declarable import Undeclared
 from tolcontact.pmi.modifiers import OF_TOLERANCES
@@ -48,6 +49,11 @@ class TolerancedSurfaces:
     def numbers(self, records: Iterable[int]) -> list[int]:
         """Return the face indices of some records on this part."""
         return [self._numbers[record] for record in records if record in self._numbers]
+
+    def placed(self, point: Vector) -> Vector:
+        """Return a point of the product in the frame of the part."""
+        R, t = self._mesh.metadata[FROM_PRODUCT]
+        return plain_vector(R @ point + t)
 
     def number_at(self, point: Vector) -> int | None:
         """Return the index of the face of a point; None if it lies on none, or where faces meet."""
@@ -195,7 +201,8 @@ def _datum_claim(datum: Datum, surfaces: TolerancedSurfaces) -> Claim:
         return Claim(datum, len(numbers), tuple(numbers))
     records = [record for target in datum.targets for record in target.face_records]
     bare = [target for target in datum.targets if not surfaces.numbers(target.face_records)]
-    places = [(surfaces.number_at(target.point), target.point) for target in bare if target.point is not None]
+    points = [surfaces.placed(target.point) for target in bare if target.point is not None]
+    places = [(surfaces.number_at(point), point) for point in points]
     targets = tuple((number, point) for number, point in places if number is not None)
     numbers = list(dict.fromkeys([*surfaces.numbers(records), *(number for number, _ in targets)]))
     stated = len(numbers) or len(datum.face_records) + len(records) + len(places)

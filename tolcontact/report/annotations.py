@@ -13,6 +13,7 @@ from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.declaration import Point
 from tolcontact.discretization import ContactPoints, Nominal
 from tolcontact.errors import ArchiveError
+from tolcontact.geometry.shapes import reflected
 
 Mark = dict[str, Any]
 
@@ -136,7 +137,7 @@ def _at(document: Mark, point: Mark) -> list[float] | None:
     if "position" not in point:
         return None
     part = next(entry for entry in document["parts"] if entry["name"] == point["part"])
-    R = Rotation.from_rotvec(part["rotation"]).as_matrix()
+    R = reflected(Rotation.from_rotvec(part["rotation"]).as_matrix(), part.get("mirror", ""))
     return [float(x) for x in R @ point["position"] + part["at"]]
 
 

@@ -117,14 +117,12 @@ def test_a_file_that_would_be_too_fine_is_cut_more_coarsely(caplog):
         shape(tc.Mesh(COVER), read_files([tc.Mesh(COVER)], ReadingLimits(triangles=10)))
 
 
-def test_a_body_that_is_mirrored_in_its_place_is_refused(tmp_path):
-    with pytest.raises(GeometryFault, match="mirrored or scaled"):
-        rigid_motion(tmp_path, np.diag([1.0, 1.0, -1.0, 1.0]))
-    with pytest.raises(GeometryFault, match="mirrored or scaled"):
-        rigid_motion(tmp_path, np.diag([1.0, 1.0, 1.001, 1.0]))
+def test_a_body_that_is_scaled_in_its_place_is_refused(tmp_path):
+    with pytest.raises(GeometryFault, match="scaled"):
+        rigid_motion(tmp_path, np.diag([1.0, 1.0, 1.001, 1.0]), np.eye(3))
     turned = trimesh.transformations.rotation_matrix(0.3, [1, 2, 3], [300.0, 100.0, 200.0])
     turned32 = turned.astype(np.float32).astype(float)
-    place = rigid_motion(tmp_path, turned32)
+    place = rigid_motion(tmp_path, turned32, np.eye(3))
     assert place[:3, :3] @ place[:3, :3].T == pytest.approx(np.eye(3), abs=1e-14)
     assert np.abs(place[:3, 3]).max() > 1 and place[:3, 3].tolist() == turned32[:3, 3].tolist()  # [mm]
 
@@ -141,7 +139,7 @@ def test_the_units_of_a_file_are_stated(file):
         (si % b".MILLI." + inch, "inch"),
         (b"#1=X();", ""),
     ):
-        assert StepText(text).units == units
+        assert ", ".join(StepText(text).units) == units
 
 
 @pytest.mark.parametrize("name", ["cover", "housing"])

@@ -11,7 +11,7 @@ import numpy as np
 import trimesh
 
 from tolcontact.errors import GeometryFault, nearest_name
-from tolcontact.geometry.files.step_shapes import StepShape, rounded, step_shape
+from tolcontact.geometry.files.step_shapes import MIRROR, StepShape, rounded, step_shape
 from tolcontact.geometry.files.step_text import StepText
 from tolcontact.texts import clipped
 
@@ -24,6 +24,7 @@ STRETCH_TOLERANCE = 1e-6  # relative, for a rigid motion
 MAX_OFFSET = 3.0  # in chords: vertices at a larger distance from the surface of their B-rep face are not moved onto it
 BREP = "brep_index"  # face attribute of a mesh: the B-rep face of each triangle
 STATED_FACES = "stated_faces"  # in its metadata: each B-rep face as the file states it
+FROM_PRODUCT = "from_product"  # and R (3, 3) and t (3,) [mm] from the frame of its product, which PMI refers to; R may mirror
 
 log = logging.getLogger(__name__)
 
@@ -35,6 +36,7 @@ class Body:
     name          a name that no other body of the file has; "" if the file states none
     path          names of the products that contain the body, from the root on
     place         (4, 4): from its own frame to the frame of the file [mm]
+    mirror        (3, 3): from the frame of its product to its own; x is reversed if the file places the product mirrored
     box           (2, 3) lower and upper corner of the box around the body in its place
     is_open       whether its triangles do not close
     """
@@ -42,6 +44,7 @@ class Body:
     name: str
     path: tuple[str, ...]
     place: np.ndarray
+    mirror: np.ndarray
     box: np.ndarray
     is_open: bool
     shape: StepShape
@@ -117,19 +120,19 @@ class Product:
     def part(self, selector: str | int | None) -> trimesh.Trimesh:
         """Return the mesh of a body: in its own frame if it is selected, in its place if `selector` is None.
 
-        The mesh has BREP, whose indices follow the file's order, and STATED_FACES.
+        The mesh has BREP, whose indices follow the file's order, STATED_FACES, and FROM_PRODUCT.
         """
         body = self.body(selector)
         shape = body.shape
-        vertices, faces = np.array(shape.vertices), shape.faces
+        vertices, faces, from_product = np.array(shape.vertices), shape.faces, (body.mirror, np.zeros(3))
         if selector is None and not np.array_equal(body.place, np.eye(4)):
             R, t = body.place[:3, :3], body.place[:3, 3]
             vertices = vertices @ R.T + t
-            faces = tuple(face.placed(R, t) for face in faces)
+            faces, from_product = tuple(face.placed(R, t) for face in faces), (R @ body.mirror, t)
         mesh = trimesh.Trimesh(vertices, np.array(shape.triangles), process=False)
         mesh.units = "mm"
         mesh.face_attributes[BREP] = np.array(shape.brep)
-        mesh.metadata[STATED_FACES] = faces
+        mesh.metadata[STATED_FACES], mesh.metadata[FROM_PRODUCT] = faces, from_product
         if shape.face_count and len(self.bodies) == 1 and shape.gap_count:
             raise GeometryFault(
                 f'"{self.path}" holds a solid whose faces do not close ({shape.gap_count} edges have a triangle on one side '
@@ -158,21 +161,19 @@ def product(path: Path, content: Mapping[str, Any], text: StepText, chord: float
     if not any(len(shape.triangles) for shape in shapes):
         raise GeometryFault(f'"{path}" holds no surfaces that could be read; export the part itself as a solid')
     entries = [entry for entry in content["bodies"] if len(shapes[entry[0]].triangles)]
-    bodies = [
-        # A solid that is alone in its file is no sheet, though faces may be missing.
-        Body(
-            name,
-            tuple(names),
-            rigid_motion(path, transform),
-            box,
-            shapes[index].gap_count > 0 and not (len(entries) == 1 and shapes[index].face_count),
-            shapes[index],
-        )
-        for index, transform, box, names, name in entries
-    ]
+    bodies = [_body(path, entry, shapes[entry[0]], is_alone=len(entries) == 1) for entry in entries]
     face_count = sum(len(entry["surfaces"]) for entry in content["shapes"])
     drawn = tuple(shape for shape in shapes if len(shape.triangles))
-    return Product(path, drawn, tuple(uniquely_named(bodies)), face_count, text.units)
+    return Product(path, drawn, tuple(uniquely_named(bodies)), face_count, ", ".join(text.units))
+
+
+def _body(path: Path, entry: Sequence[Any], shape: StepShape, *, is_alone: bool) -> Body:
+    _, transform, box, names, name = entry
+    mirror = MIRROR if np.linalg.det(transform[:3, :3]) < 0 else np.eye(3)
+    place = rigid_motion(path, transform, mirror)
+    # A solid that is alone in its file is no sheet, though faces may be missing.
+    is_open = shape.gap_count > 0 and not (is_alone and shape.face_count)
+    return Body(name, tuple(names), place, mirror, box, is_open, shape.mirrored if mirror is MIRROR else shape)
 
 
 def usual_chord(text: StepText) -> float:
@@ -192,17 +193,15 @@ def check_numbers(vertices: np.ndarray, subject: str) -> None:
         )
 
 
-def rigid_motion(path: Path, transform: np.ndarray) -> np.ndarray:
-    """Return a transform (4, 4) [mm] whose rotation is orthogonal to the last digit.
+def rigid_motion(path: Path, transform: np.ndarray, mirror: np.ndarray) -> np.ndarray:
+    """Return a transform (4, 4) [mm] after a `mirror` (3, 3) is undone, with a rotation that is orthogonal to the last digit.
 
-    Raises GeometryFault if the transform mirrors or scales.
+    Raises GeometryFault if the transform scales.
     """
     place = np.eye(4)
-    U, scales, V = np.linalg.svd(transform[:3, :3])
-    if np.abs(scales - 1).max() > STRETCH_TOLERANCE or np.linalg.det(transform[:3, :3]) < 0:
-        raise GeometryFault(
-            f'"{path}" places a body mirrored or scaled, which bodies of a rigid assembly are not; export it as it is'
-        )
+    U, scales, V = np.linalg.svd(transform[:3, :3] @ mirror)
+    if np.abs(scales - 1).max() > STRETCH_TOLERANCE:
+        raise GeometryFault(f'"{path}" places a body scaled, which bodies of a rigid assembly are not; export it as it is')
     place[:3, :3] = U @ V
     place[:3, 3] = transform[:3, 3]
     return place

@@ -24,7 +24,7 @@ from tolcontact.geometry.files.product import (
     product,
     usual_chord,
 )
-from tolcontact.geometry.files.step_text import SOLIDS, USAGES, StepText
+from tolcontact.geometry.files.step_text import OPERATOR, SOLIDS, USAGES, StepText
 from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING, edges, rim
 from tolcontact.shape_worker import Job, UnfinishedRead, Worker, taken
 from tolcontact.texts import clipped
@@ -148,6 +148,7 @@ def _job(path: Path, chord: float | None, text: StepText | None, coarsening: flo
         has_face_names=text is not None and text.has_face_names,
         has_solids=text is not None and text.has_any(SOLIDS),
         has_pmi=text is not None and text.has_any(USAGES),
+        operators=0 if text is None else len(text.numbers.get(OPERATOR, ())),
     )
 
 

@@ -7,6 +7,7 @@ All other faces have numbers, even if the kernel makes no triangles of them at s
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from tolcontact.geometry.triangle_mesh import distinct_triangles, rim
 
 COORDINATE_DIGITS = 9  # of vertices after the point [mm]
 MAX_ITERATIONS = 4  # of Newton's method: they bring vertices that are off by micrometres to the last digit
+MIRROR = np.diag([-1.0, 1.0, 1.0])  # from the frame of a product to the frame of a mirrored body
 MIN_SINGULAR = 0.05  # smallest relative singular value of the normals in a vertex whose surfaces count as different
 
 
@@ -47,7 +49,7 @@ class StatedFace:
     measure: FaceMeasure | None = None
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "StatedFace":
-        """Return the face rotated by R (3, 3), then translated by t (3,) [mm]."""
+        """Return the face rotated or mirrored by R (3, 3), then translated by t (3,) [mm]."""
         surface = self.surface and self.surface.placed(R, t)
         measure = self.measure and FaceMeasure(self.measure.area, R @ self.measure.point + t, R @ self.measure.normal)
         return replace(self, surface=surface, measure=measure)
@@ -71,6 +73,12 @@ class StepShape:
     faces: tuple[StatedFace, ...]
     face_count: int
     gap_count: int
+
+    @cached_property
+    def mirrored(self) -> "StepShape":
+        """The shape with its x reversed."""
+        faces = tuple(face.placed(MIRROR, np.zeros(3)) for face in self.faces)
+        return replace(self, vertices=self.vertices @ MIRROR, triangles=self.triangles[:, ::-1], faces=faces)
 
 
 def step_shape(

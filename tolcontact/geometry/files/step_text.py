@@ -44,6 +44,7 @@ _DOCUMENTS = ("DOCUMENT_FILE", "APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT")
 FACES = ("ADVANCED_FACE", "FACE_SURFACE")
 SOLIDS = ("MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "FACETED_BREP")
 USAGES = ("GEOMETRIC_ITEM_SPECIFIC_USAGE", "ITEM_IDENTIFIED_REPRESENTATION_USAGE")  # link PMI and faces
+OPERATOR = "CARTESIAN_TRANSFORMATION_OPERATOR_3D"  # places a shape, maybe mirrored
 SHAPE_SUFFIXES = (".step", ".stp", ".p21", ".stpz", ".stpx", ".stpnc")
 # Shapes are most of a file, and nobody asks for their records.
 _SHAPES = frozenset(
@@ -94,26 +95,32 @@ class StepText:
         """Whether a B-rep face has a name."""
         return any(_NAMED_FACE.search(self.bodies[number]) for entity in FACES for number in self.numbers.get(entity, ()))
 
-    @property
-    def units(self) -> str:
-        """The unit of lengths of shapes, as the file names it: "millimetre", "inch"; empty if it is not stated.
+    @cached_property
+    def units(self) -> tuple[str, ...]:
+        """The units of lengths of shapes, each once, as the file names them: "millimetre", "inch"; none if it states none.
 
         Files with inches define them in mm first, so that they have both.
         """
         units = {}
         for number in self.numbers.get("LENGTH_UNIT", ()):
             metres, name = _METRES.search(self.bodies[number]), _STRING.search(self.bodies[number])
-            units[number] = f"{(metres[1] or b'').decode()}metre" if metres else decoded(name[1]) if name else ""
-        contexts = self.numbers.get("GLOBAL_UNIT_ASSIGNED_CONTEXT", ())
-        references = (int(number) for context in contexts for number in _REFERENCE.findall(self._outside_strings(context)))
-        assigned = [units[number].lower() for number in references if number in units]
-        candidates = assigned or [unit.lower() for unit in units.values()]
-        return next((unit for unit in candidates if not unit.endswith("metre")), candidates[0] if candidates else "")
+            units[number] = (f"{(metres[1] or b'').decode()}metre" if metres else decoded(name[1]) if name else "").lower()
+        contexts = dict.fromkeys(self.numbers.get("GLOBAL_UNIT_ASSIGNED_CONTEXT", ()))
+        shapes = (n for entity, numbers in self.numbers.items() if entity.endswith("SHAPE_REPRESENTATION") for n in numbers)
+        of_shapes = [context for shape in shapes for context in self._references(shape) if context in contexts]
+        assigned = [n for context in dict.fromkeys(of_shapes) or contexts for n in self._references(context) if n in units]
+        if assigned:
+            return tuple(dict.fromkeys(units[number] for number in assigned))
+        return tuple(sorted(units.values(), key=lambda unit: unit.endswith("metre"))[:1])
 
     @property
     def unit(self) -> float:
-        """The unit of length [mm]; 1 if none is stated."""
-        return UNITS[_UNIT_NAMES.get(self.units.removesuffix("es"), "mm")]
+        """The unit of length [mm], the smallest one if components have different units; 1 if none is stated."""
+        return min((UNITS[_UNIT_NAMES.get(unit.removesuffix("es"), "mm")] for unit in self.units), default=1.0)
+
+    def _references(self, number: int) -> list[int]:
+        """Return the numbers of the records that a record refers to."""
+        return [int(reference) for reference in _REFERENCE.findall(self._outside_strings(number))]
 
     @cached_property
     def extent(self) -> float:

@@ -148,7 +148,7 @@ def result(job: Job) -> Arrays | dict[str, Any] | int | str:
     path = Path(job.path)
     try:
         if job.kind == "step":
-            flags = {name: getattr(job, name) for name in ("encoding", "has_face_names", "has_solids", "has_pmi")}
+            flags = {name: getattr(job, name) for name in ("encoding", "has_face_names", "has_solids", "has_pmi", "operators")}
             content = step_document().read(path, job.chord, job.angle, **flags)
             count = sum(len(shape["triangles"]) for shape in content["shapes"])
         else:
