@@ -37,8 +37,8 @@ def _toleranced(assembly: Any) -> Iterator[tuple[list[str], Callable[[float], No
         def widen(factor: float) -> None:
             value = getattr(thing, field)
             wider = tuple(_wider(t, factor) for t in value) if isinstance(value, tuple) else _wider(value, factor)
-            object.__setattr__(thing, field, wider)
-            vars(thing).pop("members", None)  # of a pattern, which have its tolerances
+            for toleranced in (thing, *vars(thing).get("members", ())):  # of a pattern, which have its tolerances
+                object.__setattr__(toleranced, field, wider)
 
         return widen
 
