@@ -52,7 +52,9 @@ def _joined(place: str, key: str) -> str:
 
 
 def _shown(value: Any) -> str:
-    """Return a value in a line: the name of a thing, or a clipped text."""
+    """Return a value in a line: the name of a thing, a number without the noise of computing it, or a clipped text."""
     if isinstance(value, dict) and "name" in value:
         return str(value["name"])
+    if isinstance(value, float):
+        return f"{value:.12g}"
     return clipped(value if isinstance(value, str) else json.dumps(value, ensure_ascii=False), MAX_VALUE)

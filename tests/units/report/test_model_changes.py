@@ -12,3 +12,4 @@ def test_changes_are_by_name_and_moved_lines_do_not_count():
         "parts, q 3: added (q)",
         "mu: 0.1, now null",
     ]
+    assert list(model_changes({"lower": -0.009}, {"lower": -0.0074 - 2e-18})) == ["lower: -0.009, now -0.0074"]
