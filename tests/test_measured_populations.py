@@ -135,3 +135,11 @@ def test_rows_with_gaps_are_refused_or_left_out_as_a_whole(kind, tmp_path):
         a.population(table.assign(one=np.nan), FEET, gaps="left out")
     with pytest.raises(ValueError, match=r"(line 3|row 2) has no lot; name it"):
         a.population(source, {"top.A1": "three"}, lots="one", gaps="left out")
+
+
+def test_a_column_of_names_is_left_out_by_those_that_are_read(tmp_path):
+    (tmp_path / "report.csv").write_text("table.A1,inspector\n0.1,Jo\n0.2,Jo\n")
+    a = tc.Assembly("report")
+    with pytest.raises(ValueError, match=r'column "inspector" is "Jo".*; columns={label: column} reads these columns alone'):
+        a.population(tmp_path / "report.csv")
+    assert a.population(tmp_path / "report.csv", {"table.A1": "table.A1"}).columns

@@ -123,6 +123,8 @@ def _of_file(source: str | Path, columns: Mapping[str, str] | None, units: str, 
     if faults:
         others = f"; and {len(faults) - MAX_LISTED} more" if len(faults) > MAX_LISTED else ""
         remedy = '; gaps="left out" leaves out the rows with empty cells' if gaps == "refused" and is_gap.any() else ""
+        if columns is None and len(table.heading) > 1:
+            remedy += "; columns={label: column} reads these columns alone"
         raise ValueError(
             f'population "{title}": {"; ".join(faults[:MAX_LISTED])}{others}; mend the table, or leave out the rows{remedy}'
         )
